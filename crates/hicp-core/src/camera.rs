@@ -1,0 +1,207 @@
+//! The pinhole camera.
+
+use nalgebra::{Matrix3, Point2, Point3};
+
+use crate::error::CameraError;
+use crate::region::PixelRegion;
+
+/// Where the centre of the first pixel lies in the coordinates that a calibration uses.
+///
+/// The two conventions differ by half a pixel; mixing them shifts every point by `depth / (2 f)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PixelCenters {
+    /// Pixel (0, 0) has its centre at (0, 0): OpenCV calibrations, BOP's distance maps, this library's inside.
+    #[default]
+    AtIntegers,
+    /// Pixel (0, 0) has its centre at (½, ½): OpenGL renderers and BlenderProc images.
+    AtHalves,
+}
+
+/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV frame).
+///
+/// A point (x, y, z) in metres in the camera frame is seen at u = fx·x/z + cx, v = fy·y/z + cy; pixel centres are at
+/// integers. Focal lengths and the principal point are in pixels.
+///
+/// ```
+/// use hicp_core::{PinholeCamera, Point3};
+/// # fn main() -> Result<(), hicp_core::CameraError> {
+/// let camera = PinholeCamera::new(600.0, 600.0, 319.5, 239.5, 640, 480)?;
+/// let pixel = camera.project(&Point3::new(0.1, 0.0, 0.5)).ok_or("behind the camera").unwrap();
+/// assert!((pixel.x - 439.5).abs() < 1e-9);
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PinholeCamera {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    width: u32,
+    height: u32,
+}
+
+/// The largest image side accepted, in pixels.
+pub const MAX_IMAGE_SIDE: u32 = 32_768;
+
+impl PinholeCamera {
+    /// Makes a camera whose pixel centres are at integers.
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError`] when a focal length is not finite and positive, the principal point is not finite, or a side of
+    /// the image is zero or above [`MAX_IMAGE_SIDE`].
+    pub fn new(
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, CameraError> {
+        for (name, value) in [("fx", fx), ("fy", fy)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(CameraError::FocalLength { name, value });
+            }
+        }
+        for (name, value) in [("cx", cx), ("cy", cy)] {
+            if !value.is_finite() {
+                return Err(CameraError::PrincipalPoint { name, value });
+            }
+        }
+        for (name, value) in [("width", width), ("height", height)] {
+            if value == 0 || value > MAX_IMAGE_SIDE {
+                return Err(CameraError::ImageSide { name, value });
+            }
+        }
+        Ok(Self {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        })
+    }
+
+    /// Makes a camera from a calibration that states where its pixel centres lie.
+    ///
+    /// The principal point is converted once, here; everything inside has centres at integers.
+    ///
+    /// # Errors
+    ///
+    /// As [`PinholeCamera::new`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn with_pixel_centers(
+        centers: PixelCenters,
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, CameraError> {
+        let shift = match centers {
+            PixelCenters::AtIntegers => 0.0,
+            PixelCenters::AtHalves => 0.5,
+        };
+        Self::new(fx, fy, cx - shift, cy - shift, width, height)
+    }
+
+    /// Makes a camera from a calibration matrix K = [fx 0 cx; 0 fy cy; 0 0 1].
+    ///
+    /// # Errors
+    ///
+    /// As [`PinholeCamera::new`], and when K has a skew or its last row is not (0, 0, 1).
+    pub fn from_matrix(k: &Matrix3<f64>, width: u32, height: u32) -> Result<Self, CameraError> {
+        for (row, column, expected) in [
+            (0, 1, 0.0),
+            (1, 0, 0.0),
+            (2, 0, 0.0),
+            (2, 1, 0.0),
+            (2, 2, 1.0),
+        ] {
+            let found = k[(row, column)];
+            if found.is_nan() || (found - expected).abs() > 1e-6 {
+                return Err(CameraError::MatrixEntry {
+                    row,
+                    column,
+                    found,
+                    expected,
+                });
+            }
+        }
+        Self::new(k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)], width, height)
+    }
+
+    /// Horizontal focal length, pixels.
+    #[must_use]
+    pub fn fx(&self) -> f64 {
+        self.fx
+    }
+
+    /// Vertical focal length, pixels.
+    #[must_use]
+    pub fn fy(&self) -> f64 {
+        self.fy
+    }
+
+    /// Column of the principal point, pixels, centres at integers.
+    #[must_use]
+    pub fn cx(&self) -> f64 {
+        self.cx
+    }
+
+    /// Row of the principal point, pixels, centres at integers.
+    #[must_use]
+    pub fn cy(&self) -> f64 {
+        self.cy
+    }
+
+    /// Image width, pixels.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Image height, pixels.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Returns the region of the whole image.
+    #[must_use]
+    pub fn region(&self) -> PixelRegion {
+        PixelRegion::of_image(self.width, self.height)
+    }
+
+    /// Returns the image position of a point of the camera frame, or `None` when it is not in front of the camera.
+    ///
+    /// The position may lie outside the image.
+    #[must_use]
+    pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
+        (point.z > 0.0).then(|| {
+            Point2::new(
+                self.fx * point.x / point.z + self.cx,
+                self.fy * point.y / point.z + self.cy,
+            )
+        })
+    }
+
+    /// Returns the point of the camera frame seen at (u, v) with a depth of `depth` metres along the optical axis.
+    #[must_use]
+    pub fn unproject(&self, u: f64, v: f64, depth: f64) -> Point3<f64> {
+        Point3::new(
+            (u - self.cx) / self.fx * depth,
+            (v - self.cy) / self.fy * depth,
+            depth,
+        )
+    }
+
+    /// Returns distance / depth at a pixel: √(((u−cx)/fx)² + ((v−cy)/fy)² + 1).
+    #[must_use]
+    pub fn distance_per_depth(&self, u: f64, v: f64) -> f64 {
+        let (x, y) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
+        (x * x + y * y + 1.0).sqrt()
+    }
+}

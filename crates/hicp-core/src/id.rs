@@ -1,0 +1,16 @@
+//! Identities of immutable inputs, for caches.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The identity of an immutable [`crate::Model`] or [`crate::Observation`] within this process.
+///
+/// Two things with the same id hold the same data; nothing else follows from the value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Id(u64);
+
+impl Id {
+    pub(crate) fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}

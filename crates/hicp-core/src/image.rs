@@ -1,0 +1,216 @@
+//! Images: depth, distance and masks, each a type of its own so that they cannot be swapped.
+//!
+//! All are row-major, index `v * width + u`, in metres where they hold lengths; 0 means "nothing was measured here".
+
+use crate::camera::PinholeCamera;
+use crate::error::ImageError;
+use crate::region::PixelRegion;
+
+/// Depths beyond this many metres are taken as missing: no depth camera measures them, and their squares overflow.
+pub const MAX_DEPTH_METERS: f32 = 1000.0;
+
+/// A row-major image of any pixel type.
+#[derive(Clone, Debug, PartialEq)]
+struct Raster<T> {
+    width: u32,
+    height: u32,
+    pixels: Vec<T>,
+}
+
+impl<T: Copy> Raster<T> {
+    fn new(width: u32, height: u32, pixels: Vec<T>) -> Result<Self, ImageError> {
+        let expected = width as usize * height as usize;
+        if pixels.len() != expected {
+            return Err(ImageError::PixelCount {
+                width,
+                height,
+                expected,
+                found: pixels.len(),
+            });
+        }
+        Ok(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+
+    fn get(&self, u: u32, v: u32) -> Option<T> {
+        (u < self.width && v < self.height)
+            .then(|| self.pixels[v as usize * self.width as usize + u as usize])
+    }
+}
+
+macro_rules! image_accessors {
+    ($pixel:ty) => {
+        /// Image width, pixels.
+        #[must_use]
+        pub fn width(&self) -> u32 {
+            self.0.width
+        }
+
+        /// Image height, pixels.
+        #[must_use]
+        pub fn height(&self) -> u32 {
+            self.0.height
+        }
+
+        /// The pixels, row-major: index `v * width + u`.
+        #[must_use]
+        pub fn pixels(&self) -> &[$pixel] {
+            &self.0.pixels
+        }
+
+        /// Returns the value at column `u`, row `v`, or `None` outside the image.
+        #[must_use]
+        pub fn get(&self, u: u32, v: u32) -> Option<$pixel> {
+            self.0.get(u, v)
+        }
+    };
+}
+
+/// Depth along the optical axis (z), metres; 0 where nothing was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthImage(Raster<f32>);
+
+impl DepthImage {
+    /// Makes a depth image from metres.
+    ///
+    /// Values that are not finite, not positive, or beyond [`MAX_DEPTH_METERS`] are stored as 0, missing.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when `meters` does not hold `width * height` values.
+    pub fn from_meters(width: u32, height: u32, mut meters: Vec<f32>) -> Result<Self, ImageError> {
+        for z in &mut meters {
+            if !(*z > 0.0 && *z <= MAX_DEPTH_METERS) {
+                *z = 0.0;
+            }
+        }
+        Raster::new(width, height, meters).map(Self)
+    }
+
+    image_accessors!(f32);
+
+    /// Returns the distance image: range along each pixel's ray instead of depth.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::SizeMismatch`] when the camera is of another size.
+    pub fn to_distance(&self, camera: &PinholeCamera) -> Result<DistanceImage, ImageError> {
+        check_size(
+            "depth image",
+            (self.width(), self.height()),
+            "camera",
+            (camera.width(), camera.height()),
+        )?;
+        let mut pixels = Vec::with_capacity(self.pixels().len());
+        let mut depths = self.pixels().iter();
+        for v in 0..self.height() {
+            for u in 0..self.width() {
+                let z = f64::from(depths.next().copied().unwrap_or(0.0));
+                pixels.push(z * camera.distance_per_depth(f64::from(u), f64::from(v)));
+            }
+        }
+        DistanceImage::new(self.width(), self.height(), pixels)
+    }
+}
+
+/// Distance from the camera centre (range), in metres unless its maker says otherwise; 0 where there is nothing.
+///
+/// VSD and MVE compare distances, not depths (§III-B).
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistanceImage(Raster<f64>);
+
+impl DistanceImage {
+    /// Makes a distance image.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when `distances` does not hold `width * height` values.
+    pub fn new(width: u32, height: u32, distances: Vec<f64>) -> Result<Self, ImageError> {
+        Raster::new(width, height, distances).map(Self)
+    }
+
+    image_accessors!(f64);
+}
+
+/// Which pixels belong to the object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mask(Raster<bool>);
+
+impl Mask {
+    /// Makes a mask.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
+    pub fn new(width: u32, height: u32, pixels: Vec<bool>) -> Result<Self, ImageError> {
+        Raster::new(width, height, pixels).map(Self)
+    }
+
+    /// Makes a mask in which every pixel belongs to the object.
+    #[must_use]
+    pub fn full(width: u32, height: u32) -> Self {
+        Self(Raster {
+            width,
+            height,
+            pixels: vec![true; width as usize * height as usize],
+        })
+    }
+
+    image_accessors!(bool);
+
+    /// Returns the smallest region that holds every set pixel; empty when none is.
+    #[must_use]
+    pub fn bounding_region(&self) -> PixelRegion {
+        let width = self.width() as usize;
+        let mut region = PixelRegion::default();
+        if width == 0 {
+            return region;
+        }
+        for (row, v) in self.pixels().chunks_exact(width).zip(0_u32..) {
+            let Some(first) = (0_u32..).zip(row).find(|(_, set)| **set).map(|(u, _)| u) else {
+                continue;
+            };
+            let last = (0..self.width())
+                .rev()
+                .find(|u| row[*u as usize])
+                .unwrap_or(first);
+            if region.is_empty() {
+                region = PixelRegion {
+                    u_min: first,
+                    v_min: v,
+                    u_max: last + 1,
+                    v_max: v + 1,
+                };
+            } else {
+                region.u_min = region.u_min.min(first);
+                region.u_max = region.u_max.max(last + 1);
+                region.v_max = v + 1;
+            }
+        }
+        region
+    }
+}
+
+/// Refuses two things of different size, naming both.
+pub(crate) fn check_size(
+    first: &'static str,
+    first_size: (u32, u32),
+    second: &'static str,
+    second_size: (u32, u32),
+) -> Result<(), ImageError> {
+    if first_size == second_size {
+        Ok(())
+    } else {
+        Err(ImageError::SizeMismatch {
+            first,
+            first_width: first_size.0,
+            first_height: first_size.1,
+            second,
+            second_width: second_size.0,
+            second_height: second_size.1,
+        })
+    }
+}

@@ -1,0 +1,273 @@
+//! Triangle meshes.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use crate::error::MeshError;
+
+/// Largest absolute vertex coordinate accepted, metres: beyond it squares lose their meaning in `f32`.
+pub const MAX_COORDINATE_METERS: f32 = 1.0e6;
+
+/// Largest number of vertices and of triangles accepted.
+pub const MAX_MESH_ELEMENTS: usize = 50_000_000;
+
+/// Which way the triangles of a mesh face, as far as the mesh itself can tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Facing {
+    /// Closed, consistently wound, counter-clockwise seen from outside: normals point out of the object.
+    Outward,
+    /// Closed and consistently wound, the other way round.
+    Inward,
+    /// Open, inconsistently wound, or of parts that disagree: nothing may be concluded from the winding.
+    Unknown,
+}
+
+/// A triangle mesh in metres, in the object frame.
+///
+/// Holds at least one triangle of non-zero area, finite coordinates and valid indices; [`TriMesh::new`] refuses anything
+/// else. Vertices that no triangle uses and triangles of zero area may be there and count for nothing but
+/// [`TriMesh::vertices`] and [`TriMesh::triangles`].
+///
+/// ```
+/// use hicp_core::{Point3, TriMesh};
+/// # fn main() -> Result<(), hicp_core::MeshError> {
+/// let mesh = TriMesh::new(
+///     vec![Point3::origin(), Point3::new(0.1, 0.0, 0.0), Point3::new(0.0, 0.1, 0.0)],
+///     vec![[0, 1, 2]],
+/// )?;
+/// assert!((mesh.area() - 0.005).abs() < 1e-9);
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug)]
+pub struct TriMesh {
+    vertices: Vec<Point3<f32>>,
+    triangles: Vec<[u32; 3]>,
+    facing: OnceLock<Facing>,
+}
+
+impl TriMesh {
+    /// Makes a mesh from vertices in metres and triangles of vertex indices counted from 0.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshError`] when there is no triangle, an index is out of range, a coordinate is not finite or beyond
+    /// [`MAX_COORDINATE_METERS`], or no triangle has an area.
+    pub fn new(vertices: Vec<Point3<f32>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        for (what, count) in [("vertices", vertices.len()), ("triangles", triangles.len())] {
+            if count > MAX_MESH_ELEMENTS {
+                return Err(MeshError::TooLarge {
+                    what,
+                    count,
+                    limit: MAX_MESH_ELEMENTS,
+                });
+            }
+        }
+        if triangles.is_empty() {
+            return Err(MeshError::NoTriangles {
+                vertices: vertices.len(),
+            });
+        }
+        for (vertex, p) in vertices.iter().enumerate() {
+            if !p.iter().all(|x| x.abs() <= MAX_COORDINATE_METERS) {
+                return Err(MeshError::Coordinate {
+                    vertex,
+                    x: p.x,
+                    y: p.y,
+                    z: p.z,
+                    limit: MAX_COORDINATE_METERS,
+                });
+            }
+        }
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|i| **i as usize >= vertices.len()) {
+                return Err(MeshError::IndexOutOfRange {
+                    triangle,
+                    index,
+                    vertices: vertices.len(),
+                });
+            }
+        }
+        let mesh = Self {
+            vertices,
+            triangles,
+            facing: OnceLock::new(),
+        };
+        if mesh.area() > 0.0 {
+            Ok(mesh)
+        } else {
+            Err(MeshError::NoArea {
+                triangles: mesh.triangles.len(),
+            })
+        }
+    }
+
+    /// The vertices, metres, object frame.
+    #[must_use]
+    pub fn vertices(&self) -> &[Point3<f32>] {
+        &self.vertices
+    }
+
+    /// The triangles as indices into [`TriMesh::vertices`].
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Returns the corners of a triangle.
+    ///
+    /// # Panics
+    ///
+    /// When `triangle` is not below the number of triangles.
+    #[must_use]
+    pub fn corners(&self, triangle: usize) -> [Point3<f32>; 3] {
+        self.triangles[triangle].map(|i| self.vertices[i as usize])
+    }
+
+    /// Returns the unit normal of a triangle by its winding (counter-clockwise seen from the tip), or `None` when it has no area.
+    ///
+    /// # Panics
+    ///
+    /// When `triangle` is not below the number of triangles.
+    #[must_use]
+    pub fn normal(&self, triangle: usize) -> Option<UnitVector3<f32>> {
+        let double_area = self.double_area_vector(triangle);
+        let norm = double_area.norm();
+        (norm > 0.0).then(|| UnitVector3::new_unchecked((double_area / norm).cast::<f32>()))
+    }
+
+    /// Returns the surface area, m².
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|t| self.triangle_area(t))
+            .sum()
+    }
+
+    /// Returns the area of a triangle, m².
+    ///
+    /// # Panics
+    ///
+    /// When `triangle` is not below the number of triangles.
+    #[must_use]
+    pub fn triangle_area(&self, triangle: usize) -> f64 {
+        0.5 * self.double_area_vector(triangle).norm()
+    }
+
+    fn double_area_vector(&self, triangle: usize) -> Vector3<f64> {
+        let [a, b, c] = self.corners(triangle).map(|p| p.cast::<f64>());
+        (b - a).cross(&(c - a))
+    }
+
+    /// Returns, for every vertex, whether a triangle uses it.
+    #[must_use]
+    pub fn used_vertices(&self) -> Vec<bool> {
+        let mut used = vec![false; self.vertices.len()];
+        for index in self.triangles.iter().flatten() {
+            used[*index as usize] = true;
+        }
+        used
+    }
+
+    /// Returns which way the triangles face; found on first use and kept. Cost: O(triangles) once.
+    ///
+    /// Vertices at the same position count as one, so that seams of texture coordinates do not open a mesh.
+    #[must_use]
+    pub fn facing(&self) -> Facing {
+        *self.facing.get_or_init(|| find_facing(self))
+    }
+
+    /// Returns whether the mesh is closed and consistently wound, so that its back faces are never seen.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.facing() != Facing::Unknown
+    }
+}
+
+/// Closedness by directed edges, orientation by the signed volume of every connected part.
+fn find_facing(mesh: &TriMesh) -> Facing {
+    let welded = weld(mesh.vertices());
+    let triangles: Vec<[u32; 3]> = mesh
+        .triangles()
+        .iter()
+        .map(|corners| corners.map(|i| welded[i as usize]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+
+    let mut edges: HashMap<(u32, u32), i32> = HashMap::with_capacity(2 * triangles.len());
+    for &[a, b, c] in &triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            // A closed, consistently wound surface walks every edge once each way. The high digits count walks,
+            // so that two forward and two backward walks (a non-manifold edge) are not mistaken for it.
+            let (key, direction) = if from < to {
+                ((from, to), 1)
+            } else {
+                ((to, from), -1)
+            };
+            *edges.entry(key).or_insert(0) += direction + 4;
+        }
+    }
+    if edges.is_empty() || edges.values().any(|&walks| walks != 8) {
+        return Facing::Unknown;
+    }
+
+    let mut parts = DisjointSets::new(mesh.vertices().len());
+    for &[a, b, c] in &triangles {
+        parts.join(a, b);
+        parts.join(b, c);
+    }
+    // The volume of a closed part does not depend on the origin; one of its own vertices keeps it well conditioned.
+    let mut volumes: HashMap<u32, (Point3<f64>, f64)> = HashMap::new();
+    for corners in &triangles {
+        let [a, b, c] = corners.map(|i| mesh.vertices()[i as usize].cast::<f64>());
+        let (origin, volume) = volumes.entry(parts.find(corners[0])).or_insert((a, 0.0));
+        *volume += (a - *origin).dot(&(b - *origin).cross(&(c - *origin)));
+    }
+    if volumes.values().all(|(_, volume)| *volume > 0.0) {
+        Facing::Outward
+    } else if volumes.values().all(|(_, volume)| *volume < 0.0) {
+        Facing::Inward
+    } else {
+        Facing::Unknown
+    }
+}
+
+/// Maps every vertex to the first one at exactly the same position.
+fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
+    let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(vertices.len());
+    (0_u32..)
+        .zip(vertices)
+        .map(|(index, p)| {
+            // Adding 0 turns −0 into +0.
+            let key = [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
+            *first_at.entry(key).or_insert(index)
+        })
+        .collect()
+}
+
+struct DisjointSets {
+    parent: Vec<u32>,
+}
+
+impl DisjointSets {
+    fn new(count: usize) -> Self {
+        Self {
+            parent: (0_u32..).take(count).collect(),
+        }
+    }
+
+    fn find(&mut self, mut x: u32) -> u32 {
+        while self.parent[x as usize] != x {
+            let grandparent = self.parent[self.parent[x as usize] as usize];
+            self.parent[x as usize] = grandparent;
+            x = grandparent;
+        }
+        x
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+}

@@ -1,0 +1,138 @@
+//! The object as everyone downstream needs it.
+
+use nalgebra::Point3;
+
+use crate::derived::Derived;
+use crate::diameter::diameter;
+use crate::id::Id;
+use crate::mesh::TriMesh;
+use crate::sampling::sample_surface;
+use crate::surfel::Surfel;
+use crate::symmetry::Symmetries;
+
+/// What a [`Model`] is made with, besides its mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelConfig {
+    /// Number of area-uniform surface samples. The count hardly matters for accuracy between 300 and 3000.
+    pub samples: usize,
+    /// Diameter in metres where a dataset prescribes one; otherwise it is the largest distance between two used vertices.
+    pub diameter: Option<f64>,
+    /// Declared symmetries.
+    pub symmetries: Symmetries,
+}
+
+impl Default for ModelConfig {
+    fn default() -> Self {
+        Self {
+            samples: 1000,
+            diameter: None,
+            symmetries: Symmetries::default(),
+        }
+    }
+}
+
+/// An object to be registered: its mesh, surface samples, size and symmetries. Immutable; metres; object frame.
+///
+/// Building one costs O(triangles) and happens once per object; share it between threads by reference or `Arc`.
+#[derive(Clone, Debug)]
+pub struct Model {
+    id: Id,
+    mesh: TriMesh,
+    samples: Vec<Surfel>,
+    diameter: f64,
+    center: Point3<f64>,
+    radius: f64,
+    symmetries: Symmetries,
+    derived: Derived,
+}
+
+impl Model {
+    /// Makes a model with the default configuration.
+    #[must_use]
+    pub fn new(mesh: TriMesh) -> Self {
+        Self::with_config(mesh, ModelConfig::default())
+    }
+
+    /// Makes a model.
+    ///
+    /// A configured diameter that is not finite and positive is ignored.
+    #[must_use]
+    pub fn with_config(mesh: TriMesh, config: ModelConfig) -> Self {
+        let used: Vec<Point3<f32>> = mesh
+            .used_vertices()
+            .iter()
+            .zip(mesh.vertices())
+            .filter_map(|(used, vertex)| used.then_some(*vertex))
+            .collect();
+        let first = used.first().copied().unwrap_or_else(Point3::origin);
+        let (min, max) = used
+            .iter()
+            .fold((first, first), |(min, max), p| (min.inf(p), max.sup(p)));
+        let center = nalgebra::center(&min.cast::<f64>(), &max.cast::<f64>());
+        let radius = used
+            .iter()
+            .map(|p| (p.cast::<f64>() - center).norm())
+            .fold(0.0, f64::max);
+        Self {
+            id: Id::next(),
+            samples: sample_surface(&mesh, config.samples),
+            diameter: config
+                .diameter
+                .filter(|d| d.is_finite() && *d > 0.0)
+                .unwrap_or_else(|| diameter(&used)),
+            center,
+            radius,
+            symmetries: config.symmetries,
+            derived: Derived::default(),
+            mesh,
+        }
+    }
+
+    /// Identity for caches.
+    #[must_use]
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
+    /// The mesh.
+    #[must_use]
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+
+    /// Area-uniform samples of the whole surface with outward normals.
+    #[must_use]
+    pub fn samples(&self) -> &[Surfel] {
+        &self.samples
+    }
+
+    /// Largest distance between two vertices, metres.
+    #[must_use]
+    pub fn diameter(&self) -> f64 {
+        self.diameter
+    }
+
+    /// Centre of the bounding box, object frame.
+    #[must_use]
+    pub fn center(&self) -> Point3<f64> {
+        self.center
+    }
+
+    /// Largest distance of a vertex from [`Model::center`], metres.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Declared symmetries.
+    #[must_use]
+    pub fn symmetries(&self) -> &Symmetries {
+        &self.symmetries
+    }
+
+    /// Values derived from this model, built once and shared.
+    #[must_use]
+    pub fn derived(&self) -> &Derived {
+        &self.derived
+    }
+}

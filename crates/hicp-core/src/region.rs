@@ -1,0 +1,79 @@
+//! Axis-aligned rectangles of pixels.
+
+/// A half-open rectangle of pixels: columns `u_min..u_max`, rows `v_min..v_max`.
+///
+/// A region of interest; empty when either range is. Buffers over a region are row-major and start at its corner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct PixelRegion {
+    /// First column.
+    pub u_min: u32,
+    /// First row.
+    pub v_min: u32,
+    /// One past the last column.
+    pub u_max: u32,
+    /// One past the last row.
+    pub v_max: u32,
+}
+
+impl PixelRegion {
+    /// Returns the region of a whole image.
+    #[must_use]
+    pub fn of_image(width: u32, height: u32) -> Self {
+        Self {
+            u_min: 0,
+            v_min: 0,
+            u_max: width,
+            v_max: height,
+        }
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.u_max.saturating_sub(self.u_min) as usize
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.v_max.saturating_sub(self.v_min) as usize
+    }
+
+    /// Number of pixels.
+    #[must_use]
+    pub fn area(&self) -> usize {
+        self.width() * self.height()
+    }
+
+    /// Returns whether the region holds no pixel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.width() == 0 || self.height() == 0
+    }
+
+    /// Returns whether pixel (u, v) lies inside.
+    #[must_use]
+    pub fn contains(&self, u: u32, v: u32) -> bool {
+        (self.u_min..self.u_max).contains(&u) && (self.v_min..self.v_max).contains(&v)
+    }
+
+    /// Returns the row-major index of pixel (u, v) in a buffer over this region, or `None` outside.
+    #[must_use]
+    pub fn index(&self, u: u32, v: u32) -> Option<usize> {
+        self.contains(u, v)
+            .then(|| (v - self.v_min) as usize * self.width() + (u - self.u_min) as usize)
+    }
+
+    /// Returns the common part of two regions; empty (but well formed) when there is none.
+    #[must_use]
+    pub fn intersection(&self, other: &Self) -> Self {
+        let u_min = self.u_min.max(other.u_min);
+        let v_min = self.v_min.max(other.v_min);
+        Self {
+            u_min,
+            v_min,
+            u_max: self.u_max.min(other.u_max).max(u_min),
+            v_max: self.v_max.min(other.v_max).max(v_min),
+        }
+    }
+}
