@@ -1,34 +1,73 @@
-pub use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point2, Point3, Translation3, UnitQuaternion, UnitVector3,
-    Vector3, Vector6,
-};
+//! The nouns of Hybrid ICP: rigid motions, cameras, depth images, observations, models, correspondences, and the trait of renderers.
+//!
+//! **Should you use this crate?** Directly, if you write a component (an association, a metric, a score) and want to depend
+//! on little. To refine poses, use `hybrid-icp`, which re-exports it.
+//!
+//! Everything is in metres and radians. A transform reads `b_from_a` and takes coordinates in frame `a` to frame `b`:
+//! the paper's T_CO is `camera_from_object`. Cameras look along +z, x right, y down; pixel centres are at integers.
+//! Buffers hold `f32`; poses and normal equations `f64`.
+//!
+//! ```
+//! use hicp_core::{DepthImage, Isometry3, Mask, Observation, PinholeCamera, Point3, TriMesh, Model};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let camera = PinholeCamera::new(60.0, 60.0, 31.5, 23.5, 64, 48)?;
+//! let depth = DepthImage::from_meters(64, 48, vec![0.5; 64 * 48])?;
+//! let observation = Observation::new(depth, Mask::full(64, 48), camera)?;
+//! let (a, b) = (0.05, 0.1);
+//! let corners = vec![Point3::new(0.0, 0.0, 0.0), Point3::new(a, 0.0, 0.0), Point3::new(0.0, b, 0.0)];
+//! let model = Model::new(TriMesh::new(corners, vec![[0, 1, 2]])?);
+//! assert!((model.diameter() - f64::hypot(0.05, 0.1)).abs() < 1e-6);
+//! assert_eq!(observation.n_surfels(), 64 * 48);
+//! # Ok(()) }
+//! ```
+//!
+//! Modules in reading order, by file: `so3`, `se3` (rigid motions), `camera`, `image`, `region`, `surfel`, `observation` and
+//! its `normals`, `mesh`, `sampling`, `symmetry`, `model`, `derived` (shared caches), `render`, `problem`, `correspondences`, `error`.
+
+// Counts and pixel coordinates become floating point numbers all over this crate; all are far below 2²⁴.
+#![allow(clippy::cast_precision_loss)]
+
 mod camera;
+mod correspondences;
 mod derived;
 mod diameter;
 mod error;
 mod id;
 mod image;
+mod label;
 mod mesh;
 mod model;
+mod normals;
+mod observation;
+mod problem;
 mod region;
+mod render;
 mod rotation;
 mod sampling;
 pub mod se3;
 pub mod so3;
 mod surfel;
 mod symmetry;
+
 pub use camera::{MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
+pub use correspondences::{Correspondences, Mover, Pair};
 pub use derived::Derived;
 pub use diameter::diameter;
 pub use error::{CameraError, ImageError, MeshError, RotationError, SymmetryError};
 pub use id::Id;
 pub use image::{DepthImage, DistanceImage, MAX_DEPTH_METERS, Mask};
+pub use label::type_label;
 pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, TriMesh};
 pub use model::{Model, ModelConfig};
+pub use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Point2, Point3, Translation3, UnitQuaternion, UnitVector3,
+    Vector3, Vector6,
+};
+pub use observation::Observation;
+pub use problem::{Context, Problem};
 pub use region::PixelRegion;
+pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
 pub use rotation::{ROTATION_TOLERANCE, rotation_from_matrix};
 pub use sampling::sample_surface;
 pub use surfel::Surfel;
 pub use symmetry::{CONTINUOUS_STEPS, Symmetries, SymmetryAxis};
-mod render;
-pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};

@@ -33,6 +33,13 @@ impl RenderedView {
         self.triangles.resize(region.area(), NO_TRIANGLE);
     }
 
+    /// Makes this view equal to another, reusing its own memory.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.region = other.region;
+        self.depth.clone_from(&other.depth);
+        self.triangles.clone_from(&other.triangles);
+    }
+
     /// The region that the buffers cover.
     #[must_use]
     pub fn region(&self) -> PixelRegion {

@@ -1,0 +1,48 @@
+//! The trait of outlier filters, and how they chain.
+
+use hicp_core::{Correspondences, Problem};
+
+/// Removes or re-weights pairs (the third and fourth ICP components, §II).
+///
+/// `()` keeps everything; tuples apply their members in order.
+pub trait OutlierFilter {
+    /// Filters the pairs of one iteration, keeping their order.
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences);
+}
+
+impl OutlierFilter for () {
+    fn filter(&mut self, _problem: &Problem<'_>, _pairs: &mut Correspondences) {}
+}
+
+impl<T: OutlierFilter + ?Sized> OutlierFilter for Box<T> {
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+        (**self).filter(problem, pairs);
+    }
+}
+
+/// `None` keeps everything.
+impl<T: OutlierFilter> OutlierFilter for Option<T> {
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+        if let Some(inner) = self {
+            inner.filter(problem, pairs);
+        }
+    }
+}
+
+macro_rules! chain {
+    ($($member:ident),+) => {
+        impl<$($member: OutlierFilter),+> OutlierFilter for ($($member,)+) {
+            #[allow(non_snake_case)]
+            fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+                let ($($member,)+) = self;
+                $($member.filter(problem, pairs);)+
+            }
+        }
+    };
+}
+chain!(A);
+chain!(A, B);
+chain!(A, B, C);
+chain!(A, B, C, D);
+chain!(A, B, C, D, E);
+chain!(A, B, C, D, E, F);

@@ -1,0 +1,51 @@
+//! Projective data association.
+
+use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Surfel};
+
+use crate::association::DataAssociation;
+
+/// Pairs a model point with the observed point stored at the pixel that it projects to (§III-A.1; Blais & Levine 1995).
+///
+/// The model point is moved by the current estimate and projected with the observation's camera; the pixel whose square
+/// contains the projection gives the target, if it is masked and has a surfel. Points at or behind the camera plane have no pair.
+/// Cost: constant per point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Projective;
+
+impl DataAssociation for Projective {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let observation = context.problem.observation;
+        let camera = observation.camera();
+        #[allow(clippy::cast_possible_truncation)]
+        // Pixels; f32 resolves 1e-3 of one in any accepted image.
+        let [fx, fy, cx, cy] =
+            [camera.fx(), camera.fy(), camera.cx(), camera.cy()].map(|x| x as f32);
+        let mover = Mover::new(camera_from_object);
+        pairs.reserve(source.len());
+        for (source_index, surfel) in (0..).zip(source) {
+            let point = mover.point(&surfel.point);
+            if point.z <= 0.0 {
+                continue;
+            }
+            let (u, v) = (fx * point.x / point.z + cx, fy * point.y / point.z + cy);
+            if let Some(target) = observation.surfel_near(u, v) {
+                pairs.push(Pair {
+                    source: mover.surfel(surfel),
+                    target: *target,
+                    weight: 1.0,
+                    source_index,
+                });
+            }
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "projective"
+    }
+}

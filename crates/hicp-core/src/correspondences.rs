@@ -1,0 +1,136 @@
+//! Pairs of model and observed surface elements.
+
+use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
+
+use crate::surfel::Surfel;
+
+/// One correspondence (cᵢ, nᵢ, oᵢ, mᵢ) of Algorithm 1, all of it in the camera frame at the current estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// The model point, moved by the current estimate: T_CO oᵢ, and its normal R_CO mᵢ.
+    pub source: Surfel,
+    /// The observed point cᵢ and its normal nᵢ.
+    pub target: Surfel,
+    /// Weight, not negative.
+    pub weight: f32,
+    /// Index of the source point in the selection.
+    pub source_index: u32,
+}
+
+impl Pair {
+    /// Returns the distance between the two points, metres.
+    #[must_use]
+    pub fn distance(&self) -> f32 {
+        (self.source.point - self.target.point).norm()
+    }
+}
+
+/// The pairs of one turn. A buffer that is cleared and refilled; the caller owns it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Correspondences {
+    pairs: Vec<Pair>,
+}
+
+impl Correspondences {
+    /// Makes an empty list.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Removes all pairs and keeps the memory.
+    pub fn clear(&mut self) {
+        self.pairs.clear();
+    }
+
+    /// Makes room for `additional` more pairs.
+    pub fn reserve(&mut self, additional: usize) {
+        self.pairs.reserve(additional);
+    }
+
+    /// Adds a pair.
+    pub fn push(&mut self, pair: Pair) {
+        self.pairs.push(pair);
+    }
+
+    /// Number of pairs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Returns whether there is no pair.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// The pairs, in the order in which they were added.
+    #[must_use]
+    pub fn as_slice(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// The pairs, to be re-weighted.
+    pub fn as_mut_slice(&mut self) -> &mut [Pair] {
+        &mut self.pairs
+    }
+
+    /// Keeps the pairs for which `keep` is true, in order.
+    pub fn retain(&mut self, keep: impl FnMut(&Pair) -> bool) {
+        self.pairs.retain(keep);
+    }
+}
+
+impl Extend<Pair> for Correspondences {
+    fn extend<I: IntoIterator<Item = Pair>>(&mut self, pairs: I) {
+        self.pairs.extend(pairs);
+    }
+}
+
+impl FromIterator<Pair> for Correspondences {
+    fn from_iter<I: IntoIterator<Item = Pair>>(pairs: I) -> Self {
+        Self {
+            pairs: pairs.into_iter().collect(),
+        }
+    }
+}
+
+/// A rigid motion in `f32`, for moving many surfels.
+#[derive(Clone, Copy, Debug)]
+pub struct Mover {
+    rotation: Matrix3<f32>,
+    translation: Vector3<f32>,
+}
+
+impl Mover {
+    /// Prepares a pose.
+    #[must_use]
+    pub fn new(pose: &Isometry3<f64>) -> Self {
+        Self {
+            rotation: pose
+                .rotation
+                .to_rotation_matrix()
+                .into_inner()
+                .cast::<f32>(),
+            translation: pose.translation.vector.cast::<f32>(),
+        }
+    }
+
+    /// Returns the moved point.
+    #[must_use]
+    #[inline]
+    pub fn point(&self, point: &Point3<f32>) -> Point3<f32> {
+        Point3::from(self.rotation * point.coords + self.translation)
+    }
+
+    /// Returns the moved surfel.
+    #[must_use]
+    #[inline]
+    pub fn surfel(&self, surfel: &Surfel) -> Surfel {
+        Surfel {
+            point: self.point(&surfel.point),
+            normal: UnitVector3::new_unchecked(self.rotation * surfel.normal.as_ref()),
+        }
+    }
+}

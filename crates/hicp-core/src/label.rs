@@ -1,0 +1,14 @@
+//! Names of components for traces.
+
+/// Returns the bare name of a type, without path and type parameters: the default name of a component.
+///
+/// ```
+/// struct MyAssociation<T>(T);
+/// assert_eq!(hicp_core::type_label::<MyAssociation<Vec<u8>>>(), "MyAssociation");
+/// ```
+#[must_use]
+pub fn type_label<T: ?Sized>() -> &'static str {
+    let full = std::any::type_name::<T>();
+    let bare = full.split('<').next().unwrap_or(full);
+    bare.rsplit("::").next().unwrap_or(bare)
+}

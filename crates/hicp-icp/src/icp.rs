@@ -1,0 +1,150 @@
+//! Algorithm 1: generic ICP.
+
+use std::ops::ControlFlow;
+
+use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
+use hicp_core::{Context, Isometry3, Problem, se3};
+use hicp_metric::ErrorMetric;
+
+use crate::observer::{IterationEvent, StageEvent};
+use crate::outcome::{Evaluation, Outcome, Termination, Verdict};
+use crate::session::Session;
+use crate::stage::Stage;
+use crate::stop::{Progress, StopRule};
+
+/// Generic ICP (Algorithm 1 of the paper) from its five components, each a public field.
+///
+/// The points are selected once, at the initial pose. A turn then associates at the candidate pose, filters, and minimises,
+/// which gives the loss *there* and the next increment; the stop rule judges. A candidate is accepted only after it was
+/// evaluated, so the returned pose is the last one that the rules let stand, and rolling back costs nothing.
+///
+/// No pairs, or pairs that determine no step, end the stage with the pose accepted last.
+///
+/// ```
+/// use hicp_association::{Projective, VisibleSurface};
+/// use hicp_icp::{Convergence, Divergence, Icp, IterationLimit};
+/// use hicp_metric::PointToPlane;
+///
+/// let fine = Icp {
+///     selection: VisibleSurface::default(),
+///     association: Projective,
+///     filter: (),
+///     metric: PointToPlane,
+///     stop: (Divergence::strict(), Convergence::default(), IterationLimit(50)),
+/// };
+/// # let _ = fine;
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Icp<P, A, F, M, S> {
+    /// Chooses the model points.
+    pub selection: P,
+    /// Pairs them with observed points.
+    pub association: A,
+    /// Removes or re-weights pairs.
+    pub filter: F,
+    /// What is minimised.
+    pub metric: M,
+    /// When to end.
+    pub stop: S,
+}
+
+impl<P, A, F, M, S> Stage for Icp<P, A, F, M, S>
+where
+    P: PointSelection,
+    A: DataAssociation,
+    F: OutlierFilter,
+    M: ErrorMetric,
+    S: StopRule,
+{
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let workspace = &mut *session.workspace;
+        let (source, pairs) = (&mut workspace.source, &mut workspace.pairs);
+        let mut context = Context::new(*problem, &mut workspace.renders);
+        source.clear();
+        if se3::is_finite(init) {
+            self.selection.select(&mut context, init, source);
+        }
+        self.stop.start();
+
+        let mut accepted: Option<(Isometry3<f64>, Evaluation)> = None;
+        let mut candidate = *init;
+        let mut first = None;
+        let mut iteration = 0;
+        let termination = loop {
+            pairs.clear();
+            if !source.is_empty() {
+                self.association
+                    .associate(&mut context, source, &candidate, pairs);
+                self.filter.filter(problem, pairs);
+            }
+            iteration += 1;
+            if pairs.is_empty() {
+                break Termination::NoPairs;
+            }
+            let Some(step) = self.metric.minimize(pairs) else {
+                break Termination::Degenerate;
+            };
+            let current = Evaluation {
+                n_pairs: pairs.len(),
+                mean_loss: step.mean_loss,
+            };
+            let first = *first.get_or_insert(current);
+            session.observer.on_iteration(&IterationEvent {
+                iteration: iteration - 1,
+                camera_from_object: &candidate,
+                evaluation: current,
+                increment: &step.increment,
+            });
+            let verdict = self.stop.check(&Progress {
+                iteration: iteration - 1,
+                current,
+                first,
+                previous: accepted.map(|(_, evaluation)| evaluation),
+                camera_from_object: &candidate,
+                init,
+                increment: &step.increment,
+            });
+            match verdict {
+                ControlFlow::Break(termination) if termination.is_rollback() => break termination,
+                ControlFlow::Break(termination) => {
+                    accepted = Some((candidate, current));
+                    break termination;
+                }
+                ControlFlow::Continue(()) => accepted = Some((candidate, current)),
+            }
+            let mut next = step.increment * candidate;
+            // Products of unit quaternions drift off the unit sphere; a long run must stay in SO(3).
+            next.rotation.renormalize();
+            if !se3::is_finite(&next) {
+                break Termination::Degenerate;
+            }
+            candidate = next;
+        };
+
+        let pose = accepted.map_or(*init, |(pose, _)| pose);
+        let outcome = Outcome {
+            camera_from_object: pose,
+            termination,
+            verdict: if pose == *init {
+                Verdict::KeptInitial(termination)
+            } else {
+                Verdict::Refined
+            },
+            iterations: iteration,
+            evaluation: accepted.map(|(_, evaluation)| evaluation),
+        };
+        session.observer.on_stage_end(&StageEvent {
+            selection: self.selection.name(),
+            association: self.association.name(),
+            metric: self.metric.name(),
+            n_source: source.len(),
+            outcome: &outcome,
+        });
+        outcome
+    }
+}

@@ -1,0 +1,83 @@
+//! Who is told what happens during a run.
+
+use hicp_core::Isometry3;
+
+use crate::outcome::{Evaluation, Outcome};
+
+/// Sees a run from outside. Called per iteration, never per point; all methods do nothing unless overridden.
+pub trait Observer {
+    /// An iteration evaluated a pose.
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) {
+        let _ = event;
+    }
+
+    /// A switcher chose.
+    fn on_regime(&mut self, event: &RegimeEvent) {
+        let _ = event;
+    }
+
+    /// An ICP stage ended. Composed stages report through their parts.
+    fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+        let _ = event;
+    }
+}
+
+/// Observes nothing.
+impl Observer for () {}
+
+/// An evaluated pose.
+#[derive(Clone, Copy, Debug)]
+pub struct IterationEvent<'a> {
+    /// Iteration within the stage, from 0.
+    pub iteration: usize,
+    /// The pose evaluated.
+    pub camera_from_object: &'a Isometry3<f64>,
+    /// Its pairs and loss.
+    pub evaluation: Evaluation,
+    /// The increment found there.
+    pub increment: &'a Isometry3<f64>,
+}
+
+/// Which branch of a switch is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Regime {
+    /// The estimate agrees with the image: projective association finds consistent pairs.
+    Aligned,
+    /// It does not: only nearest neighbours find pairs at all.
+    Misaligned,
+}
+
+impl Regime {
+    /// Name in traces and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Aligned => "aligned",
+            Self::Misaligned => "misaligned",
+        }
+    }
+}
+
+/// A switcher's choice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegimeEvent {
+    /// The branch taken.
+    pub regime: Regime,
+    /// The score that decided, if there is one.
+    pub score: Option<f64>,
+}
+
+/// An ICP stage that ended.
+#[derive(Clone, Copy, Debug)]
+pub struct StageEvent<'a> {
+    /// Name of the point selection.
+    pub selection: &'static str,
+    /// Name of the data association.
+    pub association: &'static str,
+    /// Name of the error metric.
+    pub metric: &'static str,
+    /// Number of points selected.
+    pub n_source: usize,
+    /// What the stage returned.
+    pub outcome: &'a Outcome,
+}

@@ -1,0 +1,127 @@
+//! How a stage ended, and what it returns.
+
+use hicp_core::Isometry3;
+
+/// Why a stage ended. Ending is not an error: whatever the data, a stage returns a pose and says why it stopped there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Termination {
+    /// The loss stopped changing.
+    Converged,
+    /// The iteration limit was reached; the last evaluated pose is returned.
+    IterationLimit,
+    /// No pair was found, or every pair was filtered out (divergence rule 1, §IV-B).
+    NoPairs,
+    /// Fewer pairs than at the first or the previous iteration by more than the limit (divergence rule 2).
+    PairsLost,
+    /// The mean loss rose (divergence rule 3).
+    LossIncreased,
+    /// The pairs did not determine a step.
+    Degenerate,
+}
+
+impl Termination {
+    /// Returns whether the last candidate was rejected, so that an earlier pose was returned.
+    #[must_use]
+    pub fn is_rollback(self) -> bool {
+        matches!(
+            self,
+            Self::NoPairs | Self::PairsLost | Self::LossIncreased | Self::Degenerate
+        )
+    }
+
+    /// Name in traces and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::IterationLimit => "iteration_limit",
+            Self::NoPairs => "no_pairs",
+            Self::PairsLost => "pairs_lost",
+            Self::LossIncreased => "loss_increased",
+            Self::Degenerate => "degenerate",
+        }
+    }
+}
+
+impl std::fmt::Display for Termination {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What was found when the pairs of a pose were evaluated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evaluation {
+    /// Number of pairs after filtering.
+    pub n_pairs: usize,
+    /// Weighted mean of the metric's squared residuals, m². Comparable within one metric only.
+    pub mean_loss: f64,
+}
+
+/// Whether a stage moved the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The returned pose is a new one.
+    Refined,
+    /// The returned pose is the initial one, bit for bit, and this is why.
+    KeptInitial(Termination),
+}
+
+/// What a stage returns: a pose, and an honest account of it.
+///
+/// The pose was either evaluated (its pairs were found, counted and measured) or is the initial one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// The pose.
+    pub camera_from_object: Isometry3<f64>,
+    /// Why the stage ended; for a composed stage, why its last part did.
+    pub termination: Termination,
+    /// Whether the pose is a new one.
+    pub verdict: Verdict,
+    /// Number of evaluations (associate, filter, minimise), rejected ones included; summed over the parts of a composed stage.
+    pub iterations: usize,
+    /// Pairs and loss at the returned pose, by the last part that evaluated it; `None` if none did.
+    pub evaluation: Option<Evaluation>,
+}
+
+impl Outcome {
+    /// Returns the number of pairs at the returned pose, 0 if it was never evaluated.
+    #[must_use]
+    pub fn n_pairs(&self) -> usize {
+        self.evaluation.map_or(0, |e| e.n_pairs)
+    }
+
+    /// Makes the outcome of a stage that does nothing.
+    #[must_use]
+    pub fn kept(init: &Isometry3<f64>, termination: Termination) -> Self {
+        Self {
+            camera_from_object: *init,
+            termination,
+            verdict: Verdict::KeptInitial(termination),
+            iterations: 0,
+            evaluation: None,
+        }
+    }
+
+    /// Returns the outcome of this stage followed by another that started from its pose.
+    #[must_use]
+    pub fn then(self, next: Self) -> Self {
+        let moved = self.verdict == Verdict::Refined || next.verdict == Verdict::Refined;
+        Self {
+            camera_from_object: next.camera_from_object,
+            termination: next.termination,
+            verdict: if moved {
+                Verdict::Refined
+            } else {
+                Verdict::KeptInitial(next.termination)
+            },
+            iterations: self.iterations + next.iterations,
+            evaluation: match next.verdict {
+                // Both stand at the same pose.
+                Verdict::KeptInitial(_) => next.evaluation.or(self.evaluation),
+                Verdict::Refined => next.evaluation,
+            },
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! What a run borrows: scratch memory and an observer.
+
+use hicp_core::{Context, Correspondences, Problem, RenderCache, Renderer, Surfel};
+
+use crate::observer::Observer;
+
+/// Scratch memory and the render cache of one thread. Make one per thread and keep it: a warm run allocates nothing.
+#[derive(Debug)]
+pub struct Workspace {
+    pub(crate) renders: RenderCache,
+    pub(crate) source: Vec<Surfel>,
+    pub(crate) pairs: Correspondences,
+}
+
+impl Workspace {
+    /// Makes a workspace around a renderer.
+    pub fn new(renderer: impl Renderer + Send + 'static) -> Self {
+        Self {
+            renders: RenderCache::new(renderer),
+            source: Vec::new(),
+            pairs: Correspondences::new(),
+        }
+    }
+
+    /// Returns a problem as components see it, with this workspace's render cache.
+    pub fn context<'a>(&'a mut self, problem: &Problem<'a>) -> Context<'a> {
+        Context::new(*problem, &mut self.renders)
+    }
+
+    /// Number of renders made so far.
+    #[must_use]
+    pub fn renders(&self) -> u64 {
+        self.renders.renders()
+    }
+}
+
+/// One run's loan of a workspace and an observer; `&mut ()` observes nothing.
+pub struct Session<'a> {
+    /// Scratch memory.
+    pub workspace: &'a mut Workspace,
+    /// Who is told what happens.
+    pub observer: &'a mut dyn Observer,
+}
+
+impl<'a> Session<'a> {
+    /// Puts a workspace and an observer together.
+    pub fn new(workspace: &'a mut Workspace, observer: &'a mut dyn Observer) -> Self {
+        Self {
+            workspace,
+            observer,
+        }
+    }
+}
+
+impl std::fmt::Debug for Session<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Session")
+            .field("workspace", &self.workspace)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,27 @@
+//! The point-to-plane error metric.
+
+use hicp_core::Pair;
+
+use crate::metric::ErrorMetric;
+use crate::normal_equations::NormalEquations;
+
+/// E = (nᵀ (T o − c))² (§III-A.2; Chen & Medioni 1991), n the observed normal, by Gauss–Newton (Low 2004's rows).
+///
+/// Surfaces may slide along each other: directions that no normal constrains are damped and stay put.
+/// No step from fewer than six pairs. Cost: one pass to centre, one to sum, and a 6×6 Cholesky decomposition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PointToPlane;
+
+impl ErrorMetric for PointToPlane {
+    #[inline]
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let point = pair.source.point.cast::<f64>();
+        let normal = pair.target.normal.cast::<f64>().into_inner();
+        let residual = normal.dot(&(point - pair.target.point.cast::<f64>()));
+        system.add_row(&point, &normal, residual, f64::from(pair.weight));
+    }
+
+    fn name(&self) -> &'static str {
+        "point-to-plane"
+    }
+}

@@ -1,0 +1,107 @@
+//! The mean VSD estimate.
+
+use hicp_core::{Context, Isometry3};
+
+use crate::score::Score;
+use crate::tolerances::{AgreementCounts, N_TOLERANCES, mean};
+
+/// The mean VSD estimate (MVE) of §IV-A: VSD with the measured distances and the segmentation mask in the place of the true ones.
+///
+/// The mean over τ = 5 %…50 % of the diameter; 0 for a pose whose render is the image, 1 when nothing agrees or nothing is
+/// seen. It needs no ground truth: it is the score of a pose against the live image, and an uncertainty proxy.
+///
+/// Masked pixels without depth count in neither mask; they say nothing about the pose, and would put a floor under the
+/// score of every image with holes. An empty union is 1.
+///
+/// Cost: one render (shared with whoever else looks at this pose) and O(rendered pixels).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeanVsd {
+    /// When set, rendered pixels outside the mask that something observed hides by more than this many metres are not
+    /// counted against the pose (BOP's δ is 0.015). `None` is the paper's definition: everything rendered counts.
+    pub occlusion_tolerance: Option<f64>,
+}
+
+/// BOP's visibility tolerance δ, metres, for every dataset but ITODD.
+pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
+
+impl MeanVsd {
+    /// The definition of §IV-A: everything rendered counts.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            occlusion_tolerance: None,
+        }
+    }
+
+    /// Returns e(τ) for every tolerance.
+    pub fn errors(
+        &self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> [f64; N_TOLERANCES] {
+        let problem = context.problem;
+        let observation = problem.observation;
+        let (camera, depth, mask) = (
+            observation.camera(),
+            observation.depth().pixels(),
+            observation.mask().pixels(),
+        );
+        let image_width = observation.depth().width() as usize;
+        let view = context.view(camera_from_object);
+        let region = view.region();
+
+        let mut union = observation.n_measured() as u64;
+        let mut counts = AgreementCounts::new(problem.model.diameter());
+        let (inverse_fx, inverse_fy) = (1.0 / camera.fx(), 1.0 / camera.fy());
+        for (v, row) in (region.v_min..region.v_max).zip(view.depth().chunks(region.width().max(1)))
+        {
+            let y = (f64::from(v) - camera.cy()) * inverse_fy;
+            let start = v as usize * image_width + region.u_min as usize;
+            let observed = &depth[start..start + row.len()];
+            let masked = &mask[start..start + row.len()];
+            for (((u, rendered), observed), masked) in
+                (region.u_min..).zip(row).zip(observed).zip(masked)
+            {
+                if *rendered <= 0.0 {
+                    continue;
+                }
+                let (rendered, observed) = (f64::from(*rendered), f64::from(*observed));
+                let x = (f64::from(u) - camera.cx()) * inverse_fx;
+                if *masked {
+                    if observed > 0.0 {
+                        let distance_per_depth = (x * x + y * y + 1.0).sqrt();
+                        counts.add((rendered - observed).abs() * distance_per_depth);
+                    }
+                } else {
+                    let hidden = self.occlusion_tolerance.is_some_and(|tolerance| {
+                        let distance_per_depth = (x * x + y * y + 1.0).sqrt();
+                        observed > 0.0 && (rendered - observed) * distance_per_depth > tolerance
+                    });
+                    if !hidden {
+                        union += 1;
+                    }
+                }
+            }
+        }
+        counts.errors(union)
+    }
+}
+
+impl Default for MeanVsd {
+    /// Occlusion is recognised with BOP's tolerance.
+    fn default() -> Self {
+        Self {
+            occlusion_tolerance: Some(VISIBILITY_TOLERANCE_METERS),
+        }
+    }
+}
+
+impl Score for MeanVsd {
+    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        mean(&self.errors(context, camera_from_object))
+    }
+
+    fn name(&self) -> &'static str {
+        "mve"
+    }
+}

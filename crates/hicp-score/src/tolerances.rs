@@ -1,0 +1,66 @@
+//! The misalignment tolerances of VSD, and counting against them.
+
+/// Number of tolerances: 5 %, 10 %, …, 50 % of the diameter.
+pub const N_TOLERANCES: usize = 10;
+
+/// Returns the tolerances as fractions of the diameter, each as k · 0.05.
+#[must_use]
+pub fn tolerances() -> [f64; N_TOLERANCES] {
+    std::array::from_fn(|k| (k + 1) as f64 * 0.05)
+}
+
+/// Counts how many pixels agree within each tolerance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AgreementCounts {
+    tolerances: [f64; N_TOLERANCES],
+    /// `histogram[k]`: pixels whose smallest tolerance above the difference is the k-th; the last entry, pixels beyond all.
+    histogram: [u64; N_TOLERANCES + 1],
+    inverse_diameter: f64,
+}
+
+impl AgreementCounts {
+    pub(crate) fn new(diameter: f64) -> Self {
+        Self {
+            tolerances: tolerances(),
+            histogram: [0; N_TOLERANCES + 1],
+            inverse_diameter: 1.0 / diameter,
+        }
+    }
+
+    /// Adds a pixel of the intersection whose distances differ by `difference` ≥ 0.
+    #[inline]
+    pub(crate) fn add(&mut self, difference: f64) {
+        let relative = difference * self.inverse_diameter;
+        // A first guess that rounding may put one off, then the strict comparison that defines "correct".
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // Clamped, and NaN becomes 0.
+        let mut k = (relative * 20.0).clamp(0.0, N_TOLERANCES as f64) as usize;
+        while k > 0 && relative < self.tolerances[k - 1] {
+            k -= 1;
+        }
+        while k < N_TOLERANCES && relative >= self.tolerances[k] {
+            k += 1;
+        }
+        self.histogram[k] += 1;
+    }
+
+    /// Returns e(τ) for every tolerance: the share of the union that is not in the intersection or differs by τ or more.
+    ///
+    /// An empty union is an error of 1: nothing was seen where something should be.
+    pub(crate) fn errors(&self, union: u64) -> [f64; N_TOLERANCES] {
+        let mut correct = 0;
+        std::array::from_fn(|k| {
+            correct += self.histogram[k];
+            if union == 0 {
+                1.0
+            } else {
+                (union - correct) as f64 / union as f64
+            }
+        })
+    }
+}
+
+/// Returns the mean of the errors over the tolerances.
+pub(crate) fn mean(errors: &[f64; N_TOLERANCES]) -> f64 {
+    errors.iter().sum::<f64>() / N_TOLERANCES as f64
+}

@@ -1,0 +1,181 @@
+//! Visible Surface Discrepancy.
+
+use hicp_core::{Context, DistanceImage, Isometry3, Mask, RenderedView};
+
+use crate::error::ScoreError;
+use crate::score::Score;
+use crate::tolerances::{AgreementCounts, N_TOLERANCES, mean};
+
+/// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter, from distance maps and visibility masks.
+///
+/// A pixel of the union of the masks costs 0 when it is in both and the distances differ by strictly less than τ, else 1;
+/// e is the mean cost. An empty union gives 1. Distances and diameter in one unit, any. Symmetric in its two sides.
+/// Cost: O(pixels).
+///
+/// # Errors
+///
+/// [`ScoreError`] when the images are not all of one size, or the diameter is not finite and positive.
+pub fn vsd(
+    estimate: &DistanceImage,
+    estimate_mask: &Mask,
+    truth: &DistanceImage,
+    truth_mask: &Mask,
+    diameter: f64,
+) -> Result<[f64; N_TOLERANCES], ScoreError> {
+    if !(diameter.is_finite() && diameter > 0.0) {
+        return Err(ScoreError::Diameter { value: diameter });
+    }
+    let expected = (estimate.width(), estimate.height());
+    for (what, found) in [
+        (
+            "mask of the estimate",
+            (estimate_mask.width(), estimate_mask.height()),
+        ),
+        ("true distance image", (truth.width(), truth.height())),
+        ("true mask", (truth_mask.width(), truth_mask.height())),
+    ] {
+        if found != expected {
+            return Err(ScoreError::Size {
+                what,
+                found,
+                expected,
+            });
+        }
+    }
+    let mut counts = AgreementCounts::new(diameter);
+    let mut union = 0;
+    let estimates = estimate.pixels().iter().zip(estimate_mask.pixels());
+    let truths = truth.pixels().iter().zip(truth_mask.pixels());
+    for ((d_estimate, in_estimate), (d_truth, in_truth)) in estimates.zip(truths) {
+        if *in_estimate || *in_truth {
+            union += 1;
+        }
+        if *in_estimate && *in_truth {
+            counts.add((d_estimate - d_truth).abs());
+        }
+    }
+    Ok(counts.errors(union))
+}
+
+/// Returns BOP'19's visibility masks (V_est, V_gt) from the distances of the test image and of the two renders.
+///
+/// V_gt holds where the true surface is at most δ behind the measured one, or nothing was measured; V_est likewise, and
+/// wherever V_gt does and the estimate shows anything. Same unit throughout; 0 is "nothing".
+///
+/// # Errors
+///
+/// [`ScoreError`] when the images are not all of one size.
+pub fn visibility_masks(
+    test: &DistanceImage,
+    estimate: &DistanceImage,
+    truth: &DistanceImage,
+    delta: f64,
+) -> Result<(Mask, Mask), ScoreError> {
+    let expected = (test.width(), test.height());
+    for (what, image) in [
+        ("estimated distance image", estimate),
+        ("true distance image", truth),
+    ] {
+        let found = (image.width(), image.height());
+        if found != expected {
+            return Err(ScoreError::Size {
+                what,
+                found,
+                expected,
+            });
+        }
+    }
+    let visible =
+        |model: f64, test: f64| model > 0.0 && (test == 0.0 || in_front(model, test, delta));
+    let mut truth_mask = Vec::with_capacity(test.pixels().len());
+    let mut estimate_mask = Vec::with_capacity(test.pixels().len());
+    let renders = estimate.pixels().iter().zip(truth.pixels());
+    for (d_test, (d_estimate, d_truth)) in test.pixels().iter().zip(renders) {
+        let v_truth = visible(*d_truth, *d_test);
+        truth_mask.push(v_truth);
+        estimate_mask.push(visible(*d_estimate, *d_test) || (v_truth && *d_estimate > 0.0));
+    }
+    let (width, height) = expected;
+    // The vectors were filled from images of this size.
+    Ok((
+        Mask::new(width, height, estimate_mask)?,
+        Mask::new(width, height, truth_mask)?,
+    ))
+}
+
+/// The reference compares single-precision differences, and so decides ties as it does.
+#[allow(clippy::cast_possible_truncation)]
+fn in_front(model: f64, test: f64, delta: f64) -> bool {
+    f64::from(model as f32 - test as f32) <= delta
+}
+
+/// Mean VSD against a known true pose, over τ = 5 %…50 % of the diameter: the evaluation metric of §VI-A.2.
+///
+/// Both poses are rendered; the visibility masks are the silhouettes, as for an object that nothing occludes. 1 when
+/// neither pose shows anything. Cost: two renders (one when the true pose is still remembered) and O(rendered pixels).
+#[derive(Clone, Debug)]
+pub struct Vsd {
+    truth: Isometry3<f64>,
+    scratch: RenderedView,
+}
+
+impl Vsd {
+    /// Makes the score against a true pose.
+    #[must_use]
+    pub fn new(truth: Isometry3<f64>) -> Self {
+        Self {
+            truth,
+            scratch: RenderedView::default(),
+        }
+    }
+
+    /// The true pose.
+    #[must_use]
+    pub fn truth(&self) -> &Isometry3<f64> {
+        &self.truth
+    }
+
+    /// Returns e(τ) for every tolerance.
+    pub fn errors(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> [f64; N_TOLERANCES] {
+        let problem = context.problem;
+        let camera = problem.observation.camera();
+        // The cache hands out one view at a time, so the truth's is copied.
+        self.scratch.copy_from(context.view(&self.truth));
+        let truth = &self.scratch;
+        let estimate = context.view(camera_from_object);
+        let mut union = truth.depth().iter().filter(|z| **z > 0.0).count() as u64;
+        let mut counts = AgreementCounts::new(problem.model.diameter());
+        let region = estimate.region();
+        let mut depths = estimate.depth().iter();
+        for v in region.v_min..region.v_max {
+            for u in region.u_min..region.u_max {
+                let z = depths.next().copied().unwrap_or(0.0);
+                if z <= 0.0 {
+                    continue;
+                }
+                let z_true = truth.depth_at(u, v);
+                if z_true > 0.0 {
+                    let difference = (f64::from(z) - f64::from(z_true)).abs();
+                    counts.add(difference * camera.distance_per_depth(f64::from(u), f64::from(v)));
+                } else {
+                    union += 1;
+                }
+            }
+        }
+        counts.errors(union)
+    }
+}
+
+impl Score for Vsd {
+    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        mean(&self.errors(context, camera_from_object))
+    }
+
+    fn name(&self) -> &'static str {
+        "vsd"
+    }
+}

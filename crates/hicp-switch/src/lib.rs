@@ -1,0 +1,29 @@
+//! Dynamic Switching: the trait [`Switcher`], the [`Threshold`] on a score, and the stage [`Switch`] that runs what was chosen.
+//!
+//! **Should you use this crate?** To choose between ICP stages by the image, yes. To refine poses with one call, use `hybrid-icp`.
+//!
+//! ```
+//! use hicp_icp::Stage;
+//! use hicp_score::MeanVsd;
+//! use hicp_switch::{PAPER_ALPHA, Switch, Threshold};
+//!
+//! /// Dynamic Switching between any two stages.
+//! fn switching(aligned: impl Stage, misaligned: impl Stage) -> impl Stage {
+//!     Switch {
+//!         switcher: Threshold { score: MeanVsd::paper(), alpha: PAPER_ALPHA },
+//!         aligned,
+//!         misaligned,
+//!     }
+//! }
+//! ```
+//!
+//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stage).
+
+mod switch;
+mod switcher;
+mod threshold;
+
+pub use hicp_icp::{Regime, RegimeEvent};
+pub use switch::Switch;
+pub use switcher::Switcher;
+pub use threshold::{PAPER_ALPHA, Threshold};

@@ -1,0 +1,49 @@
+//! The trait of switchers.
+
+use hicp_core::{Context, Isometry3, type_label};
+use hicp_icp::{Regime, RegimeEvent};
+
+/// Decides from the image which regime the current estimate is in (Dynamic Switching, §IV-A).
+///
+/// Pure: equal inputs give equal answers; `&mut self` is scratch.
+pub trait Switcher {
+    /// Judges a pose.
+    fn regime(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> RegimeEvent;
+
+    /// Name in traces.
+    fn name(&self) -> &'static str {
+        type_label::<Self>()
+    }
+}
+
+impl<T: Switcher + ?Sized> Switcher for Box<T> {
+    fn regime(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> RegimeEvent {
+        (**self).regime(context, camera_from_object)
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+}
+
+/// Always the same regime: switches Dynamic Switching off.
+impl Switcher for Regime {
+    fn regime(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> RegimeEvent {
+        RegimeEvent {
+            regime: *self,
+            score: None,
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        Regime::name(*self)
+    }
+}

@@ -1,0 +1,41 @@
+//! Switching on a score's threshold.
+
+use hicp_core::{Context, Isometry3};
+use hicp_icp::{Regime, RegimeEvent};
+use hicp_score::Score;
+
+use crate::switcher::Switcher;
+
+/// Misaligned when a score is α or more, aligned below: Dynamic Switching with the MVE as the score (§IV-A).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Threshold<S> {
+    /// The score, higher is worse.
+    pub score: S,
+    /// The threshold; the paper's is [`PAPER_ALPHA`].
+    pub alpha: f64,
+}
+
+/// The threshold on the MVE that the paper found to generalise (§IV-A.2).
+pub const PAPER_ALPHA: f64 = 0.4;
+
+impl<S: Score> Switcher for Threshold<S> {
+    fn regime(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> RegimeEvent {
+        let score = self.score.score(context, camera_from_object);
+        RegimeEvent {
+            regime: if score >= self.alpha {
+                Regime::Misaligned
+            } else {
+                Regime::Aligned
+            },
+            score: Some(score),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "threshold"
+    }
+}
