@@ -60,8 +60,8 @@ pub use label::type_label;
 pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, TriMesh};
 pub use model::{Model, ModelConfig};
 pub use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point2, Point3, Translation3, UnitQuaternion, UnitVector3,
-    Vector3, Vector6,
+    Isometry3, Matrix3, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,
+    UnitVector3, Vector3, Vector6,
 };
 pub use observation::Observation;
 pub use problem::{Context, Problem};

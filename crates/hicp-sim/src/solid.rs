@@ -1,0 +1,201 @@
+//! Closed triangle meshes from profiles and polygons.
+//!
+//! Every builder makes a closed, outward-facing part in metres; a [`Solid`] collects parts, which may overlap.
+
+use hicp_core::{Isometry3, MeshError, Point3, TriMesh, Vector3};
+
+/// A collection of closed parts.
+#[derive(Clone, Debug, Default)]
+pub struct Solid {
+    vertices: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Solid {
+    /// Makes a solid without parts.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds every part of another solid, moved by `pose`.
+    #[must_use]
+    pub fn with(mut self, other: &Self, pose: &Isometry3<f64>) -> Self {
+        let offset = to_index(self.vertices.len());
+        self.vertices
+            .extend(other.vertices.iter().map(|p| pose * p));
+        self.triangles
+            .extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
+        self
+    }
+
+    /// Makes the mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshError`] when there is no part, or its sizes are not finite.
+    pub fn to_mesh(&self) -> Result<TriMesh, MeshError> {
+        TriMesh::new(
+            self.vertices.iter().map(|p| p.cast::<f32>()).collect(),
+            self.triangles.clone(),
+        )
+    }
+
+    /// Makes a cuboid about the origin with the given side lengths, each face divided into `divisions`² cells.
+    #[must_use]
+    pub fn cuboid(sides: Vector3<f64>, divisions: usize) -> Self {
+        let mut solid = Self::new();
+        let half = sides / 2.0;
+        // Every face: its outward axis and two in-plane axes with axis = first × second.
+        for (axis, first, second) in [
+            (Vector3::x(), Vector3::y(), Vector3::z()),
+            (Vector3::y(), Vector3::z(), Vector3::x()),
+            (Vector3::z(), Vector3::x(), Vector3::y()),
+            (-Vector3::x(), Vector3::z(), Vector3::y()),
+            (-Vector3::y(), Vector3::x(), Vector3::z()),
+            (-Vector3::z(), Vector3::y(), Vector3::x()),
+        ] {
+            let corner = |i: usize, j: usize| {
+                let at = |k: usize| 2.0 * k as f64 / divisions as f64 - 1.0;
+                Point3::from((axis + first * at(i) + second * at(j)).component_mul(&half))
+            };
+            solid.grid(divisions, divisions, corner);
+        }
+        solid
+    }
+
+    /// Turns a closed profile of (radius, height) points about the z axis.
+    ///
+    /// The profile runs so that the material lies to its left seen with the radius to the right and the height up (counter-clockwise around the
+    /// material); points of radius 0 lie on the axis. `steps` is the number of segments around.
+    #[must_use]
+    pub fn lathe(profile: &[(f64, f64)], steps: usize) -> Self {
+        let mut solid = Self::new();
+        let angle = |j: usize| std::f64::consts::TAU * (j % steps) as f64 / steps as f64;
+        for (i, &from) in profile.iter().enumerate() {
+            let to = profile[(i + 1) % profile.len()];
+            if from.0 == 0.0 && to.0 == 0.0 {
+                continue;
+            }
+            let point = |end: usize, j: usize| {
+                let (r, z) = if end == 0 { from } else { to };
+                let (s, c) = angle(j).sin_cos();
+                Point3::new(r * c, r * s, z)
+            };
+            solid.grid(1, steps, |end, j| point(1 - end, j));
+        }
+        solid
+    }
+
+    /// Extrudes a simple polygon, counter-clockwise in x and y and star-shaped about its centroid or `kernel`, from z = −height/2 to height/2.
+    #[must_use]
+    pub fn prism(polygon: &[(f64, f64)], kernel: (f64, f64), height: f64, layers: usize) -> Self {
+        let mut solid = Self::new();
+        let n = polygon.len();
+        let z = |layer: usize| height * (layer as f64 / layers as f64 - 0.5);
+        let point = |i: usize, layer: usize| {
+            let (x, y) = polygon[i % n];
+            Point3::new(x, y, z(layer))
+        };
+        for i in 0..n {
+            solid.grid(1, layers, |end, layer| point(i + end, layer));
+            let (top, bottom) = (
+                Point3::new(kernel.0, kernel.1, z(layers)),
+                Point3::new(kernel.0, kernel.1, z(0)),
+            );
+            solid.triangle([top, point(i, layers), point(i + 1, layers)]);
+            solid.triangle([bottom, point(i + 1, 0), point(i, 0)]);
+        }
+        solid
+    }
+
+    /// Sweeps a circle of radius `tube` along a path and closes its ends with flat caps.
+    #[must_use]
+    pub fn sweep(path: &[Point3<f64>], tube: f64, steps: usize) -> Self {
+        let mut solid = Self::new();
+        let last = path.len() - 1;
+        let ring = |i: usize, j: usize| {
+            let tangent = (path[(i + 1).min(last)] - path[i.saturating_sub(1)]).normalize();
+            // The paths used here never run along this axis.
+            let side = tangent.cross(&Vector3::y()).normalize();
+            let up = side.cross(&tangent);
+            let (s, c) = (std::f64::consts::TAU * (j % steps) as f64 / steps as f64).sin_cos();
+            path[i] + (side * c + up * s) * tube
+        };
+        solid.grid(last, steps, ring);
+        for j in 0..steps {
+            solid.triangle([path[0], ring(0, j), ring(0, j + 1)]);
+            solid.triangle([path[last], ring(last, j + 1), ring(last, j)]);
+        }
+        solid
+    }
+
+    /// Adds a grid of quads; with i to the right and j up the outside is toward the viewer.
+    fn grid(&mut self, n_i: usize, n_j: usize, point: impl Fn(usize, usize) -> Point3<f64>) {
+        for i in 0..n_i {
+            for j in 0..n_j {
+                let corners = [
+                    point(i, j),
+                    point(i + 1, j),
+                    point(i + 1, j + 1),
+                    point(i, j + 1),
+                ];
+                self.triangle([corners[0], corners[1], corners[2]]);
+                self.triangle([corners[0], corners[2], corners[3]]);
+            }
+        }
+    }
+
+    /// Adds a triangle unless two of its corners coincide (at the axis of a lathe).
+    fn triangle(&mut self, corners: [Point3<f64>; 3]) {
+        let [a, b, c] = corners.map(|p| p.cast::<f32>());
+        if a == b || b == c || c == a {
+            return;
+        }
+        let first = to_index(self.vertices.len());
+        self.vertices.extend(corners);
+        self.triangles.push([first, first + 1, first + 2]);
+    }
+}
+
+/// Indices of generated meshes are far below 2³².
+fn to_index(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hicp_core::Facing;
+
+    fn facing(solid: &Solid) -> Facing {
+        solid.to_mesh().unwrap().facing()
+    }
+
+    #[test]
+    fn every_builder_makes_a_closed_outward_part() {
+        let cuboid = Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 3);
+        assert_eq!(facing(&cuboid), Facing::Outward, "cuboid");
+        let cylinder = Solid::lathe(&[(0.0, 0.0), (0.1, 0.0), (0.1, 0.2), (0.0, 0.2)], 12);
+        assert_eq!(facing(&cylinder), Facing::Outward, "lathe");
+        let square = [(0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1)];
+        let prism = Solid::prism(&square, (0.05, 0.05), 0.2, 2);
+        assert_eq!(facing(&prism), Facing::Outward, "prism");
+        let path: Vec<_> = (0..5)
+            .map(|i| Point3::new(0.05 * f64::from(i), 0.0, 0.01))
+            .collect();
+        let rod = Solid::sweep(&path, 0.01, 8);
+        assert_eq!(facing(&rod), Facing::Outward, "sweep");
+    }
+
+    #[test]
+    fn volumes_are_those_of_the_shapes() {
+        let mesh = Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 4)
+            .to_mesh()
+            .unwrap();
+        assert!((mesh.area() - 2.0 * (0.02 + 0.03 + 0.06)).abs() < 1e-6);
+        let cylinder = Solid::lathe(&[(0.0, 0.0), (0.1, 0.0), (0.1, 0.2), (0.0, 0.2)], 400);
+        let exact = std::f64::consts::TAU * (0.1 * 0.2 + 0.1 * 0.1);
+        assert!((cylinder.to_mesh().unwrap().area() - exact).abs() < 1e-4 * exact);
+    }
+}
