@@ -1,0 +1,68 @@
+//! A software rasterizer: depth and visible triangle of a mesh at a pose.
+//!
+//! [`Rasterizer`] implements [`hicp_core::Renderer`] on the CPU. It is made for what pose refinement asks for, thousands
+//! of times: one mesh of some thousand triangles that covers a small part of the image. Work is proportional to the mesh
+//! and the pixels it covers, and a warm rasterizer allocates nothing.
+//!
+//! # Should I use this crate?
+//!
+//! Yes, to render depth or visible triangles of a mesh without a GPU, in a result that is the same on every run and every
+//! machine. No, for colour, texture, anti-aliasing, lens distortion or transparency: there is none of that here.
+//!
+//! # What is exact and what is not
+//!
+//! - Pixel (u, v) samples the ray through ((u−cx)/fx, (v−cy)/fy, 1). A [`hicp_core::PinholeCamera`] has its pixel centres
+//!   at integers whatever convention its calibration was stated in (see [`hicp_core::PixelCenters`]), so there is no half
+//!   pixel to add here.
+//! - Coverage is decided in integers: projected vertices are rounded to a grid of 2⁻²⁰ pixel, and edge functions are exact
+//!   from there on. Triangles that share an edge leave no gap and never both cover a pixel, by the top-left rule.
+//! - Depth comes from the plane through the vertices as they were before rounding, in `f64`, and is rounded to `f32` once.
+//! - The bits of a pixel do not depend on the requested region, on what was rendered before, or on the order of triangles
+//!   (where two triangles give the same depth, the one that comes first in the mesh is named).
+//!
+//! # Example
+//!
+//! ```
+//! use hicp_core::{Isometry3, PinholeCamera, Point3, RenderedView, Renderer, TriMesh};
+//! use hicp_raster::Rasterizer;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mesh = TriMesh::new(
+//!     vec![
+//!         Point3::new(-0.1, -0.1, 0.0),
+//!         Point3::new(0.1, -0.1, 0.0),
+//!         Point3::new(0.0, 0.1, 0.0),
+//!     ],
+//!     vec![[0, 1, 2]],
+//! )?;
+//! let camera = PinholeCamera::new(600.0, 600.0, 319.5, 239.5, 640, 480)?;
+//! let camera_from_object = Isometry3::translation(0.0, 0.0, 0.5);
+//!
+//! let mut rasterizer = Rasterizer::default();
+//! let mut view = RenderedView::default();
+//! rasterizer.render(&mesh, &camera, &camera_from_object, &camera.region(), &mut view);
+//!
+//! assert_eq!(view.depth_at(320, 240), 0.5);
+//! assert_eq!(view.depth_at(0, 0), 0.0);
+//! assert!(view.region().area() < 250 * 250); // only what the triangle can cover
+//! # Ok(()) }
+//! ```
+//!
+//! # Modules, in reading order
+//!
+//! `rasterizer` (the triangle loop), `projection` (vertices to pixels), `region` (what a mesh can cover), `fixed` (the
+//! sub-pixel grid), `edge` (exact coverage), `clip` (near plane and guard band), `fill` (depth of covered pixels),
+//! `image` (a whole image in one call).
+
+mod clip;
+mod edge;
+mod fill;
+mod fixed;
+mod image;
+mod projection;
+mod rasterizer;
+mod region;
+
+pub use image::render_depth_image;
+pub use rasterizer::{Culling, DEFAULT_NEAR_METERS, RasterConfig, Rasterizer};
+pub use region::projected_region;
