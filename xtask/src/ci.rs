@@ -14,7 +14,15 @@ pub(crate) fn run(root: &Path) -> Findings {
     cargo(
         root,
         "clippy",
-        &["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"],
+        &[
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--quiet",
+            "--",
+            "-D",
+            "warnings",
+        ],
         &none,
     )?;
     step("tidy", || tidy::run(root))?;
@@ -34,7 +42,13 @@ pub(crate) fn run(root: &Path) -> Findings {
     cargo(
         root,
         "association without the k-d tree",
-        &["check", "--package", "hicp-association", "--no-default-features", "--quiet"],
+        &[
+            "check",
+            "--package",
+            "hicp-association",
+            "--no-default-features",
+            "--quiet",
+        ],
         &none,
     )?;
     readme(root)
@@ -52,7 +66,9 @@ fn readme(root: &Path) -> Findings {
     for command in commands.iter().filter(|c| !c.starts_with("cargo test")) {
         let words: Vec<&str> = command.split_whitespace().skip(1).collect();
         if !command.starts_with("cargo ") {
-            return Err(vec![format!("README.md: cannot run {command:?}, expected a cargo command")]);
+            return Err(vec![format!(
+                "README.md: cannot run {command:?}, expected a cargo command"
+            )]);
         }
         let none: [(&str, &str); 0] = [];
         cargo(root, command, &words, &none)?;

@@ -10,7 +10,8 @@ const MARK: &str = "// Deviation:";
 
 /// Writes the document.
 pub(crate) fn bless(root: &Path) -> Findings {
-    std::fs::write(root.join(FILE), document(root)).map_err(|error| vec![format!("{FILE}: {error}")])
+    std::fs::write(root.join(FILE), document(root))
+        .map_err(|error| vec![format!("{FILE}: {error}")])
 }
 
 /// Checks that the document is what [`bless`] would write.
@@ -19,7 +20,9 @@ pub(crate) fn check(root: &Path) -> Vec<String> {
     if written == document(root) {
         Vec::new()
     } else {
-        vec![format!("{FILE} is not what the code says: run `cargo xtask bless`")]
+        vec![format!(
+            "{FILE} is not what the code says: run `cargo xtask bless`"
+        )]
     }
 }
 

@@ -51,7 +51,12 @@ pub(crate) fn run(root: &Path) -> Findings {
 /// The layer table, and the libraries that stay inside one crate.
 fn layers(root: &Path) -> Vec<String> {
     let mut findings = Vec::new();
-    let level_of = |name: &str| LAYERS.iter().find(|(n, _)| *n == name).map(|(_, level)| *level);
+    let level_of = |name: &str| {
+        LAYERS
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map(|(_, level)| *level)
+    };
     let mut found: Vec<String> = std::fs::read_dir(root.join("crates"))
         .map(|entries| {
             entries
@@ -64,12 +69,16 @@ fn layers(root: &Path) -> Vec<String> {
     for name in &found {
         let manifest = format!("crates/{name}/Cargo.toml");
         let Some(level) = level_of(name) else {
-            findings.push(format!("{manifest}: {name} is not in the layer table of xtask/src/tidy.rs"));
+            findings.push(format!(
+                "{manifest}: {name} is not in the layer table of xtask/src/tidy.rs"
+            ));
             continue;
         };
         let text = std::fs::read_to_string(root.join(&manifest)).unwrap_or_default();
         if !text.contains(&format!("name = \"{name}\"")) {
-            findings.push(format!("{manifest}: the package is not named like its folder"));
+            findings.push(format!(
+                "{manifest}: the package is not named like its folder"
+            ));
         }
         for dependency in dependencies(&text) {
             match level_of(&dependency) {
@@ -116,7 +125,9 @@ fn crate_documentation(root: &Path) -> Vec<String> {
         };
         for wanted in ["Should you use this crate?", "//! ```", "reading order"] {
             if !text.contains(wanted) {
-                findings.push(format!("{file}: the crate's documentation lacks {wanted:?}"));
+                findings.push(format!(
+                    "{file}: the crate's documentation lacks {wanted:?}"
+                ));
             }
         }
     }

@@ -130,10 +130,10 @@ where
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
-            verdict: if pose == *init {
-                Verdict::KeptInitial(termination)
-            } else {
+            verdict: if accepted.is_some_and(|(pose, _)| pose != *init) {
                 Verdict::Refined
+            } else {
+                Verdict::KeptInitial(termination)
             },
             iterations: iteration,
             evaluation: accepted.map(|(_, evaluation)| evaluation),

@@ -1,0 +1,71 @@
+//! Refine 6D object poses in depth images.
+//!
+//! A detector gives a segmentation mask and a rough pose; [`Refiner`] makes it a better one and says how well it explains
+//! the image. The default pipeline is Hybrid ICP (Dreczkowski & Johns), which looks at the image to decide how to register;
+//! it and the eight classical variants it was compared with are [`Preset`]s, and every part they are made of is public.
+//!
+//! **Should you use this crate?** Yes: it re-exports the crates below it. Depend on one of those alone only if you write a
+//! component and want few dependencies. Files (meshes, PNGs, BOP datasets) are read by `hicp-io`.
+//!
+//! Hybrid ICP is one configured pipeline:
+//!
+//! ```
+//! use hybrid_icp::{
+//!     AllSamples, Cascade, Convergence, Divergence, Icp, IterationLimit, MeanVsd, NearestNeighbor, PointToPlane,
+//!     PointToPoint, Projective, Refiner, Repeat, Switch, Threshold, VisibleSurface,
+//! };
+//!
+//! let stop = (Divergence::strict(), Convergence::default(), IterationLimit(50));
+//! let visible = VisibleSurface::default();
+//! let nearest = NearestNeighbor::default();
+//! let hybrid = Repeat {
+//!     times: 2,
+//!     stage: Switch {
+//!         switcher: Threshold { score: MeanVsd::default(), alpha: 0.4 },
+//!         aligned: Cascade((
+//!             Icp { selection: visible, association: Projective, filter: (), metric: PointToPoint, stop },
+//!             Icp { selection: visible, association: Projective, filter: (), metric: PointToPlane, stop },
+//!         )),
+//!         misaligned: Icp { selection: AllSamples, association: nearest, filter: (), metric: PointToPoint, stop },
+//!     },
+//! };
+//! let refiner = Refiner::new(hybrid);
+//! # let _ = refiner;
+//! ```
+//!
+//! Conventions: metres, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
+//! right and y down; pixel centres are at integers.
+//!
+//! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), `refiner` (one call), `trace` (what ran).
+
+mod preset;
+pub mod presets;
+mod refiner;
+mod trace;
+
+pub use hicp_association::{
+    AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
+    PointSelection, Projective, Stride, VisibleSurface,
+};
+pub use hicp_core::{
+    CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
+    ImageError, Isometry3, Mask, Matrix3, Matrix6, MeshError, Model, ModelConfig, Mover,
+    NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2, Point3,
+    Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries, SymmetryAxis,
+    SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3, Vector6,
+    rotation_from_matrix, se3, so3,
+};
+pub use hicp_icp::{
+    Cascade, Convergence, Divergence, Evaluation, Icp, IterationEvent, IterationLimit, LossRule,
+    Observer, Outcome, Progress, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
+    Termination, Verdict, Workspace,
+};
+pub use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
+pub use hicp_raster::Rasterizer;
+pub use hicp_score::{
+    MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,
+};
+pub use hicp_switch::{PAPER_ALPHA, Switch, Switcher, Threshold};
+pub use preset::{BoxedStage, Preset, UnknownPreset};
+pub use refiner::{Refinement, Refiner};
+pub use trace::{StageRecord, Trace};

@@ -1,0 +1,188 @@
+//! Presets by name.
+
+use std::str::FromStr;
+
+use hicp_icp::Stage;
+use thiserror::Error;
+
+use crate::presets;
+
+/// A pipeline behind a box, as it is read from a name: the same code and the same bits as the literal.
+pub type BoxedStage = Box<dyn Stage + Send>;
+
+/// A pipeline that ships with the library: Hybrid ICP or one of the eight baselines, by its name in the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Preset {
+    /// [`presets::hybrid`].
+    Hybrid,
+    /// [`presets::projective_point_to_point`].
+    ProjectivePointToPoint,
+    /// [`presets::projective_point_to_plane`].
+    ProjectivePointToPlane,
+    /// [`presets::projective_cascade_point_plane`].
+    ProjectiveCascadePointPlane,
+    /// [`presets::projective_cascade_plane_point`].
+    ProjectiveCascadePlanePoint,
+    /// [`presets::nn_point_to_point`].
+    NnPointToPoint,
+    /// [`presets::nn_point_to_plane`].
+    NnPointToPlane,
+    /// [`presets::nn_cascade_point_plane`].
+    NnCascadePointPlane,
+    /// [`presets::nn_cascade_plane_point`].
+    NnCascadePlanePoint,
+}
+
+impl Preset {
+    /// Every preset, Hybrid ICP first.
+    pub const ALL: [Self; 9] = [
+        Self::Hybrid,
+        Self::ProjectivePointToPoint,
+        Self::ProjectivePointToPlane,
+        Self::ProjectiveCascadePointPlane,
+        Self::ProjectiveCascadePlanePoint,
+        Self::NnPointToPoint,
+        Self::NnPointToPlane,
+        Self::NnCascadePointPlane,
+        Self::NnCascadePlanePoint,
+    ];
+
+    /// Name on the command line and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::ProjectivePointToPoint => "projective-point-to-point",
+            Self::ProjectivePointToPlane => "projective-point-to-plane",
+            Self::ProjectiveCascadePointPlane => "projective-cascade-point-plane",
+            Self::ProjectiveCascadePlanePoint => "projective-cascade-plane-point",
+            Self::NnPointToPoint => "nn-point-to-point",
+            Self::NnPointToPlane => "nn-point-to-plane",
+            Self::NnCascadePointPlane => "nn-cascade-point-plane",
+            Self::NnCascadePlanePoint => "nn-cascade-plane-point",
+        }
+    }
+
+    /// One line about it.
+    #[must_use]
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Hybrid => {
+                "Hybrid ICP: twice, by the MVE, the projective cascade (below 0.4) or nn-point-to-point"
+            }
+            Self::ProjectivePointToPoint => "visible surface, projective pairs, point-to-point",
+            Self::ProjectivePointToPlane => "visible surface, projective pairs, point-to-plane",
+            Self::ProjectiveCascadePointPlane => {
+                "Cascading ICP: projective point-to-point, then projective point-to-plane"
+            }
+            Self::ProjectiveCascadePlanePoint => {
+                "projective point-to-plane, then projective point-to-point"
+            }
+            Self::NnPointToPoint => "whole surface, nearest neighbours, point-to-point",
+            Self::NnPointToPlane => "whole surface, nearest neighbours, point-to-plane",
+            Self::NnCascadePointPlane => {
+                "nearest-neighbour point-to-point, then nearest-neighbour point-to-plane"
+            }
+            Self::NnCascadePlanePoint => {
+                "nearest-neighbour point-to-plane, then nearest-neighbour point-to-point"
+            }
+        }
+    }
+
+    /// Builds the pipeline.
+    #[must_use]
+    pub fn build(self) -> BoxedStage {
+        match self {
+            Self::Hybrid => Box::new(presets::hybrid()),
+            Self::ProjectivePointToPoint => Box::new(presets::projective_point_to_point()),
+            Self::ProjectivePointToPlane => Box::new(presets::projective_point_to_plane()),
+            Self::ProjectiveCascadePointPlane => {
+                Box::new(presets::projective_cascade_point_plane())
+            }
+            Self::ProjectiveCascadePlanePoint => {
+                Box::new(presets::projective_cascade_plane_point())
+            }
+            Self::NnPointToPoint => Box::new(presets::nn_point_to_point()),
+            Self::NnPointToPlane => Box::new(presets::nn_point_to_plane()),
+            Self::NnCascadePointPlane => Box::new(presets::nn_cascade_point_plane()),
+            Self::NnCascadePlanePoint => Box::new(presets::nn_cascade_plane_point()),
+        }
+    }
+}
+
+impl std::fmt::Display for Preset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no preset has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "no pipeline is named {name:?}; did you mean {suggestion:?}? The names are: {}",
+    names()
+)]
+pub struct UnknownPreset {
+    /// The name given.
+    pub name: String,
+    /// The name nearest to it.
+    pub suggestion: &'static str,
+}
+
+fn names() -> String {
+    Preset::ALL.map(Preset::name).join(", ")
+}
+
+impl FromStr for Preset {
+    type Err = UnknownPreset;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPreset> {
+        if let Some(preset) = Self::ALL.into_iter().find(|p| p.name() == name) {
+            return Ok(preset);
+        }
+        let suggestion = Self::ALL
+            .map(Self::name)
+            .into_iter()
+            .min_by_key(|candidate| edit_distance(candidate, name))
+            .unwrap_or("hybrid");
+        Err(UnknownPreset {
+            name: name.to_owned(),
+            suggestion,
+        })
+    }
+}
+
+/// Levenshtein distance in bytes.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.bytes().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.bytes().enumerate() {
+            let substituted = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_reads_back() {
+        for preset in Preset::ALL {
+            assert_eq!(preset.name().parse(), Ok(preset));
+        }
+    }
+
+    #[test]
+    fn a_misspelt_name_is_answered_with_the_nearest() {
+        let error = "nn-point-to-plan".parse::<Preset>().unwrap_err();
+        assert_eq!(error.suggestion, "nn-point-to-plane");
+        assert!(error.to_string().contains("projective-cascade-plane-point"));
+    }
+}

@@ -1,0 +1,132 @@
+//! One call from an observation and a rough pose to a pose with its score.
+
+use hicp_core::{Isometry3, Model, Observation, Problem};
+use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
+use hicp_raster::Rasterizer;
+use hicp_score::{MeanVsd, Score};
+
+use crate::preset::{BoxedStage, Preset};
+
+/// What a refinement returns: a pose, how it came about, and how well it explains the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// The pose (`outcome.camera_from_object`), why the pipeline ended, and the numbers at that pose.
+    pub outcome: Outcome,
+    /// The mean VSD estimate of the initial pose: 0 agrees with the image everywhere, 1 nowhere.
+    pub mve_initial: f64,
+    /// The mean VSD estimate of the returned pose.
+    ///
+    /// Above about 0.4 the pose is not to be trusted; above `mve_initial` the refinement made it worse.
+    pub mve: f64,
+}
+
+/// A pipeline with its scratch memory and renderer: make one per thread, use it for any number of refinements.
+///
+/// ```
+/// use hybrid_icp::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Preset, Refiner, TriMesh};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
+/// let plate = vec![
+///     Point3::new(-0.1, -0.1, 0.0), Point3::new(0.1, -0.1, 0.0), Point3::new(0.1, 0.1, 0.0), Point3::new(-0.1, 0.1, 0.0),
+/// ];
+/// let model = Model::new(TriMesh::new(plate, vec![[0, 2, 1], [0, 3, 2]])?);
+/// // The plate stands half a metre in front of the camera; the detector is four centimetres off.
+/// let depth = (0..64 * 64).map(|i| if (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64)) { 0.5 } else { 0.0 });
+/// let depth = DepthImage::from_meters(64, 64, depth.collect())?;
+/// let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
+/// let observation = Observation::new(depth, mask, camera)?;
+/// let init = Isometry3::translation(0.0, 0.0, 0.54);
+///
+/// let refined = Refiner::preset(Preset::Hybrid).refine(&model, &observation, &init);
+/// assert!((refined.outcome.camera_from_object.translation.z - 0.5).abs() < 1e-4);
+/// assert!(refined.mve < refined.mve_initial);
+/// # Ok(()) }
+/// ```
+pub struct Refiner {
+    stage: BoxedStage,
+    workspace: Workspace,
+    score: MeanVsd,
+}
+
+impl Refiner {
+    /// Makes a refiner from any stage.
+    pub fn new(stage: impl Stage + Send + 'static) -> Self {
+        Self::boxed(Box::new(stage))
+    }
+
+    /// Makes a refiner from a preset.
+    #[must_use]
+    pub fn preset(preset: Preset) -> Self {
+        Self::boxed(preset.build())
+    }
+
+    /// Makes a refiner from a boxed stage.
+    #[must_use]
+    pub fn boxed(stage: BoxedStage) -> Self {
+        Self {
+            stage,
+            workspace: Workspace::new(Rasterizer::default()),
+            score: MeanVsd::default(),
+        }
+    }
+
+    /// Refines a pose (`camera_from_object`, metres).
+    ///
+    /// Never fails on data: no overlap, degenerate geometry and the like end with an outcome that says so, and the initial
+    /// pose. Deterministic. Cost: the pipeline's, and one render for the final score.
+    pub fn refine(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        init: &Isometry3<f64>,
+    ) -> Refinement {
+        self.refine_observed(model, observation, init, &mut ())
+    }
+
+    /// Refines a pose and tells an observer what happens on the way.
+    pub fn refine_observed(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        init: &Isometry3<f64>,
+        observer: &mut dyn Observer,
+    ) -> Refinement {
+        let problem = Problem::new(model, observation);
+        let mve_initial = self.mve(model, observation, init);
+        let outcome = self.stage.run(
+            &problem,
+            init,
+            &mut Session::new(&mut self.workspace, observer),
+        );
+        Refinement {
+            outcome,
+            mve_initial,
+            mve: self.mve(model, observation, &outcome.camera_from_object),
+        }
+    }
+
+    /// Returns the mean VSD estimate of a pose: 0 agrees with the image everywhere, 1 nowhere.
+    pub fn mve(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        camera_from_object: &Isometry3<f64>,
+    ) -> f64 {
+        let problem = Problem::new(model, observation);
+        self.score
+            .score(&mut self.workspace.context(&problem), camera_from_object)
+    }
+
+    /// The scratch memory and render cache, for scores and renders of one's own.
+    pub fn workspace_mut(&mut self) -> &mut Workspace {
+        &mut self.workspace
+    }
+}
+
+impl std::fmt::Debug for Refiner {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Refiner")
+            .field("workspace", &self.workspace)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,92 @@
+//! Scenes that the cross-crate tests share.
+
+use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
+use hybrid_icp::{
+    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
+    Symmetries, Workspace, se3,
+};
+
+/// A model seen in a depth image, and where it truly is.
+#[derive(Debug)]
+pub struct Scene {
+    /// The object.
+    pub model: Model,
+    /// The image.
+    pub observation: Observation,
+    /// The true pose, camera from object.
+    pub truth: Isometry3<f64>,
+}
+
+/// The camera of the synthetic scenes: 640×480, 60° wide.
+pub fn camera() -> PinholeCamera {
+    PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480).expect("a valid camera")
+}
+
+/// Renders a model at a pose into a depth image of the whole camera, with the mask of its pixels.
+pub fn render(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> (DepthImage, Mask) {
+    let nothing = DepthImage::from_meters(
+        camera.width(),
+        camera.height(),
+        vec![0.0; (camera.width() * camera.height()) as usize],
+    )
+    .expect("sizes agree");
+    let empty = Observation::new(
+        nothing,
+        Mask::full(camera.width(), camera.height()),
+        *camera,
+    )
+    .expect("sizes agree");
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let problem = Problem::new(model, &empty);
+    let mut context: Context<'_> = workspace.context(&problem);
+    let view = context.view(pose);
+    let depths: Vec<f32> = (0..camera.height())
+        .flat_map(|v| (0..camera.width()).map(move |u| (u, v)))
+        .map(|(u, v)| view.depth_at(u, v))
+        .collect();
+    let masked = depths.iter().map(|z| *z > 0.0).collect();
+    (
+        DepthImage::from_meters(camera.width(), camera.height(), depths).expect("sizes agree"),
+        Mask::new(camera.width(), camera.height(), masked).expect("sizes agree"),
+    )
+}
+
+/// Makes a scene: the object at a random pose, 0.3 to 0.6 m away, with relative depth noise.
+pub fn scene(object: Household, noise_percent: f64, rng: &mut SimRng) -> Scene {
+    let model = object.model().expect("the objects that ship are valid");
+    let camera = camera();
+    let nearest = model.diameter().max(0.3);
+    let truth = object_pose(rng, &model.center(), nearest..0.6, 0.02);
+    let (depth, mask) = render(&model, &camera, &truth);
+    let depth = RelativeGaussian {
+        percent: noise_percent,
+    }
+    .apply(rng, &depth);
+    Scene {
+        observation: Observation::new(depth, mask, camera).expect("sizes agree"),
+        model,
+        truth,
+    }
+}
+
+/// Returns the rotation (radians) and translation (metres) error, up to the declared symmetries: about a continuous one only the direction of the axis counts.
+pub fn symmetric_pose_distance(
+    pose: &Isometry3<f64>,
+    truth: &Isometry3<f64>,
+    symmetries: &Symmetries,
+) -> (f64, f64) {
+    if let Some(axis) = symmetries.continuous.first() {
+        let (a, b) = (
+            pose.rotation * axis.direction().into_inner(),
+            truth.rotation * axis.direction().into_inner(),
+        );
+        let distance = (pose * axis.offset() - truth * axis.offset()).norm();
+        return (a.cross(&b).norm().atan2(a.dot(&b)), distance);
+    }
+    symmetries
+        .motions()
+        .iter()
+        .map(|motion| se3::pose_distance(pose, &(truth * motion)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .expect("the identity is among the motions")
+}

@@ -1,0 +1,114 @@
+//! Pipelines are pure: the same bits from a second run, from a box, and on other threads.
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::{Scene, scene};
+use hybrid_icp::{
+    AllSamples, BoxedStage, Cascade, Convergence, DataAssociation, Divergence, ErrorMetric, Icp,
+    Isometry3, IterationLimit, MeanVsd, NearestNeighbor, OutlierFilter, PointSelection,
+    PointToPlane, PointToPoint, Preset, Projective, Refinement, Refiner, Repeat, Score, StopRule,
+    Switch, Switcher, Threshold, VisibleSurface, presets,
+};
+
+fn cases() -> Vec<(Scene, Isometry3<f64>)> {
+    let mut rng = rng(11);
+    [Household::Mug, Household::Hammer, Household::Carton]
+        .into_iter()
+        .flat_map(|object| [(object, 0.005, 0.1), (object, 0.07, 1.0)])
+        .map(|(object, translation, angle)| {
+            let scene = scene(object, 1.0, &mut rng);
+            let init = perturb(&mut rng, &scene.truth, translation, angle);
+            (scene, init)
+        })
+        .collect()
+}
+
+fn run(refiner: &mut Refiner, cases: &[(Scene, Isometry3<f64>)]) -> Vec<Refinement> {
+    cases
+        .iter()
+        .map(|(scene, init)| refiner.refine(&scene.model, &scene.observation, init))
+        .collect()
+}
+
+#[test]
+fn a_second_run_gives_the_same_bits() {
+    let cases = cases();
+    for preset in Preset::ALL {
+        let mut used = Refiner::preset(preset);
+        let first = run(&mut used, &cases);
+        assert_eq!(run(&mut used, &cases), first, "{preset}, same refiner");
+        assert_eq!(
+            run(&mut Refiner::preset(preset), &cases),
+            first,
+            "{preset}, new refiner"
+        );
+    }
+}
+
+#[test]
+fn every_thread_gives_the_same_bits() {
+    let cases = cases();
+    let expected = run(&mut Refiner::preset(Preset::Hybrid), &cases);
+    // The observations, and so their search trees, are shared.
+    let results: Vec<Vec<Refinement>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..8)
+            .map(|_| scope.spawn(|| run(&mut Refiner::preset(Preset::Hybrid), &cases)))
+            .collect();
+        threads
+            .into_iter()
+            .map(|t| t.join().expect("no panic"))
+            .collect()
+    });
+    for result in results {
+        assert_eq!(result, expected);
+    }
+}
+
+/// Hybrid ICP with every part behind a box.
+fn boxed_hybrid() -> BoxedStage {
+    type Part<T> = Box<T>;
+    fn icp(
+        selection: impl PointSelection + Send + 'static,
+        association: impl DataAssociation + Send + 'static,
+        metric: impl ErrorMetric + Send + 'static,
+    ) -> BoxedStage {
+        let selection: Part<dyn PointSelection + Send> = Box::new(selection);
+        let association: Part<dyn DataAssociation + Send> = Box::new(association);
+        let filter: Part<dyn OutlierFilter + Send> = Box::new(());
+        let metric: Part<dyn ErrorMetric + Send> = Box::new(metric);
+        let stop: Part<dyn StopRule + Send> = Box::new((
+            Box::new(Divergence::strict()) as Part<dyn StopRule + Send>,
+            Box::new(Convergence::default()) as Part<dyn StopRule + Send>,
+            Box::new(IterationLimit::default()) as Part<dyn StopRule + Send>,
+        ));
+        Box::new(Icp {
+            selection,
+            association,
+            filter,
+            metric,
+            stop,
+        })
+    }
+    let score: Part<dyn Score + Send> = Box::new(MeanVsd::default());
+    let switcher: Part<dyn Switcher + Send> = Box::new(Threshold { score, alpha: 0.4 });
+    Box::new(Repeat {
+        times: 2,
+        stage: Switch {
+            switcher,
+            aligned: Cascade(vec![
+                icp(VisibleSurface::default(), Projective, PointToPoint),
+                icp(VisibleSurface::default(), Projective, PointToPlane),
+            ]),
+            misaligned: icp(AllSamples, NearestNeighbor::default(), PointToPoint),
+        },
+    })
+}
+
+#[test]
+fn boxed_parts_give_the_same_bits_as_static_ones() {
+    let cases = cases();
+    let expected = run(&mut Refiner::new(presets::hybrid()), &cases);
+    assert_eq!(run(&mut Refiner::boxed(boxed_hybrid()), &cases), expected);
+    assert_eq!(run(&mut Refiner::preset(Preset::Hybrid), &cases), expected);
+    // The cases are worth something only if they differ.
+    assert!(expected.iter().any(|r| r.mve < 0.1) && expected.iter().any(|r| r.mve_initial > 0.4));
+}
