@@ -4,8 +4,9 @@ use hicp_core::PixelRegion;
 
 use crate::fixed::{FRACTION_BITS, FixedPoint, first_pixel, last_pixel};
 
-/// Up to this extent in grid units (1024 px) edge functions fit 64 bits: two products of 2³⁰ by 2³⁰.
-const SMALL_EXTENT: i64 = 1 << 30;
+/// Sides below this many grid units (512 px) from the first corner make an extent below twice as much, and edge functions
+/// that fit 64 bits: two products of 2³⁰ by 2³⁰.
+const SMALL_SIDE: i64 = 1 << 29;
 
 /// Which triangles are drawn, by the sign of their area in the image (u right, v down).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ pub(crate) struct Edge {
 
 impl Edge {
     /// Makes the edge from `p` to `q` of a triangle of positive area, seen from the pixel centre `at`.
-    #[inline]
+    #[inline(always)]
     fn new<const SMALL: bool>(p: FixedPoint, q: FixedPoint, at: FixedPoint) -> Self {
         let (du, dv) = (q.u - p.u, q.v - p.v);
         // With rows growing downwards and positive area the inside lies below an edge that runs to the right and to the
@@ -53,6 +54,16 @@ impl Edge {
             per_v: du,
         }
     }
+}
+
+/// Whether all sides lie within plus or minus [`SMALL_SIDE`].
+#[inline]
+fn are_small(sides: [i64; 4]) -> bool {
+    // Moved to start at 0 and taken together: one comparison, and negative numbers are large ones without their sign.
+    let together = sides
+        .iter()
+        .fold(0, |bits, side| bits | (side + SMALL_SIDE).cast_unsigned());
+    together < 2 * SMALL_SIDE.unsigned_abs()
 }
 
 fn wide_cross(au: i64, av: i64, bu: i64, bv: i64) -> i128 {
@@ -83,7 +94,8 @@ pub(crate) struct Coverage {
 impl Coverage {
     /// Sets up a triangle, or returns `None` if it has no area, is not to be kept, or no pixel centre of `region` lies in
     /// its bounding box.
-    #[inline]
+    // Half of all triangles end after the area, most of a fine mesh after the bounding box: worth not being a call.
+    #[inline(always)]
     pub(crate) fn new(
         a: FixedPoint,
         b: FixedPoint,
@@ -91,6 +103,22 @@ impl Coverage {
         keep: Keep,
         region: &PixelRegion,
     ) -> Option<Self> {
+        let (bu, bv, cu, cv) = (b.u - a.u, b.v - a.v, c.u - a.u, c.v - a.v);
+        let small = are_small([bu, bv, cu, cv]);
+        let area_sign = if small {
+            (bu * cv - bv * cu).signum()
+        } else {
+            narrow(wide_cross(bu, bv, cu, cv).signum())
+        };
+        let dropped = match keep {
+            Keep::Both => area_sign == 0,
+            Keep::Negative => area_sign >= 0,
+            Keep::Positive => area_sign <= 0,
+        };
+        if dropped {
+            return None;
+        }
+
         let (u_low, u_high) = (a.u.min(b.u).min(c.u), a.u.max(b.u).max(c.u));
         let u = first_pixel(u_low).max(i64::from(region.u_min));
         let u_last = last_pixel(u_high).min(i64::from(region.u_max) - 1);
@@ -101,20 +129,6 @@ impl Coverage {
             return None;
         }
 
-        let small = u_high - u_low <= SMALL_EXTENT && v_high - v_low <= SMALL_EXTENT;
-        let area_sign = if small {
-            ((b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u)).signum()
-        } else {
-            narrow(wide_cross(b.u - a.u, b.v - a.v, c.u - a.u, c.v - a.v).signum())
-        };
-        let dropped = match keep {
-            Keep::Both => area_sign == 0,
-            Keep::Negative => area_sign >= 0,
-            Keep::Positive => area_sign <= 0,
-        };
-        if dropped {
-            return None;
-        }
         let (b, c) = if area_sign > 0 { (b, c) } else { (c, b) };
         let at = FixedPoint {
             u: u << FRACTION_BITS,

@@ -105,7 +105,7 @@ impl<'a> Target<'a> {
     }
 
     /// Writes the pixels of a triangle where it is nearer than what is there.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn fill(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
         if coverage.columns <= NARROW_COLUMNS {
             self.fill_narrow(coverage, plane, triangle);
@@ -114,7 +114,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn fill_narrow(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
         let [e0, e1, e2] = &coverage.edges;
         let mut row_values = [e0.value, e1.value, e2.value];

@@ -1,7 +1,7 @@
 //! The sub-pixel grid that projected vertices are rounded to.
 
 /// Binary digits of a pixel. With 20, rounding moves a vertex by less than the `f32` coordinates of the mesh are good
-/// for, and triangles up to 1024 px still have edge functions in 64 bits.
+/// for, and triangles up to 512 px still have edge functions in 64 bits.
 pub(crate) const FRACTION_BITS: u32 = 20;
 
 /// Grid units per pixel.

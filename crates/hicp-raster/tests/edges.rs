@@ -225,7 +225,7 @@ fn a_closed_mesh_on_pixel_centres_has_no_hole() {
     }
 }
 
-/// Triangles larger than 1024 px take another path through the arithmetic; it draws the same.
+/// Triangles larger than 512 px take another path through the arithmetic; it draws the same.
 #[test]
 fn large_triangles_cover_every_pixel_once() {
     let camera = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, 4000, 3).unwrap();
