@@ -1,5 +1,7 @@
 //! Scenes that the cross-crate tests share.
 
+pub mod ycbv;
+
 use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
 use hybrid_icp::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,

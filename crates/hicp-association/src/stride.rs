@@ -7,8 +7,8 @@
 pub enum Stride {
     /// Every n-th pixel in both directions; 0 counts as 1.
     Pixels(u32),
-    /// The smallest stride that leaves at most about this many points; 0 counts as 1.
-    AtMostPoints(usize),
+    /// The stride that leaves about this many points; 0 counts as 1.
+    AboutPoints(usize),
 }
 
 impl Stride {
@@ -17,11 +17,12 @@ impl Stride {
     pub fn pixels(self, n_pixels: usize) -> u32 {
         match self {
             Self::Pixels(stride) => stride.max(1),
-            Self::AtMostPoints(points) => {
-                let points = points.max(1);
-                (1_u32..)
-                    .find(|s| n_pixels.div_ceil(*s as usize * *s as usize) <= points)
-                    .unwrap_or(1)
+            Self::AboutPoints(points) => {
+                let stride = (n_pixels as f64 / points.max(1) as f64).sqrt().round();
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                // At most √(2³²), not negative.
+                let stride = stride as u32;
+                stride.max(1)
             }
         }
     }

@@ -20,7 +20,7 @@ impl Default for VisibleSurface {
     /// Keeps about 2,000 points.
     fn default() -> Self {
         Self {
-            stride: Stride::AtMostPoints(2000),
+            stride: Stride::AboutPoints(2000),
         }
     }
 }

@@ -61,7 +61,7 @@ pub use hicp_icp::{
     Termination, Verdict, Workspace,
 };
 pub use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
-pub use hicp_raster::Rasterizer;
+pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,
 };

@@ -1,0 +1,70 @@
+//! The program `hybrid-icp`: `hybrid-icp --help` lists its commands.
+//!
+//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
+
+mod bop_refine;
+mod demo;
+mod overlay;
+mod pipelines;
+mod refine;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Refine 6D object poses in depth images.
+///
+/// A detector gives a segmentation mask and a rough pose; this program makes it a better one and scores it by the mean VSD
+/// estimate (MVE): 0 where the pose explains the image everywhere, 1 where nowhere. Poses above 0.4 are not to be trusted.
+#[derive(Debug, Parser)]
+#[command(name = "hybrid-icp", version, after_help = EXAMPLES, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  hybrid-icp demo
+  hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png --depth-scale 0.1 \\
+      --mask mask.png --camera camera.json --init pose.json --overlay overlay.png
+  hybrid-icp bop refine --dataset ycbv --split test --results cosypose_ycbv-test.csv --output refined_ycbv-test.csv
+  hybrid-icp pipelines
+
+Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
+    Demo(demo::Arguments),
+    /// Refine one pose in one depth image.
+    Refine(refine::Arguments),
+    /// Work on datasets in the layout of the BOP benchmark.
+    #[command(subcommand)]
+    Bop(BopCommand),
+    /// List the pipelines by name.
+    Pipelines,
+}
+
+#[derive(Debug, Subcommand)]
+enum BopCommand {
+    /// Refine every row of a result file.
+    Refine(bop_refine::Arguments),
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Refine(arguments) => refine::run(&arguments),
+        Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
+        Command::Pipelines => pipelines::run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

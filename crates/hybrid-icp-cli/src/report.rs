@@ -1,0 +1,157 @@
+//! What a refinement is reported as: JSON for programs, lines for people.
+
+use std::fmt::Write as _;
+
+use hybrid_icp::{Preset, Refinement, StageRecord, Verdict};
+use serde::Serialize;
+
+/// The JSON report of a refinement; lengths in millimetres where BOP has them so, losses in m².
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    #[serde(rename = "cam_R_m2c")]
+    rotation: [f64; 9],
+    #[serde(rename = "cam_t_m2c")]
+    translation_mm: [f64; 3],
+    pipeline: &'static str,
+    outcome: &'static str,
+    reason: &'static str,
+    termination: &'static str,
+    mve_initial: f64,
+    mve: f64,
+    iterations: usize,
+    n_pairs: usize,
+    time_ms: f64,
+    trace: Vec<StageReport>,
+}
+
+/// One ICP stage that ran.
+#[derive(Debug, Serialize)]
+struct StageReport {
+    /// What the switch chose before this stage, and the MVE that it chose by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regime: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regime_mve: Option<f64>,
+    selection: &'static str,
+    association: &'static str,
+    metric: &'static str,
+    n_source: usize,
+    iterations: usize,
+    n_pairs: usize,
+    mean_loss: Option<f64>,
+    termination: &'static str,
+    outcome: &'static str,
+}
+
+impl Report {
+    pub(crate) fn new(
+        preset: Preset,
+        refined: &Refinement,
+        stages: &[StageRecord],
+        time_ms: f64,
+    ) -> Self {
+        let outcome = &refined.outcome;
+        let (rotation, translation_mm) = hicp_io::pose_to_bop(&outcome.camera_from_object);
+        Self {
+            rotation,
+            translation_mm,
+            pipeline: preset.name(),
+            outcome: verdict(outcome.verdict),
+            reason: outcome.termination.name(),
+            termination: outcome.termination.name(),
+            mve_initial: refined.mve_initial,
+            mve: refined.mve,
+            iterations: outcome.iterations,
+            n_pairs: outcome.n_pairs(),
+            time_ms,
+            trace: stages.iter().map(StageReport::new).collect(),
+        }
+    }
+}
+
+impl StageReport {
+    fn new(record: &StageRecord) -> Self {
+        let outcome = &record.outcome;
+        Self {
+            regime: record.switched.map(|event| event.regime.name()),
+            regime_mve: record.switched.and_then(|event| event.score),
+            selection: record.selection,
+            association: record.association,
+            metric: record.metric,
+            n_source: record.n_source,
+            iterations: outcome.iterations,
+            n_pairs: outcome.n_pairs(),
+            mean_loss: outcome.evaluation.map(|e| e.mean_loss),
+            termination: outcome.termination.name(),
+            outcome: verdict(outcome.verdict),
+        }
+    }
+}
+
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Refined => "refined",
+        Verdict::KeptInitial(_) => "kept_initial",
+    }
+}
+
+/// The trace as a table: one line per stage that ran.
+pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
+    let mut text = format!(
+        "{:<11} {:<16} {:<15} {:>10} {:>7} {:>14}  ended\n",
+        "regime", "association", "metric", "iterations", "pairs", "mean loss mm²"
+    );
+    for record in stages {
+        let outcome = &record.outcome;
+        let regime = record.switched.map_or("", |event| event.regime.name());
+        let loss = outcome
+            .evaluation
+            .map_or_else(|| "-".to_owned(), |e| format!("{:.6}", e.mean_loss * 1e6));
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{regime:<11} {:<16} {:<15} {:>10} {:>7} {loss:>14}  {}",
+            record.association,
+            record.metric,
+            outcome.iterations,
+            outcome.n_pairs(),
+            outcome.termination,
+        );
+    }
+    text
+}
+
+/// One line about the whole.
+pub(crate) fn summary(refined: &Refinement) -> String {
+    let outcome = &refined.outcome;
+    match outcome.verdict {
+        Verdict::Refined => format!(
+            "refined: MVE {:.3} -> {:.3}, {} pairs, {} iterations, ended by {}",
+            refined.mve_initial,
+            refined.mve,
+            outcome.n_pairs(),
+            outcome.iterations,
+            outcome.termination
+        ),
+        Verdict::KeptInitial(reason) => format!(
+            "kept the initial pose ({reason}): MVE {:.3}, {} iterations",
+            refined.mve, outcome.iterations
+        ),
+    }
+}
+
+/// Warns on standard error where the pose is not to be trusted.
+pub(crate) fn warn(refined: &Refinement) {
+    if refined.mve > refined.mve_initial {
+        eprintln!(
+            "warning: the returned pose explains the image worse than the initial one (MVE {:.3}, was {:.3})",
+            refined.mve, refined.mve_initial
+        );
+    }
+    if refined.mve >= hybrid_icp::PAPER_ALPHA {
+        eprintln!(
+            "warning: MVE {:.3}: the pose does not explain the image, do not trust it",
+            refined.mve
+        );
+    }
+}

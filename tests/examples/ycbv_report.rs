@@ -1,0 +1,135 @@
+//! Refines the estimates of four detectors on five real YCB-Video frames with every pipeline: median ADI and MVE before and
+//! after, how the ground truth stays put, and times as ratios to nn-point-to-point.
+//!
+//! `cargo run --release -p hicp-tests --example ycbv_report`
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use hicp_io::bop::{Dataset, read_results};
+use hicp_tests::ycbv::{Instance, instances, root};
+use hybrid_icp::{Isometry3, Preset, Refiner, adi};
+
+const ESTIMATORS: [(&str, &str); 4] = [
+    ("CosyPose", "cosypose_ycbv-test.csv"),
+    ("PoseCNN", "posecnn-rss2018_ycbv-test.csv"),
+    ("AAE", "sundermeyer_ycbv-test.csv"),
+    ("PoseCNN+ICP", "posecnn-icp-rss2018_ycbv-test.csv"),
+];
+
+fn main() {
+    let Some(root) = root() else {
+        eprintln!("skipped: no ycbv dataset; set BOP_PATH to the folder that holds it");
+        return;
+    };
+    let dataset = Dataset::open(&root).expect("the dataset opens");
+    let instances = instances(&dataset);
+    let adi_mm = |instance: &Instance, pose: &Isometry3<f64>| {
+        1e3 * adi(pose, &instance.truth, instance.model.mesh().vertices())
+    };
+
+    println!(
+        "| pipeline | {} | from truth: max ADI mm | ms median | time ratio |",
+        ESTIMATORS
+            .map(|(name, _)| format!("{name} ADI mm | MVE"))
+            .join(" | ")
+    );
+    println!("|---|{}---|---|---|", "---|---|".repeat(ESTIMATORS.len()));
+    let starts: Vec<Vec<(usize, Isometry3<f64>)>> = ESTIMATORS
+        .iter()
+        .map(|(_, file)| {
+            read_results(root.join("results").join(file))
+                .expect("the results read")
+                .iter()
+                .map(|row| {
+                    let key = (row.scene_id, row.im_id, row.obj_id);
+                    let index = instances.iter().position(|i| i.key == key);
+                    (index.expect("an instance"), row.camera_from_object())
+                })
+                .collect()
+        })
+        .collect();
+
+    let mut baseline = 0.0;
+    let mut lines = BTreeMap::new();
+    let mut order = Preset::ALL.to_vec();
+    // The yardstick of the time ratios goes first.
+    order.sort_by_key(|p| *p != Preset::NnPointToPoint);
+    for preset in order {
+        let mut cells = Vec::new();
+        let mut times = Vec::new();
+        for starts in &starts {
+            let (mut errors, mut scores) = (Vec::new(), Vec::new());
+            for (index, init) in starts {
+                let instance = &instances[*index];
+                // A fresh observation each time, so that its normals and trees are part of the time.
+                let start = Instant::now();
+                let observation = instance.observe();
+                let mut refiner = Refiner::preset(preset);
+                let refined = refiner.refine(&instance.model, &observation, init);
+                times.push(start.elapsed().as_secs_f64() * 1e3);
+                let pose = refined.outcome.camera_from_object;
+                assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+                errors.push(adi_mm(instance, &pose));
+                scores.push(refined.mve);
+            }
+            cells.push(format!(
+                "{:.2} | {:.3}",
+                median(&mut errors),
+                median(&mut scores)
+            ));
+        }
+        let from_truth = instances
+            .iter()
+            .map(|instance| {
+                let mut refiner = Refiner::preset(preset);
+                let refined = refiner.refine(&instance.model, &instance.observe(), &instance.truth);
+                adi_mm(instance, &refined.outcome.camera_from_object)
+            })
+            .fold(0.0, f64::max);
+        let time = median(&mut times);
+        if preset == Preset::NnPointToPoint {
+            baseline = time;
+        }
+        lines.insert(
+            Preset::ALL.iter().position(|p| *p == preset),
+            format!(
+                "| {preset} | {} | {from_truth:.2} | {time:.2} | {:.2} |",
+                cells.join(" | "),
+                time / baseline
+            ),
+        );
+    }
+    let mut cells = Vec::new();
+    for starts in &starts {
+        let (mut errors, mut scores) = (Vec::new(), Vec::new());
+        for (index, init) in starts {
+            let instance = &instances[*index];
+            errors.push(adi_mm(instance, init));
+            scores.push(Refiner::preset(Preset::Hybrid).mve(
+                &instance.model,
+                &instance.observe(),
+                init,
+            ));
+        }
+        cells.push(format!(
+            "{:.2} | {:.3}",
+            median(&mut errors),
+            median(&mut scores)
+        ));
+    }
+    println!("| initial | {} | 0 | | |", cells.join(" | "));
+    for line in lines.values() {
+        println!("{line}");
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 0 {
+        (values[middle - 1] + values[middle]) / 2.0
+    } else {
+        values[middle]
+    }
+}
