@@ -1,0 +1,163 @@
+//! Writing files whole or not at all.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use crate::error::IoError;
+
+/// Writes a file whole or not at all.
+///
+/// `write` fills a temporary file in the same folder, which is flushed to the disk and then renamed over `path`. When
+/// anything fails the temporary file is removed and what was at `path` stays as it was; nobody ever sees half a file.
+/// The file gets the permissions a newly created one gets (0666 without the umask on Unix); a symbolic link is followed.
+/// What is not a regular file (a pipe, `/dev/stdout`) cannot be replaced and is written in place.
+///
+/// # Errors
+///
+/// [`IoError::MissingFolder`] when the parent folder does not exist, [`IoError::Write`] for everything else.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let dir = tempfile::tempdir()?;
+/// let path = dir.path().join("note.txt");
+/// hicp_io::write_atomically(&path, |writer| writeln!(writer, "done"))?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "done\n");
+/// # Ok(()) }
+/// ```
+pub fn write_atomically<F>(path: impl AsRef<Path>, write: F) -> Result<(), IoError>
+where
+    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+{
+    let path = path.as_ref();
+    let written = match fs::metadata(path) {
+        Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => fs::OpenOptions::new()
+            .write(true)
+            .open(path)
+            .and_then(|file| fill(file, write).map(|_| ())),
+        Ok(metadata) if metadata.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+        Ok(_) => fs::canonicalize(path).and_then(|target| replace(&target, write)),
+        Err(_) => {
+            let folder = folder_of(path);
+            if !folder.is_dir() {
+                return Err(IoError::MissingFolder {
+                    path: path.to_owned(),
+                    folder: folder.to_owned(),
+                });
+            }
+            replace(path, write)
+        }
+    };
+    written.map_err(|e| IoError::write(path, e))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn replace<F>(path: &Path, write: F) -> io::Result<()>
+where
+    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+{
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".hicp-").suffix(".tmp");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let temporary = fill(builder.tempfile_in(folder_of(path))?, write)?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path)?;
+    Ok(())
+}
+
+fn fill<W, F>(target: W, write: F) -> io::Result<W>
+where
+    W: Write,
+    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+{
+    let mut writer = BufWriter::new(target);
+    write(&mut writer)?;
+    writer.into_inner().map_err(io::IntoInnerError::into_error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        let result = write_atomically(&path, |writer| {
+            writer.write_all(&[b'x'; 100_000])?;
+            Err(io::Error::other("no more"))
+        });
+        assert!(matches!(result, Err(IoError::Write { .. })));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(names(dir.path()), ["a.txt"]);
+
+        let fresh = dir.path().join("b.txt");
+        assert!(write_atomically(&fresh, |_| Err(io::Error::other("no"))).is_err());
+        assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn an_old_file_is_replaced_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        fs::write(&path, "a longer old content").unwrap();
+        write_atomically(&path, |writer| writer.write_all(b"new")).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("no/where/a.txt");
+        let result = write_atomically(&path, |_| Ok(()));
+        assert!(matches!(
+            result,
+            Err(IoError::MissingFolder { folder, .. }) if folder == dir.path().join("no/where")
+        ));
+    }
+
+    #[test]
+    fn a_folder_is_not_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(matches!(
+            write_atomically(dir.path(), |_| Ok(())),
+            Err(IoError::Write { .. })
+        ));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_a_new_file_and_links_stay_links() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let (plain, atomic, link) = (
+            dir.path().join("plain"),
+            dir.path().join("atomic"),
+            dir.path().join("link"),
+        );
+        fs::write(&plain, "").unwrap();
+        write_atomically(&atomic, |_| Ok(())).unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&atomic), mode(&plain));
+
+        std::os::unix::fs::symlink(&atomic, &link).unwrap();
+        write_atomically(&link, |writer| writer.write_all(b"through")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&atomic).unwrap(), "through");
+    }
+}

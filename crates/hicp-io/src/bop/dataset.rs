@@ -1,0 +1,209 @@
+//! The folder of a dataset.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hicp_core::TriMesh;
+
+use super::models_info::{ModelInfo, read_models_info};
+use super::scene::Scene;
+use super::targets::{Target, read_targets};
+use crate::error::IoError;
+use crate::mesh::read_mesh;
+use crate::unit::LengthUnit;
+
+/// A dataset in BOP's layout: a folder with models, and with scenes in folders such as `test` or `test_primesense`.
+///
+/// Opening one looks at nothing but the folder; what is missing in it is reported by whoever needs it.
+///
+/// ```no_run
+/// # fn main() -> Result<(), hicp_io::IoError> {
+/// let dataset = hicp_io::bop::Dataset::open("bop/ycbv")?;
+/// let scene = dataset.scene("test", 50)?;
+/// for image in scene.image_ids() {
+///     let depth = scene.read_depth(image)?;
+///     let camera = scene.camera(image)?.pinhole(depth.width(), depth.height());
+/// }
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    root: PathBuf,
+}
+
+impl Dataset {
+    /// Opens the dataset in a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when the folder does not exist.
+    pub fn open(root: impl AsRef<Path>) -> Result<Self, IoError> {
+        let root = root.as_ref().to_owned();
+        if root.is_dir() {
+            Ok(Self { root })
+        } else {
+            Err(missing(root, "dataset folder"))
+        }
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Returns the folder of the models: `models`, or `models_eval` where there is no other.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when there is neither.
+    pub fn models_dir(&self) -> Result<PathBuf, IoError> {
+        ["models", "models_eval"]
+            .map(|name| self.root.join(name))
+            .into_iter()
+            .find(|dir| dir.is_dir())
+            .ok_or_else(|| missing(self.root.join("models"), "folder of models"))
+    }
+
+    /// Returns the path of the mesh of an object, `models/obj_000001.ply` for object 1, whether or not it exists.
+    ///
+    /// # Errors
+    ///
+    /// As [`Dataset::models_dir`].
+    pub fn model_path(&self, obj_id: u32) -> Result<PathBuf, IoError> {
+        Ok(self.models_dir()?.join(format!("obj_{obj_id:06}.ply")))
+    }
+
+    /// Reads the mesh of an object; metres.
+    ///
+    /// # Errors
+    ///
+    /// As [`Dataset::models_dir`] and [`read_mesh`].
+    pub fn read_model(&self, obj_id: u32) -> Result<TriMesh, IoError> {
+        read_mesh(self.model_path(obj_id)?, LengthUnit::Millimeters)
+    }
+
+    /// Reads the diameters and symmetries of all objects, by object id.
+    ///
+    /// # Errors
+    ///
+    /// As [`Dataset::models_dir`] and [`read_models_info`].
+    pub fn read_models_info(&self) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
+        read_models_info(self.models_dir()?.join("models_info.json"))
+    }
+
+    /// Reads the targets of the benchmark from `test_targets_bop19.json`.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_targets`].
+    pub fn read_targets(&self) -> Result<Vec<Target>, IoError> {
+        read_targets(self.root.join("test_targets_bop19.json"))
+    }
+
+    /// Returns the ids of the scenes of a split (the name of its folder, such as `test`), ascending.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when the split does not exist, [`IoError::Read`] when its folder cannot be listed.
+    pub fn scene_ids(&self, split: &str) -> Result<Vec<u32>, IoError> {
+        let dir = self.split_dir(split)?;
+        let entries = std::fs::read_dir(&dir).map_err(|e| IoError::read(&dir, e))?;
+        let mut ids = Vec::new();
+        for entry in entries {
+            let entry = entry.map_err(|e| IoError::read(&dir, e))?;
+            let name = entry.file_name();
+            if let Some(id) = name.to_str().and_then(|name| name.parse().ok())
+                && entry.path().is_dir()
+            {
+                ids.push(id);
+            }
+        }
+        ids.sort_unstable();
+        Ok(ids)
+    }
+
+    /// Opens a scene of a split: its cameras and, where they are known, its ground truth.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when the split or the scene does not exist, otherwise as [`Scene::open`].
+    pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
+        Scene::open(self.split_dir(split)?.join(format!("{scene_id:06}")))
+    }
+
+    fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {
+        let dir = self.root.join(split);
+        if dir.is_dir() {
+            Ok(dir)
+        } else {
+            Err(missing(dir, "split"))
+        }
+    }
+}
+
+pub(super) fn missing(path: PathBuf, what: &'static str) -> IoError {
+    IoError::Missing { path, what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn missing_parts_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(matches!(
+            Dataset::open(dir.path().join("no")),
+            Err(IoError::Missing {
+                what: "dataset folder",
+                ..
+            })
+        ));
+        let dataset = Dataset::open(dir.path()).unwrap();
+        assert!(matches!(dataset.models_dir(), Err(IoError::Missing { .. })));
+        assert!(matches!(
+            dataset.scene_ids("test"),
+            Err(IoError::Missing { .. })
+        ));
+        assert!(matches!(dataset.read_targets(), Err(IoError::Read { .. })));
+        fs::create_dir(dir.path().join("test")).unwrap();
+        assert!(dataset.scene_ids("test").unwrap().is_empty());
+        assert!(matches!(
+            dataset.scene("test", 3),
+            Err(IoError::Missing { what: "scene", .. })
+        ));
+    }
+
+    #[test]
+    fn models_fall_back_to_those_for_evaluation() {
+        let dir = tempfile::tempdir().unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        fs::create_dir(dir.path().join("models_eval")).unwrap();
+        assert!(
+            dataset
+                .model_path(12)
+                .unwrap()
+                .ends_with("models_eval/obj_000012.ply")
+        );
+        fs::create_dir(dir.path().join("models")).unwrap();
+        assert!(
+            dataset
+                .model_path(12)
+                .unwrap()
+                .ends_with("models/obj_000012.ply")
+        );
+    }
+
+    #[test]
+    fn scenes_are_listed_in_order() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["000010", "000002", "notes"] {
+            fs::create_dir_all(dir.path().join("val").join(name)).unwrap();
+        }
+        fs::write(dir.path().join("val/000003"), "a file").unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        assert_eq!(dataset.scene_ids("val").unwrap(), [2, 10]);
+    }
+}

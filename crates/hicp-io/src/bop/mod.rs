@@ -1,0 +1,25 @@
+//! Datasets, detections and results in the formats of the BOP benchmark for 6D object pose estimation.
+//!
+//! Files are in millimetres, everything here is in metres unless its name says otherwise. Reading order: [`Dataset`],
+//! [`Scene`], [`ModelInfo`], [`Target`], [`Detection`] with its [`Rle`], [`ResultRow`].
+
+mod annotations;
+mod dataset;
+mod detections;
+mod models_info;
+mod result_cells;
+mod result_file_name;
+mod results;
+mod rle;
+mod scene;
+mod targets;
+
+pub use annotations::{GroundTruth, GroundTruthInfo, SceneCamera};
+pub use dataset::Dataset;
+pub use detections::{Detection, read_detections};
+pub use models_info::{ModelInfo, read_models_info};
+pub use result_file_name::ResultFileName;
+pub use results::{ResultRow, read_results, write_results};
+pub use rle::{Rle, RleError};
+pub use scene::Scene;
+pub use targets::{Target, read_targets};

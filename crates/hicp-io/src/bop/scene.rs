@@ -1,0 +1,254 @@
+//! One scene: a folder of images with one camera each.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hicp_core::{DepthImage, Mask};
+
+use super::annotations::{
+    GroundTruth, GroundTruthInfo, SceneCamera, read_cameras, read_ground_truth, read_info,
+};
+use super::dataset::missing;
+use crate::error::IoError;
+use crate::image::{read_depth_png, read_mask_png};
+
+/// A scene of a dataset. Its JSON files are in memory, its images are read on demand.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    dir: PathBuf,
+    cameras: BTreeMap<u32, SceneCamera>,
+    ground_truth: Option<BTreeMap<u32, Vec<GroundTruth>>>,
+    info: Option<BTreeMap<u32, Vec<GroundTruthInfo>>>,
+}
+
+impl Scene {
+    /// Opens the scene in a folder: reads `scene_camera.json`, and `scene_gt.json` and `scene_gt_info.json` where they are.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] without the folder or its cameras, otherwise what [`IoError`] says of JSON files.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
+        let dir = dir.as_ref().to_owned();
+        if !dir.is_dir() {
+            return Err(missing(dir, "scene"));
+        }
+        let cameras = dir.join("scene_camera.json");
+        if !cameras.is_file() {
+            return Err(missing(cameras, "file of cameras"));
+        }
+        Ok(Self {
+            cameras: read_cameras(&cameras)?,
+            ground_truth: read_ground_truth(&dir.join("scene_gt.json"))?,
+            info: read_info(&dir.join("scene_gt_info.json"))?,
+            dir,
+        })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The ids of the images, ascending.
+    pub fn image_ids(&self) -> impl Iterator<Item = u32> + '_ {
+        self.cameras.keys().copied()
+    }
+
+    /// Returns the camera of an image.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::JsonValue`] when `scene_camera.json` does not have the image.
+    pub fn camera(&self, im_id: u32) -> Result<&SceneCamera, IoError> {
+        self.cameras.get(&im_id).ok_or_else(|| IoError::JsonValue {
+            path: self.dir.join("scene_camera.json"),
+            key: "$".to_owned(),
+            found: format!("{} images", self.cameras.len()),
+            expected: format!("image {im_id} among them"),
+        })
+    }
+
+    /// Returns the true poses of an image in the file's order, or `None` where they are not known.
+    #[must_use]
+    pub fn ground_truth(&self, im_id: u32) -> Option<&[GroundTruth]> {
+        Some(self.ground_truth.as_ref()?.get(&im_id)?)
+    }
+
+    /// Returns the visibility of the instances of an image in the file's order, or `None` where it is not known.
+    #[must_use]
+    pub fn ground_truth_info(&self, im_id: u32) -> Option<&[GroundTruthInfo]> {
+        Some(self.info.as_ref()?.get(&im_id)?)
+    }
+
+    /// Returns the path of the depth image of an image.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when there is none, [`IoError::Extension`] when it is a TIFF file, which is not supported.
+    pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
+        let png = self.dir.join(format!("depth/{im_id:06}.png"));
+        if png.is_file() {
+            return Ok(png);
+        }
+        for extension in ["tif", "tiff"] {
+            let path = png.with_extension(extension);
+            if path.is_file() {
+                return Err(IoError::Extension {
+                    path,
+                    found: extension.to_owned(),
+                    expected: ".png",
+                });
+            }
+        }
+        Err(missing(png, "depth image"))
+    }
+
+    /// Reads the depth image of an image, metres.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`]; [`IoError::JsonValue`] when the camera states
+    /// no `depth_scale`.
+    pub fn read_depth(&self, im_id: u32) -> Result<DepthImage, IoError> {
+        let path = self.depth_path(im_id)?;
+        let scale = self
+            .camera(im_id)?
+            .depth_scale
+            .ok_or_else(|| IoError::JsonValue {
+                path: self.dir.join("scene_camera.json"),
+                key: format!("$.{im_id}"),
+                found: "no `depth_scale`".to_owned(),
+                expected: "one, to read depth images".to_owned(),
+            })?;
+        read_depth_png(path, scale)
+    }
+
+    /// Returns the path of the colour or gray image of an image, or `None` when there is neither.
+    #[must_use]
+    pub fn color_path(&self, im_id: u32) -> Option<PathBuf> {
+        ["rgb", "gray"]
+            .iter()
+            .flat_map(|folder| ["png", "jpg"].map(|ext| format!("{folder}/{im_id:06}.{ext}")))
+            .map(|name| self.dir.join(name))
+            .find(|path| path.is_file())
+    }
+
+    /// Returns the path of the mask of the visible part of an instance, whether or not it exists.
+    ///
+    /// `instance` counts from 0 in the order of the ground truth.
+    #[must_use]
+    pub fn visible_mask_path(&self, im_id: u32, instance: usize) -> PathBuf {
+        self.dir
+            .join(format!("mask_visib/{im_id:06}_{instance:06}.png"))
+    }
+
+    /// Returns the path of the mask of the whole silhouette of an instance, whether or not it exists.
+    #[must_use]
+    pub fn full_mask_path(&self, im_id: u32, instance: usize) -> PathBuf {
+        self.dir.join(format!("mask/{im_id:06}_{instance:06}.png"))
+    }
+
+    /// Reads the mask of the visible part of an instance.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when there is none, otherwise as [`read_mask_png`].
+    pub fn read_visible_mask(&self, im_id: u32, instance: usize) -> Result<Mask, IoError> {
+        let path = self.visible_mask_path(im_id, instance);
+        if path.is_file() {
+            read_mask_png(path)
+        } else {
+            Err(missing(path, "mask"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const CAMERA: &str = r#"{"10": {"cam_K": [600,0,1,0,600,1,0,0,1], "depth_scale": 0.5,
+        "cam_R_w2c": [1,0,0,0,1,0,0,0,1], "cam_t_w2c": [0,0,1000]}, "2": {"cam_K": [600,0,1,0,600,1,0,0,1]}}"#;
+
+    fn scene(files: &[(&str, &str)]) -> (tempfile::TempDir, Result<Scene, IoError>) {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        let scene = Scene::open(dir.path());
+        (dir, scene)
+    }
+
+    #[test]
+    fn what_is_optional_may_be_missing() {
+        let (_dir, scene) = scene(&[("scene_camera.json", CAMERA)]);
+        let scene = scene.unwrap();
+        assert_eq!(scene.image_ids().collect::<Vec<_>>(), [2, 10]);
+        let camera = scene.camera(10).unwrap();
+        assert_eq!(camera.depth_scale, Some(0.5));
+        assert_eq!(camera.camera_from_world.unwrap().translation.z, 1.0);
+        assert_eq!(scene.camera(2).unwrap().camera_from_world, None);
+        assert!(matches!(scene.camera(3), Err(IoError::JsonValue { .. })));
+        assert!(scene.ground_truth(2).is_none() && scene.ground_truth_info(2).is_none());
+        assert!(scene.color_path(2).is_none());
+        assert!(matches!(scene.read_depth(2), Err(IoError::Missing { .. })));
+        assert!(matches!(
+            scene.read_visible_mask(2, 0),
+            Err(IoError::Missing { .. })
+        ));
+    }
+
+    #[test]
+    fn tiff_depth_and_a_missing_scale_are_named() {
+        let (_dir, scene) = scene(&[
+            ("scene_camera.json", CAMERA),
+            ("depth/000010.tif", ""),
+            ("depth/000002.png", ""),
+            ("gray/000002.jpg", ""),
+        ]);
+        let scene = scene.unwrap();
+        assert!(matches!(
+            scene.read_depth(10),
+            Err(IoError::Extension { found, .. }) if found == "tif"
+        ));
+        assert!(matches!(scene.read_depth(2), Err(IoError::JsonValue { key, .. }) if key == "$.2"));
+        assert!(scene.color_path(2).unwrap().ends_with("gray/000002.jpg"));
+    }
+
+    #[test]
+    fn ground_truth_is_in_metres_and_its_faults_are_named() {
+        let pose = r#""cam_R_m2c": [1,0,0,0,1,0,0,0,1], "cam_t_m2c": [0, 0, 850.5]"#;
+        let good = format!(r#"{{"2": [{{"obj_id": 7, {pose}}}]}}"#);
+        let info = r#"{"2": [{"visib_fract": 0.5, "bbox_visib": [-1, -1, -1, -1], "extra": []}]}"#;
+        let (_dir, opened) = scene(&[
+            ("scene_camera.json", CAMERA),
+            ("scene_gt.json", &good),
+            ("scene_gt_info.json", info),
+        ]);
+        let opened = opened.unwrap();
+        let truth = opened.ground_truth(2).unwrap()[0];
+        assert_eq!(
+            (truth.obj_id, truth.camera_from_object.translation.z),
+            (7, 0.8505)
+        );
+        let info = opened.ground_truth_info(2).unwrap()[0];
+        assert_eq!((info.visible_fraction, info.bbox_object), (Some(0.5), None));
+
+        for (from, to, key) in [
+            ("7", "-7", "$.2[0].obj_id"),
+            ("850.5", "null", "$.2[0].cam_t_m2c[2]"),
+            ("obj_id", "id", "$.2[0]"),
+        ] {
+            let bad = good.replace(from, to);
+            let (_dir, opened) = scene(&[("scene_camera.json", CAMERA), ("scene_gt.json", &bad)]);
+            match opened {
+                Err(IoError::JsonValue { key: found, .. }) => assert_eq!(found, key),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}

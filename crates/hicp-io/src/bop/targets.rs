@@ -1,0 +1,67 @@
+//! The instances that a method is asked for.
+
+use std::path::Path;
+
+use crate::error::IoError;
+use crate::json::Document;
+
+/// Instances of one object in one image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// The scene.
+    pub scene_id: u32,
+    /// The image.
+    pub im_id: u32,
+    /// The object.
+    pub obj_id: u32,
+    /// How many instances of the object are to be found.
+    pub inst_count: u32,
+}
+
+/// Reads a `test_targets_bop19.json`, in the file's order.
+///
+/// # Errors
+///
+/// What [`IoError`] says of JSON files. Targets of the later detection tasks, which state no objects, are refused.
+pub fn read_targets(path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
+    let document = Document::read(path.as_ref())?;
+    let mut targets = Vec::new();
+    for node in document.root().items()? {
+        let value = |key: &str| node.get(key)?.unsigned();
+        targets.push(Target {
+            scene_id: value("scene_id")?,
+            im_id: value("im_id")?,
+            obj_id: value("obj_id")?,
+            inst_count: value("inst_count")?,
+        });
+    }
+    Ok(targets)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_are_read_and_those_without_object_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("targets.json");
+        std::fs::write(
+            &path,
+            r#"[{"im_id": 3, "inst_count": 2, "obj_id": 5, "scene_id": 48}]"#,
+        )
+        .unwrap();
+        let target = Target {
+            scene_id: 48,
+            im_id: 3,
+            obj_id: 5,
+            inst_count: 2,
+        };
+        assert_eq!(read_targets(&path).unwrap(), [target]);
+        std::fs::write(&path, r#"[{"im_id": 3, "scene_id": 48}]"#).unwrap();
+        assert!(matches!(
+            read_targets(&path),
+            Err(IoError::JsonValue { key, expected, .. }) if key == "$[0]" && expected.contains("obj_id")
+        ));
+    }
+}

@@ -1,0 +1,193 @@
+//! Cameras in JSON files.
+
+use std::path::Path;
+
+use hicp_core::{CameraError, Matrix3, PinholeCamera};
+
+use crate::error::IoError;
+use crate::json::{Document, Node};
+
+/// A camera file: the camera, and what its depth images count in where the file says so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraFile {
+    /// The camera.
+    pub camera: PinholeCamera,
+    /// Millimetres per unit of its depth images.
+    pub depth_scale: Option<f64>,
+}
+
+/// Reads a camera from a JSON file, for images of `image_size` (width, height).
+///
+/// Three forms are understood; further keys are ignored:
+/// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's, which states no size;
+/// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, of BOP's `camera.json`, whose size must match;
+/// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in either form.
+///
+/// `depth_scale` is optional everywhere.
+///
+/// # Errors
+///
+/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::CameraSize`] naming both sizes, or
+/// [`IoError::Camera`].
+pub fn read_camera_json(
+    path: impl AsRef<Path>,
+    image_size: (u32, u32),
+) -> Result<CameraFile, IoError> {
+    let document = Document::read(path.as_ref())?;
+    let root = document.root();
+    let is_camera = |node: &Node<'_>| {
+        ["cam_K", "fx"]
+            .iter()
+            .any(|key| node.optional(key).is_some())
+    };
+    let node = match root.numbered() {
+        Ok(images) if !is_camera(&root) => {
+            let count = images.len();
+            match <[_; 1]>::try_from(images) {
+                Ok([(_, node)]) => node,
+                Err(_) => {
+                    let found = format!("cameras of {count} images");
+                    return Err(root.refuse_found(found, "a single camera"));
+                }
+            }
+        }
+        _ => root,
+    };
+    let (width, height) = image_size;
+    let camera = if node.optional("cam_K").is_some() {
+        PinholeCamera::from_matrix(&camera_matrix(&node)?, width, height)
+    } else if node.optional("fx").is_some() {
+        check_size(&node, image_size)?;
+        let value = |key: &str| node.get(key)?.number();
+        PinholeCamera::new(
+            value("fx")?,
+            value("fy")?,
+            value("cx")?,
+            value("cy")?,
+            width,
+            height,
+        )
+    } else {
+        return Err(
+            node.refuse("an object with the key `cam_K`, or with `fx`, `fy`, `cx` and `cy`")
+        );
+    };
+    Ok(CameraFile {
+        camera: camera.map_err(|source| camera_error(&node, source))?,
+        depth_scale: depth_scale(&node)?,
+    })
+}
+
+fn check_size(node: &Node<'_>, (width, height): (u32, u32)) -> Result<(), IoError> {
+    let (found_width, found_height) = (
+        node.get("width")?.unsigned()?,
+        node.get("height")?.unsigned()?,
+    );
+    if (found_width, found_height) == (width, height) {
+        return Ok(());
+    }
+    Err(IoError::CameraSize {
+        path: node.path().to_owned(),
+        found_width,
+        found_height,
+        expected_width: width,
+        expected_height: height,
+    })
+}
+
+/// Reads the calibration matrix `cam_K`.
+pub(crate) fn camera_matrix(node: &Node<'_>) -> Result<Matrix3<f64>, IoError> {
+    if node.optional("cam_K").is_none() && node.optional("cam_model").is_some() {
+        return Err(
+            node.refuse("a pinhole camera `cam_K`; camera models (`cam_model`) are not supported")
+        );
+    }
+    let numbers: [f64; 9] = node.get("cam_K")?.numbers()?;
+    Ok(Matrix3::from_row_slice(&numbers))
+}
+
+/// Reads `depth_scale`, millimetres per unit, where it is there.
+pub(crate) fn depth_scale(node: &Node<'_>) -> Result<Option<f64>, IoError> {
+    let Some(scale) = node.optional("depth_scale") else {
+        return Ok(None);
+    };
+    match scale.number()? {
+        value if value > 0.0 => Ok(Some(value)),
+        _ => Err(scale.refuse("a number above 0, in mm per unit")),
+    }
+}
+
+pub(crate) fn camera_error(node: &Node<'_>, source: CameraError) -> IoError {
+    IoError::Camera {
+        path: node.path().to_owned(),
+        key: node.key().to_owned(),
+        source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<CameraFile, IoError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("camera.json");
+        std::fs::write(&path, text).unwrap();
+        read_camera_json(&path, (640, 480))
+    }
+
+    const K: &str = r#""cam_K": [600.0, 0, 320.5, 0, 610, 240.25, 0, 0, 1]"#;
+    const FLAT: &str =
+        r#"{"fx": 600, "fy": 610, "cx": 320.5, "cy": 240.25, "width": 640, "height": 480}"#;
+
+    #[test]
+    fn all_forms_give_the_same_camera() {
+        let camera = PinholeCamera::new(600.0, 610.0, 320.5, 240.25, 640, 480).unwrap();
+        for (text, depth_scale) in [
+            (format!("{{{K}}}"), None),
+            (
+                format!(r#"{{{K}, "depth_scale": 0.1, "note": "x"}}"#),
+                Some(0.1),
+            ),
+            (format!(r#"{{"7": {{{K}, "depth_scale": 1}}}}"#), Some(1.0)),
+            (format!(r#"{{"7": {FLAT}}}"#), None),
+            (FLAT.to_owned(), None),
+        ] {
+            assert_eq!(
+                read(&text).unwrap(),
+                CameraFile {
+                    camera,
+                    depth_scale
+                }
+            );
+        }
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        let key = |text: &str| match read(text) {
+            Err(IoError::JsonValue { key, .. } | IoError::Camera { key, .. }) => key,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(key(&format!(r#"{{"1": {{{K}}}, "2": {{{K}}}}}"#)), "$");
+        assert_eq!(key("{}"), "$");
+        assert_eq!(key("[1]"), "$");
+        assert_eq!(key(r#"{"1": {"cam_model": {}}}"#), "$.1");
+        assert_eq!(key(r#"{"cam_K": [1, 2]}"#), "$.cam_K");
+        assert_eq!(
+            key(&format!(r#"{{{K}, "depth_scale": 0}}"#)),
+            "$.depth_scale"
+        );
+        assert_eq!(key(&FLAT.replace("600", "\"600\"")), "$.fx");
+        assert_eq!(key(&FLAT.replace("600", "-600")), "$");
+        assert_eq!(key(&FLAT.replace("640", "64.5")), "$.width");
+        assert!(matches!(
+            read(&FLAT.replace("640", "320")),
+            Err(IoError::CameraSize {
+                found_width: 320,
+                expected_width: 640,
+                ..
+            })
+        ));
+    }
+}

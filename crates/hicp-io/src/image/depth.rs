@@ -1,0 +1,236 @@
+//! Depth images in 16-bit PNG files.
+
+use std::path::Path;
+
+use hicp_core::DepthImage;
+use png::{BitDepth, ColorType, Transformations};
+
+use super::pixels;
+use crate::error::IoError;
+
+/// Reads a depth image from a PNG file of 16-bit gray values, `millimeters_per_unit` each; 0 means missing.
+///
+/// In BOP's words `millimeters_per_unit` is `depth_scale`. Depths beyond `hicp_core::MAX_DEPTH_METERS` become missing.
+///
+/// # Errors
+///
+/// [`IoError::DepthScale`] for a scale that is not finite and positive, [`IoError::PixelType`] for anything but 16-bit
+/// gray, [`IoError::ImageTooLarge`] for a side above `hicp_core::MAX_IMAGE_SIDE` or more than
+/// [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating), [`IoError::Promise`] for a header whose image the
+/// file is too small to hold, and [`IoError::Png`] or [`IoError::Read`] for the rest.
+pub fn read_depth_png(
+    path: impl AsRef<Path>,
+    millimeters_per_unit: f64,
+) -> Result<DepthImage, IoError> {
+    let path = path.as_ref();
+    check_scale(path, millimeters_per_unit)?;
+    let image = pixels::read(path, Transformations::IDENTITY, |color, depth| {
+        match (color, depth) {
+            (ColorType::Grayscale, BitDepth::Sixteen) => Ok(()),
+            _ => Err("16-bit gray"),
+        }
+    })?;
+    let meters = image
+        .bytes
+        .chunks_exact(2)
+        .map(|bytes| {
+            let units = u16::from_be_bytes([bytes[0], bytes[1]]);
+            narrow(f64::from(units) * millimeters_per_unit / 1000.0)
+        })
+        .collect();
+    DepthImage::from_meters(image.width, image.height, meters).map_err(|source| IoError::Image {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Writes a depth image as a PNG file of 16-bit gray values, `millimeters_per_unit` each; missing depths become 0.
+///
+/// Depths are rounded to the nearest unit; one below half a unit becomes missing.
+///
+/// # Errors
+///
+/// [`IoError::DepthScale`] for a scale that is not finite and positive, [`IoError::DepthRange`] for a depth above
+/// 65535 units, otherwise as [`write_atomically`](crate::write_atomically).
+pub fn write_depth_png(
+    path: impl AsRef<Path>,
+    depth: &DepthImage,
+    millimeters_per_unit: f64,
+) -> Result<(), IoError> {
+    let path = path.as_ref();
+    check_scale(path, millimeters_per_unit)?;
+    let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
+    let mut pixels = depth.pixels().iter();
+    for v in 0..depth.height() {
+        for (u, &meters) in (0..depth.width()).zip(&mut pixels) {
+            let units = (f64::from(meters) * 1000.0 / millimeters_per_unit).round();
+            let Some(units) = to_u16(units) else {
+                return Err(IoError::DepthRange {
+                    path: path.to_owned(),
+                    u,
+                    v,
+                    meters,
+                    limit: f64::from(u16::MAX) * millimeters_per_unit / 1000.0,
+                });
+            };
+            bytes.extend(units.to_be_bytes());
+        }
+    }
+    let size = (depth.width(), depth.height());
+    pixels::write(
+        path,
+        size,
+        (ColorType::Grayscale, BitDepth::Sixteen),
+        &bytes,
+    )
+}
+
+fn check_scale(path: &Path, value: f64) -> Result<(), IoError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(IoError::DepthScale {
+        path: path.to_owned(),
+        value,
+    })
+}
+
+#[allow(clippy::cast_possible_truncation)]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn to_u16(value: f64) -> Option<u16> {
+    (0.0..=f64::from(u16::MAX))
+        .contains(&value)
+        .then_some(value as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn units_come_back(
+            units in prop::collection::vec(any::<u16>(), 12),
+            scale in prop::sample::select(vec![0.1, 1.0, 0.125, 0.05, 10.0]),
+        ) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("depth.png");
+            let bytes: Vec<u8> = units.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+            pixels::write(&path, (4, 3), (ColorType::Grayscale, BitDepth::Sixteen), &bytes).unwrap();
+            let depth = read_depth_png(&path, scale).unwrap();
+            write_depth_png(&path, &depth, scale).unwrap();
+            let again = read_depth_png(&path, scale).unwrap();
+            prop_assert_eq!(&again, &depth);
+            for (meters, unit) in depth.pixels().iter().zip(&units) {
+                prop_assert!((f64::from(*meters) * 1000.0 - f64::from(*unit) * scale).abs() < 0.05);
+            }
+        }
+    }
+
+    #[test]
+    fn other_pixel_types_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        for (kind, bytes, name) in [
+            ((ColorType::Grayscale, BitDepth::Eight), 1, "8-bit gray"),
+            ((ColorType::Rgb, BitDepth::Sixteen), 6, "16-bit RGB"),
+            ((ColorType::Rgba, BitDepth::Eight), 4, "8-bit RGBA"),
+        ] {
+            pixels::write(&path, (1, 1), kind, &vec![1; bytes]).unwrap();
+            match read_depth_png(&path, 1.0) {
+                Err(IoError::PixelType { found, .. }) => assert_eq!(found, name),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn scales_and_ranges_are_checked() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let depth = DepthImage::from_meters(2, 1, vec![0.0, 70.0]).unwrap();
+        for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(
+                write_depth_png(&path, &depth, scale),
+                Err(IoError::DepthScale { .. })
+            ));
+            assert!(matches!(
+                read_depth_png(&path, scale),
+                Err(IoError::DepthScale { .. })
+            ));
+        }
+        assert!(matches!(
+            write_depth_png(&path, &depth, 1.0),
+            Err(IoError::DepthRange { u: 1, v: 0, .. })
+        ));
+        assert!(!path.exists());
+        write_depth_png(&path, &depth, 10.0).unwrap();
+        assert_eq!(read_depth_png(&path, 10.0).unwrap(), depth);
+    }
+
+    #[test]
+    fn truncated_and_foreign_files_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let meters: Vec<f32> = (0..4096_u16).map(|i| f32::from(i % 251) * 0.01).collect();
+        let depth = DepthImage::from_meters(64, 64, meters).unwrap();
+        write_depth_png(&path, &depth, 1.0).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in [0, 7, 20, 40, whole.len() / 2] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(
+                matches!(read_depth_png(&path, 1.0), Err(IoError::Png { .. })),
+                "{length}"
+            );
+        }
+        std::fs::write(&path, "P5 64 64 65535").unwrap();
+        assert!(matches!(
+            read_depth_png(&path, 1.0),
+            Err(IoError::Png { .. })
+        ));
+    }
+
+    #[test]
+    fn headers_of_decompression_bombs_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let depth = DepthImage::from_meters(1, 1, vec![1.0]).unwrap();
+        write_depth_png(&path, &depth, 1.0).unwrap();
+        let small = std::fs::read(&path).unwrap();
+        let announce = |width: u32, height: u32| {
+            let mut content = small.clone();
+            content[16..20].copy_from_slice(&width.to_be_bytes());
+            content[20..24].copy_from_slice(&height.to_be_bytes());
+            let checksum = crc32(&content[12..29]);
+            content[29..33].copy_from_slice(&checksum.to_be_bytes());
+            std::fs::write(&path, content).unwrap();
+            read_depth_png(&path, 1.0)
+        };
+        for (width, height) in [(40_000, 1), (20_000, 20_000), (0x7fff_ffff, 0x7fff_ffff)] {
+            assert!(matches!(
+                announce(width, height),
+                Err(IoError::ImageTooLarge { .. })
+            ));
+        }
+        assert!(matches!(announce(8192, 8192), Err(IoError::Promise { .. })));
+        assert!(matches!(announce(2, 2), Err(IoError::Png { .. })));
+    }
+
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(u32::MAX, |crc, byte| {
+            (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+                if crc & 1 == 1 {
+                    (crc >> 1) ^ 0xedb8_8320
+                } else {
+                    crc >> 1
+                }
+            })
+        })
+    }
+}

@@ -1,0 +1,122 @@
+//! Masks in PNG files.
+
+use std::path::Path;
+
+use hicp_core::Mask;
+use png::{BitDepth, ColorType, Transformations};
+
+use super::pixels;
+use crate::error::IoError;
+
+/// Reads a mask from a PNG file of any pixel type: a pixel belongs to the object when a gray or colour sample is not 0.
+///
+/// Palette images count by colour, so that black is background whatever its index; transparency does not count.
+///
+/// # Errors
+///
+/// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
+pub fn read_mask_png(path: impl AsRef<Path>) -> Result<Mask, IoError> {
+    let path = path.as_ref();
+    let image = pixels::read(path, Transformations::EXPAND, |_, _| Ok(()))?;
+    let sample_bytes = if image.depth == BitDepth::Sixteen {
+        2
+    } else {
+        1
+    };
+    let samples = image.color.samples();
+    let opaque = match image.color {
+        ColorType::GrayscaleAlpha | ColorType::Rgba => samples - 1,
+        _ => samples,
+    };
+    let mask = image
+        .bytes
+        .chunks_exact(samples * sample_bytes)
+        .map(|pixel| pixel[..opaque * sample_bytes].iter().any(|byte| *byte != 0))
+        .collect();
+    Mask::new(image.width, image.height, mask).map_err(|source| IoError::Image {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Writes a mask as a PNG file of 8-bit gray values: 255 for the object, 0 elsewhere.
+///
+/// # Errors
+///
+/// As [`write_atomically`](crate::write_atomically).
+pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError> {
+    let bytes: Vec<u8> = mask
+        .pixels()
+        .iter()
+        .map(|set| if *set { 255 } else { 0 })
+        .collect();
+    let size = (mask.width(), mask.height());
+    pixels::write(
+        path.as_ref(),
+        size,
+        (ColorType::Grayscale, BitDepth::Eight),
+        &bytes,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mask.png");
+        let mask = Mask::new(5, 3, (0..15).map(|i| i % 4 == 1).collect()).unwrap();
+        write_mask_png(&path, &mask).unwrap();
+        assert_eq!(read_mask_png(&path).unwrap(), mask);
+    }
+
+    #[test]
+    fn every_pixel_type_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mask.png");
+        // Two pixels each: background, opaque where there is alpha, then object.
+        let cases: [((ColorType, BitDepth), &[u8]); 7] = [
+            ((ColorType::Grayscale, BitDepth::One), &[0b0100_0000]),
+            ((ColorType::Grayscale, BitDepth::Four), &[0x01]),
+            ((ColorType::Grayscale, BitDepth::Sixteen), &[0, 0, 0, 1]),
+            (
+                (ColorType::GrayscaleAlpha, BitDepth::Eight),
+                &[0, 255, 1, 0],
+            ),
+            ((ColorType::Rgb, BitDepth::Eight), &[0, 0, 0, 0, 0, 9]),
+            (
+                (ColorType::Rgba, BitDepth::Eight),
+                &[0, 0, 0, 255, 0, 1, 0, 0],
+            ),
+            (
+                (ColorType::Rgb, BitDepth::Sixteen),
+                &[0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0],
+            ),
+        ];
+        for (kind, bytes) in cases {
+            pixels::write(&path, (2, 1), kind, bytes).unwrap();
+            assert_eq!(
+                read_mask_png(&path).unwrap().pixels(),
+                [false, true],
+                "{kind:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn palettes_count_by_colour() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mask.png");
+        let file = std::fs::File::create(&path).unwrap();
+        let mut encoder = png::Encoder::new(file, 2, 1);
+        encoder.set_color(ColorType::Indexed);
+        encoder.set_depth(BitDepth::Eight);
+        encoder.set_palette(vec![0, 200, 0, 0, 0, 0]);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[0, 1]).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(read_mask_png(&path).unwrap().pixels(), [true, false]);
+    }
+}

@@ -1,0 +1,11 @@
+//! Images from and to PNG files.
+
+mod depth;
+mod mask;
+mod pixels;
+mod rgb;
+
+pub use depth::{read_depth_png, write_depth_png};
+pub use mask::{read_mask_png, write_mask_png};
+pub use pixels::MAX_IMAGE_PIXELS;
+pub use rgb::{read_rgb_png, write_rgb_png};

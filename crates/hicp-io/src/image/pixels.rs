@@ -1,0 +1,126 @@
+//! Raw pixels from and to PNG files, within limits.
+
+use std::io::{self, Cursor};
+use std::path::Path;
+
+use hicp_core::MAX_IMAGE_SIDE;
+use png::{BitDepth, ColorType, DecodingError, Transformations};
+
+use crate::atomic::write_atomically;
+use crate::error::IoError;
+use crate::source::read_bytes;
+
+/// Largest number of pixels of an image that is read: 2²⁷, half a gigabyte of depth.
+pub const MAX_IMAGE_PIXELS: u64 = 1 << 27;
+
+/// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image it announces.
+const MAX_COMPRESSION: u64 = 1032;
+
+/// The pixels of an image as the decoder hands them out: rows without padding, samples of 16 bits big-endian.
+pub(super) struct Pixels {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) color: ColorType,
+    pub(super) depth: BitDepth,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// Decodes a PNG file.
+///
+/// `accept` sees the pixel type of the header, before anything is allocated; it says what it expects when it refuses.
+pub(super) fn read(
+    path: &Path,
+    transformations: Transformations,
+    accept: impl FnOnce(ColorType, BitDepth) -> Result<(), &'static str>,
+) -> Result<Pixels, IoError> {
+    let content = read_bytes(path)?;
+    let available = content.len() as u64;
+    let limits = png::Limits {
+        bytes: usize::try_from(MAX_IMAGE_PIXELS).unwrap_or(usize::MAX),
+    };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(content), limits);
+    decoder.set_transformations(transformations);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let failed = |error: DecodingError| match error {
+        DecodingError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
+            IoError::read(path, source)
+        }
+        other => IoError::Png {
+            path: path.to_owned(),
+            source: other.into(),
+        },
+    };
+
+    let header = decoder.read_header_info().map_err(failed)?;
+    let (width, height) = header.size();
+    accept(header.color_type, header.bit_depth).map_err(|expected| IoError::PixelType {
+        path: path.to_owned(),
+        found: describe(header.color_type, header.bit_depth),
+        expected,
+    })?;
+    let count = u64::from(width) * u64::from(height);
+    if width.max(height) > MAX_IMAGE_SIDE || count > MAX_IMAGE_PIXELS {
+        return Err(IoError::ImageTooLarge {
+            path: path.to_owned(),
+            width,
+            height,
+            max_side: MAX_IMAGE_SIDE,
+            max_pixels: MAX_IMAGE_PIXELS,
+        });
+    }
+    let needed = (header.raw_bytes() as u64) / MAX_COMPRESSION;
+    if needed > available {
+        return Err(IoError::Promise {
+            path: path.to_owned(),
+            what: "pixels".to_owned(),
+            count,
+            needed,
+            available,
+        });
+    }
+
+    let mut reader = decoder.read_info().map_err(failed)?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or(DecodingError::LimitsExceeded)
+        .map_err(failed)?;
+    let mut bytes = vec![0; size];
+    let frame = reader.next_frame(&mut bytes).map_err(failed)?;
+    bytes.truncate(frame.buffer_size());
+    Ok(Pixels {
+        width,
+        height,
+        color: frame.color_type,
+        depth: frame.bit_depth,
+        bytes,
+    })
+}
+
+/// Encodes pixels of one kind as a PNG file, atomically. Samples of 16 bits are big-endian.
+pub(super) fn write(
+    path: &Path,
+    (width, height): (u32, u32),
+    (color, depth): (ColorType, BitDepth),
+    bytes: &[u8],
+) -> Result<(), IoError> {
+    write_atomically(path, |writer| {
+        let mut encoder = png::Encoder::new(writer, width, height);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        let mut image = encoder.write_header().map_err(io::Error::other)?;
+        image.write_image_data(bytes).map_err(io::Error::other)?;
+        image.finish().map_err(io::Error::other)
+    })
+}
+
+fn describe(color: ColorType, depth: BitDepth) -> String {
+    let color = match color {
+        ColorType::Grayscale => "gray",
+        ColorType::Rgb => "RGB",
+        ColorType::Indexed => "palette",
+        ColorType::GrayscaleAlpha => "gray + alpha",
+        ColorType::Rgba => "RGBA",
+    };
+    format!("{}-bit {color}", depth as u8)
+}

@@ -1,0 +1,118 @@
+//! Colour images in PNG files: for pictures of results, nothing computes with them.
+
+use std::path::Path;
+
+use png::{BitDepth, ColorType, Transformations};
+
+use super::pixels;
+use crate::error::IoError;
+
+/// Reads a PNG file of any pixel type as 8-bit RGB: width, height, and 3 · width · height bytes, row-major.
+///
+/// Gray values are repeated, 16-bit samples lose their low byte, transparency is dropped.
+///
+/// # Errors
+///
+/// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
+pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoError> {
+    let transformations = Transformations::EXPAND | Transformations::STRIP_16;
+    let image = pixels::read(path.as_ref(), transformations, |_, _| Ok(()))?;
+    let bytes = match image.color {
+        ColorType::Rgb => image.bytes,
+        ColorType::Rgba => drop_alpha(&image.bytes),
+        _ => image
+            .bytes
+            .chunks_exact(image.color.samples())
+            .flat_map(|pixel| [pixel[0]; 3])
+            .collect(),
+    };
+    Ok((image.width, image.height, bytes))
+}
+
+fn drop_alpha(bytes: &[u8]) -> Vec<u8> {
+    bytes
+        .chunks_exact(4)
+        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
+        .collect()
+}
+
+/// Writes 8-bit RGB pixels (3 · `width` · `height` bytes, row-major) as a PNG file.
+///
+/// # Errors
+///
+/// [`IoError::Count`] when the number of bytes does not fit the size, otherwise as
+/// [`write_atomically`](crate::write_atomically).
+pub fn write_rgb_png(
+    path: impl AsRef<Path>,
+    width: u32,
+    height: u32,
+    rgb: &[u8],
+) -> Result<(), IoError> {
+    let path = path.as_ref();
+    let expected = (width as usize)
+        .saturating_mul(height as usize)
+        .saturating_mul(3);
+    if rgb.len() != expected {
+        return Err(IoError::Count {
+            path: path.to_owned(),
+            what: "bytes",
+            found: rgb.len(),
+            expected,
+        });
+    }
+    pixels::write(
+        path,
+        (width, height),
+        (ColorType::Rgb, BitDepth::Eight),
+        rgb,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_come_back_and_sizes_are_checked() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let rgb: Vec<u8> = (0..36).collect();
+        write_rgb_png(&path, 4, 3, &rgb).unwrap();
+        assert_eq!(read_rgb_png(&path).unwrap(), (4, 3, rgb.clone()));
+        assert!(matches!(
+            write_rgb_png(&path, 4, 4, &rgb),
+            Err(IoError::Count {
+                found: 36,
+                expected: 48,
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn other_pixel_types_become_rgb() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        for (kind, bytes, expected) in [
+            ((ColorType::Grayscale, BitDepth::One), vec![0x80], [255; 3]),
+            (
+                (ColorType::Grayscale, BitDepth::Sixteen),
+                vec![7, 9],
+                [7; 3],
+            ),
+            (
+                (ColorType::GrayscaleAlpha, BitDepth::Eight),
+                vec![7, 9],
+                [7; 3],
+            ),
+            (
+                (ColorType::Rgba, BitDepth::Eight),
+                vec![1, 2, 3, 4],
+                [1, 2, 3],
+            ),
+        ] {
+            pixels::write(&path, (1, 1), kind, &bytes).unwrap();
+            assert_eq!(read_rgb_png(&path).unwrap().2, expected, "{kind:?}");
+        }
+    }
+}

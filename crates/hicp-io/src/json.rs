@@ -1,0 +1,231 @@
+//! JSON values that know their file and their path of keys, so that every refusal can name both.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::error::{IoError, quote};
+use crate::source::{read_bytes, text_bytes};
+
+/// A parsed JSON file.
+#[derive(Debug)]
+pub(crate) struct Document {
+    path: PathBuf,
+    value: Value,
+}
+
+impl Document {
+    /// Reads a JSON file whole. Numbers keep every digit of an `f64`.
+    pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
+        let content = read_bytes(path)?;
+        let value = serde_json::from_slice(text_bytes(path, &content)?).map_err(|error| {
+            IoError::JsonSyntax {
+                path: path.to_owned(),
+                line: error.line(),
+                column: error.column(),
+                source: error.into(),
+            }
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            value,
+        })
+    }
+
+    pub(crate) fn root(&self) -> Node<'_> {
+        Node {
+            path: &self.path,
+            key: "$".to_owned(),
+            value: &self.value,
+        }
+    }
+}
+
+/// A value of a document.
+#[derive(Clone, Debug)]
+pub(crate) struct Node<'a> {
+    path: &'a Path,
+    key: String,
+    value: &'a Value,
+}
+
+impl<'a> Node<'a> {
+    pub(crate) fn path(&self) -> &'a Path {
+        self.path
+    }
+
+    pub(crate) fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// Returns the member `name` of an object, or `None` when it is not there or `null`.
+    pub(crate) fn optional(&self, name: &str) -> Option<Self> {
+        let value = self.value.get(name).filter(|value| !value.is_null())?;
+        Some(Self {
+            path: self.path,
+            key: format!("{}.{name}", self.key),
+            value,
+        })
+    }
+
+    pub(crate) fn get(&self, name: &str) -> Result<Self, IoError> {
+        self.optional(name)
+            .ok_or_else(|| self.refuse(format!("an object with the key `{name}`")))
+    }
+
+    /// Returns the members of an object whose keys are numbers, as BOP's are, in ascending order.
+    pub(crate) fn numbered(&self) -> Result<Vec<(u32, Self)>, IoError> {
+        let members = self
+            .value
+            .as_object()
+            .ok_or_else(|| self.refuse("an object whose keys are numbers"))?;
+        let mut numbered = Vec::with_capacity(members.len());
+        for (name, value) in members {
+            let number = name
+                .parse()
+                .map_err(|_| self.refuse_found(quote(name), "keys that are numbers"))?;
+            let key = format!("{}.{name}", self.key);
+            let path = self.path;
+            numbered.push((number, Self { path, key, value }));
+        }
+        numbered.sort_by_key(|(number, _)| *number);
+        Ok(numbered)
+    }
+
+    pub(crate) fn items(&self) -> Result<Vec<Self>, IoError> {
+        let items = self
+            .value
+            .as_array()
+            .ok_or_else(|| self.refuse("an array"))?;
+        Ok(items
+            .iter()
+            .enumerate()
+            .map(|(index, value)| Self {
+                path: self.path,
+                key: format!("{}[{index}]", self.key),
+                value,
+            })
+            .collect())
+    }
+
+    pub(crate) fn number(&self) -> Result<f64, IoError> {
+        self.value.as_f64().ok_or_else(|| self.refuse("a number"))
+    }
+
+    pub(crate) fn text(&self) -> Option<&'a str> {
+        self.value.as_str()
+    }
+
+    pub(crate) fn unsigned(&self) -> Result<u32, IoError> {
+        self.value
+            .as_u64()
+            .and_then(|value| u32::try_from(value).ok())
+            .ok_or_else(|| self.refuse("an integer from 0 to 4294967295"))
+    }
+
+    pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], IoError> {
+        let items = match self.value.as_array() {
+            Some(items) if items.len() == N => items,
+            _ => return Err(self.refuse(format!("an array of {N} numbers"))),
+        };
+        let mut numbers = [0.0; N];
+        for (index, (number, item)) in numbers.iter_mut().zip(items).enumerate() {
+            *number = item.as_f64().ok_or_else(|| IoError::JsonValue {
+                path: self.path.to_owned(),
+                key: format!("{}[{index}]", self.key),
+                found: describe(item),
+                expected: format!("a number, one of {N}"),
+            })?;
+        }
+        Ok(numbers)
+    }
+
+    /// Makes the error for a value that is not what was expected.
+    pub(crate) fn refuse(&self, expected: impl Into<String>) -> IoError {
+        self.refuse_found(describe(self.value), expected)
+    }
+
+    pub(crate) fn refuse_found(&self, found: String, expected: impl Into<String>) -> IoError {
+        IoError::JsonValue {
+            path: self.path.to_owned(),
+            key: self.key.clone(),
+            found,
+            expected: expected.into(),
+        }
+    }
+}
+
+fn describe(value: &Value) -> String {
+    match value {
+        Value::Null => "null".to_owned(),
+        Value::Bool(value) => value.to_string(),
+        Value::Number(number) => number.to_string(),
+        Value::String(text) => format!("the text {}", quote(text)),
+        Value::Array(items) => format!("an array of {}", items.len()),
+        Value::Object(members) => {
+            let mut names: Vec<&str> = members.keys().take(12).map(String::as_str).collect();
+            if members.len() > names.len() {
+                names.push("...");
+            }
+            format!("an object with the keys {names:?}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn document(text: &str) -> Result<Document, IoError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        std::fs::write(&path, text).unwrap();
+        Document::read(&path)
+    }
+
+    #[test]
+    fn syntax_errors_name_line_and_column() {
+        for text in ["{\n \"a\": NaN}", "", "{\n", "[1,]", "1e999"] {
+            assert!(
+                matches!(document(text), Err(IoError::JsonSyntax { .. })),
+                "{text}"
+            );
+        }
+        match document("{\n \"a\": NaN}") {
+            Err(IoError::JsonSyntax { line, .. }) => assert_eq!(line, 2),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn refusals_name_the_key_the_value_and_what_was_expected() {
+        let document =
+            document("\u{feff}{\"a\": [{\"R\": [1, \"x\", 3], \"n\": -1, \"t\": 4}]}").unwrap();
+        let item = document.root().get("a").unwrap().items().unwrap().remove(0);
+        let message = |result: Result<(), IoError>| {
+            let text = result.unwrap_err().to_string();
+            text.split_once(", ").unwrap().1.to_owned()
+        };
+        let r = item.get("R").unwrap();
+        assert_eq!(
+            message(r.numbers::<3>().map(|_| ())),
+            "$.a[0].R[1]: found the text \"x\", expected a number, one of 3"
+        );
+        assert_eq!(
+            message(r.numbers::<9>().map(|_| ())),
+            "$.a[0].R: found an array of 3, expected an array of 9 numbers"
+        );
+        assert_eq!(
+            message(item.get("n").unwrap().unsigned().map(|_| ())),
+            "$.a[0].n: found -1, expected an integer from 0 to 4294967295"
+        );
+        assert_eq!(
+            message(item.get("t").unwrap().numbers::<3>().map(|_| ())),
+            "$.a[0].t: found 4, expected an array of 3 numbers"
+        );
+        assert!(
+            message(item.get("z").map(|_| ())).ends_with("expected an object with the key `z`")
+        );
+        assert!(document.root().numbered().is_err());
+    }
+}

@@ -1,0 +1,64 @@
+//! Files in and out for Hybrid ICP: meshes, depth images, masks, cameras, poses, BOP datasets and result files.
+//!
+//! Use it to get the types of `hicp-core` out of the files that robots, scanners and benchmarks write, and back. It is
+//! no general mesh or image library: it keeps geometry and drops colours, materials and texture coordinates. Units end
+//! here: files may be in millimetres, everything handed out is in metres and seconds. Whatever a file holds, reading it
+//! returns a value or an [`IoError`] that names the file, the place in it, what was found and what was expected; it does
+//! not panic and does not allocate more than the size of the file justifies. Writers replace a file whole or leave it
+//! untouched ([`write_atomically`]).
+//!
+//! ```
+//! use hicp_core::{DepthImage, Isometry3, Translation3};
+//! use hicp_io::{LengthUnit, read_depth_png, read_mesh, write_depth_png};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let dir = tempfile::tempdir()?;
+//! # let (mesh_path, depth_path) = (dir.path().join("part.obj"), dir.path().join("depth.png"));
+//! std::fs::write(&mesh_path, "v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")?;
+//! let mesh = read_mesh(&mesh_path, LengthUnit::Millimeters)?;
+//! assert!((mesh.area() - 0.005).abs() < 1e-9); // square metres
+//!
+//! let depth = DepthImage::from_meters(2, 1, vec![0.5, 0.0])?;
+//! write_depth_png(&depth_path, &depth, 0.1)?; // 0.1 mm per unit
+//! assert_eq!(read_depth_png(&depth_path, 0.1)?, depth);
+//!
+//! let camera_from_object = Isometry3::from(Translation3::new(0.0, 0.0, 0.8));
+//! assert_eq!(hicp_io::pose_to_bop(&camera_from_object).1, [0.0, 0.0, 800.0]);
+//! # Ok(()) }
+//! ```
+//!
+//! Modules in reading order: `error` (what can go wrong), `source` (whole files into memory, within limits), `atomic`
+//! (writing), `unit`, `mesh` (OBJ, PLY, STL), `point_cloud`, `image` (PNG), `json` (values with their key path),
+//! `pose`, `camera`, and [`bop`] (datasets, detections, results).
+
+mod error;
+
+mod source;
+
+mod atomic;
+pub use atomic::write_atomically;
+pub use error::IoError;
+
+mod unit;
+pub use unit::{LengthUnit, UnknownUnit};
+
+mod mesh;
+pub use mesh::{read_mesh, write_obj, write_ply};
+
+mod point_cloud;
+pub use point_cloud::{PointCloud, read_point_cloud_ply, write_point_cloud_ply};
+
+mod image;
+pub use image::{
+    MAX_IMAGE_PIXELS, read_depth_png, read_mask_png, read_rgb_png, write_depth_png, write_mask_png,
+    write_rgb_png,
+};
+
+mod json;
+
+mod pose;
+pub use pose::{pose_from_bop, pose_to_bop, read_pose_json, write_pose_json};
+
+mod camera;
+pub use camera::{CameraFile, read_camera_json};
+
+pub mod bop;

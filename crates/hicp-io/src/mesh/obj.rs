@@ -1,0 +1,251 @@
+//! Wavefront OBJ, read with `tobj`.
+//!
+//! The reader gets the two records that make a mesh, `v` and `f`, in a plain form: it neither joins continued lines nor
+//! forgives broken colours, and it says what is wrong but not where. Handing it one record per line tells the line.
+
+use std::io::{self, BufRead, Read};
+use std::path::Path;
+
+use hicp_core::Point3;
+
+use super::RawMesh;
+use crate::error::IoError;
+use crate::source::text_bytes;
+
+/// Parses an OBJ file. Vertices that no face uses are dropped.
+pub(super) fn parse(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
+    let records = Records::of(text_bytes(path, &content)?);
+    drop(content);
+    let options = tobj::LoadOptions {
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    let mut reader = CountingReader {
+        rest: records.text.as_bytes(),
+        lines: 0,
+    };
+    // Materials are never asked for: no `mtllib` gets through.
+    let models = tobj::load_obj_buf(&mut reader, &options, |_| Err(tobj::LoadError::ReadError))
+        .map_err(|error| {
+            let at_fault = match error {
+                tobj::LoadError::FaceVertexOutOfBounds => records.first_missing_vertex(),
+                _ => reader.lines.saturating_sub(1),
+            };
+            records.error(path, at_fault, error)
+        })?
+        .0;
+
+    let mut mesh = RawMesh::default();
+    for tobj::Model { mesh: part, .. } in models {
+        // One model comes back, as no record that starts another gets through.
+        mesh.vertices.extend(
+            part.positions
+                .chunks_exact(3)
+                .map(|p| Point3::new(p[0], p[1], p[2])),
+        );
+        if part.face_arities.is_empty() {
+            for corners in part.indices.chunks_exact(3) {
+                mesh.add_face(corners);
+            }
+        } else {
+            let mut rest = part.indices.as_slice();
+            for arity in part.face_arities {
+                let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
+                mesh.add_face(corners);
+                rest = others;
+            }
+        }
+    }
+    Ok(mesh)
+}
+
+/// The `v` and `f` records of a file, one per line, and the lines they come from.
+#[derive(Debug, Default)]
+struct Records {
+    text: String,
+    lines: Vec<u32>,
+}
+
+impl Records {
+    fn of(content: &[u8]) -> Self {
+        let end_of_line = if content.contains(&b'\n') {
+            b'\n'
+        } else {
+            b'\r'
+        };
+        let mut records = Self::default();
+        let mut pending = String::new();
+        for (number, line) in (1_u32..).zip(content.split(|byte| *byte == end_of_line)) {
+            let line = String::from_utf8_lossy(line);
+            let line = line.split('#').next().unwrap_or_default().trim();
+            if let Some(start) = line.strip_suffix('\\') {
+                pending.push_str(start);
+                pending.push(' ');
+            } else if pending.is_empty() {
+                records.add(line, number);
+            } else {
+                pending.push_str(line);
+                records.add(&std::mem::take(&mut pending), number);
+            }
+        }
+        records
+    }
+
+    fn add(&mut self, line: &str, number: u32) {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                self.text.push('v');
+                // Three coordinates, or four with a weight; what follows is a colour.
+                let keep = if words.clone().count() == 4 { 4 } else { 3 };
+                for word in words.take(keep) {
+                    self.text.push(' ');
+                    self.text.push_str(word);
+                }
+            }
+            Some("f") => {
+                self.text.push('f');
+                for word in words {
+                    let position = word.split('/').next().filter(|index| !index.is_empty());
+                    self.text.push(' ');
+                    self.text.push_str(position.unwrap_or(word));
+                }
+            }
+            _ => return,
+        }
+        self.text.push('\n');
+        self.lines.push(number);
+    }
+
+    /// Returns the record of the first face that names a vertex that is not there.
+    fn first_missing_vertex(&self) -> usize {
+        let is_vertex = |record: &str| record.starts_with('v');
+        let vertices = self.text.lines().filter(|record| is_vertex(record)).count();
+        let mut seen = 0;
+        for (record, line) in self.text.lines().enumerate() {
+            if is_vertex(line) {
+                seen += 1;
+                continue;
+            }
+            let valid = |word: &str| match word.parse::<i64>() {
+                Ok(index) if index < 0 => index.unsigned_abs() <= seen,
+                Ok(index) => (1..=vertices).contains(&usize::try_from(index).unwrap_or(0)),
+                Err(_) => false,
+            };
+            let corners = line.split_whitespace().skip(1);
+            if corners.clone().count() >= 3 && !corners.clone().all(valid) {
+                return record;
+            }
+        }
+        0
+    }
+
+    fn error(&self, path: &Path, record: usize, error: tobj::LoadError) -> IoError {
+        use tobj::LoadError as E;
+        let vertices = self
+            .text
+            .lines()
+            .filter(|line| line.starts_with('v'))
+            .count();
+        let expected = match error {
+            E::PositionParseError => "`v` and three numbers".to_owned(),
+            E::ScalingByZeroError => "a vertex whose weight is not 0".to_owned(),
+            E::FaceParseError => "`f` and vertex indices".to_owned(),
+            E::FaceVertexOutOfBounds => format!(
+                "vertex indices from 1 to {vertices}, or negative ones that count back no further than the first vertex"
+            ),
+            other => format!("a readable record ({other})"),
+        };
+        let line = self.lines.get(record).copied().unwrap_or(1);
+        let found = self.text.lines().nth(record).unwrap_or_default();
+        IoError::line(path, line as usize, found, expected)
+    }
+}
+
+/// Counts the lines taken from it.
+struct CountingReader<'a> {
+    rest: &'a [u8],
+    lines: usize,
+}
+
+impl Read for CountingReader<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = (&mut self.rest).read(buffer)?;
+        self.lines += buffer[..count].iter().filter(|b| **b == b'\n').count();
+        Ok(count)
+    }
+}
+
+impl BufRead for CountingReader<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        Ok(self.rest)
+    }
+
+    fn consume(&mut self, amount: usize) {
+        let (taken, rest) = self.rest.split_at(amount);
+        self.lines += taken.iter().filter(|b| **b == b'\n').count();
+        self.rest = rest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<RawMesh, IoError> {
+        parse(Path::new("a.obj"), text.as_bytes().to_vec())
+    }
+
+    #[test]
+    fn continuations_comments_colours_groups_and_relative_indices() {
+        let mesh = read(
+            "# exported \\\r\nmtllib no such.mtl\r\nv 0 0 0 nan nan nan\r\nv 1 0 0 # right\r\nv 1 \\\r\n 1 0\r\no b\r\n\
+             usemtl\r\nv 0 1 0 0.5\r\nl 1 2\r\np 1\r\ng c\r\nf -4/1/9 -3//2 \\\r\n -2 -1\r\nf 1/ 2/ 3/",
+        )
+        .unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
+        assert_eq!(mesh.vertices[2], Point3::new(1.0, 1.0, 0.0));
+        assert_eq!(
+            mesh.vertices[3],
+            Point3::new(0.0, 2.0, 0.0),
+            "divided by its weight"
+        );
+    }
+
+    #[test]
+    fn old_line_endings_and_latin_comments() {
+        let text = b"# M\xfcller\rv 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r";
+        let mesh = parse(Path::new("a.obj"), text.to_vec()).unwrap();
+        assert_eq!(mesh.triangles.len(), 1);
+    }
+
+    #[test]
+    fn errors_name_the_line_and_what_stands_there() {
+        let head = "# c\nv 0 0 0\nv 1 0 0\nv 0 1 0\n\n";
+        for (record, at) in [
+            ("v 1 2", 6),
+            ("v 1 2 x", 6),
+            ("v 1 2 3 0", 6),
+            ("f 1 2 x", 6),
+            ("f 1 2 4", 6),
+            ("f 1 2 0", 6),
+            ("f 1 2 -4", 6),
+            ("f 1 2 99999999999999999999", 6),
+            ("f 1 2 -9223372036854775808", 6),
+        ] {
+            match read(&format!("{head}{record}\nf 1 2 3\n")) {
+                Err(IoError::Line { line, found, .. }) => {
+                    assert_eq!((line, found), (at, format!("{record:?}")));
+                }
+                other => panic!("{record}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_continued_at_the_end_of_the_file_is_dropped_or_read_but_never_panics() {
+        assert!(read("v 0 0 0\nf 1 \\").unwrap().triangles.is_empty());
+        assert!(read("\\").unwrap().triangles.is_empty());
+    }
+}

@@ -1,0 +1,97 @@
+//! The elements that are kept: vertices and faces.
+
+use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+
+use super::header::is_face_list;
+
+/// A vertex: x, y, z, nx, ny, nz; NaN where the file says nothing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    pub(crate) value: [f64; 6],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self {
+            value: [f64::NAN; 6],
+        }
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let names = ["x", "y", "z", "nx", "ny", "nz"];
+        match (names.iter().position(|n| *n == name), scalar(&property)) {
+            (Some(index), Some(number)) => {
+                self.value[index] = number;
+                PropertyAccessResult::Set
+            }
+            (Some(_), None) => PropertyAccessResult::UnsupportedType,
+            _ => PropertyAccessResult::Ignored,
+        }
+    }
+}
+
+/// A face: indices of its corners.
+#[derive(Clone, Debug)]
+pub(crate) struct Face {
+    pub(super) corners: Vec<i64>,
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self {
+            corners: Vec::new(),
+        }
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !is_face_list(name) {
+            return PropertyAccessResult::Ignored;
+        }
+        match integers(property) {
+            Some(corners) => {
+                self.corners = corners;
+                PropertyAccessResult::Set
+            }
+            None => PropertyAccessResult::UnsupportedType,
+        }
+    }
+}
+
+/// An element that is read past.
+#[derive(Debug)]
+pub(super) struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}
+
+fn scalar(property: &Property) -> Option<f64> {
+    match *property {
+        Property::Char(v) => Some(v.into()),
+        Property::UChar(v) => Some(v.into()),
+        Property::Short(v) => Some(v.into()),
+        Property::UShort(v) => Some(v.into()),
+        Property::Int(v) => Some(v.into()),
+        Property::UInt(v) => Some(v.into()),
+        Property::Float(v) => Some(v.into()),
+        Property::Double(v) => Some(v),
+        _ => None,
+    }
+}
+
+fn integers(property: Property) -> Option<Vec<i64>> {
+    fn widen<T: Into<i64>>(list: Vec<T>) -> Option<Vec<i64>> {
+        Some(list.into_iter().map(Into::into).collect())
+    }
+    match property {
+        Property::ListChar(list) => widen(list),
+        Property::ListUChar(list) => widen(list),
+        Property::ListShort(list) => widen(list),
+        Property::ListUShort(list) => widen(list),
+        Property::ListInt(list) => widen(list),
+        Property::ListUInt(list) => widen(list),
+        _ => None,
+    }
+}

@@ -1,0 +1,191 @@
+//! Polygons into triangles.
+
+use hicp_core::{Point2, Point3, Vector3};
+
+/// Polygons with more corners are cut into a fan: ear clipping is quadratic at best.
+const MAX_CLIPPED_CORNERS: usize = 1024;
+
+/// Appends the n − 2 triangles of a polygon of n corners, with its winding; nothing for fewer than three corners.
+///
+/// A convex polygon becomes a fan, a concave one is clipped ear by ear in its mean plane. What is left of a polygon that
+/// crosses itself becomes a fan. Corners must be indices into `vertices`.
+pub(super) fn triangulate(
+    vertices: &[Point3<f64>],
+    corners: &[u32],
+    triangles: &mut Vec<[u32; 3]>,
+) {
+    if corners.len() <= 3 || corners.len() > MAX_CLIPPED_CORNERS {
+        return fan(corners, triangles);
+    }
+    let points = flatten(vertices, corners);
+    let n = corners.len();
+    if (0..n).all(|i| turn(&points[(i + n - 1) % n], &points[i], &points[(i + 1) % n]) >= 0.0) {
+        return fan(corners, triangles);
+    }
+    clip_ears(&points, corners, triangles);
+}
+
+fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    if let [first, rest @ ..] = corners {
+        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+/// Projects the corners along the axis closest to the polygon's normal, so that they run counter-clockwise.
+fn flatten(vertices: &[Point3<f64>], corners: &[u32]) -> Vec<Point2<f64>> {
+    let positions: Vec<Point3<f64>> = corners.iter().map(|i| vertices[*i as usize]).collect();
+    // Newell's normal, about the first corner to keep the digits of polygons far from the origin.
+    let mut normal = Vector3::zeros();
+    for (i, p) in positions.iter().enumerate() {
+        let next = positions[(i + 1) % positions.len()];
+        normal += (p - positions[0]).cross(&(next - positions[0]));
+    }
+    let axis = normal.iamax();
+    let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
+    if normal[axis] < 0.0 {
+        (u, v) = (v, u);
+    }
+    positions.iter().map(|p| Point2::new(p[u], p[v])).collect()
+}
+
+/// Twice the signed area of a triangle: positive where it turns left.
+fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
+    (b - a).perp(&(c - a))
+}
+
+fn clip_ears(points: &[Point2<f64>], corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    let mut left: Vec<usize> = (0..points.len()).collect();
+    let (mut at, mut misses) = (0, 0);
+    while left.len() > 3 && misses < left.len() {
+        let n = left.len();
+        at %= n;
+        let ear = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]];
+        if is_ear(points, &left, ear) {
+            triangles.push(ear.map(|i| corners[i]));
+            left.remove(at);
+            misses = 0;
+        } else {
+            misses += 1;
+            at += 1;
+        }
+    }
+    let rest: Vec<u32> = left.iter().map(|i| corners[*i]).collect();
+    fan(&rest, triangles);
+}
+
+fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3]) -> bool {
+    let [a, b, c] = ear.map(|i| points[i]);
+    // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbour on the line.
+    if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
+        return false;
+    }
+    left.iter().map(|i| points[*i]).all(|p| {
+        // Corners are visited twice where a hole is bridged: equal positions do not block.
+        p == a
+            || p == b
+            || p == c
+            || turn(&a, &b, &p) < 0.0
+            || turn(&b, &c, &p) < 0.0
+            || turn(&c, &a, &p) < 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hicp_core::Isometry3;
+    use proptest::prelude::*;
+
+    fn area(vertices: &[Point3<f64>], triangles: &[[u32; 3]], up: &Vector3<f64>) -> (f64, f64) {
+        let (mut signed, mut absolute) = (0.0, 0.0);
+        for t in triangles {
+            let [a, b, c] = t.map(|i| vertices[i as usize]);
+            let area = 0.5 * (b - a).cross(&(c - a)).dot(up);
+            signed += area;
+            absolute += area.abs();
+        }
+        (signed, absolute)
+    }
+
+    fn cut(vertices: &[Point3<f64>]) -> Vec<[u32; 3]> {
+        let corners: Vec<u32> = (0..).take(vertices.len()).collect();
+        let mut triangles = Vec::new();
+        triangulate(vertices, &corners, &mut triangles);
+        triangles
+    }
+
+    fn flat(points: &[[f64; 2]]) -> Vec<Point3<f64>> {
+        points
+            .iter()
+            .map(|p| Point3::new(p[0], p[1], 0.0))
+            .collect()
+    }
+
+    #[test]
+    fn a_dart_is_cut_at_its_notch() {
+        // A fan from the first corner would leave the polygon.
+        let vertices = flat(&[[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]]);
+        let triangles = cut(&vertices);
+        assert_eq!(triangles.len(), 2);
+        let (signed, absolute) = area(&vertices, &triangles, &Vector3::z());
+        assert!((signed - 1.0).abs() < 1e-12 && (absolute - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bridged_hole_stays_open() {
+        // A 4 x 4 square with a 2 x 2 hole, joined by a bridge that is walked twice.
+        let vertices = flat(&[
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [4.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [3.0, 3.0],
+            [3.0, 1.0],
+            [1.0, 1.0],
+        ]);
+        let triangles = cut(&vertices);
+        assert_eq!(triangles.len(), 8);
+        let (signed, absolute) = area(&vertices, &triangles, &Vector3::z());
+        assert!((signed - 12.0).abs() < 1e-12 && (absolute - 12.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn broken_polygons_still_give_all_their_triangles() {
+        let line = flat(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.5, 0.0]]);
+        assert_eq!(cut(&line).len(), 3);
+        let bow_tie = flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert_eq!(cut(&bow_tie).len(), 2);
+        let nan = flat(&[[0.0, 0.0], [f64::NAN, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert_eq!(cut(&nan).len(), 2);
+        let many = vec![Point3::origin(); 100_000];
+        assert_eq!(cut(&many).len(), 99_998);
+        assert!(cut(&line[..2]).is_empty() && cut(&[]).is_empty());
+    }
+
+    proptest! {
+        /// A star-shaped polygon is covered exactly once, in any attitude and from any first corner.
+        #[test]
+        fn star_shaped_polygons_are_covered_once(
+            radii in prop::collection::vec(0.2_f64..2.0, 4..40),
+            turn in prop::array::uniform3(-3.0_f64..3.0),
+        ) {
+            let n = radii.len() as f64;
+            let motion = Isometry3::new(Vector3::new(5.0, -3.0, 8.0), Vector3::from(turn));
+            let vertices: Vec<Point3<f64>> = radii.iter().enumerate().map(|(i, r)| {
+                let angle = std::f64::consts::TAU * i as f64 / n;
+                motion * Point3::new(r * angle.cos(), r * angle.sin(), 0.0)
+            }).collect();
+            let expected: f64 = (0..radii.len()).map(|i| {
+                0.5 * radii[i] * radii[(i + 1) % radii.len()] * (std::f64::consts::TAU / n).sin()
+            }).sum();
+            let triangles = cut(&vertices);
+            prop_assert_eq!(triangles.len(), radii.len() - 2);
+            let (signed, absolute) = area(&vertices, &triangles, &(motion * Vector3::z()));
+            prop_assert!((signed - expected).abs() < 1e-9, "{} {}", signed, expected);
+            prop_assert!((absolute - expected).abs() < 1e-9);
+        }
+    }
+}

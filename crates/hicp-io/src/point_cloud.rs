@@ -1,0 +1,194 @@
+//! Point clouds from and to PLY files.
+
+use std::io::Write;
+use std::path::Path;
+
+use hicp_core::{Point3, UnitVector3, Vector3};
+
+use crate::atomic::write_atomically;
+use crate::error::IoError;
+use crate::mesh::ply;
+use crate::source::read_bytes;
+use crate::unit::LengthUnit;
+
+/// Points in metres, with normals where the file has them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointCloud {
+    /// Positions, metres.
+    pub points: Vec<Point3<f32>>,
+    /// One unit normal per point, or none at all.
+    pub normals: Option<Vec<UnitVector3<f32>>>,
+}
+
+/// Reads the vertices of a PLY file, ASCII or binary, as a point cloud; faces and other elements are skipped.
+///
+/// Normals are read where the vertices have `nx`, `ny` and `nz`, and are brought to unit length.
+///
+/// # Errors
+///
+/// As [`crate::read_mesh`] for malformed files, and [`IoError::Unsupported`] for a coordinate that is not finite (as
+/// `f32`, in metres) or a normal that has no direction.
+pub fn read_point_cloud_ply(
+    path: impl AsRef<Path>,
+    unit: LengthUnit,
+) -> Result<PointCloud, IoError> {
+    let path = path.as_ref();
+    let (vertices, _) = ply::read(path, &read_bytes(path)?)?;
+    let bad = |number: usize, what: &str, value: &[f64], expected| IoError::Unsupported {
+        path: path.to_owned(),
+        found: format!("vertex {number} with the {what} {value:?}"),
+        expected,
+    };
+    let mut points = Vec::with_capacity(vertices.len());
+    for (number, vertex) in vertices.iter().enumerate() {
+        let position = Point3::from_slice(&vertex.value[..3]);
+        let point = (position / unit.units_per_meter()).cast::<f32>();
+        if !point.iter().all(|x| x.is_finite()) {
+            return Err(bad(
+                number,
+                "position",
+                &vertex.value[..3],
+                "finite positions",
+            ));
+        }
+        points.push(point);
+    }
+    // A file states normals for all vertices or for none.
+    let without = |v: &ply::Vertex| v.value[3..].iter().all(|x| x.is_nan());
+    if vertices.iter().all(without) {
+        return Ok(PointCloud {
+            points,
+            normals: None,
+        });
+    }
+    let mut normals = Vec::with_capacity(vertices.len());
+    for (number, vertex) in vertices.iter().enumerate() {
+        let normal = Vector3::from_column_slice(&vertex.value[3..]).cast::<f32>();
+        match UnitVector3::try_new(normal, 1e-6) {
+            Some(unit) if unit.iter().all(|x| x.is_finite()) => normals.push(unit),
+            _ => {
+                let expected = "finite normals that are not zero";
+                return Err(bad(number, "normal", &vertex.value[3..], expected));
+            }
+        }
+    }
+    Ok(PointCloud {
+        points,
+        normals: Some(normals),
+    })
+}
+
+/// Writes a point cloud as binary little-endian PLY, in metres.
+///
+/// # Errors
+///
+/// [`IoError::Count`] when there is not one normal per point; otherwise as [`write_atomically`].
+pub fn write_point_cloud_ply(
+    path: impl AsRef<Path>,
+    points: &[Point3<f32>],
+    normals: Option<&[UnitVector3<f32>]>,
+) -> Result<(), IoError> {
+    let path = path.as_ref();
+    if let Some(normals) = normals
+        && normals.len() != points.len()
+    {
+        return Err(IoError::Count {
+            path: path.to_owned(),
+            what: "normals",
+            found: normals.len(),
+            expected: points.len(),
+        });
+    }
+    write_atomically(path, |writer| {
+        writeln!(
+            writer,
+            "ply\nformat binary_little_endian 1.0\ncomment units m"
+        )?;
+        writeln!(writer, "element vertex {}", points.len())?;
+        let names: &[&str] = match normals {
+            Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
+            None => &["x", "y", "z"],
+        };
+        for name in names {
+            writeln!(writer, "property float {name}")?;
+        }
+        writeln!(writer, "end_header")?;
+        let put = |writer: &mut dyn Write, values: [f32; 3]| {
+            values
+                .iter()
+                .try_for_each(|value| writer.write_all(&value.to_le_bytes()))
+        };
+        for (index, point) in points.iter().enumerate() {
+            put(writer, (*point).into())?;
+            if let Some(normals) = normals {
+                put(writer, normals[index].into_inner().into())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.ply");
+        let points = [Point3::new(0.1, -0.2, 0.3), Point3::new(1.0, 2.0, 3.0)];
+        let normals = [
+            Vector3::x_axis(),
+            UnitVector3::new_normalize(Vector3::new(1.0, 1.0, 0.0)),
+        ];
+        for normals in [None, Some(&normals[..])] {
+            write_point_cloud_ply(&path, &points, normals).unwrap();
+            let cloud = read_point_cloud_ply(&path, LengthUnit::Meters).unwrap();
+            assert_eq!(cloud.points, points);
+            match (cloud.normals, normals) {
+                (None, None) => {}
+                (Some(read), Some(written)) => {
+                    for (a, b) in read.iter().zip(written) {
+                        assert!((a.into_inner() - b.into_inner()).norm() < 1e-6);
+                    }
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        write_point_cloud_ply(&path, &[], None).unwrap();
+        assert!(
+            read_point_cloud_ply(&path, LengthUnit::Meters)
+                .unwrap()
+                .points
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn bad_clouds_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.ply");
+        assert!(matches!(
+            write_point_cloud_ply(&path, &[Point3::origin()], Some(&[])),
+            Err(IoError::Count {
+                found: 0,
+                expected: 1,
+                ..
+            })
+        ));
+        for (names, body) in [("x y z", "0 nan 0"), ("x y z nx ny nz", "0 0 0 0 0 0")] {
+            let properties: String = names
+                .split(' ')
+                .map(|name| format!("property float {name}\n"))
+                .collect();
+            let text = format!(
+                "ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n{body}\n"
+            );
+            std::fs::write(&path, text).unwrap();
+            assert!(matches!(
+                read_point_cloud_ply(&path, LengthUnit::Meters),
+                Err(IoError::Unsupported { .. })
+            ));
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Poses in BOP's form: nine numbers of a rotation, row-major, and a translation in millimetres.
+
+use std::path::Path;
+
+use hicp_core::{Isometry3, Matrix3, RotationError, Translation3, rotation_from_matrix};
+
+use crate::atomic::write_atomically;
+use crate::error::IoError;
+use crate::json::{Document, Node};
+
+/// Returns the pose of a row-major rotation and a translation in millimetres; the pose is in metres.
+///
+/// The rotation returned is the one nearest to the nine numbers. A translation that is not finite is passed on.
+///
+/// # Errors
+///
+/// [`RotationError`] when the nine numbers are further from a rotation than rounding explains.
+///
+/// ```
+/// # fn main() -> Result<(), hicp_core::RotationError> {
+/// let pose = hicp_io::pose_from_bop(&[1., 0., 0., 0., 1., 0., 0., 0., 1.], &[0., 0., 800.])?;
+/// assert_eq!(pose.translation.z, 0.8);
+/// # Ok(()) }
+/// ```
+pub fn pose_from_bop(
+    rotation: &[f64; 9],
+    translation_mm: &[f64; 3],
+) -> Result<Isometry3<f64>, RotationError> {
+    let rotation = rotation_from_matrix(&Matrix3::from_row_slice(rotation))?;
+    let [x, y, z] = translation_mm.map(|mm| mm / 1000.0);
+    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+}
+
+/// Returns the rotation of a pose, row-major, and its translation in millimetres; the pose is in metres.
+#[must_use]
+pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
+    let matrix = pose.rotation.to_rotation_matrix().into_inner();
+    let mut rotation = [0.0; 9];
+    // The columns of the transpose are the rows of the matrix.
+    rotation.copy_from_slice(matrix.transpose().as_slice());
+    let t = pose.translation.vector * 1000.0;
+    (rotation, [t.x, t.y, t.z])
+}
+
+/// Reads a pose from a JSON file: an object with `cam_R_m2c` (9 numbers, row-major) and `cam_t_m2c` (3, millimetres).
+///
+/// Other keys are ignored. The pose returned is in metres; as in BOP it is `camera_from_object`.
+///
+/// # Errors
+///
+/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, or [`IoError::Rotation`].
+pub fn read_pose_json(path: impl AsRef<Path>) -> Result<Isometry3<f64>, IoError> {
+    pose_of(
+        &Document::read(path.as_ref())?.root(),
+        "cam_R_m2c",
+        "cam_t_m2c",
+    )
+}
+
+/// Writes a pose (metres) as [`read_pose_json`] reads it, with every digit.
+///
+/// # Errors
+///
+/// As [`write_atomically`].
+pub fn write_pose_json(path: impl AsRef<Path>, pose: &Isometry3<f64>) -> Result<(), IoError> {
+    let (rotation, translation) = pose_to_bop(pose);
+    let value = serde_json::json!({ "cam_R_m2c": rotation, "cam_t_m2c": translation });
+    write_atomically(path, |writer| writeln!(writer, "{value}"))
+}
+
+/// Reads the pose stated by two members of a JSON object.
+pub(crate) fn pose_of(
+    node: &Node<'_>,
+    rotation: &str,
+    translation: &str,
+) -> Result<Isometry3<f64>, IoError> {
+    let rotation = node.get(rotation)?;
+    let translation = node.get(translation)?;
+    pose_from_bop(&rotation.numbers()?, &translation.numbers()?).map_err(|source| {
+        IoError::Rotation {
+            path: rotation.path().to_owned(),
+            place: rotation.key().to_owned(),
+            source,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hicp_core::{Vector6, se3};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn poses_come_back(twist in prop::array::uniform6(-3.0_f64..3.0)) {
+            let pose = se3::exp(&Vector6::from(twist));
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("pose.json");
+            write_pose_json(&path, &pose).unwrap();
+            let (angle, distance) = se3::pose_distance(&read_pose_json(&path).unwrap(), &pose);
+            prop_assert!(angle < 1e-14 && distance < 1e-14, "{} {}", angle, distance);
+        }
+    }
+
+    fn read(text: &str) -> Result<Isometry3<f64>, IoError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("pose.json");
+        std::fs::write(&path, text).unwrap();
+        read_pose_json(&path)
+    }
+
+    #[test]
+    fn rotations_are_row_major() {
+        // A quarter turn about z takes x to y.
+        let pose = read(r#"{"cam_R_m2c":[0,-1,0, 1,0,0, 0,0,1],"cam_t_m2c":[1,2,3],"score":null}"#);
+        let point = pose.unwrap() * hicp_core::Point3::new(1.0, 0.0, 0.0);
+        assert!((point - hicp_core::Point3::new(0.001, 1.002, 0.003)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        let good = "[1,0,0,0,1,0,0,0,1]";
+        for (r, t, key) in [
+            ("[1,0,0,0,1,0,0,0]", "[0,0,0]", "$.cam_R_m2c"),
+            ("1", "[0,0,0]", "$.cam_R_m2c"),
+            (r#"[1,0,0,0,"1",0,0,0,1]"#, "[0,0,0]", "$.cam_R_m2c[4]"),
+            (good, "[0,0,0,1]", "$.cam_t_m2c"),
+            (good, "null", "$"),
+        ] {
+            match read(&format!(r#"{{"cam_R_m2c":{r},"cam_t_m2c":{t}}}"#)) {
+                Err(IoError::JsonValue { key: found, .. }) => assert_eq!(found, key),
+                other => panic!("{other:?}"),
+            }
+        }
+        let reflection = r#"{"cam_R_m2c":[1,0,0,0,1,0,0,0,-1],"cam_t_m2c":[0,0,0]}"#;
+        assert!(matches!(
+            read(reflection),
+            Err(IoError::Rotation { source: RotationError::Determinant { determinant, .. }, .. })
+                if determinant == -1.0
+        ));
+        assert!(matches!(read("[1]"), Err(IoError::JsonValue { .. })));
+    }
+}

@@ -1,0 +1,96 @@
+//! Units of length in files.
+
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
+/// The unit in which a file states lengths. Mesh formats do not say theirs, so the reader must be told.
+///
+/// ```
+/// use hicp_io::LengthUnit;
+/// assert_eq!("mm".parse(), Ok(LengthUnit::Millimeters));
+/// assert_eq!(LengthUnit::Centimeters.to_string(), "cm");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LengthUnit {
+    /// m: scans and robot descriptions.
+    Meters,
+    /// mm: CAD files, BOP models.
+    Millimeters,
+    /// cm: some modelling programs.
+    Centimeters,
+}
+
+impl LengthUnit {
+    /// Metres in one of this unit.
+    #[must_use]
+    pub fn meters_per_unit(self) -> f64 {
+        match self {
+            Self::Meters => 1.0,
+            Self::Millimeters => 0.001,
+            Self::Centimeters => 0.01,
+        }
+    }
+
+    /// Units in one metre: a whole number for every unit, so that converting by it rounds once.
+    pub(crate) fn units_per_meter(self) -> f64 {
+        match self {
+            Self::Meters => 1.0,
+            Self::Millimeters => 1000.0,
+            Self::Centimeters => 100.0,
+        }
+    }
+}
+
+impl fmt::Display for LengthUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Meters => "m",
+            Self::Millimeters => "mm",
+            Self::Centimeters => "cm",
+        })
+    }
+}
+
+impl FromStr for LengthUnit {
+    type Err = UnknownUnit;
+
+    fn from_str(text: &str) -> Result<Self, UnknownUnit> {
+        match text {
+            "m" => Ok(Self::Meters),
+            "mm" => Ok(Self::Millimeters),
+            "cm" => Ok(Self::Centimeters),
+            _ => Err(UnknownUnit {
+                found: text.to_owned(),
+            }),
+        }
+    }
+}
+
+/// A text that is not the abbreviation of a [`LengthUnit`].
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("unit is {found:?}, expected m, mm or cm")]
+pub struct UnknownUnit {
+    /// The text given.
+    pub found: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_factors_agree() {
+        for unit in [
+            LengthUnit::Meters,
+            LengthUnit::Millimeters,
+            LengthUnit::Centimeters,
+        ] {
+            assert_eq!(unit.to_string().parse(), Ok(unit));
+            assert_eq!(unit.meters_per_unit() * unit.units_per_meter(), 1.0);
+        }
+        let error = "inch".parse::<LengthUnit>().unwrap_err();
+        assert_eq!(error.to_string(), r#"unit is "inch", expected m, mm or cm"#);
+    }
+}
