@@ -69,3 +69,8 @@ pub use hicp_switch::{PAPER_ALPHA, Switch, Switcher, Threshold};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use trace::{StageRecord, Trace};
+
+/// Compiles the README's examples.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -1,0 +1,50 @@
+//! Whole pipelines: every preset by its name, from an observation to a pose and from a depth image to a pose.
+//!
+//! `cargo bench -p hicp-benches --bench pipeline`
+
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+use hicp_benches::{OBJECTS, case};
+use hybrid_icp::{Observation, Preset, Refiner};
+
+/// A warm refinement: the observation, its search tree and the scratch memory are there.
+fn pipeline(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("pipeline");
+    for object in OBJECTS {
+        let case = case(object);
+        for preset in Preset::ALL {
+            let mut refiner = Refiner::preset(preset);
+            group.bench_function(BenchmarkId::new(preset.name(), case.name), |bencher| {
+                bencher.iter(|| {
+                    refiner.refine(&case.scene.model, &case.scene.observation, &case.init)
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// From the depth image: observation, search tree, refinement and both scores.
+fn cold(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("pipeline-cold");
+    for object in OBJECTS {
+        let case = case(object);
+        let observation = &case.scene.observation;
+        for preset in [Preset::Hybrid, Preset::NnPointToPoint] {
+            group.bench_function(BenchmarkId::new(preset.name(), case.name), |bencher| {
+                let mut refiner = Refiner::preset(preset);
+                bencher.iter_batched(
+                    || (observation.depth().clone(), observation.mask().clone()),
+                    |(depth, mask)| {
+                        Observation::new(depth, mask, *observation.camera())
+                            .map(|o| refiner.refine(&case.scene.model, &o, &case.init))
+                    },
+                    BatchSize::LargeInput,
+                );
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, pipeline, cold);
+criterion_main!(benches);

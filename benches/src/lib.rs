@@ -1,0 +1,39 @@
+//! The scenes that the benches measure: fixed seeds, so that every run measures the same work.
+
+use hicp_sim::{
+    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
+};
+use hicp_tests::Scene;
+use hybrid_icp::Isometry3;
+
+/// A scene and a start at the paper's mean initialisation error.
+#[derive(Debug)]
+pub struct Case {
+    /// Name of the object.
+    pub name: &'static str,
+    /// The scene.
+    pub scene: Scene,
+    /// The initial pose.
+    pub init: Isometry3<f64>,
+}
+
+/// Makes the case of an object, with 0.5 % depth noise.
+#[must_use]
+pub fn case(object: Household) -> Case {
+    let mut rng = rng(42);
+    let scene = hicp_tests::scene(object, 0.5, &mut rng);
+    let init = perturb(
+        &mut rng,
+        &scene.truth,
+        MEAN_TRANSLATION_ERROR_METERS,
+        MEAN_ROTATION_ERROR_DEGREES.to_radians(),
+    );
+    Case {
+        name: object.name(),
+        scene,
+        init,
+    }
+}
+
+/// The objects that the benches measure: a body with a handle, a thin one, and a flat box.
+pub const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
