@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::{Dataset, read_results};
+use hicp_tests::median;
 use hicp_tests::ycbv::{Instance, instances, root};
 use hybrid_icp::{Isometry3, Preset, Refiner, adi};
 
@@ -121,15 +122,5 @@ fn main() {
     println!("| initial | {} | 0 | | |", cells.join(" | "));
     for line in lines.values() {
         println!("{line}");
-    }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        (values[middle - 1] + values[middle]) / 2.0
-    } else {
-        values[middle]
     }
 }

@@ -19,6 +19,30 @@ pub struct Scene {
     pub truth: Isometry3<f64>,
 }
 
+impl Scene {
+    /// Makes the observation anew, without its search trees.
+    pub fn observe_anew(&self) -> Observation {
+        let observation = &self.observation;
+        Observation::new(
+            observation.depth().clone(),
+            observation.mask().clone(),
+            *observation.camera(),
+        )
+        .expect("sizes agree")
+    }
+}
+
+/// Returns the median; the mean of the two middle values of an even number. Sorts the values; NaN without any.
+pub fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[middle],
+        _ => f64::midpoint(values[middle - 1], values[middle]),
+    }
+}
+
 /// The camera of the synthetic scenes: 640×480, 60° wide.
 pub fn camera() -> PinholeCamera {
     PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480).expect("a valid camera")

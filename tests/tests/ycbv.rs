@@ -1,6 +1,7 @@
 //! Real YCB-Video frames: ground truth stays put, and real detectors' estimates improve. Skipped, aloud, without the data.
 
 use hicp_io::bop::{Dataset, read_results};
+use hicp_tests::median;
 use hicp_tests::ycbv::{instances, root};
 use hybrid_icp::{Preset, Refiner, adi, se3};
 
@@ -54,9 +55,4 @@ fn hybrid_improves_what_real_detectors_found() {
             "{file}: {before} mm -> {after} mm"
         );
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
