@@ -10,7 +10,10 @@ const MARK: &str = "// Deviation:";
 
 /// Writes the document.
 pub(crate) fn bless(root: &Path) -> Findings {
-    std::fs::write(root.join(FILE), document(root))
+    let file = root.join(FILE);
+    file.parent()
+        .map_or(Ok(()), std::fs::create_dir_all)
+        .and_then(|()| std::fs::write(&file, document(root)))
         .map_err(|error| vec![format!("{FILE}: {error}")])
 }
 

@@ -1,6 +1,6 @@
 //! Files in and out for Hybrid ICP: meshes, depth images, masks, cameras, poses, BOP datasets and result files.
 //!
-//! Use it to get the types of `hicp-core` out of the files that robots, scanners and benchmarks write, and back. It is
+//! **Should you use this crate?** Use it to get the types of `hicp-core` out of the files that robots, scanners and benchmarks write, and back. It is
 //! no general mesh or image library: it keeps geometry and drops colours, materials and texture coordinates. Units end
 //! here: files may be in millimetres, everything handed out is in metres and seconds. Whatever a file holds, reading it
 //! returns a value or an [`IoError`] that names the file, the place in it, what was found and what was expected; it does

@@ -4,7 +4,7 @@
 //! of times: one mesh of some thousand triangles that covers a small part of the image. Work is proportional to the mesh
 //! and the pixels it covers, and a warm rasterizer allocates nothing.
 //!
-//! # Should I use this crate?
+//! # Should you use this crate?
 //!
 //! Yes, to render depth or visible triangles of a mesh without a GPU, in a result that is the same on every run and every
 //! machine. No, for colour, texture, anti-aliasing, lens distortion or transparency: there is none of that here.
