@@ -14,13 +14,13 @@ use crate::stride::Stride;
 /// An observation without surfels gives no pairs. Cost: O(n log n) once per observation, then O(log n) per point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NearestNeighbor {
-    /// Which observed pixels enter the tree. A tree that fits the cache answers ten times faster, at no loss of accuracy.
+    /// Which observed pixels enter the tree. A tree that fits the cache answers several times faster, at hardly any loss of accuracy.
     pub targets: Stride,
 }
 
 impl Default for NearestNeighbor {
     /// About 4,000 observed points.
-    // Deviation: §III-A.1 searches all of C; a strided C gave the same accuracy in a tenth of the time.
+    // Deviation: §III-A.1 searches all of C; a strided C ended at a mean VSD of .254 instead of .251 in half of the time.
     fn default() -> Self {
         Self {
             targets: Stride::AboutPoints(4000),

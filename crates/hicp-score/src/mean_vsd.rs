@@ -24,6 +24,7 @@ pub struct MeanVsd {
 /// BOP's visibility tolerance δ, metres, for every dataset but ITODD.
 pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
 
+// Deviation: masked pixels without depth count in neither mask; the paper's images have none.
 impl MeanVsd {
     /// The definition of §IV-A: everything rendered counts.
     #[must_use]

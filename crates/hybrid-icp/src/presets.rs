@@ -19,6 +19,8 @@ use hicp_switch::{PAPER_ALPHA, Switch, Threshold};
 /// When a stage of the paper's variants ends (§IV-B).
 pub type PaperStop = (Divergence, Convergence, IterationLimit);
 
+// Deviation: §IV-B states the divergence rules for Cascading ICP; here they end the single-metric baselines too, so that all
+// variants differ in association and metric alone.
 /// Returns the paper's rules: divergence as written, convergence of the loss, at most 50 iterations.
 #[must_use]
 pub fn paper_stop() -> PaperStop {
