@@ -9,7 +9,8 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
 /// - `source` holds the selected surfels in the object frame; `pairs` arrives empty.
 /// - Every pair pushed holds the source *moved by* `camera_from_object` and its target, both in the camera frame in metres,
 ///   with finite coordinates and a finite weight that is not negative (1 unless the association knows better).
-/// - `source_index` is the index of the point in `source`; a point may have no pair, or several.
+/// - `source_index` is the index of the point in `source` and `target_index` that of the observed surfel; a point may have no
+///   pair, or several.
 /// - Pure: equal inputs give equal pairs in equal order; `&mut self` is scratch. What depends on the observation or the
 ///   model alone belongs into their `derived()` caches, where all threads share it.
 ///
@@ -36,8 +37,9 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
 ///         for (source_index, surfel) in (0..).zip(source) {
 ///             let source = mover.surfel(surfel);
 ///             let Some(pixel) = observation.camera().project(&source.point.cast()) else { continue };
-///             if let Some(target) = observation.surfel_near(pixel.x as f32, pixel.y as f32) {
-///                 pairs.push(Pair { source, target: *target, weight: 1.0, source_index });
+///             let Some(target_index) = observation.index_near(pixel.x as f32, pixel.y as f32) else { continue };
+///             if let Some(target) = observation.surfel(target_index) {
+///                 pairs.push(Pair::new(source_index, source, target_index, *target));
 ///             }
 ///         }
 ///     }

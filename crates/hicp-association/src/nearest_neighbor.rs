@@ -41,13 +41,8 @@ impl DataAssociation for NearestNeighbor {
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            if let Some(target) = index.nearest(&source) {
-                pairs.push(Pair {
-                    source,
-                    target: *target,
-                    weight: 1.0,
-                    source_index,
-                });
+            if let Some((target_index, target)) = index.nearest(&source) {
+                pairs.push(Pair::new(source_index, source, target_index, target));
             }
         }
     }
@@ -57,9 +52,9 @@ impl DataAssociation for NearestNeighbor {
     }
 }
 
-/// The observed surfels of one stride and the tree over their positions.
+/// The observed surfels of one stride with their indices, and the tree over their positions.
 struct TargetIndex {
-    surfels: Vec<Surfel>,
+    surfels: Vec<(u32, Surfel)>,
     /// `None` when there is nothing to find: the tree would answer with item 0 at an infinite distance.
     tree: Option<ImmutableKdTree<f32, 3>>,
 }
@@ -74,8 +69,9 @@ impl TargetIndex {
 
     fn build(observation: &Observation, stride: u32) -> Self {
         // An observation's surfels are finite by construction, so no NaN reaches the tree.
-        let surfels: Vec<Surfel> = observation.surfels(stride).map(|(_, _, s)| *s).collect();
-        let points: Vec<[f32; 3]> = surfels.iter().map(|s| s.point.into()).collect();
+        let surfels: Vec<(u32, Surfel)> =
+            observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
+        let points: Vec<[f32; 3]> = surfels.iter().map(|(_, s)| s.point.into()).collect();
         let tree = if points.is_empty() {
             None
         } else {
@@ -84,7 +80,7 @@ impl TargetIndex {
         Self { surfels, tree }
     }
 
-    fn nearest(&self, source: &Surfel) -> Option<&Surfel> {
+    fn nearest(&self, source: &Surfel) -> Option<(u32, Surfel)> {
         let found = self
             .tree
             .as_ref()?
@@ -95,7 +91,7 @@ impl TargetIndex {
         found
             .distance
             .is_finite()
-            .then(|| self.surfels.get(found.item as usize))
+            .then(|| self.surfels.get(found.item as usize).copied())
             .flatten()
     }
 }

@@ -34,13 +34,12 @@ impl DataAssociation for Projective {
                 continue;
             }
             let (u, v) = (fx * point.x / point.z + cx, fy * point.y / point.z + cy);
-            if let Some(target) = observation.surfel_near(u, v) {
-                pairs.push(Pair {
-                    source: mover.surfel(surfel),
-                    target: *target,
-                    weight: 1.0,
-                    source_index,
-                });
+            let Some(target_index) = observation.index_near(u, v) else {
+                continue;
+            };
+            if let Some(target) = observation.surfel(target_index) {
+                let source = mover.surfel(surfel);
+                pairs.push(Pair::new(source_index, source, target_index, *target));
             }
         }
     }

@@ -13,11 +13,26 @@ pub struct Pair {
     pub target: Surfel,
     /// Weight, not negative.
     pub weight: f32,
-    /// Index of the source point in the selection.
+    /// Which source element this is: its index in the selection; for an association that starts from the observation, its index
+    /// among the model's elements. Equal indices mean the same element.
     pub source_index: u32,
+    /// Which target element this is: its row-major index in the observation's region, see [`crate::Observation::surfel`].
+    pub target_index: u32,
 }
 
 impl Pair {
+    /// Makes a pair of weight 1.
+    #[must_use]
+    pub fn new(source_index: u32, source: Surfel, target_index: u32, target: Surfel) -> Self {
+        Self {
+            source,
+            target,
+            weight: 1.0,
+            source_index,
+            target_index,
+        }
+    }
+
     /// Returns the distance between the two points, metres.
     #[must_use]
     pub fn distance(&self) -> f32 {

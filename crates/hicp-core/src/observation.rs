@@ -164,30 +164,46 @@ impl Observation {
             .filter(|s| s.point.z > 0.0)
     }
 
-    /// Returns the surfel of the pixel whose square contains the image position (u, v); `None` outside and for NaN.
+    /// Returns the surfel of the pixel whose square contains the image position (u, v), as [`Observation::index_near`] finds it.
+    #[must_use]
+    #[inline]
+    pub fn surfel_near(&self, u: f32, v: f32) -> Option<&Surfel> {
+        self.index_near(u, v)
+            .map(|index| &self.surfels[index as usize])
+    }
+
+    /// Returns the index of the surfel of the pixel whose square contains the image position (u, v); `None` where there is
+    /// none, outside, and for NaN.
     ///
     /// The square of a pixel reaches half a pixel to every side of its integer centre; its lower edges belong to it.
     #[must_use]
     #[inline]
-    pub fn surfel_near(&self, u: f32, v: f32) -> Option<&Surfel> {
+    pub fn index_near(&self, u: f32, v: f32) -> Option<u32> {
         let column = u - self.region.u_min as f32 + 0.5;
         let row = v - self.region.v_min as f32 + 0.5;
         let (width, height) = (self.region.width(), self.region.height());
         // False for NaN, so the casts below see numbers inside the region.
         if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            // Floor of a checked value.
-            let index = row as usize * width + column as usize;
-            self.surfels.get(index).filter(|s| s.point.z > 0.0)
+            // Floor of a checked value, below 2³².
+            let index = row as u32 * width as u32 + column as u32;
+            self.surfel(index).map(|_| index)
         } else {
             None
         }
     }
 
-    /// Returns the surfels on the pixel grid u ≡ v ≡ 0 (mod `stride`) in row-major order, with their pixels.
+    /// Returns the surfel of an index: the row-major position of its pixel in [`Observation::region`]. `None` where there is none.
+    #[must_use]
+    #[inline]
+    pub fn surfel(&self, index: u32) -> Option<&Surfel> {
+        self.surfels.get(index as usize).filter(|s| s.point.z > 0.0)
+    }
+
+    /// Returns the surfels on the pixel grid u ≡ v ≡ 0 (mod `stride`) in row-major order, each with its index, see [`Observation::surfel`].
     ///
     /// The grid is anchored at the image's corner, so equal strides pick equal pixels whatever the mask.
-    pub fn surfels(&self, stride: u32) -> impl Iterator<Item = (u32, u32, &Surfel)> {
+    pub fn surfels(&self, stride: u32) -> impl Iterator<Item = (u32, &Surfel)> {
         let stride = stride.max(1);
         let (region, width) = (self.region, self.region.width());
         let step = stride as usize;
@@ -197,9 +213,16 @@ impl Observation {
                 let row = (v - region.v_min) as usize * width;
                 (region.u_min.next_multiple_of(stride)..region.u_max)
                     .step_by(step)
-                    .map(move |u| (u, v, &self.surfels[row + (u - region.u_min) as usize]))
+                    .map(move |u| row + (u - region.u_min) as usize)
             })
-            .filter(|(_, _, s)| s.point.z > 0.0)
+            // At most 2³⁰ pixels in any accepted image.
+            .map(|index| {
+                (
+                    u32::try_from(index).unwrap_or(u32::MAX),
+                    &self.surfels[index],
+                )
+            })
+            .filter(|(_, s)| s.point.z > 0.0)
     }
 
     /// Values derived from this observation, such as search trees: built once, shared by all threads.

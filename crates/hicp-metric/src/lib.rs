@@ -12,7 +12,7 @@
 //! // Three points and their counterparts, half a metre further along x.
 //! let pairs: Correspondences = [(0.0, 0.0, 1.0), (0.2, 0.0, 1.0), (0.0, 0.1, 1.0)]
 //!     .into_iter()
-//!     .map(|(x, y, z)| Pair { source: surfel(x, y, z), target: surfel(x + 0.5, y, z), weight: 1.0, source_index: 0 })
+//!     .map(|(x, y, z)| Pair::new(0, surfel(x, y, z), 0, surfel(x + 0.5, y, z)))
 //!     .collect();
 //! let step = PointToPoint.minimize(&pairs).ok_or("undetermined").unwrap();
 //! assert!((step.increment.translation.vector - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-6);
