@@ -95,7 +95,7 @@ fn associate(criterion: &mut Criterion) {
             let id = BenchmarkId::new(association.name(), case.name);
             group.bench_function(id, |bencher| {
                 bencher.iter(|| {
-                    pairs.clear();
+                    pairs.begin(&case.init, source.len());
                     let mut context = workspace.context(&problem);
                     association.associate(&mut context, &source, &case.init, &mut pairs);
                     black_box(pairs.len())
@@ -115,8 +115,9 @@ fn metric(criterion: &mut Criterion) {
         let mut context = workspace.context(&problem);
         Projective.associate(&mut context, &source, &case.init, &mut pairs);
         group.throughput(Throughput::Elements(pairs.len() as u64));
-        let metrics: [Box<dyn ErrorMetric>; 2] = [Box::new(PointToPoint), Box::new(PointToPlane)];
-        for metric in &metrics {
+        let mut metrics: [Box<dyn ErrorMetric>; 2] =
+            [Box::new(PointToPoint), Box::new(PointToPlane)];
+        for metric in &mut metrics {
             group.bench_function(BenchmarkId::new(metric.name(), case.name), |bencher| {
                 bencher.iter(|| metric.minimize(black_box(&pairs)));
             });

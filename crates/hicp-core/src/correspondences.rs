@@ -40,10 +40,23 @@ impl Pair {
     }
 }
 
-/// The pairs of one turn. A buffer that is cleared and refilled; the caller owns it.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// The pairs of one turn, the pose they were made at, and how many were tried. A buffer that is begun anew and refilled; the
+/// caller owns it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Correspondences {
     pairs: Vec<Pair>,
+    camera_from_object: Isometry3<f64>,
+    n_candidates: usize,
+}
+
+impl Default for Correspondences {
+    fn default() -> Self {
+        Self {
+            pairs: Vec::new(),
+            camera_from_object: Isometry3::identity(),
+            n_candidates: 0,
+        }
+    }
 }
 
 impl Correspondences {
@@ -53,9 +66,28 @@ impl Correspondences {
         Self::default()
     }
 
-    /// Removes all pairs and keeps the memory.
-    pub fn clear(&mut self) {
+    /// Removes all pairs, keeps the memory, and notes the pose at which the next ones are made and how many points ask for one.
+    pub fn begin(&mut self, camera_from_object: &Isometry3<f64>, n_candidates: usize) {
         self.pairs.clear();
+        self.camera_from_object = *camera_from_object;
+        self.n_candidates = n_candidates;
+    }
+
+    /// The pose at which the pairs were made: their sources are moved by it.
+    #[must_use]
+    pub fn camera_from_object(&self) -> &Isometry3<f64> {
+        &self.camera_from_object
+    }
+
+    /// How many points asked for a pair; the matched share of them is the fitness.
+    #[must_use]
+    pub fn n_candidates(&self) -> usize {
+        self.n_candidates
+    }
+
+    /// Says how many points asked for a pair, for an association that does not start from the selected ones.
+    pub fn set_candidates(&mut self, n_candidates: usize) {
+        self.n_candidates = n_candidates;
     }
 
     /// Makes room for `additional` more pairs.
@@ -105,8 +137,11 @@ impl Extend<Pair> for Correspondences {
 
 impl FromIterator<Pair> for Correspondences {
     fn from_iter<I: IntoIterator<Item = Pair>>(pairs: I) -> Self {
+        let pairs: Vec<Pair> = pairs.into_iter().collect();
         Self {
-            pairs: pairs.into_iter().collect(),
+            n_candidates: pairs.len(),
+            pairs,
+            ..Self::default()
         }
     }
 }

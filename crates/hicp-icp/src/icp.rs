@@ -76,7 +76,7 @@ where
         let mut first = None;
         let mut iteration = 0;
         let termination = loop {
-            pairs.clear();
+            pairs.begin(&candidate, source.len());
             if !source.is_empty() {
                 self.association
                     .associate(&mut context, source, &candidate, pairs);

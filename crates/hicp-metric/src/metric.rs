@@ -42,11 +42,14 @@ pub trait ErrorMetric {
     /// Adds the residual rows of one pair, linearised at the identity increment.
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations);
 
-    /// Takes one step of minimisation over all pairs.
+    /// Takes one step of minimisation over all pairs. Pure: `&mut self` is scratch.
+    ///
+    /// A metric that depends on the pose (a prior, a frozen direction of the object frame) finds it in
+    /// [`Correspondences::camera_from_object`].
     ///
     /// `None` when the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
     /// that are not finite. The provided method is one Gauss–Newton step about the centroid with lengths scaled by the RMS radius.
-    fn minimize(&self, pairs: &Correspondences) -> Option<Step> {
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         let mut system = NormalEquations::about_sources(pairs.as_slice())?;
         for pair in pairs.as_slice() {
             self.linearize(pair, &mut system);
@@ -71,7 +74,7 @@ impl<T: ErrorMetric + ?Sized> ErrorMetric for Box<T> {
         (**self).linearize(pair, system);
     }
 
-    fn minimize(&self, pairs: &Correspondences) -> Option<Step> {
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         (**self).minimize(pairs)
     }
 

@@ -33,7 +33,7 @@ impl ErrorMetric for PointToPoint {
         system.add_row(&point, &Vector3::z(), difference.z, weight);
     }
 
-    fn minimize(&self, pairs: &Correspondences) -> Option<Step> {
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         let pairs = pairs.as_slice();
         let first = pairs.first().filter(|_| pairs.len() >= MIN_PAIRS)?;
         // Sums relative to the first pair, so that objects far from the camera lose no digits.
