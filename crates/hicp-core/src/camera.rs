@@ -133,6 +133,21 @@ impl PinholeCamera {
         Self::new(k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)], width, height)
     }
 
+    /// Returns the camera whose pixel (i, j) looks along the ray of this one's pixel (i·factor, j·factor). 0 counts as 1.
+    #[must_use]
+    pub fn scaled_down(&self, factor: u32) -> Self {
+        let factor = factor.max(1);
+        let scale = 1.0 / f64::from(factor);
+        Self {
+            fx: self.fx * scale,
+            fy: self.fy * scale,
+            cx: self.cx * scale,
+            cy: self.cy * scale,
+            width: self.width.div_ceil(factor),
+            height: self.height.div_ceil(factor),
+        }
+    }
+
     /// Horizontal focal length, pixels.
     #[must_use]
     pub fn fx(&self) -> f64 {

@@ -94,7 +94,7 @@ where
                 mean_loss: step.mean_loss,
             };
             let first = *first.get_or_insert(current);
-            session.observer.on_iteration(&IterationEvent {
+            let wish = session.observer.on_iteration(&IterationEvent {
                 iteration: iteration - 1,
                 camera_from_object: &candidate,
                 evaluation: current,
@@ -116,6 +116,9 @@ where
                     break termination;
                 }
                 ControlFlow::Continue(()) => accepted = Some((candidate, current)),
+            }
+            if wish.is_break() {
+                break Termination::Stopped;
             }
             let mut next = step.increment * candidate;
             // Products of unit quaternions drift off the unit sphere; a long run must stay in SO(3).

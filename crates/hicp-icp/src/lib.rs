@@ -18,23 +18,31 @@
 //! # let _ = projective_cascade();
 //! ```
 //!
-//! Modules in reading order: `stage` (trait), `icp` (the engine), `outcome`, `stop` and `divergence` (stop rules), `compose`
-//! (cascade, repeat), `session` (workspace), `observer`.
+//! Modules in reading order: `stage` (trait), `icp` (the engine), `outcome`, `stop`, `divergence`, `motion` and `limits` (stop
+//! rules), `compose` (cascade, repeat), `guard` (stages that answer to a score), `resolution`, `session` (workspace), `observer`.
 
 mod compose;
 mod divergence;
+mod guard;
 mod icp;
+mod limits;
+mod motion;
 mod observer;
 mod outcome;
+mod resolution;
 mod session;
 mod stage;
 mod stop;
 
 pub use compose::{Cascade, Repeat};
 pub use divergence::{Divergence, LossRule};
+pub use guard::{Guard, KeepBest};
 pub use icp::Icp;
+pub use limits::{AbsoluteLoss, Deadline, TimeLimit};
+pub use motion::{Bound, Motion, Oscillation};
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
 pub use outcome::{Evaluation, Outcome, Termination, Verdict};
+pub use resolution::AtResolution;
 pub use session::{Session, Workspace};
 pub use stage::Stage;
 pub use stop::{Convergence, IterationLimit, Progress, StopRule};

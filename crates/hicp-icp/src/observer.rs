@@ -1,14 +1,18 @@
 //! Who is told what happens during a run.
 
+use std::ops::ControlFlow;
+
 use hicp_core::Isometry3;
 
 use crate::outcome::{Evaluation, Outcome};
 
 /// Sees a run from outside. Called per iteration, never per point; all methods do nothing unless overridden.
 pub trait Observer {
-    /// An iteration evaluated a pose.
-    fn on_iteration(&mut self, event: &IterationEvent<'_>) {
+    /// An iteration evaluated a pose. `Break` ends the stage there, with [`crate::Termination::Stopped`], unless a stop rule
+    /// rejects the pose; composed stages go on with what follows, and meet the same answer.
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
         let _ = event;
+        ControlFlow::Continue(())
     }
 
     /// A switcher chose.

@@ -18,6 +18,16 @@ pub enum Termination {
     LossIncreased,
     /// The pairs did not determine a step.
     Degenerate,
+    /// The pose returned to where it had been some iterations before, and would go on doing so.
+    Oscillating,
+    /// The pose left the bounds set about the initial one.
+    OutOfBounds,
+    /// The time was up; the last evaluated pose is returned.
+    Deadline,
+    /// The observer asked to stop; the last evaluated pose is returned.
+    Stopped,
+    /// A guard's score did not improve.
+    ScoreNotImproved,
 }
 
 impl Termination {
@@ -26,7 +36,12 @@ impl Termination {
     pub fn is_rollback(self) -> bool {
         matches!(
             self,
-            Self::NoPairs | Self::PairsLost | Self::LossIncreased | Self::Degenerate
+            Self::NoPairs
+                | Self::PairsLost
+                | Self::LossIncreased
+                | Self::Degenerate
+                | Self::OutOfBounds
+                | Self::ScoreNotImproved
         )
     }
 
@@ -40,6 +55,11 @@ impl Termination {
             Self::PairsLost => "pairs_lost",
             Self::LossIncreased => "loss_increased",
             Self::Degenerate => "degenerate",
+            Self::Oscillating => "oscillating",
+            Self::OutOfBounds => "out_of_bounds",
+            Self::Deadline => "deadline",
+            Self::Stopped => "stopped",
+            Self::ScoreNotImproved => "score_not_improved",
         }
     }
 }

@@ -56,9 +56,10 @@ pub use hicp_core::{
     rotation_from_matrix, se3, so3,
 };
 pub use hicp_icp::{
-    Cascade, Convergence, Divergence, Evaluation, Icp, IterationEvent, IterationLimit, LossRule,
-    Observer, Outcome, Progress, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
-    Termination, Verdict, Workspace,
+    AbsoluteLoss, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence, Evaluation,
+    Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer, Oscillation,
+    Outcome, Progress, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
+    Termination, TimeLimit, Verdict, Workspace,
 };
 pub use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
 pub use hicp_raster::{Rasterizer, render_depth_image};
