@@ -7,7 +7,7 @@ use hicp_core::{Context, Isometry3, Problem, se3};
 use hicp_metric::ErrorMetric;
 
 use crate::observer::{IterationEvent, StageEvent};
-use crate::outcome::{Evaluation, Outcome, Termination, Verdict};
+use crate::outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::Stage;
 use crate::stop::{Progress, StopRule};
@@ -66,7 +66,8 @@ where
         let (source, pairs) = (&mut workspace.source, &mut workspace.pairs);
         let mut context = Context::new(*problem, &mut workspace.renders);
         source.clear();
-        if se3::is_finite(init) {
+        let finite = se3::is_finite(init);
+        if finite {
             self.selection.select(&mut context, init, source);
         }
         self.stop.start();
@@ -77,7 +78,8 @@ where
         let mut iteration = 0;
         let termination = loop {
             pairs.begin(&candidate, source.len());
-            if !source.is_empty() {
+            if finite {
+                // Even without a source: an association may start from the observation.
                 self.association
                     .associate(&mut context, source, &candidate, pairs);
                 self.filter.filter(problem, pairs);
@@ -130,6 +132,17 @@ where
         };
 
         let pose = accepted.map_or(*init, |(pose, _)| pose);
+        let mut quality = None;
+        if accepted.is_some() {
+            if *pairs.camera_from_object() != pose {
+                // Rolled back: the pairs in hand are those of the rejected pose.
+                pairs.begin(&pose, source.len());
+                self.association
+                    .associate(&mut context, source, &pose, pairs);
+                self.filter.filter(problem, pairs);
+            }
+            quality = Quality::of(pairs);
+        }
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
@@ -140,6 +153,7 @@ where
             },
             iterations: iteration,
             evaluation: accepted.map(|(_, evaluation)| evaluation),
+            quality,
         };
         session.observer.on_stage_end(&StageEvent {
             selection: self.selection.name(),

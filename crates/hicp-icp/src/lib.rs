@@ -41,7 +41,7 @@ pub use icp::Icp;
 pub use limits::{AbsoluteLoss, Deadline, TimeLimit};
 pub use motion::{Bound, Motion, Oscillation};
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
-pub use outcome::{Evaluation, Outcome, Termination, Verdict};
+pub use outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 pub use resolution::AtResolution;
 pub use session::{Session, Workspace};
 pub use stage::Stage;

@@ -42,22 +42,25 @@ pub struct IterationEvent<'a> {
     pub increment: &'a Isometry3<f64>,
 }
 
-/// Which branch of a switch is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Regime {
-    /// The estimate agrees with the image: projective association finds consistent pairs.
-    Aligned,
-    /// It does not: only nearest neighbours find pairs at all.
-    Misaligned,
-}
+/// Which branch of a switch is taken, counted from 0: the better the estimate agrees with the image, the lower.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Regime(pub usize);
 
 impl Regime {
+    /// The estimate agrees with the image: projective association finds consistent pairs.
+    pub const ALIGNED: Self = Self(0);
+    /// It does not: only nearest neighbours find pairs at all.
+    pub const MISALIGNED: Self = Self(1);
+
     /// Name in traces and files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Aligned => "aligned",
-            Self::Misaligned => "misaligned",
+        match self.0 {
+            0 => "aligned",
+            1 => "misaligned",
+            2 => "regime-2",
+            3 => "regime-3",
+            _ => "regime-n",
         }
     }
 }

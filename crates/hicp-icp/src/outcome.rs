@@ -1,6 +1,6 @@
 //! How a stage ended, and what it returns.
 
-use hicp_core::Isometry3;
+use hicp_core::{Correspondences, Isometry3};
 
 /// Why a stage ended. Ending is not an error: whatever the data, a stage returns a pose and says why it stopped there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -79,6 +79,41 @@ pub struct Evaluation {
     pub mean_loss: f64,
 }
 
+/// How well the pairs of the returned pose fit: what is measured there and nowhere else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Share of the points that asked for a pair and have one after filtering, 0 to 1; higher is better.
+    pub fitness: f64,
+    /// Root mean square of the distances between the points of the pairs, metres.
+    pub point_rmse: f64,
+    /// Root mean square of the distances of the model points from the observed tangent planes, metres.
+    pub plane_rmse: f64,
+}
+
+impl Quality {
+    /// Measures pairs; `None` without any.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+    pub fn of(pairs: &Correspondences) -> Option<Self> {
+        if pairs.is_empty() {
+            return None;
+        }
+        let count = pairs.len() as f64;
+        let (mut points, mut planes) = (0.0, 0.0);
+        for pair in pairs.as_slice() {
+            let difference = (pair.source.point - pair.target.point).cast::<f64>();
+            points += difference.norm_squared();
+            planes += pair.target.normal.cast::<f64>().dot(&difference).powi(2);
+        }
+        Some(Self {
+            // Several pairs per point do not make more than all of the points matched.
+            fitness: (count / pairs.n_candidates().max(1) as f64).min(1.0),
+            point_rmse: (points / count).sqrt(),
+            plane_rmse: (planes / count).sqrt(),
+        })
+    }
+}
+
 /// Whether a stage moved the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -103,6 +138,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// Pairs and loss at the returned pose, by the last part that evaluated it; `None` if none did.
     pub evaluation: Option<Evaluation>,
+    /// How well the pairs at the returned pose fit, by the same part; `None` if none evaluated it.
+    pub quality: Option<Quality>,
 }
 
 impl Outcome {
@@ -121,12 +158,19 @@ impl Outcome {
             verdict: Verdict::KeptInitial(termination),
             iterations: 0,
             evaluation: None,
+            quality: None,
         }
     }
 
     /// Returns the outcome of this stage followed by another that started from its pose.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
+        // A part that evaluated nothing stands at the pose where the one before it was measured.
+        let measured = if next.evaluation.is_some() || next.verdict == Verdict::Refined {
+            &next
+        } else {
+            &self
+        };
         let moved = self.verdict == Verdict::Refined || next.verdict == Verdict::Refined;
         Self {
             camera_from_object: next.camera_from_object,
@@ -137,11 +181,8 @@ impl Outcome {
                 Verdict::KeptInitial(next.termination)
             },
             iterations: self.iterations + next.iterations,
-            evaluation: match next.verdict {
-                // Both stand at the same pose.
-                Verdict::KeptInitial(_) => next.evaluation.or(self.evaluation),
-                Verdict::Refined => next.evaluation,
-            },
+            evaluation: measured.evaluation,
+            quality: measured.quality,
         }
     }
 }

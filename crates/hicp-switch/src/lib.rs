@@ -17,13 +17,13 @@
 //! }
 //! ```
 //!
-//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stage).
+//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stages).
 
 mod switch;
 mod switcher;
 mod threshold;
 
 pub use hicp_icp::{Regime, RegimeEvent};
-pub use switch::Switch;
+pub use switch::{Switch, SwitchAmong};
 pub use switcher::Switcher;
-pub use threshold::{PAPER_ALPHA, Threshold};
+pub use threshold::{PAPER_ALPHA, Threshold, Thresholds};

@@ -27,9 +27,9 @@ impl<S: Score> Switcher for Threshold<S> {
         let score = self.score.score(context, camera_from_object);
         RegimeEvent {
             regime: if score >= self.alpha {
-                Regime::Misaligned
+                Regime::MISALIGNED
             } else {
-                Regime::Aligned
+                Regime::ALIGNED
             },
             score: Some(score),
         }
@@ -37,5 +37,34 @@ impl<S: Score> Switcher for Threshold<S> {
 
     fn name(&self) -> &'static str {
         "threshold"
+    }
+}
+
+/// Any number of regimes by ascending thresholds on a score: regime k when exactly k of the bounds are at or below it.
+///
+/// With one bound it is [`Threshold`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Thresholds<S> {
+    /// The score, higher is worse.
+    pub score: S,
+    /// The bounds, in any order.
+    pub bounds: Vec<f64>,
+}
+
+impl<S: Score> Switcher for Thresholds<S> {
+    fn regime(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> RegimeEvent {
+        let score = self.score.score(context, camera_from_object);
+        RegimeEvent {
+            regime: Regime(self.bounds.iter().filter(|bound| score >= **bound).count()),
+            score: Some(score),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "thresholds"
     }
 }

@@ -58,7 +58,7 @@ pub use hicp_core::{
 pub use hicp_icp::{
     AbsoluteLoss, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence, Evaluation,
     Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer, Oscillation,
-    Outcome, Progress, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
+    Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
     Termination, TimeLimit, Verdict, Workspace,
 };
 pub use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
@@ -66,7 +66,7 @@ pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,
 };
-pub use hicp_switch::{PAPER_ALPHA, Switch, Switcher, Threshold};
+pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use trace::{StageRecord, Trace};
