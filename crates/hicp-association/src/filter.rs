@@ -29,6 +29,15 @@ impl<T: OutlierFilter> OutlierFilter for Option<T> {
     }
 }
 
+/// Applies the members in order.
+impl<T: OutlierFilter> OutlierFilter for Vec<T> {
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+        for member in self {
+            member.filter(problem, pairs);
+        }
+    }
+}
+
 macro_rules! chain {
     ($($member:ident),+) => {
         impl<$($member: OutlierFilter),+> OutlierFilter for ($($member,)+) {

@@ -12,11 +12,16 @@ use crate::session::Session;
 use crate::stage::Stage;
 use crate::stop::{Progress, StopRule};
 
+/// The most evaluations that a stage makes, whatever its stop rules say.
+pub const MAX_ITERATIONS: usize = 1000;
+
 /// Generic ICP (Algorithm 1 of the paper) from its five components, each a public field.
 ///
 /// The points are selected once, at the initial pose. A turn then associates at the candidate pose, filters, and minimises,
 /// which gives the loss *there* and the next increment; the stop rule judges. A candidate is accepted only after it was
 /// evaluated, so the returned pose is the last one that the rules let stand, and rolling back costs nothing.
+///
+/// Whatever the stop rules say, a stage ends after [`MAX_ITERATIONS`] evaluations: a rule set without a limit may never fire.
 ///
 /// No pairs, or pairs that determine no step, end the stage with the pose accepted last.
 ///
@@ -121,6 +126,9 @@ where
             }
             if wish.is_break() {
                 break Termination::Stopped;
+            }
+            if iteration >= MAX_ITERATIONS {
+                break Termination::IterationLimit;
             }
             let mut next = step.increment * candidate;
             // Products of unit quaternions drift off the unit sphere; a long run must stay in SO(3).

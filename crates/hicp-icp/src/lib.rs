@@ -37,7 +37,7 @@ mod stop;
 pub use compose::{Cascade, Repeat};
 pub use divergence::{Divergence, LossRule};
 pub use guard::{Guard, KeepBest};
-pub use icp::Icp;
+pub use icp::{Icp, MAX_ITERATIONS};
 pub use limits::{AbsoluteLoss, Deadline, TimeLimit};
 pub use motion::{Bound, Motion, Oscillation};
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};

@@ -47,6 +47,24 @@ impl<T: StopRule + ?Sized> StopRule for Box<T> {
     }
 }
 
+/// As tuples: all see every iteration, the first `Break` wins.
+impl<T: StopRule> StopRule for Vec<T> {
+    fn start(&mut self) {
+        self.iter_mut().for_each(StopRule::start);
+    }
+
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        let mut verdict = ControlFlow::Continue(());
+        for rule in self {
+            let judged = rule.check(progress);
+            if verdict.is_continue() {
+                verdict = judged;
+            }
+        }
+        verdict
+    }
+}
+
 macro_rules! all_of {
     ($($member:ident),+) => {
         impl<$($member: StopRule),+> StopRule for ($($member,)+) {

@@ -36,11 +36,14 @@
 //! Conventions: metres, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
 //! right and y down; pixel centres are at integers.
 //!
-//! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), `refiner` (one call), `trace` (what ran).
+//! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), [`pipeline`] (from a file),
+//! `refiner` (one call), `trace` (what ran).
 
+pub mod pipeline;
 mod preset;
 pub mod presets;
 mod refiner;
+mod suggest;
 mod trace;
 
 pub use hicp_association::{
@@ -67,6 +70,7 @@ pub use hicp_score::{
     MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,
 };
 pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
+pub use pipeline::{PipelineError, PipelineFile};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use trace::{StageRecord, Trace};

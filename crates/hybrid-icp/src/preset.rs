@@ -6,6 +6,7 @@ use hicp_icp::Stage;
 use thiserror::Error;
 
 use crate::presets;
+use crate::suggest::nearest;
 
 /// A pipeline behind a box, as it is read from a name: the same code and the same bits as the literal.
 pub type BoxedStage = Box<dyn Stage + Send>;
@@ -90,6 +91,38 @@ impl Preset {
         }
     }
 
+    /// The pipeline as a file: what [`crate::PipelineFile`] builds from it gives the same bits as [`Preset::build`].
+    #[must_use]
+    pub fn toml(self) -> &'static str {
+        match self {
+            Self::Hybrid => include_str!("../pipelines/hybrid.toml"),
+            Self::ProjectivePointToPoint => {
+                include_str!("../pipelines/projective-point-to-point.toml")
+            }
+            Self::ProjectivePointToPlane => {
+                include_str!("../pipelines/projective-point-to-plane.toml")
+            }
+            Self::ProjectiveCascadePointPlane => {
+                include_str!("../pipelines/projective-cascade-point-plane.toml")
+            }
+            Self::ProjectiveCascadePlanePoint => {
+                include_str!("../pipelines/projective-cascade-plane-point.toml")
+            }
+            Self::NnPointToPoint => {
+                include_str!("../pipelines/nn-point-to-point.toml")
+            }
+            Self::NnPointToPlane => {
+                include_str!("../pipelines/nn-point-to-plane.toml")
+            }
+            Self::NnCascadePointPlane => {
+                include_str!("../pipelines/nn-cascade-point-plane.toml")
+            }
+            Self::NnCascadePlanePoint => {
+                include_str!("../pipelines/nn-cascade-plane-point.toml")
+            }
+        }
+    }
+
     /// Builds the pipeline.
     #[must_use]
     pub fn build(self) -> BoxedStage {
@@ -119,15 +152,16 @@ impl std::fmt::Display for Preset {
 
 /// A name that no preset has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "no pipeline is named {name:?}; did you mean {suggestion:?}? The names are: {}",
-    names()
-)]
+#[error("no pipeline is named {name:?}{}; the names are: {}", did_you_mean(*suggestion), names())]
 pub struct UnknownPreset {
     /// The name given.
     pub name: String,
-    /// The name nearest to it.
-    pub suggestion: &'static str,
+    /// The name nearest to it, if one is near.
+    pub suggestion: Option<&'static str>,
+}
+
+fn did_you_mean(suggestion: Option<&str>) -> String {
+    suggestion.map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
 }
 
 fn names() -> String {
@@ -141,31 +175,12 @@ impl FromStr for Preset {
         if let Some(preset) = Self::ALL.into_iter().find(|p| p.name() == name) {
             return Ok(preset);
         }
-        let suggestion = Self::ALL
-            .map(Self::name)
-            .into_iter()
-            .min_by_key(|candidate| edit_distance(candidate, name))
-            .unwrap_or("hybrid");
+        let suggestion = nearest(name, Self::ALL.map(Self::name));
         Err(UnknownPreset {
             name: name.to_owned(),
             suggestion,
         })
     }
-}
-
-/// Levenshtein distance in bytes.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.bytes().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.bytes().enumerate() {
-            let substituted = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -182,7 +197,7 @@ mod tests {
     #[test]
     fn a_misspelt_name_is_answered_with_the_nearest() {
         let error = "nn-point-to-plan".parse::<Preset>().unwrap_err();
-        assert_eq!(error.suggestion, "nn-point-to-plane");
+        assert_eq!(error.suggestion, Some("nn-point-to-plane"));
         assert!(error.to_string().contains("projective-cascade-plane-point"));
     }
 }

@@ -1,0 +1,103 @@
+//! Pipelines from TOML files.
+//!
+//! A file describes a stage: a table whose `type` names a part of the catalogue ([`PARTS`]) and whose other fields are that
+//! part's parameters. A part without parameters of its own may be given by its bare name.
+//!
+//! ```
+//! use hybrid_icp::PipelineFile;
+//! # fn main() -> Result<(), hybrid_icp::PipelineError> {
+//! let mut file = PipelineFile::parse(
+//!     r#"
+//!     type = "icp"
+//!     selection = "visible-surface"
+//!     association = "projective"
+//!     filter = [{ type = "max-distance", limit = 0.25 }]
+//!     metric = "point-to-plane"
+//!     "#,
+//!     "example",
+//! )?;
+//! file.set("selection.points=500")?;
+//! let stage = file.build()?;
+//! # let _ = stage;
+//! let misspelt = PipelineFile::parse("type = \"icq\"", "example")?;
+//! assert!(misspelt.build().is_err_and(|e| e.to_string().contains("did you mean \"icp\"?")));
+//! # Ok(()) }
+//! ```
+
+// Files are read once, and their errors carry everything a person needs.
+#![allow(clippy::result_large_err)]
+
+mod build;
+mod catalog;
+mod error;
+mod parts;
+mod reader;
+mod tree;
+
+use std::path::Path;
+
+pub use catalog::{Accepts, Parameter, Part, PartKind};
+pub use error::{PipelineError, Place};
+pub use parts::PARTS;
+
+use crate::preset::BoxedStage;
+use reader::Reader;
+use tree::Node;
+
+/// A pipeline file that has been read: it builds any number of pipelines, one per thread.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PipelineFile {
+    tree: Node,
+    origin: String,
+}
+
+impl PipelineFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError`] when it cannot be read or is not TOML.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, PipelineError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| PipelineError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, &path.to_string_lossy())
+    }
+
+    /// Parses text; `origin` is what messages call it.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError::Syntax`] when it is not TOML.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, PipelineError> {
+        Ok(Self {
+            tree: Node::parse(text, origin)?,
+            origin: origin.to_owned(),
+        })
+    }
+
+    /// Overrides a field: `path=value`, the path dotted with list indices from 0, the value TOML or a bare word.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError::Override`] when the path leads nowhere. Whether the field means anything is found when building.
+    pub fn set(&mut self, assignment: &str) -> Result<(), PipelineError> {
+        self.tree.set(assignment)
+    }
+
+    /// Builds the pipeline: the same parts as a struct literal, boxed, giving the same bits.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError`] naming the line and field, what is there, and what would be right.
+    pub fn build(&self) -> Result<BoxedStage, PipelineError> {
+        let place = Place {
+            origin: self.origin.clone(),
+            line: None,
+            field: String::new(),
+        };
+        build::stage(&Reader::new(&self.tree, PartKind::Stage, place)?)
+    }
+}

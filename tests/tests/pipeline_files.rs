@@ -1,0 +1,214 @@
+//! Pipelines from files: the same bits as code, and messages that help.
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::scene;
+use hybrid_icp::pipeline::{Accepts, PARTS, PartKind};
+use hybrid_icp::{PipelineFile, Preset, Refiner};
+
+#[test]
+fn every_shipped_file_gives_the_same_bits_as_its_code() {
+    let mut rng = rng(21);
+    let cases: Vec<_> = [Household::Mug, Household::Hammer]
+        .into_iter()
+        .flat_map(|object| [(object, 0.005, 0.1), (object, 0.07, 1.0)])
+        .map(|(object, translation, angle)| {
+            let scene = scene(object, 0.5, &mut rng);
+            let init = perturb(&mut rng, &scene.truth, translation, angle);
+            (scene, init)
+        })
+        .collect();
+    for preset in Preset::ALL {
+        let file = PipelineFile::parse(preset.toml(), preset.name()).unwrap();
+        let mut from_file = Refiner::boxed(file.build().unwrap());
+        let mut from_code = Refiner::preset(preset);
+        for (scene, init) in &cases {
+            let expected = from_code.refine(&scene.model, &scene.observation, init);
+            let found = from_file.refine(&scene.model, &scene.observation, init);
+            assert_eq!(found, expected, "{preset}");
+        }
+    }
+}
+
+/// A file that uses a part, with every parameter that has no default given.
+fn smallest_use(kind: PartKind, name: &str) -> String {
+    let part = PARTS
+        .iter()
+        .find(|p| p.kind == kind && p.name == name)
+        .unwrap();
+    let mut fields = format!("type = \"{name}\"");
+    for parameter in part.parameters {
+        let value = match parameter.accepts {
+            Accepts::Number {
+                min, default: None, ..
+            } => format!("{:?}", min.max(1.0)),
+            Accepts::Count { min, default: None } => min.max(1).to_string(),
+            Accepts::NumberList => "[0.2, 0.4]".to_owned(),
+            Accepts::Part {
+                kind,
+                default: None,
+            } => smallest_use(kind, first(kind)),
+            Accepts::Parts {
+                kind,
+                default: None,
+            } => format!("[{}]", smallest_use(kind, first(kind))),
+            _ => continue,
+        };
+        fields += &format!(", {} = {value}", parameter.name);
+    }
+    format!("{{ {fields} }}")
+}
+
+fn first(kind: PartKind) -> &'static str {
+    PARTS.iter().find(|p| p.kind == kind).unwrap().name
+}
+
+/// A pipeline in which a part stands where parts of its kind stand.
+fn pipeline_with(kind: PartKind, part: &str) -> String {
+    let field = |wanted, default: &str| {
+        if kind == wanted {
+            part.to_owned()
+        } else {
+            default.to_owned()
+        }
+    };
+    let stage = if kind == PartKind::Stage {
+        part.to_owned()
+    } else {
+        format!(
+            "{{ type = \"icp\", selection = {}, association = {}, filter = [{}], metric = {}, stop = [{}] }}",
+            field(PartKind::Selection, "\"all-samples\""),
+            field(PartKind::Association, "\"projective\""),
+            field(PartKind::Filter, "\"max-distance\""),
+            field(PartKind::Metric, "\"point-to-point\""),
+            field(PartKind::Stop, "\"iteration-limit\""),
+        )
+    };
+    let switcher = field(PartKind::Switcher, "\"threshold\"");
+    let score = field(PartKind::Score, "\"mve\"");
+    format!(
+        "type = \"guard\"\nscore = {score}\nstage = {{ type = \"switch\", switcher = {switcher}, aligned = {stage}, misaligned = {stage} }}"
+    )
+}
+
+#[test]
+fn every_part_of_the_catalogue_builds_and_runs() {
+    let mut rng = rng(4);
+    let scene = scene(Household::Mug, 0.5, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
+    for part in PARTS {
+        let text = pipeline_with(part.kind, &smallest_use(part.kind, part.name));
+        let file = PipelineFile::parse(&text, part.name).unwrap();
+        let stage = file.build().unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let refined = Refiner::boxed(stage).refine(&scene.model, &scene.observation, &init);
+        // The guard around it holds whatever the part does.
+        assert!(
+            refined.mve <= refined.mve_initial,
+            "{}: {refined:?}",
+            part.name
+        );
+    }
+}
+
+#[test]
+fn names_in_the_catalogue_are_unique_within_a_kind() {
+    for (index, part) in PARTS.iter().enumerate() {
+        let twin = PARTS[..index]
+            .iter()
+            .find(|p| p.kind == part.kind && p.name == part.name);
+        assert!(twin.is_none(), "{} twice", part.name);
+    }
+}
+
+fn message(text: &str) -> String {
+    let file = match PipelineFile::parse(text, "my.toml") {
+        Ok(file) => file,
+        Err(error) => return error.to_string(),
+    };
+    match file.build() {
+        Ok(_) => "built".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn messages_name_the_line_the_field_and_what_would_be_right() {
+    let icp = "type = \"icp\"\nselection = \"all-samples\"\nassociation = \"projective\"\nmetric = \"point-to-plane\"\n";
+    assert_eq!(message(icp), "built");
+    for (text, wanted) in [
+        (
+            icp.replace("point-to-plane", "point-to-plain"),
+            "my.toml:4: metric: no metric is named \"point-to-plain\"; did you mean \"point-to-plane\"?",
+        ),
+        (
+            format!("{icp}filtr = []\n"),
+            "my.toml:5: filtr: icp has no such field; did you mean \"filter\"?",
+        ),
+        (
+            icp.replace("metric", "# metric"),
+            "my.toml:1: metric: missing, expected a metric: point-to-point",
+        ),
+        (
+            format!("{icp}filter = [\n  {{ type = \"max-distance\", limit = -1 }},\n]\n"),
+            "my.toml:6: filter.0.limit: found -1, expected a number from 0 to inf",
+        ),
+        (
+            format!("{icp}filter = [{{ type = \"max-distance\", unit = \"feet\" }}]\n"),
+            "my.toml:5: filter.0.unit: found the text \"feet\", expected one of diameters, meters",
+        ),
+        (
+            format!("{icp}stop = [{{ type = \"iteration-limit\", iterations = 2.5 }}]\n"),
+            "my.toml:5: stop.0.iterations: found 2.5, expected a whole number of 0 or more",
+        ),
+        (
+            format!("{icp}stop = \"divergence\"\n"),
+            "my.toml:5: stop: found the text \"divergence\", expected a list of stop rules",
+        ),
+        (
+            icp.replace("\"icp\"", "3"),
+            "my.toml:1: type: found 3, expected the name of a stage",
+        ),
+        (
+            "times = 2".to_owned(),
+            "my.toml:1: type: missing, expected the name of a stage: icp",
+        ),
+        ("type = ".to_owned(), "my.toml:1: not TOML: "),
+        (format!("{icp}type = \"icp\"\n"), "my.toml:5: not TOML: "),
+    ] {
+        let found = message(&text);
+        assert!(found.starts_with(wanted), "wanted {wanted}\nfound  {found}");
+    }
+}
+
+#[test]
+fn overrides_reach_into_the_tree() {
+    let parse = || PipelineFile::parse(Preset::Hybrid.toml(), "hybrid").unwrap();
+    let mut file = parse();
+    file.set("times=1").unwrap();
+    file.set("stage.switcher.alpha = 0.5").unwrap();
+    file.set("stage.aligned.stages.1.metric=point-to-point")
+        .unwrap();
+    // A bare name becomes a table when a field of it is set.
+    file.set("stage.misaligned.association.points=500").unwrap();
+    assert!(file.build().is_ok());
+    assert_ne!(file, parse());
+
+    for (assignment, wanted) in [
+        ("times", "expected path=value"),
+        (
+            "stage.nothing.here=1",
+            "there is no \"nothing\" in \"stage\"",
+        ),
+        ("stage.aligned.stages.7.metric=x", "a list of 2"),
+        ("times.more.still=1", "\"times\" is 2, expected a table"),
+    ] {
+        let error = parse().set(assignment).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{assignment}: {error}");
+    }
+    let mut wrong = parse();
+    wrong.set("stage.switcher.alpha=high").unwrap();
+    let error = wrong.build().map(|_| ()).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "hybrid: stage.switcher.alpha: found the text \"high\", expected a number from -inf to inf"
+    );
+}
