@@ -1,5 +1,7 @@
 //! The pinhole camera, and the distances of its pixels.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
+
 use hicp_core::{
     CameraError, DepthImage, ImageError, MAX_IMAGE_SIDE, Matrix3, PinholeCamera, PixelCenters,
     Point3,

@@ -1,5 +1,7 @@
 //! Observations and the images they are made of.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
+
 mod support;
 
 use hicp_core::{

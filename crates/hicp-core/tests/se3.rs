@@ -1,5 +1,7 @@
 //! The group of rigid motions against its definitions.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
+
 mod support;
 
 use std::f64::consts::PI;

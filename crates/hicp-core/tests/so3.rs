@@ -1,5 +1,7 @@
 //! The rotation group against its definitions (pitfall 17).
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
+
 mod support;
 
 use std::f64::consts::PI;

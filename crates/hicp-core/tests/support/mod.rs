@@ -4,7 +4,8 @@
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,
     clippy::missing_panics_doc,
-    clippy::must_use_candidate
+    clippy::must_use_candidate,
+    clippy::unwrap_used
 )]
 
 use hicp_core::{
