@@ -130,7 +130,7 @@ where
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
-            verdict: if pose == *init {
+            verdict: if same_bits(&pose, init) {
                 Verdict::KeptInitial(termination)
             } else {
                 Verdict::Refined
@@ -147,4 +147,13 @@ where
         });
         outcome
     }
+}
+
+/// Whether two poses are one to the bit; by value a pose with a NaN would differ from itself.
+fn same_bits(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    let coordinates = |pose: &Isometry3<f64>| {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
+    };
+    coordinates(a) == coordinates(b)
 }
