@@ -3,7 +3,8 @@
     dead_code,
     unreachable_pub,
     clippy::unwrap_used,
-    clippy::cast_possible_truncation
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss
 )] // Every test file uses its own part.
 
 #[path = "../../../hicp-core/tests/support/mod.rs"]
