@@ -30,7 +30,8 @@ impl DataAssociation for Projective {
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let point = mover.point(&surfel.point);
-            if point.z <= 0.0 {
+            // A pose that overflows f32 would put every point on the principal point, infinitely far away.
+            if !(point.z > 0.0 && point.z.is_finite()) {
                 continue;
             }
             let (u, v) = (fx * point.x / point.z + cx, fy * point.y / point.z + cy);

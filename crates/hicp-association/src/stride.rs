@@ -7,7 +7,7 @@
 pub enum Stride {
     /// Every n-th pixel in both directions; 0 counts as 1.
     Pixels(u32),
-    /// The stride that leaves about this many points; 0 counts as 1.
+    /// The stride that leaves about this many points, within a factor of two where there are that many; 0 counts as 1.
     AboutPoints(usize),
 }
 
@@ -18,7 +18,9 @@ impl Stride {
         match self {
             Self::Pixels(stride) => stride.max(1),
             Self::AboutPoints(points) => {
-                let stride = (n_pixels as f64 / points.max(1) as f64).sqrt().round();
+                let ratio = n_pixels as f64 / points.max(1) as f64;
+                // The spacing s whose share 1/s² comes nearest to 1/ratio, as a factor: s (s − 1) ≤ ratio < s (s + 1).
+                let stride = ((1.0 + (1.0 + 4.0 * ratio).sqrt()) / 2.0).floor();
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
                 // At most √(2³²), not negative.
                 let stride = stride as u32;

@@ -117,7 +117,7 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// A used vertex with a coordinate that is not finite, or so large that its square overflows.
+    /// A vertex, used or not, with a coordinate that is not finite, or so large that its square overflows.
     #[error("vertex {vertex} is ({x}, {y}, {z}) m, expected finite coordinates within ±{limit} m")]
     Coordinate {
         /// Index of the vertex.

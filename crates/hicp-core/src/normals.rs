@@ -3,7 +3,8 @@
 //! A plane seen by a pinhole camera has an inverse depth that is *affine* in the pixel coordinates, so a normal is a linear
 //! least-squares fit of 1/z over a window of pixels, exact for planes at any tilt. The window's sums are carried along
 //! columns and rows, so the cost per pixel does not depend on its size; the size follows the noise found in the image.
-//! Windows never mix two sides of a depth edge: near one, a small window takes only the neighbours on the pixel's own side.
+//! Windows never mix two sides of a depth edge: near one, a small window takes only the neighbours that are joined to the
+//! pixel by steps that are no edges.
 
 use nalgebra::{UnitVector3, Vector3};
 
@@ -14,16 +15,18 @@ use crate::region::PixelRegion;
 const SLOPE_ERROR: f64 = 0.1;
 /// Smallest and largest window half sides, pixels.
 const RADIUS: std::ops::RangeInclusive<usize> = 2..=10;
-/// Half side of the gated window beside depth edges, pixels.
+/// Half side of the gated window beside depth edges, pixels. Its rows must fit [`Joined`].
 const EDGE_RADIUS: usize = 3;
 /// A step between neighbours steeper than a surface seen at this angle (degrees off frontal) is a depth edge …
 const EDGE_TILT_DEGREES: f64 = 85.0;
-/// … unless noise explains it: steps below this many standard deviations are not edges.
+/// … unless noise explains it: steps below this many of *their* standard deviations, √2 times a depth's, are not edges.
 const EDGE_SIGMAS: f64 = 5.0;
 /// Fewest pixels that a plane is fitted to.
 const MIN_SUPPORT: f64 = 6.0;
 /// Pixels examined for the noise estimate.
 const NOISE_SAMPLES: usize = 4096;
+/// Depths below this many metres carry no normal: their inverses would drown those of the pixels around in rounding.
+const MIN_DEPTH_METERS: f32 = 1e-4;
 
 /// Depth inside a region: metres, 0 where the pixel is not to be used. Row-major.
 pub(crate) struct DepthPatch<'a> {
@@ -32,12 +35,13 @@ pub(crate) struct DepthPatch<'a> {
     pub(crate) depth: &'a [f32],
 }
 
-/// Calls `found(index, normal)` for every used pixel that has a normal; normals are in the camera frame and face the camera.
+/// Calls `found(column, row, normal)` for every pixel in row-major order; normals are in the camera frame and face the camera.
 ///
-/// Pixels with too few neighbours on their own side of the depth edges (flying pixels, single-pixel lines) have none.
+/// Column and row count from the region's corner. Pixels without depth have no normal, nor those with too few neighbours on
+/// their own side of the depth edges (flying pixels, single-pixel lines).
 pub(crate) fn estimate_normals(
     patch: &DepthPatch<'_>,
-    mut found: impl FnMut(usize, UnitVector3<f32>),
+    mut found: impl FnMut(usize, usize, Option<UnitVector3<f32>>),
 ) {
     let (width, height) = (patch.region.width(), patch.region.height());
     if width == 0 || height == 0 {
@@ -47,51 +51,56 @@ pub(crate) fn estimate_normals(
     let focal = patch.camera.fx().min(patch.camera.fy());
     let radius = window_radius(focal * noise);
     #[allow(clippy::cast_possible_truncation)] // A relative step; f32 is the precision of depth.
-    let edge_step = (EDGE_TILT_DEGREES.to_radians().tan() / focal).max(EDGE_SIGMAS * noise) as f32;
-    let clearance = edge_clearance(patch, edge_step, radius);
+    let edge_step = (EDGE_TILT_DEGREES.to_radians().tan() / focal)
+        .max(EDGE_SIGMAS * std::f64::consts::SQRT_2 * noise) as f32;
+    let edges = Edges::find(patch, edge_step, radius);
     let rays = Rays::new(patch);
 
-    let mut columns = ColumnSums::new(width);
+    let mut columns = ColumnSums::new(width, radius);
+    for row in 0..radius.min(height) {
+        columns.slide(row, patch.depth.get(row * width..(row + 1) * width));
+    }
     for v in 0..height {
-        let entering = if v == 0 {
-            0..radius.min(height - 1) + 1
-        } else {
-            v + radius..v + radius + 1
-        };
-        for row in entering.filter(|row| *row < height) {
-            columns.add(row, &patch.depth[row * width..][..width]);
-        }
-        if v > radius {
-            let row = v - radius - 1;
-            columns.remove(row, &patch.depth[row * width..][..width]);
-        }
+        let entering = v + radius;
+        columns.slide(
+            entering,
+            patch.depth.get(entering * width..(entering + 1) * width),
+        );
         let mut window = WindowSums::default();
         for u in 0..radius.min(width) {
-            window.add(&columns, u);
+            window.add(&columns.sums[u], u as f64);
         }
         for u in 0..width {
-            if u + radius < width {
-                window.add(&columns, u + radius);
+            if let Some(column) = columns.sums.get(u + radius) {
+                window.add(column, (u + radius) as f64);
             }
             if u > radius {
-                window.remove(&columns, u - radius - 1);
+                let leaving = u - radius - 1;
+                window.remove(&columns.sums[leaving], leaving as f64);
             }
             let index = v * width + u;
-            if patch.depth[index] <= 0.0 {
-                continue;
-            }
-            let near_edge = clearance
-                .as_ref()
-                .is_some_and(|c| usize::from(c[index]) <= radius);
-            let normal = if near_edge {
-                gated_window(patch, u, v, radius.min(EDGE_RADIUS), edge_step).normal(&rays, u, v)
+            let normal = if patch.depth[index] < MIN_DEPTH_METERS {
+                None
             } else {
-                window.normal(&rays, u, v)
+                match &edges {
+                    Some(edges) if usize::from(edges.clearance[index]) <= radius => {
+                        gated_normal(patch, edges, &rays, (u, v), edge_step)
+                    }
+                    _ => window.normal(&rays, u, v),
+                }
             };
-            if let Some(normal) = normal {
-                found(index, normal);
-            }
+            found(u, v, normal);
         }
+    }
+}
+
+/// Returns 1/z, or 0 where there is nothing to use.
+#[inline]
+fn inverse_depth(z: f32) -> f64 {
+    if z >= MIN_DEPTH_METERS {
+        1.0 / f64::from(z)
+    } else {
+        0.0
     }
 }
 
@@ -133,36 +142,100 @@ fn window_radius(slope_noise_per_pixel: f64) -> usize {
         .unwrap_or(*RADIUS.end())
 }
 
-/// Returns, per pixel, the distance in pixels (larger of rows and columns) to the nearest depth edge, up to `radius` + 1;
-/// `None` when there is no edge at all.
-fn edge_clearance(patch: &DepthPatch<'_>, edge_step: f32, radius: usize) -> Option<Vec<u8>> {
-    let (width, height) = (patch.region.width(), patch.region.height());
-    let depth = patch.depth;
-    let far = u8::try_from(radius + 1).unwrap_or(u8::MAX);
-    let mut clearance = vec![far; depth.len()];
-    let mut any = false;
-    let mut mark = |a: usize, b: usize, clearance: &mut [u8]| {
-        let (za, zb) = (depth[a], depth[b]);
-        if za > 0.0 && zb > 0.0 && (za - zb).abs() > edge_step * za.min(zb) {
-            clearance[a] = 0;
-            clearance[b] = 0;
-            any = true;
+/// The depth edges of a patch.
+struct Edges {
+    /// Per pixel, the distance in pixels (larger of rows and columns) to the nearest edge, up to the window's radius + 1.
+    clearance: Vec<u8>,
+    /// Which pixels are joined to their right neighbour: both are used, and the step between them is no edge.
+    right: BitRows,
+    /// Which pixels are joined to the one below.
+    below: BitRows,
+}
+
+impl Edges {
+    /// `None` when there is no edge at all. Neighbours without depth are no edges; nothing is fitted to them anyway.
+    fn find(patch: &DepthPatch<'_>, edge_step: f32, radius: usize) -> Option<Self> {
+        let (width, height) = (patch.region.width(), patch.region.height());
+        let depth = patch.depth;
+        let is_edge = |za: f32, zb: f32| {
+            let nearer = za.min(zb);
+            (nearer > 0.0) & ((za - zb).abs() > edge_step * nearer)
+        };
+        // Most objects have none, and this scan without branches says so at a fraction of the cost.
+        let between = |a: &[f32], b: &[f32]| {
+            let pairs = a.iter().zip(b);
+            pairs.fold(false, |any, (za, zb)| any | is_edge(*za, *zb))
+        };
+        let mut any = between(depth, depth.get(width..).unwrap_or_default());
+        for row in depth.chunks_exact(width) {
+            any |= between(row, &row[1..]);
         }
-    };
-    for v in 0..height {
-        for index in v * width..(v + 1) * width {
-            if index + 1 < (v + 1) * width {
-                mark(index, index + 1, &mut clearance);
+        if !any {
+            return None;
+        }
+        let far = u8::try_from(radius + 1).unwrap_or(u8::MAX);
+        let mut clearance = vec![far; depth.len()];
+        let (mut right, mut below) = (BitRows::new(width, height), BitRows::new(width, height));
+        for v in 0..height {
+            for u in 0..width {
+                let index = v * width + u;
+                for (inside, other, joined) in [
+                    (u + 1 < width, index + 1, &mut right),
+                    (v + 1 < height, index + width, &mut below),
+                ] {
+                    if !inside || depth[index] <= 0.0 || depth[other] <= 0.0 {
+                        continue;
+                    }
+                    if is_edge(depth[index], depth[other]) {
+                        clearance[index] = 0;
+                        clearance[other] = 0;
+                    } else {
+                        joined.set(u, v);
+                    }
+                }
             }
-            if v + 1 < height {
-                mark(index, index + width, &mut clearance);
-            }
+        }
+        spread(&mut clearance, width);
+        Some(Self {
+            clearance,
+            right,
+            below,
+        })
+    }
+}
+
+/// One bit per pixel.
+struct BitRows {
+    words: Vec<u64>,
+    words_per_row: usize,
+}
+
+impl BitRows {
+    fn new(width: usize, height: usize) -> Self {
+        // One word more than needed, so that any bits of a row lie in two neighbouring words.
+        let words_per_row = width / 64 + 2;
+        Self {
+            words: vec![0; words_per_row * height],
+            words_per_row,
         }
     }
-    if !any {
-        return None;
+
+    fn set(&mut self, u: usize, v: usize) {
+        self.words[v * self.words_per_row + u / 64] |= 1 << (u % 64);
     }
-    // Two-pass chessboard distance transform.
+
+    /// Returns the bits of `count` < 64 pixels from (u, v) to the right, the first in the lowest bit.
+    fn get(&self, u: usize, v: usize, count: usize) -> u64 {
+        let word = v * self.words_per_row + u / 64;
+        let shift = u % 64;
+        let bits = self.words[word] >> shift | (self.words[word + 1] << 1) << (63 - shift);
+        bits & ((1 << count) - 1)
+    }
+}
+
+/// Two-pass chessboard distance transform.
+fn spread(clearance: &mut [u8], width: usize) {
+    let height = clearance.len() / width;
     for v in 0..height {
         for u in 0..width {
             let index = v * width + u;
@@ -203,75 +276,114 @@ fn edge_clearance(patch: &DepthPatch<'_>, edge_step: f32, radius: usize) -> Opti
             clearance[index] = nearest;
         }
     }
-    Some(clearance)
 }
 
-/// Sums over the neighbours that lie on the same side of the depth edges as the pixel itself.
-fn gated_window(
+/// A set of pixels of the gated window, one byte per row: bit `8 y + x`.
+type Joined = u64;
+
+/// Fits the neighbours that lie on the same side of the depth edges as the pixel itself: those that steps which are no
+/// edges lead to without leaving the window.
+#[inline(never)] // Few pixels come here; the others' sums stay in registers.
+fn gated_normal(
     patch: &DepthPatch<'_>,
-    u: usize,
-    v: usize,
-    radius: usize,
+    edges: &Edges,
+    rays: &Rays,
+    (u, v): (usize, usize),
     edge_step: f32,
-) -> WindowSums {
+) -> Option<UnitVector3<f32>> {
     let (width, height) = (patch.region.width(), patch.region.height());
-    let center = patch.depth[v * width + u];
-    let mut sums = WindowSums::default();
-    for y in v.saturating_sub(radius)..(v + radius + 1).min(height) {
-        for x in u.saturating_sub(radius)..(u + radius + 1).min(width) {
-            let z = patch.depth[y * width + x];
-            // A slope just short of an edge may add up over the window, so the gate widens with the distance.
-            let reach = x.abs_diff(u).max(y.abs_diff(v)).max(1) as f32;
-            let gate = edge_step * center * (0.5 + 0.5 * reach);
-            if z > 0.0 && (z - center).abs() <= gate {
-                sums.add_pixel(x as f64, y as f64, 1.0 / f64::from(z));
-            }
+    let columns = u.saturating_sub(EDGE_RADIUS)..(u + EDGE_RADIUS + 1).min(width);
+    let rows = v.saturating_sub(EDGE_RADIUS)..(v + EDGE_RADIUS + 1).min(height);
+
+    // Column 7 stays empty, so that shifts do not run from one row into the next.
+    let (mut right, mut below): (Joined, Joined) = (0, 0);
+    for (y, row) in rows.clone().enumerate() {
+        right |= edges.right.get(columns.start, row, columns.len() - 1) << (8 * y);
+        if row + 1 < rows.end {
+            below |= edges.below.get(columns.start, row, columns.len()) << (8 * y);
         }
     }
-    sums
+    let mut reached: Joined = 1 << (8 * (v - rows.start) + (u - columns.start));
+    loop {
+        let grown = reached
+            | (reached & right) << 1
+            | (reached >> 1) & right
+            | (reached & below) << 8
+            | (reached >> 8) & below;
+        if grown == reached {
+            break;
+        }
+        reached = grown;
+    }
+
+    let center = patch.depth[v * width + u];
+    let mut sums = WindowSums::default();
+    while reached != 0 {
+        let bit = reached.trailing_zeros() as usize;
+        reached &= reached - 1;
+        let (column, row) = (columns.start + bit % 8, rows.start + bit / 8);
+        let z = patch.depth[row * width + column];
+        // A way around an edge's end may lead to its other side, and a slope just short of an edge may add up.
+        let reach = column.abs_diff(u).max(row.abs_diff(v)).max(1) as f32;
+        let gate = edge_step * center * (0.5 + 0.5 * reach);
+        if z >= MIN_DEPTH_METERS && (z - center).abs() <= gate {
+            sums.add_pixel(column as f64, row as f64, 1.0 / f64::from(z));
+        }
+    }
+    sums.normal(rays, u, v)
 }
 
-/// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
+/// Sums over a column of the window: n, Σv, Σv², Σw, Σvw with w = 1/z.
+#[derive(Clone, Copy, Default)]
+struct ColumnSum {
+    n: f64,
+    v: f64,
+    vv: f64,
+    w: f64,
+    vw: f64,
+}
+
+/// Sums over the window's rows, one per column.
 struct ColumnSums {
-    n: Vec<f64>,
-    v: Vec<f64>,
-    vv: Vec<f64>,
-    w: Vec<f64>,
-    vw: Vec<f64>,
+    sums: Vec<ColumnSum>,
+    /// 1/z of the window's rows, so that what leaves is to the bit what entered; row r is at r modulo the number of rows.
+    inverse: Vec<f64>,
+    rows: usize,
 }
 
 impl ColumnSums {
-    fn new(width: usize) -> Self {
-        let zeros = || vec![0.0; width];
+    fn new(width: usize, radius: usize) -> Self {
+        let rows = 2 * radius + 1;
         Self {
-            n: zeros(),
-            v: zeros(),
-            vv: zeros(),
-            w: zeros(),
-            vw: zeros(),
+            sums: vec![ColumnSum::default(); width],
+            inverse: vec![0.0; width * rows],
+            rows,
         }
     }
 
-    fn add(&mut self, row: usize, depth: &[f32]) {
-        self.accumulate(row, depth, 1.0);
-    }
-
-    fn remove(&mut self, row: usize, depth: &[f32]) {
-        self.accumulate(row, depth, -1.0);
-    }
-
-    fn accumulate(&mut self, row: usize, depth: &[f32], sign: f64) {
-        let v = row as f64;
-        let sums = self.n.iter_mut().zip(&mut self.v).zip(&mut self.vv);
-        let sums = sums.zip(self.w.iter_mut().zip(&mut self.vw));
-        for (((n, sv), svv), ((sw, svw), z)) in sums.zip(depth).map(|((a, b), z)| (a, (b, z))) {
-            let used = if *z > 0.0 { sign } else { 0.0 };
-            let w = if *z > 0.0 { sign / f64::from(*z) } else { 0.0 };
-            *n += used;
-            *sv += used * v;
-            *svv += used * v * v;
-            *sw += w;
-            *svw += w * v;
+    /// Takes the next row in (`None` below the patch) and the one that it pushes out of the window out.
+    fn slide(&mut self, entering: usize, depth: Option<&[f32]>) {
+        let width = self.sums.len();
+        let slot = &mut self.inverse[entering % self.rows * width..][..width];
+        let (v_in, v_out) = (entering as f64, entering as f64 - self.rows as f64);
+        let update = |sum: &mut ColumnSum, kept: &mut f64, w_in: f64| {
+            let w_out = std::mem::replace(kept, w_in);
+            let n_in = f64::from(u8::from(w_in > 0.0));
+            let n_out = f64::from(u8::from(w_out > 0.0));
+            sum.n += n_in - n_out;
+            sum.v += n_in * v_in - n_out * v_out;
+            sum.vv += n_in * (v_in * v_in) - n_out * (v_out * v_out);
+            sum.w += w_in - w_out;
+            sum.vw += w_in * v_in - w_out * v_out;
+        };
+        let sums = self.sums.iter_mut().zip(slot);
+        match depth {
+            Some(depth) => {
+                for ((sum, kept), z) in sums.zip(depth) {
+                    update(sum, kept, inverse_depth(*z));
+                }
+            }
+            None => sums.for_each(|(sum, kept)| update(sum, kept, 0.0)),
         }
     }
 }
@@ -291,26 +403,30 @@ struct WindowSums {
 }
 
 impl WindowSums {
-    fn add(&mut self, columns: &ColumnSums, column: usize) {
-        self.accumulate(columns, column, 1.0);
+    #[inline]
+    fn add(&mut self, column: &ColumnSum, u: f64) {
+        self.n += column.n;
+        self.u += u * column.n;
+        self.uu += u * u * column.n;
+        self.v += column.v;
+        self.uv += u * column.v;
+        self.vv += column.vv;
+        self.w += column.w;
+        self.uw += u * column.w;
+        self.vw += column.vw;
     }
 
-    fn remove(&mut self, columns: &ColumnSums, column: usize) {
-        self.accumulate(columns, column, -1.0);
-    }
-
-    fn accumulate(&mut self, columns: &ColumnSums, column: usize, sign: f64) {
-        let u = column as f64 * sign;
-        let (n, v, w) = (columns.n[column], columns.v[column], columns.w[column]);
-        self.n += sign * n;
-        self.u += u * n;
-        self.uu += u * column as f64 * n;
-        self.v += sign * v;
-        self.uv += u * v;
-        self.vv += sign * columns.vv[column];
-        self.w += sign * w;
-        self.uw += u * w;
-        self.vw += sign * columns.vw[column];
+    #[inline]
+    fn remove(&mut self, column: &ColumnSum, u: f64) {
+        self.n -= column.n;
+        self.u -= u * column.n;
+        self.uu -= u * u * column.n;
+        self.v -= column.v;
+        self.uv -= u * column.v;
+        self.vv -= column.vv;
+        self.w -= column.w;
+        self.uw -= u * column.w;
+        self.vw -= column.vw;
     }
 
     fn add_pixel(&mut self, u: f64, v: f64, w: f64) {
@@ -328,25 +444,28 @@ impl WindowSums {
     /// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀), facing the camera.
     ///
     /// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
-    fn normal(&self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
-        if self.n < MIN_SUPPORT {
+    #[inline]
+    fn normal(self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
+        let n = self.n;
+        if n < MIN_SUPPORT {
             return None;
         }
-        let scale = 1.0 / self.n;
-        let (mean_u, mean_v, mean_w) = (self.u * scale, self.v * scale, self.w * scale);
-        let suu = self.uu - self.u * mean_u;
-        let suv = self.uv - self.u * mean_v;
-        let svv = self.vv - self.v * mean_v;
-        let suw = self.uw - self.w * mean_u;
-        let svw = self.vw - self.w * mean_v;
+        // Central moments times n: integers but for those with w, and no division.
+        let suu = n * self.uu - self.u * self.u;
+        let suv = n * self.uv - self.u * self.v;
+        let svv = n * self.vv - self.v * self.v;
+        let suw = n * self.uw - self.u * self.w;
+        let svw = n * self.vw - self.v * self.w;
         let determinant = suu * svv - suv * suv;
-        // Pixels on one line determine no plane. Coordinates are integers, so one row's determinant is exactly 0 up to rounding.
-        if determinant <= 1e-3 * (suu + svv) {
+        // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
+        if determinant <= 1e-3 * n * (suu + svv) {
             return None;
         }
-        let b = (suw * svv - svw * suv) / determinant;
-        let c = (svw * suu - suw * suv) / determinant;
-        let w0 = mean_w + b * (u as f64 - mean_u) + c * (v as f64 - mean_v);
+        // b, c and w₀ times n · determinant: only their ratios matter.
+        let b = suw * svv - svw * suv;
+        let c = svw * suu - suw * suv;
+        let w0 = self.w * determinant + b * (n * u as f64 - self.u) + c * (n * v as f64 - self.v);
+        let (b, c) = (n * b, n * c);
         let (x, y) = (rays.x[u], rays.y[v]);
         let (nx, ny) = (b * rays.fx, c * rays.fy);
         let away = Vector3::new(nx, ny, w0 - x * nx - y * ny);

@@ -78,7 +78,7 @@ impl Observation {
         }
         let n_measured = patch.iter().filter(|z| **z > 0.0).count();
 
-        let width = region.width().max(1);
+        let width = region.width();
         let (xs, ys) = (
             ray_slopes(region.u_min, region.u_max, camera.fx(), camera.cx()),
             ray_slopes(region.v_min, region.v_max, camera.fy(), camera.cy()),
@@ -87,19 +87,23 @@ impl Observation {
             point: Point3::origin(),
             normal: UnitVector3::new_unchecked(-Vector3::z()),
         };
-        let mut surfels = vec![nothing; region.area()];
+        let mut surfels = Vec::with_capacity(region.area());
         let mut n_surfels = 0;
         let depth_patch = DepthPatch {
             region,
             camera: &camera,
             depth: &patch,
         };
-        estimate_normals(&depth_patch, |index, normal| {
-            let z = patch[index];
-            surfels[index] = Surfel {
-                point: Point3::new(xs[index % width] * z, ys[index / width] * z, z),
-                normal,
+        estimate_normals(&depth_patch, |column, row, normal| {
+            let Some(normal) = normal else {
+                surfels.push(nothing);
+                return;
             };
+            let z = patch[row * width + column];
+            surfels.push(Surfel {
+                point: Point3::new(xs[column] * z, ys[row] * z, z),
+                normal,
+            });
             n_surfels += 1;
         });
         Ok(Self {
@@ -200,6 +204,17 @@ impl Observation {
     #[inline]
     pub fn surfel(&self, index: u32) -> Option<&Surfel> {
         self.surfels.get(index as usize).filter(|s| s.point.z > 0.0)
+    }
+
+    /// Returns the pixel (u, v) of a surfel's index, see [`Observation::surfel`].
+    #[must_use]
+    pub fn pixel(&self, index: u32) -> (u32, u32) {
+        // The side of an accepted image fits; an empty region has no indices.
+        let width = u32::try_from(self.region.width()).unwrap_or(1).max(1);
+        (
+            self.region.u_min + index % width,
+            self.region.v_min + index / width,
+        )
     }
 
     /// Returns the surfels on the pixel grid u ≡ v ≡ 0 (mod `stride`) in row-major order, each with its index, see [`Observation::surfel`].

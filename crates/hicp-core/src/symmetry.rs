@@ -25,16 +25,16 @@ impl SymmetryAxis {
             let (x, y, z) = (offset.x, offset.y, offset.z);
             return Err(SymmetryError::Offset { x, y, z });
         }
-        match UnitVector3::try_new(direction, 1e-9) {
-            Some(unit) if unit.iter().all(|x| x.is_finite()) => Ok(Self {
-                direction: unit,
-                offset,
-            }),
-            _ => {
-                let (x, y, z) = (direction.x, direction.y, direction.z);
-                Err(SymmetryError::Axis { x, y, z })
-            }
+        // Brought to unit size first: squares of very long and very short directions overflow and vanish.
+        let size = direction.amax();
+        if !(size > 0.0 && direction.iter().all(|x| x.is_finite())) {
+            let (x, y, z) = (direction.x, direction.y, direction.z);
+            return Err(SymmetryError::Axis { x, y, z });
         }
+        Ok(Self {
+            direction: UnitVector3::new_normalize(direction / size),
+            offset,
+        })
     }
 
     /// Direction of the axis, object frame.

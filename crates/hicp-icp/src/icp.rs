@@ -154,10 +154,10 @@ where
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
-            verdict: if accepted.is_some_and(|(pose, _)| pose != *init) {
-                Verdict::Refined
-            } else {
+            verdict: if same_bits(&pose, init) {
                 Verdict::KeptInitial(termination)
+            } else {
+                Verdict::Refined
             },
             iterations: iteration,
             evaluation: accepted.map(|(_, evaluation)| evaluation),
@@ -172,4 +172,13 @@ where
         });
         outcome
     }
+}
+
+/// Whether two poses are one to the bit; by value a pose with a NaN would differ from itself.
+fn same_bits(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    let coordinates = |pose: &Isometry3<f64>| {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
+    };
+    coordinates(a) == coordinates(b)
 }

@@ -42,8 +42,9 @@ impl NormalEquations {
     #[must_use]
     pub fn about_sources(pairs: &[Pair]) -> Option<Self> {
         let (mut sum, mut squares, mut weight) = (Vector3::zeros(), 0.0, 0.0);
-        // Relative to the first point, so that an object far from the origin loses no digits.
-        let origin = pairs.first()?.source.point.cast::<f64>();
+        // Relative to the first point that counts, so that an object far from the origin loses no digits.
+        let first = pairs.iter().find(|pair| pair.weight > 0.0)?;
+        let origin = first.source.point.cast::<f64>();
         for pair in pairs {
             let (offset, w) = (
                 pair.source.point.cast::<f64>() - origin,
@@ -96,10 +97,10 @@ impl NormalEquations {
             self.gradient[column] += weighted * residual;
         }
         self.loss += weight * residual * residual;
-        self.rows += 1;
+        self.rows += usize::from(weight > 0.0);
     }
 
-    /// Number of rows added.
+    /// Number of rows added with a positive weight.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
@@ -135,5 +136,126 @@ impl NormalEquations {
         let pivot = self.pivot.coords;
         let increment = Translation3::from(pivot) * about_pivot * Translation3::from(-pivot);
         se3::is_finite(&increment).then_some(increment)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ½ Σ w (d · (exp(ξ) p) + r₀)² over the rows, with ξ about the pivot and rotations in units of 1/L.
+    struct Rows {
+        pivot: Point3<f64>,
+        length: f64,
+        rows: Vec<(Point3<f64>, Vector3<f64>, f64, f64)>,
+    }
+
+    impl Rows {
+        fn half_loss(&self, x: &Vector6<f64>) -> f64 {
+            let l = self.length;
+            let motion = se3::exp(&Vector6::new(
+                x[0],
+                x[1],
+                x[2],
+                x[3] / l,
+                x[4] / l,
+                x[5] / l,
+            ));
+            let terms = self.rows.iter().map(|(p, d, r, w)| {
+                let moved = self.pivot
+                    + motion * Point3::from(p - self.pivot).coords
+                    + motion.translation.vector;
+                0.5 * w * (r + d.dot(&(moved - p))).powi(2)
+            });
+            terms.sum()
+        }
+    }
+
+    #[test]
+    fn gradient_and_hessian_are_those_of_the_linearised_loss() {
+        // Rows of no symmetry; zero residuals, where the Gauss–Newton Hessian is the Hessian.
+        let rows = Rows {
+            pivot: Point3::new(0.1, -0.2, 0.7),
+            length: 0.037,
+            rows: (0..12)
+                .map(|i| {
+                    let a = f64::from(i);
+                    let point = Point3::new((1.3 * a).sin(), (2.1 * a).cos(), (0.7 * a).sin());
+                    let direction = Vector3::new((3.1 * a).cos(), (1.7 * a).sin(), 0.4 - 0.1 * a);
+                    (point, direction, 0.0, 0.3 + 0.1 * a)
+                })
+                .collect(),
+        };
+        let build = |residual: f64| {
+            let mut system = NormalEquations::new(rows.pivot, rows.length);
+            for (p, d, _, w) in &rows.rows {
+                system.add_row(p, d, residual, *w);
+            }
+            system
+        };
+        let unit = |i: usize| Vector6::from_fn(|j, _| f64::from(u8::from(i == j)));
+        let h = 1e-5;
+        let at_zero = build(0.0);
+        for i in 0..6 {
+            for j in 0..=i {
+                let f = |a: f64, b: f64| rows.half_loss(&(unit(i) * (a * h) + unit(j) * (b * h)));
+                let second =
+                    (f(1.0, 1.0) - f(1.0, -1.0) - f(-1.0, 1.0) + f(-1.0, -1.0)) / (4.0 * h * h);
+                let found = at_zero.hessian[(i, j)];
+                // Differences cancel to ε/h² and are off by h² times the fourth derivative, which levers of 1/L reach.
+                let scale = at_zero.hessian.diagonal().amax();
+                assert!(
+                    (found - second).abs() < 1e-5 * scale,
+                    "{i} {j}: {found} {second}"
+                );
+            }
+        }
+
+        let residual = 0.021;
+        let with_residual = Rows {
+            rows: rows
+                .rows
+                .iter()
+                .map(|(p, d, _, w)| (*p, *d, residual, *w))
+                .collect(),
+            ..rows
+        };
+        let mut system = NormalEquations::new(with_residual.pivot, with_residual.length);
+        for (p, d, r, w) in &with_residual.rows {
+            system.add_row(p, d, *r, *w);
+        }
+        for i in 0..6 {
+            let h = 1e-7;
+            let f = |a: f64| with_residual.half_loss(&(unit(i) * (a * h)));
+            let slope = (f(1.0) - f(-1.0)) / (2.0 * h);
+            assert!(
+                (system.gradient[i] - slope).abs() < 1e-6,
+                "{i}: {} {slope}",
+                system.gradient[i]
+            );
+        }
+        let loss = 2.0 * with_residual.half_loss(&Vector6::zeros());
+        assert!((system.loss() - loss).abs() < 1e-15);
+        assert_eq!(system.rows(), 12);
+    }
+
+    #[test]
+    fn pivot_and_length_do_not_change_the_increment() {
+        let solve = |pivot: Point3<f64>, length: f64| {
+            let mut system = NormalEquations::new(pivot, length);
+            for i in 0..20 {
+                let a = f64::from(i);
+                let point = Point3::new((1.3 * a).sin(), (2.1 * a).cos(), (0.7 * a).sin());
+                let direction = Vector3::new((3.1 * a).cos(), (1.7 * a).sin(), (5.3 * a).sin());
+                system.add_row(&point, &direction, 0.01 * (2.9 * a).cos(), 1.0);
+            }
+            system.solve().unwrap()
+        };
+        let reference = solve(Point3::origin(), 1.0);
+        for (pivot, length) in [(Point3::new(0.3, -0.2, 0.4), 1.0), (Point3::origin(), 0.5)] {
+            let (angle, distance) = se3::pose_distance(&solve(pivot, length), &reference);
+            // Both damp by 1e-6 of themselves, of a step of 1e-2, each in its own coordinates.
+            assert!(angle < 1e-6 && distance < 1e-6, "{angle} {distance}");
+        }
     }
 }

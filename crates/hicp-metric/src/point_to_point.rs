@@ -3,7 +3,7 @@
 use hicp_core::{
     Correspondences, Isometry3, Matrix3, Pair, Point3, Translation3, UnitQuaternion, Vector3,
 };
-use nalgebra::{Rotation3, SymmetricEigen};
+use nalgebra::{Matrix2, Quaternion, Rotation3, SymmetricEigen};
 
 use crate::metric::{ErrorMetric, Step};
 use crate::normal_equations::NormalEquations;
@@ -18,7 +18,7 @@ const MIN_PAIRS: usize = 3;
 /// the pairs and one decomposition of a 3×3 matrix.
 ///
 /// Collinear sets leave the turn about their line free: it stays zero, and the smallest rotation that aligns the lines is taken.
-/// No step from fewer than three pairs, without weight, from points all in one place, nor where a reflection would fit better
+/// No step from fewer than three pairs of positive weight, from points all in one place, nor where a reflection would fit better
 /// and several rotations fit next best.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PointToPoint;
@@ -35,8 +35,13 @@ impl ErrorMetric for PointToPoint {
 
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         let pairs = pairs.as_slice();
-        let first = pairs.first().filter(|_| pairs.len() >= MIN_PAIRS)?;
-        // Sums relative to the first pair, so that objects far from the camera lose no digits.
+        // Sums relative to the first pair that counts, so that objects far from the camera lose no digits, and points all
+        // in one place give sums of exact zeros.
+        let mut counting = pairs.iter().filter(|pair| pair.weight > 0.0);
+        let first = counting.next()?;
+        if counting.take(MIN_PAIRS - 1).count() < MIN_PAIRS - 1 {
+            return None;
+        }
         let source_origin = first.source.point.cast::<f64>();
         let target_origin = first.target.point.cast::<f64>();
         let (mut source_sum, mut target_sum) = (Vector3::zeros(), Vector3::zeros());
@@ -83,9 +88,9 @@ fn about(from: &Point3<f64>, to: &Point3<f64>, rotation: UnitQuaternion<f64>) ->
 
 /// Returns the rotation R that maximises tr(R H) for H = Σ w p qᵀ, as Kabsch's V diag(1, 1, det(V Uᵀ)) Uᵀ.
 ///
-/// With HᵀH = V Σ² Vᵀ the left vectors are u_i = H v_i/σ_i for the two largest singular values; the third pair is completed
-/// by cross products, which *is* the determinant factor: both bases are right-handed, so det R = +1, and the smallest
-/// singular value, which planar sets do not determine, is never divided by.
+/// The largest singular pair (u₁, v₁) comes from the eigenvectors of HᵀH, which know smaller ones only to √ε. What is left is
+/// the turn about v₁ that maximises the trace over the planes across u₁ and v₁, an angle in closed form. A turn has
+/// determinant +1, so a reflection cannot come out, and no small singular value is ever divided by.
 fn nearest_rotation(covariance: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let scale = covariance.amax();
     if !(scale > 0.0 && scale.is_finite()) {
@@ -93,33 +98,49 @@ fn nearest_rotation(covariance: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     }
     let h = covariance / scale;
     let eigen = SymmetricEigen::new(h.transpose() * h);
-    let mut order = [0, 1, 2];
-    order.sort_unstable_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let [first, second, _] = order;
-    let v1 = eigen.eigenvectors.column(first).into_owned();
+    let v1 = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let v1 = v1.into_owned().normalize();
     let u1 = h * v1;
     let sigma1 = u1.norm();
-    // Eigenvectors of HᵀH carry errors of the order of ε σ₁²: re-orthogonalise in the second direction.
-    let v2 = eigen.eigenvectors.column(second).into_owned();
-    let v2 = (v2 - v1 * v1.dot(&v2)).try_normalize(0.0)?;
     let u1 = u1 / sigma1;
-    let u2 = h * v2;
-    let u2 = u2 - u1 * u1.dot(&u2);
-    let sigma2 = u2.norm();
+    let ((u2, u3), (v2, v3)) = (plane_across(&u1), plane_across(&v1));
+    let (h2, h3) = (h * v2, h * v3);
+    let m = Matrix2::new(u2.dot(&h2), u2.dot(&h3), u3.dot(&h2), u3.dot(&h3));
     // Collinear points: any turn about their line fits, and the shortest way from line to line has none.
-    if sigma2 <= 1e-9 * sigma1 {
-        return UnitQuaternion::rotation_between(&u1, &v1);
+    if m.norm() <= 1e-9 * sigma1 {
+        return Some(shortest_turn(&u1, &v1));
     }
-    let u2 = u2 / sigma2;
-    let (u3, v3) = (u1.cross(&u2), v1.cross(&v2));
-    // A reflection would fit better and the two smallest singular values agree: the rotation is not unique.
-    let sigma3 = u3.dot(&(h * v3));
-    if sigma3 < 0.0 && sigma2 + sigma3 <= 1e-9 * sigma1 {
+    let (along, across) = (m.m11 + m.m22, m.m12 - m.m21);
+    let gain = along.hypot(across);
+    // A reflection would fit better and the two smallest singular values agree: every turn fits alike.
+    if gain <= 1e-9 * sigma1 {
         return None;
     }
+    let (cosine, sine) = (along / gain, across / gain);
+    let turned = [v1, v2 * cosine + v3 * sine, v3 * cosine - v2 * sine];
     let rotation =
-        Matrix3::from_columns(&[v1, v2, v3]) * Matrix3::from_columns(&[u1, u2, u3]).transpose();
+        Matrix3::from_columns(&turned) * Matrix3::from_columns(&[u1, u2, u3]).transpose();
     Some(UnitQuaternion::from_rotation_matrix(
         &Rotation3::from_matrix_unchecked(rotation),
     ))
+}
+
+/// Completes a unit vector to a right-handed basis.
+fn plane_across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let mut other = Vector3::zeros();
+    other[axis.iamin()] = 1.0;
+    let second = axis.cross(&other).normalize();
+    (second, axis.cross(&second))
+}
+
+/// Returns the smallest rotation that carries one unit vector to another, one of many when they are opposite.
+///
+/// The half angle from the sum and the difference of the vectors has full precision at every angle.
+fn shortest_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let normal = from.cross(to);
+    let axis = (normal - from * from.dot(&normal))
+        .try_normalize(1e-12)
+        .unwrap_or_else(|| plane_across(from).0);
+    let (cosine, sine) = ((from + to).norm(), (from - to).norm());
+    UnitQuaternion::new_normalize(Quaternion::from_parts(cosine, axis * sine))
 }

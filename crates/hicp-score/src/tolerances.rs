@@ -33,12 +33,13 @@ impl AgreementCounts {
         let relative = difference * self.inverse_diameter;
         // A first guess that rounding may put one off, then the strict comparison that defines "correct".
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // Clamped, and NaN becomes 0.
+        // Clamped, and NaN becomes 0, from where it climbs to the end: it agrees with nothing.
         let mut k = (relative * 20.0).clamp(0.0, N_TOLERANCES as f64) as usize;
-        while k > 0 && relative < self.tolerances[k - 1] {
+        let correct = |k: usize| relative < self.tolerances[k];
+        while k > 0 && correct(k - 1) {
             k -= 1;
         }
-        while k < N_TOLERANCES && relative >= self.tolerances[k] {
+        while k < N_TOLERANCES && !correct(k) {
             k += 1;
         }
         self.histogram[k] += 1;

@@ -1,0 +1,46 @@
+//! Values derived once and shared.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier};
+
+use hicp_core::Derived;
+
+#[test]
+fn a_derived_value_is_built_once_by_however_many_threads() {
+    let derived = Derived::default();
+    let (built, barrier) = (AtomicUsize::new(0), Barrier::new(8));
+    let values: Vec<Arc<usize>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..8)
+            .map(|_| {
+                scope.spawn(|| {
+                    barrier.wait();
+                    derived.get_or_build(7, || {
+                        std::thread::sleep(std::time::Duration::from_millis(20));
+                        built.fetch_add(1, Ordering::SeqCst)
+                    })
+                })
+            })
+            .collect();
+        threads.into_iter().map(|t| t.join().unwrap()).collect()
+    });
+    assert_eq!(built.load(Ordering::SeqCst), 1);
+    assert!(
+        values
+            .iter()
+            .all(|v| Arc::ptr_eq(v, &values[0]) && **v == 0)
+    );
+}
+
+#[test]
+fn derived_values_are_told_apart_by_type_and_key() {
+    let derived = Derived::default();
+    assert_eq!(*derived.get_or_build(1, || 10_u32), 10);
+    assert_eq!(*derived.get_or_build(2, || 20_u32), 20);
+    assert_eq!(*derived.get_or_build(1, || 30_u64), 30);
+    assert_eq!(*derived.get_or_build(1, || 99_u32), 10);
+    assert_eq!(*derived.get_or_build(1, || 99_u64), 30);
+    // A clone starts afresh.
+    assert_eq!(*derived.clone().get_or_build(1, || 40_u32), 40);
+}

@@ -1,0 +1,60 @@
+//! Pairs to be aligned.
+#![allow(dead_code, unreachable_pub, clippy::cast_possible_truncation)] // Every test file uses its own part.
+
+#[path = "../../../hicp-core/tests/support/mod.rs"]
+pub mod support;
+
+use hicp_core::{Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3};
+
+pub fn pair(p: Point3<f64>, q: Point3<f64>, normal: Vector3<f64>, weight: f32) -> Pair {
+    let normal = UnitVector3::new_unchecked(normal.cast::<f32>());
+    let surfel = |p: Point3<f64>| Surfel {
+        point: p.cast::<f32>(),
+        normal,
+    };
+    Pair {
+        source: surfel(p),
+        target: surfel(q),
+        weight,
+        source_index: 0,
+        target_index: 0,
+    }
+}
+
+/// Pairs of points and their images under a motion, both rounded to f32.
+pub fn images(points: &[Point3<f64>], motion: &Isometry3<f64>) -> Correspondences {
+    points
+        .iter()
+        .map(|p| pair(*p, motion * p, Vector3::z(), 1.0))
+        .collect()
+}
+
+/// Mean squared distance between the moved sources and the targets.
+pub fn loss(pairs: &Correspondences, motion: &Isometry3<f64>) -> f64 {
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for pair in pairs.as_slice() {
+        let w = f64::from(pair.weight);
+        let p = motion * pair.source.point.cast::<f64>();
+        sum += w * (p - pair.target.point.cast::<f64>()).norm_squared();
+        weight += w;
+    }
+    sum / weight
+}
+
+pub fn rms(pairs: &Correspondences, motion: &Isometry3<f64>) -> f64 {
+    loss(pairs, motion).sqrt()
+}
+
+/// The largest rounding of a coordinate of the pairs: half a unit in the last place of f32, times √3 for a point.
+pub fn rounding(pairs: &Correspondences) -> f64 {
+    let largest = pairs
+        .as_slice()
+        .iter()
+        .flat_map(|p| [p.source.point.coords.amax(), p.target.point.coords.amax()])
+        .fold(0.0_f32, f32::max);
+    f64::from(largest) * f64::from(f32::EPSILON) * 0.5 * 3.0_f64.sqrt()
+}
+
+pub fn determinant(motion: &Isometry3<f64>) -> f64 {
+    motion.rotation.to_rotation_matrix().matrix().determinant()
+}

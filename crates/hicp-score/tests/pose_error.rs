@@ -1,0 +1,104 @@
+//! ADD and ADI: the golden case of BOP's reference code and the invariances.
+
+#![allow(clippy::unwrap_used, clippy::cast_possible_truncation)]
+
+#[path = "../../hicp-core/tests/support/mod.rs"]
+mod support;
+
+use hicp_core::{Isometry3, Point3, UnitQuaternion, Vector3};
+use hicp_score::{add, adi};
+use support::Numbers;
+
+/// The corners (±20, ±30, ±40) mm.
+fn corners() -> Vec<Point3<f32>> {
+    (0..8_u8)
+        .map(|i| {
+            let side = |bit: u8, half: f32| if i >> bit & 1 == 1 { half } else { -half };
+            Point3::new(side(0, 20.0), side(1, 30.0), side(2, 40.0))
+        })
+        .collect()
+}
+
+fn rotation(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::new(axis * angle)
+}
+
+#[test]
+fn the_golden_case() {
+    let turn = rotation(Vector3::z(), 0.3);
+    let truth = Isometry3::from_parts(Vector3::new(10.0, -5.0, 600.0).into(), turn);
+    let tilt = rotation(Vector3::x(), 0.2) * turn;
+    let estimate = Isometry3::from_parts(Vector3::new(12.0, -4.0, 605.0).into(), tilt);
+    let expected = 10.932_263_188_943_395;
+    assert!((add(&estimate, &truth, &corners()) - expected).abs() < 1e-11);
+    // Distances between points are taken in f32, of coordinates up to 50 mm: 3e-6 mm at most.
+    assert!((adi(&estimate, &truth, &corners()) - expected).abs() < 1e-5);
+
+    // A half turn about z maps the box onto itself: 2 √(20² + 30²) for every corner, and nothing for ADI.
+    let flipped = Isometry3::from_parts(
+        truth.translation,
+        truth.rotation * rotation(Vector3::z(), std::f64::consts::PI),
+    );
+    assert!((add(&flipped, &truth, &corners()) - 72.111_025_509_279_78).abs() < 1e-11);
+    assert!(adi(&flipped, &truth, &corners()) < 1e-14);
+}
+
+#[test]
+fn adi_is_never_above_add_and_is_its_definition() {
+    let mut numbers = Numbers(311);
+    for _ in 0..50 {
+        let points: Vec<Point3<f32>> = (0..60)
+            .map(|_| Point3::from((numbers.vector() * 0.05).cast()))
+            .collect();
+        let (a, b) = (numbers.pose(0.1), numbers.pose(0.1));
+        let (full, nearest) = (add(&a, &b, &points), adi(&a, &b, &points));
+        // f32 of 0.5 m.
+        assert!(nearest <= full + 1e-7);
+        let moved: Vec<Point3<f64>> = points.iter().map(|p| a * p.cast::<f64>()).collect();
+        let sum: f64 = points
+            .iter()
+            .map(|p| {
+                moved
+                    .iter()
+                    .map(|q| (q - b * p.cast::<f64>()).norm())
+                    .fold(f64::INFINITY, f64::min)
+            })
+            .sum();
+        assert!((nearest - sum / 60.0).abs() < 1e-7, "{nearest}");
+    }
+}
+
+#[test]
+fn a_common_motion_changes_nothing() {
+    let mut numbers = Numbers(312);
+    let points: Vec<Point3<f32>> = (0..60)
+        .map(|_| Point3::from((numbers.vector() * 0.05).cast()))
+        .collect();
+    for _ in 0..50 {
+        let (a, b, common) = (numbers.pose(0.1), numbers.pose(0.1), numbers.pose(0.5));
+        let difference = add(&(common * a), &(common * b), &points) - add(&a, &b, &points);
+        assert!(difference.abs() < 1e-14);
+        let difference = adi(&(common * a), &(common * b), &points) - adi(&a, &b, &points);
+        assert!(difference.abs() < 1e-7);
+        assert_eq!(add(&a, &b, &points), add(&b, &a, &points));
+    }
+}
+
+#[test]
+fn equal_poses_and_no_points_have_no_error() {
+    let mut numbers = Numbers(313);
+    let points: Vec<Point3<f32>> = (0..20)
+        .map(|_| Point3::from((numbers.vector() * 0.05).cast()))
+        .collect();
+    let pose = numbers.pose(0.5);
+    assert_eq!(add(&pose, &pose, &points), 0.0);
+    assert!(adi(&pose, &pose, &points) < 1e-8);
+    let other = numbers.pose(0.5);
+    assert_eq!(
+        (add(&pose, &other, &[]), adi(&pose, &other, &[])),
+        (0.0, 0.0)
+    );
+    // A shift is its own error, for every shape.
+    let shifted = Isometry3::translation(0.3, 0.0, 0.4) * pose;
+    assert!((add(&shifted, &pose, &points) - 0.5).abs() < 1e-14);
+}
