@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         );
     };
     let depth = hicp_io::read_depth_png(&arguments.depth, depth_scale)?;
-    let init = hicp_io::read_pose_json(&arguments.init)?;
+    let init = hicp_io::read_pose_json(&arguments.init)?.camera_from_object;
     let model = Model::new(hicp_io::read_mesh(&arguments.model, arguments.model_unit)?);
     let picture = arguments
         .overlay
