@@ -41,7 +41,7 @@ pub fn read_camera_json(
             .any(|key| node.optional(key).is_some())
     };
     let node = match root.numbered() {
-        Ok(images) if !is_camera(&root) => {
+        Ok(images) if !is_camera(&root) && !images.is_empty() => {
             let count = images.len();
             match <[_; 1]>::try_from(images) {
                 Ok([(_, node)]) => node,
