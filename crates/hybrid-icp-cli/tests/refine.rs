@@ -309,6 +309,18 @@ fn units_that_do_not_go_together_are_warned_of() {
         &Scene::new().with("--depth-scale", "0.0001"),
         &["warning: depth.png", "--depth-scale", "0.0001 mm per unit"],
     );
+    warned(
+        &Scene::new().with("--depth-scale", "1e9"),
+        &[
+            "warning: depth.png",
+            "no depth inside the mask",
+            "--depth-scale",
+        ],
+    );
+    let scene = Scene::new();
+    let far = Isometry3::translation(0.0, 0.0, 1e300);
+    scene.write("init.json", pose_json(&far).to_string());
+    warned(&scene, &["warning: depth.png", "1.000e300 m", "cam_t_m2c"]);
     let scene = Scene::new().with("--model-unit", "mm");
     warned(
         &scene,
