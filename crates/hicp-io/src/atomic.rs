@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
 
 use crate::error::IoError;
 
@@ -10,7 +12,8 @@ use crate::error::IoError;
 ///
 /// `write` fills a temporary file in the same folder, which is flushed to the disk and then renamed over `path`. When
 /// anything fails the temporary file is removed and what was at `path` stays as it was; nobody ever sees half a file.
-/// The file gets the permissions a newly created one gets (0666 without the umask on Unix); a symbolic link is followed.
+/// A new file gets the permissions a newly created one gets (0666 without the umask on Unix), a replaced one keeps its own;
+/// a file that may not be written to is not replaced; a symbolic link is followed.
 /// What is not a regular file (a pipe, `/dev/stdout`) cannot be replaced and is written in place.
 ///
 /// # Errors
@@ -30,25 +33,72 @@ where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
 {
     let path = path.as_ref();
-    let written = match fs::metadata(path) {
-        Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => fs::OpenOptions::new()
+    let written = match target_of(path)? {
+        Target::Stream => fs::OpenOptions::new()
             .write(true)
             .open(path)
             .and_then(|file| fill(file, write).map(|_| ())),
-        Ok(metadata) if metadata.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
-        Ok(_) => fs::canonicalize(path).and_then(|target| replace(&target, write)),
-        Err(_) => {
-            let folder = folder_of(path);
-            if !folder.is_dir() {
-                return Err(IoError::MissingFolder {
-                    path: path.to_owned(),
-                    folder: folder.to_owned(),
-                });
-            }
-            replace(path, write)
-        }
+        Target::New => replace(path, None, write),
+        Target::Old(file, permissions) => replace(&file, Some(permissions), write),
     };
     written.map_err(|e| IoError::write(path, e))
+}
+
+/// Checks that [`write_atomically`] can write to a path, and changes nothing there.
+///
+/// For programs that compute for long before they write. It cannot promise that the disk has room then.
+///
+/// # Errors
+///
+/// As [`write_atomically`].
+///
+/// ```
+/// assert!(hicp_io::check_writable("no/such/folder/result.json").is_err());
+/// ```
+pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
+    let path = path.as_ref();
+    let folder = match target_of(path)? {
+        Target::Stream => return Ok(()),
+        Target::New => folder_of(path).to_owned(),
+        Target::Old(file, _) => folder_of(&file).to_owned(),
+    };
+    // The temporary file is gone when this returns.
+    match temporary(&folder) {
+        Ok(_) => Ok(()),
+        Err(e) => Err(IoError::write(path, e)),
+    }
+}
+
+/// What a path to be written leads to.
+enum Target {
+    /// A pipe, a device: it cannot be replaced.
+    Stream,
+    /// Nothing yet.
+    New,
+    /// A regular file, with links followed, and its permissions.
+    Old(PathBuf, fs::Permissions),
+}
+
+fn target_of(path: &Path) -> Result<Target, IoError> {
+    let failed = |e| IoError::write(path, e);
+    match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(failed(io::ErrorKind::IsADirectory.into())),
+        Ok(metadata) if !metadata.is_file() => Ok(Target::Stream),
+        Ok(metadata) => {
+            // Renaming would replace a file that may not be written to: ask first.
+            fs::OpenOptions::new()
+                .append(true)
+                .open(path)
+                .and_then(|_| fs::canonicalize(path))
+                .map(|file| Target::Old(file, metadata.permissions()))
+                .map_err(failed)
+        }
+        Err(_) if folder_of(path).is_dir() => Ok(Target::New),
+        Err(_) => Err(IoError::MissingFolder {
+            path: path.to_owned(),
+            folder: folder_of(path).to_owned(),
+        }),
+    }
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -58,18 +108,25 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn replace<F>(path: &Path, write: F) -> io::Result<()>
+fn replace<F>(path: &Path, permissions: Option<fs::Permissions>, write: F) -> io::Result<()>
 where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
 {
+    let temporary = fill(temporary(folder_of(path))?, write)?;
+    if let Some(permissions) = permissions {
+        temporary.as_file().set_permissions(permissions)?;
+    }
+    temporary.as_file().sync_all()?;
+    temporary.persist(path)?;
+    Ok(())
+}
+
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hicp-").suffix(".tmp");
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = fill(builder.tempfile_in(folder_of(path))?, write)?;
-    temporary.as_file().sync_all()?;
-    temporary.persist(path)?;
-    Ok(())
+    builder.tempfile_in(folder)
 }
 
 fn fill<W, F>(target: W, write: F) -> io::Result<W>
@@ -132,6 +189,28 @@ mod tests {
     }
 
     #[test]
+    fn checking_foretells_and_changes_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, new) = (dir.path().join("old"), dir.path().join("new"));
+        fs::write(&old, "old").unwrap();
+        for path in [&old, &new] {
+            check_writable(path).unwrap();
+        }
+        assert_eq!(names(dir.path()), ["old"]);
+        assert_eq!(fs::read_to_string(&old).unwrap(), "old");
+        assert!(matches!(
+            check_writable(dir.path().join("no/where")),
+            Err(IoError::MissingFolder { .. })
+        ));
+        assert!(matches!(
+            check_writable(dir.path()),
+            Err(IoError::Write { .. })
+        ));
+        // A file is no folder to write into.
+        assert!(check_writable(old.join("below")).is_err());
+    }
+
+    #[test]
     fn a_folder_is_not_replaced() {
         let dir = tempfile::tempdir().unwrap();
         assert!(matches!(
@@ -154,6 +233,10 @@ mod tests {
         write_atomically(&atomic, |_| Ok(())).unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&atomic), mode(&plain));
+
+        fs::set_permissions(&atomic, fs::Permissions::from_mode(0o640)).unwrap();
+        write_atomically(&atomic, |_| Ok(())).unwrap();
+        assert_eq!(mode(&atomic) & 0o777, 0o640);
 
         std::os::unix::fs::symlink(&atomic, &link).unwrap();
         write_atomically(&link, |writer| writer.write_all(b"through")).unwrap();

@@ -19,7 +19,7 @@ pub struct CameraFile {
 /// Reads a camera from a JSON file, for images of `image_size` (width, height).
 ///
 /// Three forms are understood; further keys are ignored:
-/// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's, which states no size;
+/// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's, which states no size (one that is there must match);
 /// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, of BOP's `camera.json`, whose size must match;
 /// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in either form.
 ///
@@ -41,7 +41,7 @@ pub fn read_camera_json(
             .any(|key| node.optional(key).is_some())
     };
     let node = match root.numbered() {
-        Ok(images) if !is_camera(&root) => {
+        Ok(images) if !is_camera(&root) && !images.is_empty() => {
             let count = images.len();
             match <[_; 1]>::try_from(images) {
                 Ok([(_, node)]) => node,
@@ -53,31 +53,36 @@ pub fn read_camera_json(
         }
         _ => root,
     };
-    let (width, height) = image_size;
-    let camera = if node.optional("cam_K").is_some() {
-        PinholeCamera::from_matrix(&camera_matrix(&node)?, width, height)
-    } else if node.optional("fx").is_some() {
-        check_size(&node, image_size)?;
-        let value = |key: &str| node.get(key)?.number();
-        PinholeCamera::new(
-            value("fx")?,
-            value("fy")?,
-            value("cx")?,
-            value("cy")?,
-            width,
-            height,
-        )
-    } else {
+    if !is_camera(&node) {
         return Err(
             node.refuse("an object with the key `cam_K`, or with `fx`, `fy`, `cx` and `cy`")
         );
+    }
+    let (width, height) = image_size;
+    let matrix = node.optional("cam_K");
+    let states_size = ["width", "height"]
+        .iter()
+        .all(|key| node.optional(key).is_some());
+    if matrix.is_none() || states_size {
+        check_size(&node, image_size)?;
+    }
+    let camera = match matrix {
+        Some(place) => PinholeCamera::from_matrix(&camera_matrix(&node)?, width, height)
+            .map_err(|source| camera_error(&place, source))?,
+        None => {
+            let value = |key: &str| node.get(key)?.number();
+            let (fx, fy, cx, cy) = (value("fx")?, value("fy")?, value("cx")?, value("cy")?);
+            PinholeCamera::new(fx, fy, cx, cy, width, height)
+                .map_err(|source| camera_error(&node, source))?
+        }
     };
     Ok(CameraFile {
-        camera: camera.map_err(|source| camera_error(&node, source))?,
+        camera,
         depth_scale: depth_scale(&node)?,
     })
 }
 
+/// Checks the size that a camera states.
 fn check_size(node: &Node<'_>, (width, height): (u32, u32)) -> Result<(), IoError> {
     let (found_width, found_height) = (
         node.get("width")?.unsigned()?,
@@ -180,14 +185,20 @@ mod tests {
         );
         assert_eq!(key(&FLAT.replace("600", "\"600\"")), "$.fx");
         assert_eq!(key(&FLAT.replace("600", "-600")), "$");
+        assert_eq!(key(&format!("{{{}}}", K.replace("600", "0"))), "$.cam_K");
         assert_eq!(key(&FLAT.replace("640", "64.5")), "$.width");
-        assert!(matches!(
-            read(&FLAT.replace("640", "320")),
-            Err(IoError::CameraSize {
-                found_width: 320,
-                expected_width: 640,
-                ..
-            })
-        ));
+        for text in [
+            FLAT.replace("640", "320"),
+            format!(r#"{{{K}, "width": 320, "height": 480}}"#),
+        ] {
+            assert!(matches!(
+                read(&text),
+                Err(IoError::CameraSize {
+                    found_width: 320,
+                    expected_width: 640,
+                    ..
+                })
+            ));
+        }
     }
 }

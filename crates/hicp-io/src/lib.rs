@@ -35,7 +35,7 @@ mod error;
 mod source;
 
 mod atomic;
-pub use atomic::write_atomically;
+pub use atomic::{check_writable, write_atomically};
 pub use error::IoError;
 
 mod unit;
@@ -49,14 +49,14 @@ pub use point_cloud::{PointCloud, read_point_cloud_ply, write_point_cloud_ply};
 
 mod image;
 pub use image::{
-    MAX_IMAGE_PIXELS, read_depth_png, read_mask_png, read_rgb_png, write_depth_png, write_mask_png,
-    write_rgb_png,
+    MAX_IMAGE_PIXELS, read_depth_png, read_mask_png, read_png_size, read_rgb_png, write_depth_png,
+    write_mask_png, write_rgb_png,
 };
 
 mod json;
 
 mod pose;
-pub use pose::{pose_from_bop, pose_to_bop, read_pose_json, write_pose_json};
+pub use pose::{PoseFile, pose_from_bop, pose_to_bop, read_pose_json, write_pose_json};
 
 mod camera;
 pub use camera::{CameraFile, read_camera_json};

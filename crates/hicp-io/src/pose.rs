@@ -42,14 +42,25 @@ pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
     (rotation, [t.x, t.y, t.z])
 }
 
+/// A pose file: the pose, and the very numbers that state it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseFile {
+    /// The pose, metres; its rotation is the one nearest to the file's numbers.
+    pub camera_from_object: Isometry3<f64>,
+    /// `cam_R_m2c`, row-major, as in the file.
+    pub rotation: [f64; 9],
+    /// `cam_t_m2c`, millimetres, as in the file.
+    pub translation_mm: [f64; 3],
+}
+
 /// Reads a pose from a JSON file: an object with `cam_R_m2c` (9 numbers, row-major) and `cam_t_m2c` (3, millimetres).
 ///
-/// Other keys are ignored. The pose returned is in metres; as in BOP it is `camera_from_object`.
+/// Other keys are ignored. As in BOP the pose is `camera_from_object`.
 ///
 /// # Errors
 ///
 /// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, or [`IoError::Rotation`].
-pub fn read_pose_json(path: impl AsRef<Path>) -> Result<Isometry3<f64>, IoError> {
+pub fn read_pose_json(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
     pose_of(
         &Document::read(path.as_ref())?.root(),
         "cam_R_m2c",
@@ -73,15 +84,20 @@ pub(crate) fn pose_of(
     node: &Node<'_>,
     rotation: &str,
     translation: &str,
-) -> Result<Isometry3<f64>, IoError> {
-    let rotation = node.get(rotation)?;
-    let translation = node.get(translation)?;
-    pose_from_bop(&rotation.numbers()?, &translation.numbers()?).map_err(|source| {
-        IoError::Rotation {
-            path: rotation.path().to_owned(),
-            place: rotation.key().to_owned(),
+) -> Result<PoseFile, IoError> {
+    let place = node.get(rotation)?;
+    let rotation = place.numbers()?;
+    let translation_mm = node.get(translation)?.numbers()?;
+    let camera_from_object =
+        pose_from_bop(&rotation, &translation_mm).map_err(|source| IoError::Rotation {
+            path: place.path().to_owned(),
+            place: place.key().to_owned(),
             source,
-        }
+        })?;
+    Ok(PoseFile {
+        camera_from_object,
+        rotation,
+        translation_mm,
     })
 }
 
@@ -99,12 +115,12 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             let path = dir.path().join("pose.json");
             write_pose_json(&path, &pose).unwrap();
-            let (angle, distance) = se3::pose_distance(&read_pose_json(&path).unwrap(), &pose);
+            let (angle, distance) = se3::pose_distance(&read_pose_json(&path).unwrap().camera_from_object, &pose);
             prop_assert!(angle < 1e-14 && distance < 1e-14, "{} {}", angle, distance);
         }
     }
 
-    fn read(text: &str) -> Result<Isometry3<f64>, IoError> {
+    fn read(text: &str) -> Result<PoseFile, IoError> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("pose.json");
         std::fs::write(&path, text).unwrap();
@@ -115,8 +131,20 @@ mod tests {
     fn rotations_are_row_major() {
         // A quarter turn about z takes x to y.
         let pose = read(r#"{"cam_R_m2c":[0,-1,0, 1,0,0, 0,0,1],"cam_t_m2c":[1,2,3],"score":null}"#);
-        let point = pose.unwrap() * hicp_core::Point3::new(1.0, 0.0, 0.0);
+        let point = pose.unwrap().camera_from_object * hicp_core::Point3::new(1.0, 0.0, 0.0);
         assert!((point - hicp_core::Point3::new(0.001, 1.002, 0.003)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_numbers_of_the_file_are_kept() {
+        // Orthogonal to seven digits only, as files are.
+        let text = "[0.768311175,-0.0665434694,0.636608126,0.311033385,0.908074697,-0.280461366,-0.559424858,0.413487982,0.718381178]";
+        let pose = read(&format!(
+            r#"{{"cam_R_m2c":{text},"cam_t_m2c":[0.1,-0.2,1035.65777]}}"#
+        ))
+        .unwrap();
+        assert_eq!(serde_json::to_string(&pose.rotation).unwrap(), text);
+        assert_eq!(pose.translation_mm, [0.1, -0.2, 1035.65777]);
     }
 
     #[test]

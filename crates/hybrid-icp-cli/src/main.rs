@@ -4,10 +4,13 @@
 
 mod bop_refine;
 mod demo;
+mod doubts;
+mod outputs;
 mod overlay;
 mod pipelines;
 mod refine;
 mod report;
+mod terminal;
 
 use std::process::ExitCode;
 
@@ -15,8 +18,9 @@ use clap::{Parser, Subcommand};
 
 /// Refine 6D object poses in depth images.
 ///
-/// A detector gives a segmentation mask and a rough pose; this program makes it a better one and scores it by the mean VSD
-/// estimate (MVE): 0 where the pose explains the image everywhere, 1 where nowhere. Poses above 0.4 are not to be trusted.
+/// A detector gives a segmentation mask and a rough pose; this program moves the object's mesh onto the measured depth and
+/// scores the result by the mean VSD estimate (MVE): 0 where the pose explains the image everywhere, 1 where nowhere. Poses
+/// of 0.4 and above are not to be trusted.
 #[derive(Debug, Parser)]
 #[command(name = "hybrid-icp", version, after_help = EXAMPLES, max_term_width = 110)]
 struct Cli {
@@ -27,18 +31,17 @@ struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   hybrid-icp demo
-  hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png --depth-scale 0.1 \\
-      --mask mask.png --camera camera.json --init pose.json --overlay overlay.png
-  hybrid-icp bop refine --dataset ycbv --split test --results cosypose_ycbv-test.csv --output refined_ycbv-test.csv
+  hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png \\
+      --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
+  hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp pipelines
 
+`hybrid-icp help refine` tells all about a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
     Demo(demo::Arguments),
-    /// Refine one pose in one depth image.
     Refine(refine::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
@@ -49,7 +52,6 @@ enum Command {
 
 #[derive(Debug, Subcommand)]
 enum BopCommand {
-    /// Refine every row of a result file.
     Refine(bop_refine::Arguments),
 }
 
@@ -63,7 +65,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            terminal::complain(format_args!("{error:#}"));
             ExitCode::FAILURE
         }
     }

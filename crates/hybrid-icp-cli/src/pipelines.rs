@@ -1,19 +1,13 @@
 //! `hybrid-icp pipelines`.
 
-use std::io::Write;
-
 use hybrid_icp::Preset;
+
+use crate::terminal::say;
 
 /// Prints every pipeline's name and one line about it.
 pub(crate) fn run() -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    let width = Preset::ALL
-        .iter()
-        .map(|p| p.name().len())
-        .max()
-        .unwrap_or(0);
-    for preset in Preset::ALL {
-        writeln!(out, "{preset:width$}  {}", preset.summary())?;
-    }
-    Ok(())
+    let names = Preset::ALL.map(Preset::name);
+    let width = names.iter().map(|name| name.len()).max().unwrap_or(0);
+    let lines = Preset::ALL.map(|preset| format!("{preset:width$}  {}", preset.summary()));
+    say(lines.join("\n"))
 }

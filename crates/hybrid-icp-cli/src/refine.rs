@@ -5,15 +5,22 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_io::LengthUnit;
+use hicp_io::{CameraFile, IoError, LengthUnit};
 use hybrid_icp::{Model, Observation, Preset, Refiner, Trace};
 
+use crate::doubts::{self, Names};
+use crate::outputs;
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report::{self, Report};
+use crate::terminal::{say, warn};
 
-/// Refines one pose in one depth image and writes the result as JSON: `cam_R_m2c`, `cam_t_m2c` (mm), the MVE before and
-/// after, how it ended, and a trace of every stage that ran.
+/// Refine one pose in one depth image.
+///
+/// The result is JSON: the pose as cam_R_m2c and cam_t_m2c (mm), mve_initial and mve, outcome (refined or kept_initial) and
+/// its reason, termination, iterations, n_pairs, time_ms, and a trace with one object per stage that ran. A pose that
+/// cannot be refined is given back with the numbers of the file; that is an outcome and no error.
 #[derive(Debug, Args)]
+#[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     /// The object's mesh: OBJ, PLY or STL.
     #[arg(long, value_name = "FILE")]
@@ -21,19 +28,19 @@ pub(crate) struct Arguments {
     /// Unit of the mesh's coordinates: m, mm or cm.
     #[arg(long, value_name = "UNIT")]
     model_unit: LengthUnit,
-    /// The depth image: 16-bit grey PNG, 0 where nothing was measured.
+    /// The depth image: 16-bit gray PNG, 0 where nothing was measured.
     #[arg(long, value_name = "FILE")]
     depth: PathBuf,
-    /// Millimetres per unit of the depth image; the camera file's depth_scale if not given.
-    #[arg(long, value_name = "MM_PER_UNIT")]
+    /// Millimetres per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if not given.
+    #[arg(long, value_name = "MM_PER_UNIT", value_parser = scale, allow_negative_numbers = true)]
     depth_scale: Option<f64>,
-    /// The object's mask: a PNG of the same size, not zero on the object.
+    /// The object's mask: a PNG of the depth image's size, not zero on the object.
     #[arg(long, value_name = "FILE")]
     mask: PathBuf,
-    /// The camera: JSON with cam_K (nine numbers, row-major), or fx, fy, cx, cy, width, height. Pixel centres at integers.
+    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and height. Pixel centres are at integers.
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm).
+    /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm), model to camera.
     #[arg(long, value_name = "FILE")]
     init: PathBuf,
     /// The pipeline; `hybrid-icp pipelines` lists them.
@@ -42,29 +49,47 @@ pub(crate) struct Arguments {
     /// Where the JSON result goes; standard output if not given.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Writes the depth image with the model's outline before (orange) and after (blue).
+    /// Where a picture goes: the depth image with the model's outline before (orange) and after (blue), as PNG.
     #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
 }
 
+const USAGE: &str = "\
+hybrid-icp refine --model <FILE> --model-unit <UNIT>
+           --depth <FILE> [--depth-scale <MM_PER_UNIT>] --mask <FILE>
+           --camera <FILE> --init <FILE> [OPTIONS]";
+
+const EXAMPLE: &str = "\
+Example:
+  hybrid-icp refine --model mug.ply --model-unit mm \\
+      --depth depth.png --depth-scale 0.1 --mask mask.png \\
+      --camera camera.json --init pose.json \\
+      --output refined.json --overlay overlay.png
+
+camera.json: {\"cam_K\": [572.4, 0, 325.3, 0, 573.6, 242.0, 0, 0, 1]}
+         or: {\"fx\": 572.4, \"fy\": 573.6, \"cx\": 325.3, \"cy\": 242.0,
+              \"width\": 640, \"height\": 480}
+pose.json:   {\"cam_R_m2c\": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+              \"cam_t_m2c\": [0, 0, 800]}";
+
+fn scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a finite number above 0, in millimetres per unit".to_owned()),
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mask = hicp_io::read_mask_png(&arguments.mask)?;
-    let size = (mask.width(), mask.height());
-    let camera_file = hicp_io::read_camera_json(&arguments.camera, size)?;
-    let Some(depth_scale) = arguments.depth_scale.or(camera_file.depth_scale) else {
-        bail!(
-            "{}: no depth_scale there, expected --depth-scale (millimetres per unit of the depth image)",
-            arguments.camera.display()
-        );
-    };
+    check_outputs(arguments)?;
+    let (camera_file, depth_scale) = read_camera(arguments)?;
     let depth = hicp_io::read_depth_png(&arguments.depth, depth_scale)?;
-    let init = hicp_io::read_pose_json(&arguments.init)?;
+    let mask = hicp_io::read_mask_png(&arguments.mask)?;
+    let init_file = hicp_io::read_pose_json(&arguments.init)?;
+    let init = init_file.camera_from_object;
     let model = Model::new(hicp_io::read_mesh(&arguments.model, arguments.model_unit)?);
-    let picture = arguments
-        .overlay
-        .as_ref()
-        .map(|_| Picture::of_depth(&depth));
+    let overlay = arguments.overlay.as_deref();
+    let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
     let mut refiner = Refiner::preset(arguments.pipeline);
     let mut trace = Trace::new();
@@ -79,21 +104,96 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let refined = refiner.refine_observed(&model, &observation, &init, &mut trace);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
 
-    let report = Report::new(arguments.pipeline, &refined, &trace.stages, time_ms);
+    let reason = doubts::reason(&refined, &model, &observation, &init);
+    let summary = report::summary(&refined, &reason);
+    let report = Report::new(
+        arguments.pipeline,
+        &init_file,
+        &refined,
+        reason,
+        &trace.stages,
+        time_ms,
+    );
     let json = serde_json::to_string_pretty(&report)?;
-    match &arguments.output {
-        Some(path) => {
-            hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
-            println!("{}", report::summary(&refined));
-        }
-        None => println!("{json}"),
+    if let Some(path) = &arguments.output {
+        hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
     }
-    report::warn(&refined);
-    if let (Some(path), Some(mut picture)) = (&arguments.overlay, picture) {
+    if let Some((path, mut picture)) = picture {
         let after = refined.outcome.camera_from_object;
         picture.outline(&mut refiner, &model, &observation, &init, BEFORE);
         picture.outline(&mut refiner, &model, &observation, &after, AFTER);
         picture.write(path)?;
     }
-    Ok(())
+    let names = Names {
+        model: arguments.model.display(),
+        model_unit: arguments.model_unit,
+        depth: arguments.depth.display(),
+        depth_scale,
+        mask: arguments.mask.display(),
+        init: arguments.init.display(),
+    };
+    for doubt in doubts::about_units(&model, &observation, &init, &names) {
+        warn(doubt);
+    }
+    report::warn_of_distrust(&refined);
+    match arguments.output {
+        Some(_) => say(summary),
+        None => say(json),
+    }
+}
+
+fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
+    let outputs: Vec<_> = [
+        ("--output", &arguments.output),
+        ("--overlay", &arguments.overlay),
+    ]
+    .into_iter()
+    .filter_map(|(option, path)| Some((option, path.as_deref()?)))
+    .collect();
+    let inputs = [
+        ("--model", arguments.model.as_path()),
+        ("--depth", &arguments.depth),
+        ("--mask", &arguments.mask),
+        ("--camera", &arguments.camera),
+        ("--init", &arguments.init),
+    ];
+    // The result has the keys of a pose file: refining one in place makes sense.
+    outputs::check(&outputs, &inputs, &[("--output", "--init")])
+}
+
+/// Reads the camera and the depth scale, once the sizes of all that has one are known to agree.
+fn read_camera(arguments: &Arguments) -> anyhow::Result<(CameraFile, f64)> {
+    let (depth, mask) = (arguments.depth.display(), arguments.mask.display());
+    let size = hicp_io::read_png_size(&arguments.depth)?;
+    let mask_size = hicp_io::read_png_size(&arguments.mask)?;
+    if mask_size != size {
+        bail!(
+            "{mask} is {}x{} pixels but {depth} is {}x{}, expected the same size",
+            mask_size.0,
+            mask_size.1,
+            size.0,
+            size.1
+        );
+    }
+    let camera_file = match hicp_io::read_camera_json(&arguments.camera, size) {
+        Err(IoError::CameraSize {
+            path,
+            found_width,
+            found_height,
+            ..
+        }) => bail!(
+            "{} is a camera for {found_width}x{found_height} images but {depth} is {}x{}, expected the same size",
+            path.display(),
+            size.0,
+            size.1
+        ),
+        read => read?,
+    };
+    match arguments.depth_scale.or(camera_file.depth_scale) {
+        Some(depth_scale) => Ok((camera_file, depth_scale)),
+        None => bail!(
+            "{}: no depth_scale there, expected it or --depth-scale (millimetres per unit of the depth image)",
+            arguments.camera.display()
+        ),
+    }
 }

@@ -2,8 +2,11 @@
 
 use std::fmt::Write as _;
 
-use hybrid_icp::{Preset, Refinement, StageRecord, Verdict};
+use hicp_io::PoseFile;
+use hybrid_icp::{Preset, Refinement, StageRecord, Termination, Verdict};
 use serde::Serialize;
+
+use crate::terminal::warn;
 
 /// The JSON report of a refinement; lengths in millimetres where BOP has them so, losses in m².
 #[derive(Debug, Serialize)]
@@ -14,7 +17,8 @@ pub(crate) struct Report {
     translation_mm: [f64; 3],
     pipeline: &'static str,
     outcome: &'static str,
-    reason: &'static str,
+    /// Why the outcome is what it is, in words.
+    reason: String,
     termination: &'static str,
     mve_initial: f64,
     mve: f64,
@@ -27,6 +31,8 @@ pub(crate) struct Report {
 /// One ICP stage that ran.
 #[derive(Debug, Serialize)]
 struct StageReport {
+    /// Which it is, from 1.
+    stage: usize,
     /// What the switch chose before this stage, and the MVE that it chose by.
     #[serde(skip_serializing_if = "Option::is_none")]
     regime: Option<&'static str>,
@@ -46,33 +52,40 @@ struct StageReport {
 impl Report {
     pub(crate) fn new(
         preset: Preset,
+        init: &PoseFile,
         refined: &Refinement,
+        reason: String,
         stages: &[StageRecord],
         time_ms: f64,
     ) -> Self {
         let outcome = &refined.outcome;
-        let (rotation, translation_mm) = hicp_io::pose_to_bop(&outcome.camera_from_object);
+        let (rotation, translation_mm) = match outcome.verdict {
+            Verdict::Refined => hicp_io::pose_to_bop(&outcome.camera_from_object),
+            // The very numbers that were given, though they be orthogonal only to their digits.
+            Verdict::KeptInitial(_) => (init.rotation, init.translation_mm),
+        };
         Self {
             rotation,
             translation_mm,
             pipeline: preset.name(),
             outcome: verdict(outcome.verdict),
-            reason: outcome.termination.name(),
+            reason,
             termination: outcome.termination.name(),
             mve_initial: refined.mve_initial,
             mve: refined.mve,
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
             time_ms,
-            trace: stages.iter().map(StageReport::new).collect(),
+            trace: (1..).zip(stages).map(StageReport::new).collect(),
         }
     }
 }
 
 impl StageReport {
-    fn new(record: &StageRecord) -> Self {
+    fn new((stage, record): (usize, &StageRecord)) -> Self {
         let outcome = &record.outcome;
         Self {
+            stage,
             regime: record.switched.map(|event| event.regime.name()),
             regime_mve: record.switched.and_then(|event| event.score),
             selection: record.selection,
@@ -95,22 +108,35 @@ fn verdict(verdict: Verdict) -> &'static str {
     }
 }
 
+/// What a way to end means for the pose that is returned.
+pub(crate) fn explain(termination: Termination) -> &'static str {
+    match termination {
+        Termination::Converged => "the loss stopped changing",
+        Termination::IterationLimit => "the limit of iterations was reached",
+        Termination::NoPairs => "no pairs of model and measured points were found",
+        Termination::PairsLost => "the next step lost too many pairs",
+        Termination::LossIncreased => "the next step raised the loss",
+        Termination::Degenerate => "the pairs did not determine a step",
+        other => other.name(),
+    }
+}
+
 /// The trace as a table: one line per stage that ran.
 pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
     let mut text = format!(
-        "{:<11} {:<16} {:<15} {:>10} {:>7} {:>14}  ended\n",
-        "regime", "association", "metric", "iterations", "pairs", "mean loss mm²"
+        "{:<5} {:<10} {:<16} {:<14} {:>10} {:>6} {:>13}  ended\n",
+        "stage", "regime", "association", "metric", "iterations", "pairs", "mean loss mm²"
     );
-    for record in stages {
+    for (stage, record) in (1..).zip(stages) {
         let outcome = &record.outcome;
         let regime = record.switched.map_or("", |event| event.regime.name());
         let loss = outcome
             .evaluation
-            .map_or_else(|| "-".to_owned(), |e| format!("{:.6}", e.mean_loss * 1e6));
+            .map_or_else(|| "-".to_owned(), |e| format!("{:.4}", e.mean_loss * 1e6));
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{regime:<11} {:<16} {:<15} {:>10} {:>7} {loss:>14}  {}",
+            "{stage:<5} {regime:<10} {:<16} {:<14} {:>10} {:>6} {loss:>13}  {}",
             record.association,
             record.metric,
             outcome.iterations,
@@ -122,36 +148,35 @@ pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
 }
 
 /// One line about the whole.
-pub(crate) fn summary(refined: &Refinement) -> String {
+pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
     let outcome = &refined.outcome;
     match outcome.verdict {
         Verdict::Refined => format!(
-            "refined: MVE {:.3} -> {:.3}, {} pairs, {} iterations, ended by {}",
+            "refined: MVE {:.3} -> {:.3}, {} pairs, {} iterations; ended because {reason}",
             refined.mve_initial,
             refined.mve,
             outcome.n_pairs(),
             outcome.iterations,
-            outcome.termination
         ),
-        Verdict::KeptInitial(reason) => format!(
-            "kept the initial pose ({reason}): MVE {:.3}, {} iterations",
+        Verdict::KeptInitial(_) => format!(
+            "kept the initial pose: {reason}; MVE {:.3}, {} iterations",
             refined.mve, outcome.iterations
         ),
     }
 }
 
-/// Warns on standard error where the pose is not to be trusted.
-pub(crate) fn warn(refined: &Refinement) {
+/// Warns where the pose is not to be trusted.
+pub(crate) fn warn_of_distrust(refined: &Refinement) {
     if refined.mve > refined.mve_initial {
-        eprintln!(
-            "warning: the returned pose explains the image worse than the initial one (MVE {:.3}, was {:.3})",
+        warn(format_args!(
+            "the returned pose explains the image worse than the initial one (MVE {:.3}, was {:.3})",
             refined.mve, refined.mve_initial
-        );
+        ));
     }
     if refined.mve >= hybrid_icp::PAPER_ALPHA {
-        eprintln!(
-            "warning: MVE {:.3}: the pose does not explain the image, do not trust it",
+        warn(format_args!(
+            "MVE {:.3}: the pose does not explain the image, do not trust it",
             refined.mve
-        );
+        ));
     }
 }

@@ -104,14 +104,15 @@ fn scene_camera(node: &Node<'_>) -> Result<SceneCamera, IoError> {
         depth_scale: depth_scale(node)?,
         camera_from_world: has_pose
             .then(|| pose_of(node, "cam_R_w2c", "cam_t_w2c"))
-            .transpose()?,
+            .transpose()?
+            .map(|pose| pose.camera_from_object),
     })
 }
 
 fn ground_truth(node: &Node<'_>) -> Result<GroundTruth, IoError> {
     Ok(GroundTruth {
         obj_id: node.get("obj_id")?.unsigned()?,
-        camera_from_object: pose_of(node, "cam_R_m2c", "cam_t_m2c")?,
+        camera_from_object: pose_of(node, "cam_R_m2c", "cam_t_m2c")?.camera_from_object,
     })
 }
 

@@ -126,6 +126,7 @@ mod tests {
             let depth = read_depth_png(&path, scale).unwrap();
             write_depth_png(&path, &depth, scale).unwrap();
             let again = read_depth_png(&path, scale).unwrap();
+            prop_assert_eq!(pixels::read_png_size(&path).unwrap(), (4, 3));
             prop_assert_eq!(&again, &depth);
             for (meters, unit) in depth.pixels().iter().zip(&units) {
                 prop_assert!((f64::from(*meters) * 1000.0 - f64::from(*unit) * scale).abs() < 0.05);

@@ -1,6 +1,7 @@
 //! Raw pixels from and to PNG files, within limits.
 
-use std::io::{self, Cursor};
+use std::fs::File;
+use std::io::{self, BufReader, Cursor};
 use std::path::Path;
 
 use hicp_core::MAX_IMAGE_SIDE;
@@ -42,15 +43,7 @@ pub(super) fn read(
     decoder.set_transformations(transformations);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    let failed = |error: DecodingError| match error {
-        DecodingError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
-            IoError::read(path, source)
-        }
-        other => IoError::Png {
-            path: path.to_owned(),
-            source: other.into(),
-        },
-    };
+    let failed = |error| failed(path, error);
 
     let header = decoder.read_header_info().map_err(failed)?;
     let (width, height) = header.size();
@@ -97,6 +90,21 @@ pub(super) fn read(
     })
 }
 
+/// Reads the width and height of a PNG image from its header, and no more of the file.
+///
+/// # Errors
+///
+/// [`IoError::Read`], or [`IoError::Png`] when the file does not begin as a PNG image.
+pub fn read_png_size(path: impl AsRef<Path>) -> Result<(u32, u32), IoError> {
+    let path = path.as_ref();
+    let file = File::open(path).map_err(|e| IoError::read(path, e))?;
+    let mut decoder = png::Decoder::new(BufReader::new(file));
+    match decoder.read_header_info() {
+        Ok(header) => Ok(header.size()),
+        Err(error) => Err(failed(path, error)),
+    }
+}
+
 /// Encodes pixels of one kind as a PNG file, atomically. Samples of 16 bits are big-endian.
 pub(super) fn write(
     path: &Path,
@@ -112,6 +120,18 @@ pub(super) fn write(
         image.write_image_data(bytes).map_err(io::Error::other)?;
         image.finish().map_err(io::Error::other)
     })
+}
+
+fn failed(path: &Path, error: DecodingError) -> IoError {
+    match error {
+        DecodingError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
+            IoError::read(path, source)
+        }
+        other => IoError::Png {
+            path: path.to_owned(),
+            source: other.into(),
+        },
+    }
 }
 
 fn describe(color: ColorType, depth: BitDepth) -> String {
