@@ -97,7 +97,7 @@ fn the_visible_surface_is_the_pixels_of_the_grid_and_faces_the_camera() {
 }
 
 #[test]
-fn at_most_so_many_points() {
+fn about_so_many_points() {
     let model = Model::new(cuboid(0.1, 0.1, 0.1));
     let at = pose(0.0, 0.0, 0.3, 0.3, 0.4, 0.0);
     let observation = observe(&model, &camera(), &at);
@@ -123,8 +123,9 @@ fn at_most_so_many_points() {
             &at,
         );
         assert_eq!(found, thinned.len());
-        // A grid holds its share of a compact region, up to the region's border.
-        assert!(found <= points + points / 3, "{found} of {points}");
+        // Within a factor of two; a grid holds its share of a compact region, up to the region's border.
+        assert!(found <= 2 * points + points / 3, "{found} of {points}");
+        assert!(found == all || found >= points / 3, "{found} of {points}");
     }
 }
 
