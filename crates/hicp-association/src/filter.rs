@@ -55,3 +55,5 @@ chain!(A, B, C);
 chain!(A, B, C, D);
 chain!(A, B, C, D, E);
 chain!(A, B, C, D, E, F);
+chain!(A, B, C, D, E, F, G);
+chain!(A, B, C, D, E, F, G, H);

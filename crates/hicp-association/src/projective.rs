@@ -3,6 +3,7 @@
 use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Surfel};
 
 use crate::association::DataAssociation;
+use crate::pixel_projection::PixelProjection;
 
 /// Pairs a model point with the observed point stored at the pixel that it projects to (§III-A.1; Blais & Levine 1995).
 ///
@@ -21,20 +22,14 @@ impl DataAssociation for Projective {
         pairs: &mut Correspondences,
     ) {
         let observation = context.problem.observation;
-        let camera = observation.camera();
-        #[allow(clippy::cast_possible_truncation)]
-        // Pixels; f32 resolves 1e-3 of one in any accepted image.
-        let [fx, fy, cx, cy] =
-            [camera.fx(), camera.fy(), camera.cx(), camera.cy()].map(|x| x as f32);
+        let projection = PixelProjection::new(observation.camera());
         let mover = Mover::new(camera_from_object);
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let point = mover.point(&surfel.point);
-            // A pose that overflows f32 would put every point on the principal point, infinitely far away.
-            if !(point.z > 0.0 && point.z.is_finite()) {
+            let Some((u, v)) = projection.project(&point) else {
                 continue;
-            }
-            let (u, v) = (fx * point.x / point.z + cx, fy * point.y / point.z + cy);
+            };
             let Some(target_index) = observation.index_near(u, v) else {
                 continue;
             };

@@ -1,0 +1,79 @@
+//! Where a surface in a depth image ends.
+
+use std::sync::Arc;
+
+use hicp_core::{Observation, PixelRegion};
+
+/// The largest width that counts, pixels.
+const MAX_WIDTH: u32 = 64;
+
+/// What is taken for the boundary of a surface in an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BoundaryRule {
+    pub(crate) width: u32,
+    pub(crate) max_step: f32,
+}
+
+impl BoundaryRule {
+    /// Returns whether pixel (u, v) of an image lies at a boundary: whether it shows no surface (`depth_at` returns 0 or less), or a pixel at a
+    /// chessboard distance of r ≤ width shows none or one that is nearer or further by more than r·max_step of the nearer depth.
+    ///
+    /// Pixels outside `image` are not looked at.
+    pub(crate) fn holds(
+        &self,
+        u: u32,
+        v: u32,
+        image: &PixelRegion,
+        depth_at: impl Fn(u32, u32) -> f32,
+    ) -> bool {
+        let width = self.width.min(MAX_WIDTH);
+        let depth = depth_at(u, v);
+        let columns = u.saturating_sub(width).max(image.u_min)..(u + width + 1).min(image.u_max);
+        let mut rows = v.saturating_sub(width).max(image.v_min)..(v + width + 1).min(image.v_max);
+        let continues = |x: u32, y: u32| {
+            let other = depth_at(x, y);
+            let reach = x.abs_diff(u).max(y.abs_diff(v)) as f32;
+            let gate = self.max_step * reach * depth.min(other);
+            // The pixel itself is no step, and a NaN gate is one.
+            other > 0.0 && (reach == 0.0 || (other - depth).abs() <= gate)
+        };
+        !(depth > 0.0 && rows.all(|y| columns.clone().all(|x| continues(x, y))))
+    }
+}
+
+/// Which pixels of an observation's region lie at a boundary. Built once per observation and rule, shared by all threads.
+pub(crate) struct BoundaryMap {
+    at_boundary: Vec<bool>,
+}
+
+impl BoundaryMap {
+    pub(crate) fn of(observation: &Observation, rule: BoundaryRule) -> Arc<Self> {
+        let key = u64::from(rule.width.min(MAX_WIDTH)) << 32 | u64::from(rule.max_step.to_bits());
+        observation.derived().get_or_build(key, || {
+            let (mask, depth) = (observation.mask(), observation.depth());
+            let (region, image) = (observation.region(), observation.camera().region());
+            let depth_at = |u, v| {
+                let masked = mask.get(u, v) == Some(true);
+                depth.get(u, v).filter(|_| masked).unwrap_or(0.0)
+            };
+            let width = rule.width.min(MAX_WIDTH);
+            // The measurement ends with the image.
+            let beside_border = |u: u32, v: u32| {
+                u < width || v < width || u + width >= image.u_max || v + width >= image.v_max
+            };
+            let at_boundary = (region.v_min..region.v_max)
+                .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)))
+                .map(|(u, v)| beside_border(u, v) || rule.holds(u, v, &image, depth_at))
+                .collect();
+            Self { at_boundary }
+        })
+    }
+
+    /// Returns whether the surfel of an index lies at a boundary; true for an index that there is not.
+    pub(crate) fn contains(&self, target_index: u32) -> bool {
+        self.at_boundary
+            .get(target_index as usize)
+            .copied()
+            .unwrap_or(true)
+    }
+}

@@ -1,0 +1,32 @@
+//! Order statistics of the distances of pairs.
+
+use hicp_core::Correspondences;
+
+/// Replaces the content of `distances` by the pairs' distances, those that are not finite left out.
+pub(crate) fn collect_finite(pairs: &Correspondences, distances: &mut Vec<f32>) {
+    distances.clear();
+    let all = pairs.as_slice().iter().map(|pair| pair.distance());
+    distances.extend(all.filter(|distance| distance.is_finite()));
+}
+
+/// Returns the value that `rank` others precede in ascending order (the largest when there are not as many); reorders `values`.
+/// `None` without values.
+pub(crate) fn nth_smallest(values: &mut [f32], rank: usize) -> Option<f32> {
+    let rank = rank.min(values.len().checked_sub(1)?);
+    Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
+}
+
+/// Returns the median, the upper of the two middle values of an even number; reorders `values`. `None` without values.
+pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
+    nth_smallest(values, values.len() / 2)
+}
+
+/// Returns ⌈fraction·count⌉, between 0 and `count`; 0 for NaN.
+pub(crate) fn share_of(fraction: f32, count: usize) -> usize {
+    // Products such as 0.85·100 come out just above the whole number that is meant.
+    let share = (f64::from(fraction.clamp(0.0, 1.0)) * count as f64 - 1e-5).ceil();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // Between −0 and `count`; NaN becomes 0.
+    let share = share as usize;
+    share.min(count)
+}
