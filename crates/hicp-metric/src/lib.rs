@@ -1,5 +1,4 @@
-//! Error metrics: the trait [`ErrorMetric`], [`PointToPoint`] and [`PointToPlane`], and the [`NormalEquations`] that
-//! iterative metrics share.
+//! Error metrics: the trait [`ErrorMetric`], the metrics, and the decorators that make them robust, constrain them or iterate them.
 //!
 //! **Should you use this crate?** To write a metric of your own, or to align pairs that you already have. To refine poses,
 //! use `hybrid-icp`.
@@ -19,14 +18,71 @@
 //! assert!((step.mean_loss - 0.25).abs() < 1e-6);
 //! ```
 //!
-//! Modules in reading order: `metric` (trait), `point_to_point`, `point_to_plane`, `normal_equations`.
+//! **Metrics**: [`PointToPoint`], [`PointToPlane`], [`PlaneToPoint`] (the model's normals), [`Symmetric`] (both normals, exact in
+//! one step), [`Generalized`] (both normals, tangential offsets count a little), [`WeightedSum`] of several.
+//!
+//! **Decorators**, each a metric again: [`Robust`] (a [`Kernel`] against outliers), [`PosePrior`], [`Conditioned`] (a policy for
+//! [`Degeneracy`]), [`Frozen`] (degrees of freedom held), [`GaussNewton`] and [`LevenbergMarquardt`] (iterations over fixed
+//! pairs). From the inside out, that is the order in which they make sense: a kernel weighs data and not the prior, and a
+//! solver heeds what was held:
+//!
+//! ```
+//! use hicp_metric::{Frame, Frozen, Kernel, LevenbergMarquardt, PointToPlane, Robust, Scale};
+//!
+//! let robust = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Mad { floor_meters: 0.001 });
+//! // A bottle: the turn about its own axis is not to be refined.
+//! let metric = LevenbergMarquardt::new(Frozen {
+//!     metric: robust,
+//!     frame: Frame::Object,
+//!     translation: [false; 3],
+//!     rotation: [false, false, true],
+//! });
+//! # let _ = metric;
+//! ```
+//!
+//! **What the pairs determine** is read from [`ErrorMetric::system`]: [`NormalEquations::observability`],
+//! [`NormalEquations::information`] and [`NormalEquations::covariance`].
+//!
+//! Modules in reading order: `metric` (trait); `point_to_point`, `point_to_plane`, `plane_to_point`, `symmetric`, `generalized`,
+//! `weighted_sum`; `normal_equations` and what they are asked: `degeneracy` (solving), `freedom` (held components),
+//! `observability`, `covariance`; the decorators `kernel` and `robust`, `pose_prior`, `conditioned`, `frozen`, `moved` with
+//! `gauss_newton` and `levenberg_marquardt`.
 
+mod conditioned;
+mod covariance;
+mod degeneracy;
+mod freedom;
+mod frozen;
+mod gauss_newton;
+mod generalized;
+mod kernel;
+mod levenberg_marquardt;
 mod metric;
+mod moved;
 mod normal_equations;
+mod observability;
+mod plane_to_point;
 mod point_to_plane;
 mod point_to_point;
+mod pose_prior;
+mod robust;
+mod symmetric;
+mod weighted_sum;
 
+pub use conditioned::Conditioned;
+pub use degeneracy::Degeneracy;
+pub use frozen::{Frame, Frozen};
+pub use gauss_newton::GaussNewton;
+pub use generalized::Generalized;
+pub use kernel::Kernel;
+pub use levenberg_marquardt::LevenbergMarquardt;
 pub use metric::{ErrorMetric, Step};
 pub use normal_equations::NormalEquations;
+pub use observability::Observability;
+pub use plane_to_point::PlaneToPoint;
 pub use point_to_plane::PointToPlane;
 pub use point_to_point::PointToPoint;
+pub use pose_prior::PosePrior;
+pub use robust::{Robust, Scale};
+pub use symmetric::Symmetric;
+pub use weighted_sum::WeightedSum;

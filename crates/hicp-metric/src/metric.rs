@@ -18,23 +18,24 @@ pub struct Step {
 /// Pairs are in the camera frame with the source already moved, so a metric is linearised at the identity increment
 /// ξ = [ρ; φ] (translation first, left perturbation).
 ///
-/// Implement [`ErrorMetric::linearize`] and get Gauss–Newton from the provided [`ErrorMetric::minimize`]; override
-/// `minimize` where there is a closed form or a batch kernel.
+/// Implement [`ErrorMetric::linearize`] and get the rest: Gauss–Newton from the provided [`ErrorMetric::minimize`]; override
+/// `minimize` where there is a closed form or a batch kernel. What acts on the set of pairs rather than on one of them (a
+/// kernel with a scale, a prior, a frozen direction) overrides [`ErrorMetric::system`], and [`ErrorMetric::mean_loss`] if it
+/// changes the loss; decorators therefore ask the metric inside for its `system`, not for its rows.
 ///
 /// ```
-/// use hicp_core::Pair;
+/// use hicp_core::{Pair, Vector3};
 /// use hicp_metric::{ErrorMetric, NormalEquations};
 ///
-/// /// Point-to-plane in the model's tangent planes instead of the observation's.
+/// /// The difference of depths alone: z of the optical axis.
 /// #[derive(Debug)]
-/// struct PlaneToPoint;
+/// struct DepthDifference;
 ///
-/// impl ErrorMetric for PlaneToPoint {
+/// impl ErrorMetric for DepthDifference {
 ///     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-///         let normal = pair.source.normal.cast::<f64>().into_inner();
 ///         let (p, c) = (pair.source.point.cast::<f64>(), pair.target.point.cast::<f64>());
-///         // The residual moves by n · (displacement of p): one row at p along n.
-///         system.add_row(&p, &normal, normal.dot(&(p - c)), f64::from(pair.weight));
+///         // The residual moves by z · (displacement of p): one row at p along z.
+///         system.add_row(&p, &Vector3::z(), p.z - c.z, f64::from(pair.weight));
 ///     }
 /// }
 /// ```
@@ -42,18 +43,57 @@ pub trait ErrorMetric {
     /// Adds the residual rows of one pair, linearised at the identity increment.
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations);
 
+    /// Returns E(c, n, o, m, I) of one pair at the pose that it was made at, without its weight; m².
+    ///
+    /// The provided method sums the squares of the pair's own rows. Override it where that is a short formula: kernels and
+    /// [`ErrorMetric::mean_loss`] ask once per pair.
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        let mut system = NormalEquations::new(pair.source.point.cast(), 1.0);
+        let unweighted = Pair {
+            weight: 1.0,
+            ..*pair
+        };
+        self.linearize(&unweighted, &mut system);
+        system.loss()
+    }
+
+    /// Returns the weighted mean of the errors at the pose that the pairs were made at, as [`ErrorMetric::minimize`] reports
+    /// it; m². Pure: `&mut self` is scratch.
+    ///
+    /// `None` without weight or with numbers that are not finite.
+    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for pair in pairs.as_slice() {
+            let w = f64::from(pair.weight);
+            sum += w * self.squared_error(pair);
+            weight += w;
+        }
+        let mean = sum / weight;
+        (weight > 0.0 && mean.is_finite()).then_some(mean)
+    }
+
+    /// Returns all pairs linearised: what one Gauss–Newton step solves, and what information, covariance and observability at
+    /// that pose are read from. Pure: `&mut self` is scratch.
+    ///
+    /// `None` without weight or with points that are not finite. The provided method sums the rows of
+    /// [`ErrorMetric::linearize`] about the centroid, with lengths scaled by the RMS radius.
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        let mut system = NormalEquations::about_sources(pairs.as_slice())?;
+        for pair in pairs.as_slice() {
+            self.linearize(pair, &mut system);
+        }
+        Some(system)
+    }
+
     /// Takes one step of minimisation over all pairs. Pure: `&mut self` is scratch.
     ///
     /// A metric that depends on the pose (a prior, a frozen direction of the object frame) finds it in
     /// [`Correspondences::camera_from_object`].
     ///
     /// `None` when the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
-    /// that are not finite. The provided method is one Gauss–Newton step about the centroid with lengths scaled by the RMS radius.
+    /// that are not finite. The provided method is one Gauss–Newton step: it solves [`ErrorMetric::system`].
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let mut system = NormalEquations::about_sources(pairs.as_slice())?;
-        for pair in pairs.as_slice() {
-            self.linearize(pair, &mut system);
-        }
+        let system = self.system(pairs)?;
         let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
         let mean_loss = system.loss() / weight;
         let increment = system.solve()?;
@@ -72,6 +112,18 @@ pub trait ErrorMetric {
 impl<T: ErrorMetric + ?Sized> ErrorMetric for Box<T> {
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         (**self).linearize(pair, system);
+    }
+
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        (**self).squared_error(pair)
+    }
+
+    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+        (**self).mean_loss(pairs)
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        (**self).system(pairs)
     }
 
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {

@@ -1,25 +1,32 @@
 //! The 6×6 normal equations of a rigid increment.
 
-use hicp_core::{Isometry3, Matrix6, Pair, Point3, Translation3, Vector3, Vector6, se3};
+use hicp_core::{Matrix3, Matrix6, Pair, Point3, Vector3, Vector6, so3::hat};
 
-/// Damping relative to the mean diagonal of the scaled system: directions that the pairs do not constrain stay put.
-const DAMPING: f64 = 1e-6;
-/// Fewer rows than unknowns determine nothing.
-const MIN_ROWS: usize = 6;
+use crate::degeneracy::Degeneracy;
+use crate::freedom::Freedom;
 
 /// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
 ///
 /// Rotations turn about a pivot (the centroid of the points) and are measured in units of 1/L radians (L the RMS radius),
 /// so that all six unknowns are lengths of similar size: for a 10 cm object at 0.5 m the condition number falls from 2·10⁴
 /// to about 40 (Low 2004 for the rows). [`NormalEquations::solve`] converts back.
+///
+/// A system also knows how it is to be solved, so that decorators compose: what happens in directions that the rows leave
+/// open ([`NormalEquations::with_policy`]) and which components of the increment are held ([`NormalEquations::freeze`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalEquations {
-    pivot: Point3<f64>,
-    length: f64,
-    hessian: Matrix6<f64>,
-    gradient: Vector6<f64>,
+    pub(crate) pivot: Point3<f64>,
+    pub(crate) length: f64,
+    /// The lower triangle only.
+    pub(crate) hessian: Matrix6<f64>,
+    pub(crate) gradient: Vector6<f64>,
     loss: f64,
-    rows: usize,
+    pub(crate) rows: usize,
+    /// Trace of the rows alone, once a prior was added: its stiffness must not raise the damping.
+    row_trace: Option<f64>,
+    pub(crate) freedom: Option<Freedom>,
+    pub(crate) policy: Degeneracy,
+    pub(crate) threshold: f64,
 }
 
 impl NormalEquations {
@@ -33,6 +40,10 @@ impl NormalEquations {
             gradient: Vector6::zeros(),
             loss: 0.0,
             rows: 0,
+            row_trace: None,
+            freedom: None,
+            policy: Degeneracy::default(),
+            threshold: Degeneracy::THRESHOLD,
         }
     }
 
@@ -112,36 +123,111 @@ impl NormalEquations {
         self.loss
     }
 
-    /// Returns the increment that minimises the linearised loss, as a motion of the camera frame.
-    ///
-    /// `None` with fewer than six rows, without any information, or with numbers that are not finite. Directions that the
-    /// rows leave free (a plane's own plane, a cylinder's axis) are damped and do not move.
+    /// Point about which rotations turn, camera frame, metres.
     #[must_use]
-    pub fn solve(&self) -> Option<Isometry3<f64>> {
-        let mean_diagonal = self.hessian.trace() / 6.0;
-        if self.rows < MIN_ROWS || !mean_diagonal.is_finite() || mean_diagonal <= 0.0 {
-            return None;
-        }
-        let damped = self.hessian + Matrix6::identity() * (DAMPING * mean_diagonal);
-        let solution = damped.cholesky()?.solve(&-self.gradient);
-        let twist = Vector6::new(
-            solution[0],
-            solution[1],
-            solution[2],
-            solution[3] / self.length,
-            solution[4] / self.length,
-            solution[5] / self.length,
-        );
-        let about_pivot = se3::exp(&twist);
-        let pivot = self.pivot.coords;
-        let increment = Translation3::from(pivot) * about_pivot * Translation3::from(-pivot);
-        se3::is_finite(&increment).then_some(increment)
+    pub fn pivot(&self) -> Point3<f64> {
+        self.pivot
     }
+
+    /// Length by which rotations are scaled, metres.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Adds eᵀΛe for e(ξ) = `residual` + `jacobian` ξ, with ξ the twist about the *camera origin* in metres and radians.
+    ///
+    /// Λ (`information`) is symmetric and positive semi-definite; eᵀΛe has the unit of the loss. Each component with
+    /// information counts as a row. Add it after the rows: they alone set the damping of [`NormalEquations::solve`].
+    pub fn add_twist(
+        &mut self,
+        residual: &Vector6<f64>,
+        jacobian: &Matrix6<f64>,
+        information: &Matrix6<f64>,
+    ) {
+        self.row_trace.get_or_insert(self.hessian.trace());
+        let jacobian = jacobian * self.camera_from_scaled();
+        let weighted = jacobian.transpose() * information;
+        self.hessian += weighted * jacobian;
+        self.gradient += weighted * residual;
+        self.loss += residual.dot(&(information * residual));
+        self.rows += (0..6).filter(|&i| information[(i, i)] > 0.0).count();
+    }
+
+    /// Adds `factor` times another system, whose pivot and length may be others.
+    ///
+    /// Policy and held components stay those of `self`.
+    pub fn merge(&mut self, other: &Self, factor: f64) {
+        // The same twist in the other system's unknowns: ρ' = ρ + φ × (pivot' − pivot), θ' = θ L'/L.
+        let shift = hat(&(other.pivot - self.pivot)) / -self.length;
+        let scale = Matrix3::identity() * (other.length / self.length);
+        let change = blocks(&Matrix3::identity(), &shift, &scale);
+        let trace = self.damping_trace() + factor * other.damping_trace();
+        if self.row_trace.is_some() || other.row_trace.is_some() {
+            self.row_trace = Some(trace);
+        }
+        self.hessian += change.transpose() * other.full_hessian() * change * factor;
+        self.gradient += change.transpose() * other.gradient * factor;
+        self.loss += factor * other.loss;
+        self.rows += other.rows;
+    }
+
+    /// Multiplies every weight by a factor.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.hessian *= factor;
+        self.gradient *= factor;
+        self.loss *= factor;
+        self.row_trace = self.row_trace.map(|trace| trace * factor);
+        self
+    }
+
+    /// The trace that the damping is relative to: that of the rows, or of all if they say nothing.
+    pub(crate) fn damping_trace(&self) -> f64 {
+        self.row_trace
+            .filter(|trace| *trace > 0.0)
+            .unwrap_or_else(|| self.hessian.trace())
+    }
+
+    /// JᵀWJ in scaled unknowns, both triangles.
+    pub(crate) fn full_hessian(&self) -> Matrix6<f64> {
+        let mut full = self.hessian;
+        full.fill_upper_triangle_with_lower_triangle();
+        full
+    }
+
+    /// The matrix S of ξ = S z: z the scaled twist about the pivot, ξ the plain one about the camera origin.
+    pub(crate) fn camera_from_scaled(&self) -> Matrix6<f64> {
+        blocks(
+            &Matrix3::identity(),
+            &(hat(&self.pivot.coords) / self.length),
+            &(Matrix3::identity() / self.length),
+        )
+    }
+
+    /// The inverse of [`NormalEquations::camera_from_scaled`].
+    pub(crate) fn scaled_from_camera(&self) -> Matrix6<f64> {
+        blocks(
+            &Matrix3::identity(),
+            &-hat(&self.pivot.coords),
+            &(Matrix3::identity() * self.length),
+        )
+    }
+}
+
+/// [a b; 0 d]
+pub(crate) fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
+    let mut matrix = Matrix6::zeros();
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(b);
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(d);
+    matrix
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hicp_core::se3;
 
     /// ½ Σ w (d · (exp(ξ) p) + r₀)² over the rows, with ξ about the pivot and rotations in units of 1/L.
     struct Rows {

@@ -21,6 +21,12 @@ impl ErrorMetric for PointToPlane {
         system.add_row(&point, &normal, residual, f64::from(pair.weight));
     }
 
+    #[inline]
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        let offset = pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>();
+        pair.target.normal.cast::<f64>().dot(&offset).powi(2)
+    }
+
     fn name(&self) -> &'static str {
         "point-to-plane"
     }

@@ -73,6 +73,11 @@ impl ErrorMetric for PointToPoint {
         })
     }
 
+    #[inline]
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        (pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>()).norm_squared()
+    }
+
     fn name(&self) -> &'static str {
         "point-to-point"
     }

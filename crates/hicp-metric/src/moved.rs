@@ -1,0 +1,32 @@
+//! Pairs with their sources moved further.
+
+use hicp_core::{Correspondences, Isometry3, Pair, Surfel, UnitVector3};
+
+/// Refills `moved` with the pairs, their sources and their pose moved by an increment.
+///
+/// Always from the original pairs, so that roundings to `f32` do not add up.
+pub(crate) fn move_sources(
+    pairs: &Correspondences,
+    increment: &Isometry3<f64>,
+    moved: &mut Correspondences,
+) {
+    moved.begin(
+        &(increment * pairs.camera_from_object()),
+        pairs.n_candidates(),
+    );
+    moved.extend(pairs.as_slice().iter().map(|pair| {
+        let normal = increment.rotation * pair.source.normal.cast::<f64>().into_inner();
+        let source = Surfel {
+            point: (increment * pair.source.point.cast::<f64>()).cast(),
+            normal: UnitVector3::new_unchecked(normal.cast()),
+        };
+        Pair { source, ..*pair }
+    }));
+}
+
+/// Composes increments; long products stay rotations.
+pub(crate) fn compose(after: &Isometry3<f64>, before: &Isometry3<f64>) -> Isometry3<f64> {
+    let mut product = after * before;
+    product.rotation.renormalize();
+    product
+}

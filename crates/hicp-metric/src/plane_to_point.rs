@@ -1,0 +1,35 @@
+//! The plane-to-point error metric: point-to-plane in the model's tangent planes.
+
+use hicp_core::Pair;
+
+use crate::metric::ErrorMetric;
+use crate::normal_equations::NormalEquations;
+
+/// E = (mᵀ (T o − c))², m the normal of the model, which turns with it; by Gauss–Newton.
+///
+/// The model's normals are free of the depth sensor's noise. Otherwise as [`crate::PointToPlane`], by whose symmetry the row
+/// is that of the observed point: J = [mᵀ, (c × m)ᵀ].
+/// No step from fewer than six pairs. Cost: one pass to centre, one to sum, and a 6×6 Cholesky decomposition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlaneToPoint;
+
+impl ErrorMetric for PlaneToPoint {
+    #[inline]
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let observed = pair.target.point.cast::<f64>();
+        let normal = pair.source.normal.cast::<f64>().into_inner();
+        let residual = normal.dot(&(pair.source.point.cast::<f64>() - observed));
+        // m·(ρ + φ × p) + (φ × m)·(p − c) = m·ρ + φ·(c × m): the lever of c, not of p, as m turns too.
+        system.add_row(&observed, &normal, residual, f64::from(pair.weight));
+    }
+
+    #[inline]
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        let offset = pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>();
+        pair.source.normal.cast::<f64>().dot(&offset).powi(2)
+    }
+
+    fn name(&self) -> &'static str {
+        "plane-to-point"
+    }
+}
