@@ -42,6 +42,7 @@ fn smallest_use(kind: PartKind, name: &str) -> String {
                 min, default: None, ..
             } => format!("{:?}", min.max(1.0)),
             Accepts::Count { min, default: None } => min.max(1).to_string(),
+            Accepts::NumberList if name == "weighted-sum" => "[0.5]".to_owned(),
             Accepts::NumberList => "[0.2, 0.4]".to_owned(),
             Accepts::Part {
                 kind,

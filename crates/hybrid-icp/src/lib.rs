@@ -47,8 +47,13 @@ mod suggest;
 mod trace;
 
 pub use hicp_association::{
-    AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
-    PointSelection, Projective, Stride, VisibleSurface,
+    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
+    DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
+    MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
+    ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
+    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, SensorNoise,
+    SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
+    VoxelGrid, WithoutBoundary,
 };
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
@@ -64,7 +69,11 @@ pub use hicp_icp::{
     Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
     Termination, TimeLimit, Verdict, Workspace,
 };
-pub use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
+pub use hicp_metric::{
+    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
+    LevenbergMarquardt, NormalEquations, Observability, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Robust, Scale, Step, Symmetric, WeightedSum,
+};
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,

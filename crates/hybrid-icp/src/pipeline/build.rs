@@ -1,14 +1,23 @@
 //! From a tree to a pipeline: every field is read through the catalogue, which knows its range and its default.
 
 use hicp_association::{
-    AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
-    PointSelection, Projective, Stride, VisibleSurface,
+    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
+    DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
+    MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
+    ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
+    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, SensorNoise,
+    SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
+    VoxelGrid, WithoutBoundary,
 };
 use hicp_icp::{
     AbsoluteLoss, AtResolution, Bound, Cascade, Convergence, Divergence, Guard, Icp,
     IterationLimit, KeepBest, LossRule, Motion, Oscillation, Repeat, StopRule, TimeLimit,
 };
-use hicp_metric::{ErrorMetric, PointToPlane, PointToPoint};
+use hicp_metric::{
+    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
+    LevenbergMarquardt, PlaneToPoint, PointToPlane, PointToPoint, Robust, Scale, Symmetric,
+    WeightedSum,
+};
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{Switch, SwitchAmong, Switcher, Threshold, Thresholds};
 
@@ -82,13 +91,49 @@ fn each<T>(
     part.parts(field)?.iter().map(build).collect()
 }
 
+#[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
 fn selection(part: &Reader<'_>) -> Result<Selection, PipelineError> {
+    let inner = || selection(&part.part("selection")?);
     Ok(match part.name() {
         "all-samples" => Box::new(AllSamples),
         "visible-surface" => Box::new(VisibleSurface {
             stride: stride(part)?,
         }),
+        "observed-surface" => Box::new(ObservedSurface {
+            stride: stride(part)?,
+        }),
+        "without-boundary" => Box::new(WithoutBoundary {
+            inner: inner()?,
+            width: part.count("width")?,
+            max_step: part.number("max_step")? as f32,
+        }),
+        "uniform-count" => Box::new(UniformCount {
+            inner: inner()?,
+            count: part.count("count")? as usize,
+        }),
+        "random-sample" => Box::new(RandomSample {
+            inner: inner()?,
+            count: part.count("count")? as usize,
+            seed: u64::from(part.count("seed")?),
+        }),
+        "voxel-grid" => Box::new(VoxelGrid::new(inner()?, length(part, "cell")?)),
+        "normal-space" => Box::new(NormalSpace::new(
+            inner()?,
+            part.count("count")? as usize,
+            part.count("resolution")? as usize,
+        )),
+        "stable-sampling" => Box::new(StableSampling::new(inner()?, part.count("count")? as usize)),
         _ => return Err(part.unknown(PartKind::Selection)),
+    })
+}
+
+/// A length and the word that says what it counts in.
+#[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+fn length(part: &Reader<'_>, field: &str) -> Result<Length, PipelineError> {
+    let value = part.number(field)? as f32;
+    Ok(match part.word("unit")? {
+        "meters" => Length::Meters(value),
+        _ => Length::Diameters(value),
     })
 }
 
@@ -101,12 +146,46 @@ fn stride(part: &Reader<'_>) -> Result<Stride, PipelineError> {
     })
 }
 
+#[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
 fn association(part: &Reader<'_>) -> Result<Association, PipelineError> {
     Ok(match part.name() {
         "nearest-neighbor" => Box::new(NearestNeighbor {
             targets: stride(part)?,
         }),
         "projective" => Box::new(Projective),
+        "k-nearest" => Box::new(KNearest::new(part.count("k")? as usize, stride(part)?)),
+        "normal-compatible" => Box::new(NormalCompatible::new(
+            part.number("max_angle_degrees")? as f32,
+            part.count("k")? as usize,
+            stride(part)?,
+        )),
+        "normal-shooting" => {
+            let limited = part.number("max_offset")?.is_finite();
+            let max_offset = limited.then(|| length(part, "max_offset")).transpose()?;
+            // Read whether or not it counts, so that a wrong word is refused.
+            part.word("unit")?;
+            Box::new(NormalShooting::new(
+                part.count("k")? as usize,
+                max_offset,
+                stride(part)?,
+            ))
+        }
+        "reciprocal" => Box::new(Reciprocal::new(association(&part.part("association")?)?)),
+        "projective-search" => Box::new(ProjectiveSearch {
+            radius: part.count("radius")?,
+        }),
+        "projective-interpolated" => Box::new(ProjectiveInterpolated {
+            max_step: part.number("max_step")? as f32,
+        }),
+        "observation-to-model" => Box::new(ObservationToModel {
+            stride: stride(part)?,
+            samples: part.count("samples")? as usize,
+            visible_only: part.flag("visible_only")?,
+        }),
+        "closest-point-on-mesh" => Box::new(ClosestPointOnMesh {
+            stride: stride(part)?,
+            visible_only: part.flag("visible_only")?,
+        }),
         _ => return Err(part.unknown(PartKind::Association)),
     })
 }
@@ -114,23 +193,126 @@ fn association(part: &Reader<'_>) -> Result<Association, PipelineError> {
 #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
 fn filter(part: &Reader<'_>) -> Result<Filter, PipelineError> {
     Ok(match part.name() {
-        "max-distance" => {
-            let limit = part.number("limit")? as f32;
-            Box::new(match part.word("unit")? {
-                "meters" => MaxDistance::meters(limit),
-                _ => MaxDistance::diameters(limit),
-            })
-        }
+        "max-distance" => Box::new(MaxDistance::new(length(part, "limit")?)),
         "max-normal-angle" => Box::new(MaxNormalAngle::degrees(part.number("degrees")? as f32)),
+        "median-distance" => Box::new(MedianDistance::new(part.number("factor")? as f32)),
+        "mad-distance" => Box::new(MadDistance::new(
+            part.number("factor")? as f32,
+            part.number("floor_meters")? as f32,
+        )),
+        "trimmed" => Box::new(Trimmed::new(part.number("keep")? as f32)),
+        "var-trimmed" => Box::new(VarTrimmed::new(
+            part.number("min_keep")? as f32,
+            part.number("max_keep")? as f32,
+            part.number("lambda")? as f32,
+        )),
+        "one-to-one" => Box::new(OneToOne::default()),
+        "boundary-targets" => Box::new(BoundaryTargets {
+            width: part.count("width")?,
+            max_step: part.number("max_step")? as f32,
+        }),
+        "min-pairs" => Box::new(MinPairs {
+            count: part.count("count")? as usize,
+        }),
+        "constant-weight" => Box::new(ConstantWeight {
+            weight: part.number("weight")? as f32,
+        }),
+        "distance-weight" => Box::new(DistanceWeight {
+            max: length(part, "max")?,
+        }),
+        "normal-weight" => Box::new(NormalWeight),
+        "sensor-noise-weight" => Box::new(SensorNoiseWeight {
+            noise: SensorNoise {
+                constant: part.number("constant")? as f32,
+                linear: part.number("linear")? as f32,
+                quadratic: part.number("quadratic")? as f32,
+                tilt: part.number("tilt")? as f32,
+            },
+        }),
         _ => return Err(part.unknown(PartKind::Filter)),
     })
 }
 
 fn metric(part: &Reader<'_>) -> Result<Metric, PipelineError> {
+    let inner = || metric(&part.part("metric")?);
     Ok(match part.name() {
         "point-to-point" => Box::new(PointToPoint),
         "point-to-plane" => Box::new(PointToPlane),
+        "plane-to-point" => Box::new(PlaneToPoint),
+        "symmetric" => Box::new(Symmetric),
+        "generalized" => Box::new(Generalized {
+            epsilon: part.number("epsilon")?,
+        }),
+        "weighted-sum" => {
+            let metrics = each(part, "metrics", metric)?;
+            let weights = part.numbers("weights")?;
+            if weights.len() != metrics.len() || weights.iter().any(|w| *w < 0.0) {
+                let expected = format!("{} numbers of 0 or more, one per metric", metrics.len());
+                return Err(part.refuse("weights", expected));
+            }
+            Box::new(WeightedSum {
+                terms: weights.into_iter().zip(metrics).collect::<Vec<_>>(),
+            })
+        }
+        "robust" => {
+            let meters = part.number("meters")?;
+            let scale = match part.word("scale")? {
+                "meters" => Scale::Meters(meters),
+                _ => Scale::Mad {
+                    floor_meters: meters,
+                },
+            };
+            Box::new(Robust::new(inner()?, kernel(part)?, scale))
+        }
+        "frozen" => Box::new(Frozen {
+            metric: inner()?,
+            frame: match part.word("frame")? {
+                "object" => Frame::Object,
+                _ => Frame::Camera,
+            },
+            translation: part.flags("translation")?,
+            rotation: part.flags("rotation")?,
+        }),
+        "conditioned" => Box::new(Conditioned {
+            metric: inner()?,
+            policy: match part.word("policy")? {
+                "damp" => Degeneracy::Damp,
+                "refuse" => Degeneracy::Refuse,
+                "ignore" => Degeneracy::Ignore,
+                _ => Degeneracy::Freeze,
+            },
+            threshold: part.number("threshold")?,
+        }),
+        "gauss-newton" => {
+            let mut solver = GaussNewton::new(inner()?);
+            solver.max_iterations = part.count("iterations")? as usize;
+            solver.tolerance = part.number("tolerance")?;
+            Box::new(solver)
+        }
+        "levenberg-marquardt" => {
+            let mut solver = LevenbergMarquardt::new(inner()?);
+            solver.max_iterations = part.count("iterations")? as usize;
+            solver.tolerance = part.number("tolerance")?;
+            solver.initial_damping = part.number("initial_damping")?;
+            Box::new(solver)
+        }
         _ => return Err(part.unknown(PartKind::Metric)),
+    })
+}
+
+fn kernel(part: &Reader<'_>) -> Result<Kernel, PipelineError> {
+    let tuning = part.number("tuning")?;
+    let own = |usual: Kernel, tuned: fn(f64) -> Kernel| {
+        if tuning > 0.0 { tuned(tuning) } else { usual }
+    };
+    Ok(match part.word("kernel")? {
+        "fair" => own(Kernel::FAIR, Kernel::Fair),
+        "cauchy" => own(Kernel::CAUCHY, Kernel::Cauchy),
+        "geman-mcclure" => own(Kernel::GEMAN_MCCLURE, Kernel::GemanMcClure),
+        "welsch" => own(Kernel::WELSCH, Kernel::Welsch),
+        "tukey" => own(Kernel::TUKEY, Kernel::Tukey),
+        "l2" => Kernel::L2,
+        _ => own(Kernel::HUBER, Kernel::Huber),
     })
 }
 

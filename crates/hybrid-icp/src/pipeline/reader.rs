@@ -262,6 +262,14 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// The error of a value that is wrong only together with others.
+    pub(crate) fn refuse(&self, field: &str, expected: String) -> PipelineError {
+        match self.node.and_then(|node| node.get(field)) {
+            Some(node) => self.wrong(field, node, expected),
+            None => self.missing(field, expected),
+        }
+    }
+
     fn wrong(&self, field: &str, node: &Node, expected: String) -> PipelineError {
         PipelineError::Value {
             place: inside(&self.place, field, node.line),
