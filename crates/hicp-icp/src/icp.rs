@@ -149,7 +149,7 @@ where
                     .associate(&mut context, source, &pose, pairs);
                 self.filter.filter(problem, pairs);
             }
-            quality = Quality::of(pairs);
+            quality = Quality::of(pairs, &mut self.metric);
         }
         let outcome = Outcome {
             camera_from_object: pose,

@@ -1,6 +1,7 @@
 //! How a stage ended, and what it returns.
 
-use hicp_core::{Correspondences, Isometry3};
+use hicp_core::{Correspondences, Isometry3, Matrix6};
+use hicp_metric::{ErrorMetric, NormalEquations, Observability};
 
 /// Why a stage ended. Ending is not an error: whatever the data, a stage returns a pose and says why it stopped there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -88,13 +89,15 @@ pub struct Quality {
     pub point_rmse: f64,
     /// Root mean square of the distances of the model points from the observed tangent planes, metres.
     pub plane_rmse: f64,
+    /// The metric's normal equations there: what the pairs say about each of the six directions. `None` where it has none.
+    pub system: Option<NormalEquations>,
 }
 
 impl Quality {
-    /// Measures pairs; `None` without any.
+    /// Measures pairs by a metric; `None` without any.
     #[must_use]
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
-    pub fn of(pairs: &Correspondences) -> Option<Self> {
+    pub fn of<M: ErrorMetric + ?Sized>(pairs: &Correspondences, metric: &mut M) -> Option<Self> {
         if pairs.is_empty() {
             return None;
         }
@@ -110,7 +113,30 @@ impl Quality {
             fitness: (count / pairs.n_candidates().max(1) as f64).min(1.0),
             point_rmse: (points / count).sqrt(),
             plane_rmse: (planes / count).sqrt(),
+            system: metric.system(pairs),
         })
+    }
+
+    /// The 6×6 information of the pose, ξ = [ρ; φ] (translation first, metres and radians), a left perturbation in the camera
+    /// frame; see [`NormalEquations::information`].
+    #[must_use]
+    pub fn information(&self) -> Option<Matrix6<f64>> {
+        self.system.as_ref().map(NormalEquations::information)
+    }
+
+    /// The 6×6 covariance of the pose in the same convention, if the pairs are right and their residuals independent; see
+    /// [`NormalEquations::covariance`]. `None` where a direction is not determined.
+    #[must_use]
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        self.system.as_ref().and_then(NormalEquations::covariance)
+    }
+
+    /// How well each direction is determined; see [`NormalEquations::observability`].
+    #[must_use]
+    pub fn observability(&self) -> Option<Observability> {
+        self.system
+            .as_ref()
+            .and_then(NormalEquations::observability)
     }
 }
 

@@ -9,11 +9,12 @@ use clap::Args;
 use hicp_io::IoError;
 use hicp_io::bop::{Dataset, Detection, ModelInfo, ResultRow, Rle, Scene};
 use hybrid_icp::{
-    DepthImage, Isometry3, Model, ModelConfig, Observation, PinholeCamera, Preset, Refiner, Verdict,
+    DepthImage, Isometry3, Model, ModelConfig, Observation, PinholeCamera, Refiner, Verdict,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
+use crate::choice::PipelineArguments;
 use crate::terminal::{complain, say, warn};
 use crate::{outputs, report};
 
@@ -41,9 +42,8 @@ pub(crate) struct Arguments {
     /// Take the masks from a detections file (JSON with RLE segmentations) instead of mask_visib.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
-    /// The pipeline; `hybrid-icp pipelines` lists them.
-    #[arg(long, value_name = "NAME", default_value_t = Preset::Hybrid)]
-    pipeline: Preset,
+    #[command(flatten)]
+    pipeline: PipelineArguments,
     /// Threads; the number of cores if not given. Nothing but the time column depends on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     threads: Option<u16>,
@@ -157,12 +157,19 @@ type FrameRows = ((u32, u32), Vec<usize>);
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut inputs = vec![("--results", arguments.results.as_path())];
+    inputs.extend(
+        arguments
+            .pipeline
+            .file()
+            .map(|p| ("--pipeline", p.as_path())),
+    );
     inputs.extend(arguments.detections.as_deref().map(|p| ("--detections", p)));
     outputs::check(
         &[("--output", &arguments.output)],
         &inputs,
         &[("--output", "--results")],
     )?;
+    let pipeline = arguments.pipeline.choose()?;
     let mut rows = hicp_io::bop::read_results(&arguments.results)?;
     let dataset = Dataset::open(&arguments.dataset)?;
     dataset.scene_ids(&arguments.split)?;
@@ -190,7 +197,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             // One frame at a time per thread: frames differ in cost by their number of rows.
             .with_max_len(1)
             .map_init(
-                || Refiner::preset(arguments.pipeline),
+                || pipeline.refiner(),
                 |refiner, ((scene_id, im_id), indices)| {
                     let result = job.frame(refiner, *scene_id, *im_id, indices, &rows);
                     progress.inc(indices.len() as u64);

@@ -10,10 +10,11 @@ use hicp_sim::{
     object_pose, perturb, rng,
 };
 use hybrid_icp::{
-    Isometry3, Mask, Observation, PinholeCamera, Preset, Problem, Refiner, Score, Trace, Vsd,
-    render_depth_image, se3,
+    Isometry3, Mask, Observation, PinholeCamera, Problem, Score, Trace, Vsd, render_depth_image,
+    se3,
 };
 
+use crate::choice::PipelineArguments;
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report;
 use crate::terminal::say;
@@ -35,9 +36,8 @@ pub(crate) struct Arguments {
     /// Seed of the pose, the noise and the perturbation.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The pipeline; `hybrid-icp pipelines` lists them.
-    #[arg(long, value_name = "NAME", default_value_t = Preset::Hybrid)]
-    pipeline: Preset,
+    #[command(flatten)]
+    pipeline: PipelineArguments,
     /// The picture: the depth image with the model's outline before (orange) and after (blue).
     #[arg(long, value_name = "FILE", default_value = "demo.png")]
     picture: PathBuf,
@@ -63,6 +63,7 @@ fn percent(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     outputs::check(&[("--picture", &arguments.picture)], &[], &[])?;
+    let pipeline = arguments.pipeline.choose()?;
     let mut rng = rng(arguments.seed);
     let model = arguments.object.model()?;
     let camera = PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480)?;
@@ -83,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     let mut picture = Picture::of_depth(&depth);
 
-    let mut refiner = Refiner::preset(arguments.pipeline);
+    let mut refiner = pipeline.refiner();
     let mut trace = Trace::new();
     let start = Instant::now();
     let observation = Observation::new(depth, mask, camera)?;
@@ -99,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         truth.translation.z,
         observation.n_measured(),
         arguments.noise,
-        arguments.pipeline,
+        pipeline.name(),
         arguments.seed,
     );
     let mut vsd = |pose: &Isometry3<f64>| {

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
 
 mod bop_refine;
+mod choice;
 mod demo;
 mod doubts;
 mod outputs;
@@ -46,8 +47,7 @@ enum Command {
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(BopCommand),
-    /// List the pipelines by name.
-    Pipelines,
+    Pipelines(pipelines::Arguments),
 }
 
 #[derive(Debug, Subcommand)]
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
-        Command::Pipelines => pipelines::run(),
+        Command::Pipelines(arguments) => pipelines::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

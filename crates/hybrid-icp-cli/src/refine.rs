@@ -6,8 +6,9 @@ use std::time::Instant;
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::{CameraFile, IoError, LengthUnit};
-use hybrid_icp::{Model, Observation, Preset, Refiner, Trace};
+use hybrid_icp::{Model, Observation, Trace};
 
+use crate::choice::PipelineArguments;
 use crate::doubts::{self, Names};
 use crate::outputs;
 use crate::overlay::{AFTER, BEFORE, Picture};
@@ -43,9 +44,8 @@ pub(crate) struct Arguments {
     /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm), model to camera.
     #[arg(long, value_name = "FILE")]
     init: PathBuf,
-    /// The pipeline; `hybrid-icp pipelines` lists them.
-    #[arg(long, value_name = "NAME", default_value_t = Preset::Hybrid)]
-    pipeline: Preset,
+    #[command(flatten)]
+    pipeline: PipelineArguments,
     /// Where the JSON result goes; standard output if not given.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -82,6 +82,7 @@ fn scale(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     check_outputs(arguments)?;
+    let pipeline = arguments.pipeline.choose()?;
     let (camera_file, depth_scale) = read_camera(arguments)?;
     let depth = hicp_io::read_depth_png(&arguments.depth, depth_scale)?;
     let mask = hicp_io::read_mask_png(&arguments.mask)?;
@@ -91,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let overlay = arguments.overlay.as_deref();
     let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
-    let mut refiner = Refiner::preset(arguments.pipeline);
+    let mut refiner = pipeline.refiner();
     let mut trace = Trace::new();
     let start = Instant::now();
     let observation = Observation::new(depth, mask, camera_file.camera).with_context(|| {
@@ -107,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let reason = doubts::reason(&refined, &model, &observation, &init);
     let summary = report::summary(&refined, &reason);
     let report = Report::new(
-        arguments.pipeline,
+        pipeline.name(),
         &init_file,
         &refined,
         reason,
@@ -150,13 +151,19 @@ fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
     .into_iter()
     .filter_map(|(option, path)| Some((option, path.as_deref()?)))
     .collect();
-    let inputs = [
+    let mut inputs = vec![
         ("--model", arguments.model.as_path()),
         ("--depth", &arguments.depth),
         ("--mask", &arguments.mask),
         ("--camera", &arguments.camera),
         ("--init", &arguments.init),
     ];
+    inputs.extend(
+        arguments
+            .pipeline
+            .file()
+            .map(|p| ("--pipeline", p.as_path())),
+    );
     // The result has the keys of a pose file: refining one in place makes sense.
     outputs::check(&outputs, &inputs, &[("--output", "--init")])
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use hicp_io::PoseFile;
-use hybrid_icp::{Preset, Refinement, StageRecord, Termination, Verdict};
+use hybrid_icp::{Refinement, StageRecord, Termination, Verdict};
 use serde::Serialize;
 
 use crate::terminal::warn;
@@ -15,7 +15,7 @@ pub(crate) struct Report {
     rotation: [f64; 9],
     #[serde(rename = "cam_t_m2c")]
     translation_mm: [f64; 3],
-    pipeline: &'static str,
+    pipeline: String,
     outcome: &'static str,
     /// Why the outcome is what it is, in words.
     reason: String,
@@ -51,7 +51,7 @@ struct StageReport {
 
 impl Report {
     pub(crate) fn new(
-        preset: Preset,
+        pipeline: &str,
         init: &PoseFile,
         refined: &Refinement,
         reason: String,
@@ -67,7 +67,7 @@ impl Report {
         Self {
             rotation,
             translation_mm,
-            pipeline: preset.name(),
+            pipeline: pipeline.to_owned(),
             outcome: verdict(outcome.verdict),
             reason,
             termination: outcome.termination.name(),

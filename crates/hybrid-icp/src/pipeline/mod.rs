@@ -30,6 +30,7 @@
 mod build;
 mod catalog;
 mod error;
+mod page;
 mod parts;
 mod reader;
 mod tree;
@@ -38,6 +39,7 @@ use std::path::Path;
 
 pub use catalog::{Accepts, Parameter, Part, PartKind};
 pub use error::{PipelineError, Place};
+pub use page::catalogue;
 pub use parts::PARTS;
 
 use crate::preset::BoxedStage;

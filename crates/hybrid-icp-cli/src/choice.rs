@@ -1,0 +1,108 @@
+//! Which pipeline runs.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use hybrid_icp::{PipelineFile, Preset, Refiner, UnknownPreset};
+
+/// The options that choose a pipeline.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PipelineArguments {
+    /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "hybrid")]
+    pipeline: Source,
+    /// Overrides a field of the pipeline, such as times=3 or stage.switcher.alpha=0.5; may be given several times.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    overrides: Vec<String>,
+}
+
+/// What `--pipeline` names.
+#[derive(Clone, Debug)]
+enum Source {
+    Preset(Preset),
+    File(PathBuf),
+}
+
+impl FromStr for Source {
+    type Err = UnknownPreset;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPreset> {
+        if text.ends_with(".toml") {
+            Ok(Self::File(text.into()))
+        } else {
+            text.parse().map(Self::Preset)
+        }
+    }
+}
+
+/// A pipeline that is known to build: makes any number of refiners, one per thread.
+#[derive(Clone, Debug)]
+pub(crate) struct Pipeline {
+    name: String,
+    made_of: MadeOf,
+}
+
+#[derive(Clone, Debug)]
+enum MadeOf {
+    Preset(Preset),
+    File(PipelineFile),
+}
+
+impl PipelineArguments {
+    /// The pipeline file, so that no output overwrites it.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        match &self.pipeline {
+            Source::File(path) => Some(path),
+            Source::Preset(_) => None,
+        }
+    }
+
+    /// Reads the file, applies the overrides, and makes sure that the pipeline builds.
+    pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
+        let (name, mut file) = match &self.pipeline {
+            Source::Preset(preset) if self.overrides.is_empty() => {
+                return Ok(Pipeline {
+                    name: preset.name().to_owned(),
+                    made_of: MadeOf::Preset(*preset),
+                });
+            }
+            Source::Preset(preset) => (
+                preset.name().to_owned(),
+                PipelineFile::parse(preset.toml(), preset.name())?,
+            ),
+            Source::File(path) => (path.display().to_string(), PipelineFile::read(path)?),
+        };
+        for assignment in &self.overrides {
+            file.set(assignment)?;
+        }
+        file.build()?;
+        let name = std::iter::once(name)
+            .chain(self.overrides.iter().cloned())
+            .collect::<Vec<_>>()
+            .join(" ");
+        Ok(Pipeline {
+            name,
+            made_of: MadeOf::File(file),
+        })
+    }
+}
+
+impl Pipeline {
+    /// Name in reports: that of the preset or file, and the overrides.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Makes a refiner.
+    pub(crate) fn refiner(&self) -> Refiner {
+        match &self.made_of {
+            MadeOf::Preset(preset) => Refiner::preset(*preset),
+            MadeOf::File(file) => match file.build() {
+                Ok(stage) => Refiner::boxed(stage),
+                // It was built once, and building is pure.
+                Err(error) => unreachable!("{error}"),
+            },
+        }
+    }
+}
