@@ -8,6 +8,11 @@ use hicp_core::{Correspondences, Problem};
 pub trait OutlierFilter {
     /// Filters the pairs of one iteration, keeping their order.
     fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences);
+
+    /// Says which iteration of a stage, from 0, the next pairs belong to, for filters that change from one to the next.
+    fn begin(&mut self, iteration: usize) {
+        let _ = iteration;
+    }
 }
 
 impl OutlierFilter for () {
@@ -18,6 +23,10 @@ impl<T: OutlierFilter + ?Sized> OutlierFilter for Box<T> {
     fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
         (**self).filter(problem, pairs);
     }
+
+    fn begin(&mut self, iteration: usize) {
+        (**self).begin(iteration);
+    }
 }
 
 /// `None` keeps everything.
@@ -25,6 +34,12 @@ impl<T: OutlierFilter> OutlierFilter for Option<T> {
     fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
         if let Some(inner) = self {
             inner.filter(problem, pairs);
+        }
+    }
+
+    fn begin(&mut self, iteration: usize) {
+        for member in self.iter_mut() {
+            member.begin(iteration);
         }
     }
 }
@@ -36,6 +51,12 @@ impl<T: OutlierFilter> OutlierFilter for Vec<T> {
             member.filter(problem, pairs);
         }
     }
+
+    fn begin(&mut self, iteration: usize) {
+        for member in self.iter_mut() {
+            member.begin(iteration);
+        }
+    }
 }
 
 macro_rules! chain {
@@ -45,6 +66,12 @@ macro_rules! chain {
             fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
                 let ($($member,)+) = self;
                 $($member.filter(problem, pairs);)+
+            }
+
+            #[allow(non_snake_case)]
+            fn begin(&mut self, iteration: usize) {
+                let ($($member,)+) = self;
+                $($member.begin(iteration);)+
             }
         }
     };

@@ -41,7 +41,7 @@
 //! - `association` (trait), `projective`, `projective_search`, `projective_interpolated`; `nearest_neighbor` (feature `kiddo`, on
 //!   by default), `k_nearest`, `normal_compatible`, `normal_shooting`, `reciprocal`; from the observation `observation_to_model`, `closest_point_on_mesh`;
 //! - `filter` (trait), `max_distance`, `max_normal_angle`, `median_distance`, `mad_distance`, `trimmed`, `var_trimmed`, `one_to_one`,
-//!   `boundary_targets`, `min_pairs`; `constant_weight`, `distance_weight`, `normal_weight`, `sensor_noise_weight`;
+//!   `boundary_targets`, `min_pairs`, `schedule`; `constant_weight`, `distance_weight`, `normal_weight`, `sensor_noise_weight`;
 //! - what they share: `length`, `box_tree` with `point_tree`, `observed_points` and `triangle`, `pixel_projection`, `boundary`, `distances`, `keep`, `scratch`.
 
 // Image sizes and counts become floating point numbers; all are far below 2²⁴.
@@ -82,6 +82,7 @@ mod projective_interpolated;
 mod projective_search;
 mod random_sample;
 mod reciprocal;
+mod schedule;
 mod scratch;
 mod selection;
 mod sensor_noise_weight;
@@ -123,6 +124,7 @@ pub use projective_interpolated::ProjectiveInterpolated;
 pub use projective_search::ProjectiveSearch;
 pub use random_sample::RandomSample;
 pub use reciprocal::Reciprocal;
+pub use schedule::Schedule;
 pub use selection::PointSelection;
 pub use sensor_noise_weight::{SensorNoise, SensorNoiseWeight};
 pub use stable_sampling::StableSampling;

@@ -87,6 +87,7 @@ where
                 // Even without a source: an association may start from the observation.
                 self.association
                     .associate(&mut context, source, &candidate, pairs);
+                self.filter.begin(iteration);
                 self.filter.filter(problem, pairs);
             }
             iteration += 1;
@@ -143,10 +144,11 @@ where
         let mut quality = None;
         if accepted.is_some() {
             if *pairs.camera_from_object() != pose {
-                // Rolled back: the pairs in hand are those of the rejected pose.
+                // Rolled back: the pairs in hand are those of the rejected pose, one iteration after the accepted one.
                 pairs.begin(&pose, source.len());
                 self.association
                     .associate(&mut context, source, &pose, pairs);
+                self.filter.begin(iteration.saturating_sub(2));
                 self.filter.filter(problem, pairs);
             }
             quality = Quality::of(pairs, &mut self.metric);

@@ -19,8 +19,9 @@
 //! ```
 //!
 //! Modules in reading order: `stage` (trait), `icp` (the engine), `outcome`, `stop`, `divergence`, `motion` and `limits` (stop
-//! rules), `compose` (cascade, repeat), `guard` (stages that answer to a score), `resolution`, `session` (workspace), `observer`.
+//! rules), `compose` (cascade, repeat), `guard` (stages that answer to a score), `resolution`, `anderson`, `session` (workspace), `observer`.
 
+mod anderson;
 mod compose;
 mod divergence;
 mod guard;
@@ -34,6 +35,7 @@ mod session;
 mod stage;
 mod stop;
 
+pub use anderson::Anderson;
 pub use compose::{Cascade, Repeat};
 pub use divergence::{Divergence, LossRule};
 pub use guard::{Guard, KeepBest};

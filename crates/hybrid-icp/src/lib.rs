@@ -51,7 +51,7 @@ pub use hicp_association::{
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
     MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
     ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, SensorNoise,
+    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SensorNoise,
     SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
     VoxelGrid, WithoutBoundary,
 };
@@ -64,10 +64,10 @@ pub use hicp_core::{
     rotation_from_matrix, se3, so3,
 };
 pub use hicp_icp::{
-    AbsoluteLoss, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence, Evaluation,
-    Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer, Oscillation,
-    Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Session, Stage, StageEvent, StopRule,
-    Termination, TimeLimit, Verdict, Workspace,
+    AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
+    Evaluation, Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer,
+    Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Session, Stage,
+    StageEvent, StopRule, Termination, TimeLimit, Verdict, Workspace,
 };
 pub use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,

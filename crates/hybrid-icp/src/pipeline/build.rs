@@ -5,12 +5,12 @@ use hicp_association::{
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
     MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
     ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, SensorNoise,
+    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SensorNoise,
     SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
     VoxelGrid, WithoutBoundary,
 };
 use hicp_icp::{
-    AbsoluteLoss, AtResolution, Bound, Cascade, Convergence, Divergence, Guard, Icp,
+    AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard, Icp,
     IterationLimit, KeepBest, LossRule, Motion, Oscillation, Repeat, StopRule, TimeLimit,
 };
 use hicp_metric::{
@@ -78,6 +78,12 @@ pub(crate) fn stage(part: &Reader<'_>) -> Result<BoxedStage, PipelineError> {
             times: part.count("times")? as usize,
             stage: one("stage")?,
             score: score(&part.part("score")?)?,
+        }),
+        "anderson" => Box::new(Anderson {
+            stage: one("stage")?,
+            max_steps: part.count("max_steps")? as usize,
+            translation_meters: part.number("translation_meters")?,
+            rotation_degrees: part.number("rotation_degrees")?,
         }),
         _ => return Err(part.unknown(PartKind::Stage)),
     })
@@ -229,6 +235,7 @@ fn filter(part: &Reader<'_>) -> Result<Filter, PipelineError> {
                 tilt: part.number("tilt")? as f32,
             },
         }),
+        "schedule" => Box::new(Schedule::new(each(part, "filters", filter)?)),
         _ => return Err(part.unknown(PartKind::Filter)),
     })
 }

@@ -245,6 +245,37 @@ pub const PARTS: &[Part] = &[
             part("score", "the judge", PartKind::Score, Some("mve")),
         ],
     },
+    Part {
+        kind: PartKind::Stage,
+        name: "anderson",
+        rust: "Anderson",
+        summary: "a stage of one step, run again and again from extrapolated poses",
+        source: "Anderson 1965; Pavlov et al. 2018; Zhang, Yao & Deng 2021",
+        cost: "steps × the stage",
+        parameters: &[
+            part(
+                "stage",
+                "one step: an ICP stage with an iteration limit of 2",
+                PartKind::Stage,
+                None,
+            ),
+            count("max_steps", "how many at most", 0, Some(50)),
+            number(
+                "translation_meters",
+                "m",
+                "step below which it has converged",
+                POSITIVE,
+                Some(1e-5),
+            ),
+            number(
+                "rotation_degrees",
+                "degrees",
+                "and turn below which it has",
+                POSITIVE,
+                Some(1e-3),
+            ),
+        ],
+    },
     // Selections.
     Part {
         kind: PartKind::Selection,
@@ -855,6 +886,20 @@ pub const PARTS: &[Part] = &[
             ),
             number("tilt", "", "factor of the tilt term", POSITIVE, Some(0.0)),
         ],
+    },
+    Part {
+        kind: PartKind::Filter,
+        name: "schedule",
+        rust: "Schedule",
+        summary: "one filter per iteration, the last from then on",
+        source: "-",
+        cost: "that of the filter",
+        parameters: &[parts(
+            "filters",
+            "the filters by iteration",
+            PartKind::Filter,
+            None,
+        )],
     },
     // Metrics.
     Part {
