@@ -19,10 +19,10 @@ impl PixelProjection {
         Self { fx, fy, cx, cy }
     }
 
-    /// Returns the image position (u, v) of a point; `None` for a point at or behind the camera plane.
+    /// Returns the image position (u, v) of a point; `None` for a point at or behind the camera plane, or infinitely far.
     #[inline]
     pub(crate) fn project(&self, point: &Point3<f32>) -> Option<(f32, f32)> {
-        (point.z > 0.0).then(|| {
+        (point.z > 0.0 && point.z < f32::INFINITY).then(|| {
             (
                 self.fx * point.x / point.z + self.cx,
                 self.fy * point.y / point.z + self.cy,
