@@ -23,10 +23,10 @@ pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
 
 /// Returns ⌈fraction·count⌉, between 0 and `count`; 0 for NaN.
 pub(crate) fn share_of(fraction: f32, count: usize) -> usize {
-    // Products such as 0.85·100 come out just above the whole number that is meant.
-    let share = (f64::from(fraction.clamp(0.0, 1.0)) * count as f64 - 1e-5).ceil();
+    // The f32 nearest to 0.85 lies above it, and 85 of 100 are meant.
+    let share = (f64::from(fraction.clamp(0.0, 1.0)) * count as f64 * (1.0 - 1e-7)).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    // Between −0 and `count`; NaN becomes 0.
+    // Between 0 and `count`; NaN becomes 0.
     let share = share as usize;
     share.min(count)
 }
