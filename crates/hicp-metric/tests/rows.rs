@@ -3,6 +3,8 @@
 
 mod scenes;
 
+use std::f64::consts::PI;
+
 use hicp_core::{Isometry3, Matrix3, Pair, Point3, Vector3, se3};
 use hicp_metric::{
     ErrorMetric, Generalized, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
@@ -74,7 +76,17 @@ fn generalized_normals_may_be_parallel_opposite_or_anything() {
     let mut numbers = Numbers(12);
     let base = messy(&mut numbers, 1).as_slice()[0];
     for angle in [
-        0.0, 1e-9, 1e-6, 9e-5, 1.1e-4, 1e-3, 1.0, 3.0, 3.14149, 3.1415926,
+        0.0,
+        1e-9,
+        1e-6,
+        9e-5,
+        1.1e-4,
+        1e-3,
+        1.0,
+        3.0,
+        PI - 1e-3,
+        PI - 1e-7,
+        PI,
     ] {
         let mut pair = base;
         let turn = Isometry3::new(Vector3::zeros(), numbers.direction() * angle);
