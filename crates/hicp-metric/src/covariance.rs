@@ -1,6 +1,6 @@
-//! Information and covariance of the pose that the pairs determine.
+//! Gradient, information and covariance of the pose that the pairs determine.
 
-use hicp_core::Matrix6;
+use hicp_core::{Matrix6, Vector6};
 
 use crate::degeneracy::eigen;
 use crate::freedom::reduce;
@@ -20,6 +20,12 @@ impl NormalEquations {
     pub fn information(&self) -> Matrix6<f64> {
         let scaled = self.scaled_from_camera();
         scaled.transpose() * self.full_hessian() * scaled
+    }
+
+    /// Returns JᵀWr, half the gradient of the loss for the twist of [`NormalEquations::information`]: zero at a minimum.
+    #[must_use]
+    pub fn gradient(&self) -> Vector6<f64> {
+        self.scaled_from_camera().transpose() * self.gradient
     }
 
     /// Returns the covariance Σ = s² (JᵀWJ)⁻¹ of ξ = [ρ; φ], in the frame and order of [`NormalEquations::information`],

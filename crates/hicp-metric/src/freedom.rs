@@ -89,7 +89,7 @@ impl NormalEquations {
     }
 }
 
-/// Keeps what the reduction needs in one place: BᵀHB and Bᵀg, held unknowns with a zero gradient.
+/// Returns BᵀHB and Bᵀg: the equations of y, with zero rows and columns for what is held.
 pub(crate) fn reduce(
     basis: &Matrix6<f64>,
     hessian: &Matrix6<f64>,

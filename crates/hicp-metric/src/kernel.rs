@@ -81,6 +81,7 @@ impl Kernel {
             Self::Huber(_) => c * (x.abs() - 0.5 * c),
             // Below 10⁻⁴ the difference cancels: u²/2 − u³/3 + u⁴/4.
             Self::Fair(_) if u < 1e-4 => c * c * square * (0.5 - u / 3.0 + square / 4.0),
+            Self::Fair(_) if u.is_infinite() => u,
             Self::Fair(_) => c * c * (u - u.ln_1p()),
             Self::Cauchy(_) => 0.5 * c * c * square.ln_1p(),
             // Its limit where the square is out of range.
