@@ -36,7 +36,7 @@ pub struct ObservationToModel {
 }
 
 impl Default for ObservationToModel {
-    /// About 2,000 observed points to 20,000 points of the model (0.4 % of the diameter apart on a ball), those that face
+    /// About 2,000 observed points to 20,000 points of the model (1.3 % of the diameter apart on a ball), those that face
     /// the camera.
     fn default() -> Self {
         Self {
