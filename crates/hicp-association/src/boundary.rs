@@ -15,8 +15,9 @@ pub(crate) struct BoundaryRule {
 }
 
 impl BoundaryRule {
-    /// Returns whether pixel (u, v) of an image lies at a boundary: whether it shows no surface (`depth_at` returns 0 or less), or a pixel at a
-    /// chessboard distance of r ≤ width shows none or one that is nearer or further by more than r·max_step of the nearer depth.
+    /// Returns whether pixel (u, v) of an image lies at a boundary: whether it shows no surface (`depth_at` returns 0 or
+    /// less), or a pixel at a chessboard distance of r ≤ width shows none or one that is nearer or further by more than
+    /// r·max_step of the nearer depth.
     ///
     /// Pixels outside `image` are not looked at.
     pub(crate) fn holds(

@@ -9,14 +9,14 @@ use crate::filter::OutlierFilter;
 ///
 /// Model points that have no counterpart pair up with the rim of what was seen and pull the object across it; depth beside
 /// an edge is unreliable too. A target is at the boundary when a pixel at a chessboard distance of r ≤ `width` is outside
-/// the mask or the image, has no depth, or differs in depth by more than r·`max_step` of the nearer one. Found once per observation
-/// and shared by all threads: O(pixels·(2·width + 1)²), then constant per pair.
+/// the mask or the image, has no depth, or differs in depth by more than r·`max_step` of the nearer one. Found once per
+/// observation and shared by all threads: O(pixels·(2·width + 1)²), then constant per pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundaryTargets {
     /// How many pixels wide the boundary is; 0 removes nothing, and above 64 counts as 64.
     pub width: u32,
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. NaN and negative values
-    /// make everything a boundary, unless `width` is 0.
+    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. NaN and negative
+    /// values make everything a boundary, unless `width` is 0.
     pub max_step: f32,
 }
 

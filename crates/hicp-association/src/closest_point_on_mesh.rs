@@ -15,11 +15,11 @@ use crate::triangle::closest_point;
 /// Pairs every observed point with the exact closest point on the model's triangles (Besl & McKay 1992, §III).
 ///
 /// From the observation to the model, see [`crate::ObservationToModel`], without the error of a sampled surface: half the
-/// spacing of the samples, and the noise that it puts on the direction. The observed point is brought into the object frame; the closest point comes from a
-/// tree of boxes over the triangles by branch and bound, built once per model and shared by all threads; the pair's source
-/// is that point and the normal of its triangle, moved by the current estimate. Normals point out of the object where the
-/// mesh is closed, and toward the camera where nothing may be concluded from the winding. Triangles of no area are never found; of
-/// equally close triangles (a shared edge) the first is.
+/// spacing of the samples, and the noise that it puts on the direction. The observed point is brought into the object
+/// frame; the closest point comes from a tree of boxes over the triangles by branch and bound, built once per model and
+/// shared by all threads; the pair's source is that point and the normal of its triangle, moved by the current estimate.
+/// Normals point out of the object where the mesh is closed, and toward the camera where nothing may be concluded from the
+/// winding. Triangles of no area are never found; of equally close triangles (a shared edge) the first is.
 ///
 /// `source` is ignored; `source_index` is the index of the triangle, and all observed points tried are candidates.
 /// Cost: O(n log n) once per model, then about O(log n) per observed point.

@@ -6,7 +6,8 @@ use crate::filter::OutlierFilter;
 
 /// Multiplies every weight by a constant.
 ///
-/// A step does not depend on it where one stage minimises on its own; losses do, and so does whatever adds several sets of pairs. Cost: O(pairs).
+/// A step does not depend on it where one stage minimises on its own; losses do, and so does whatever adds several sets of
+/// pairs. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantWeight {
     /// The factor; negative values, NaN and infinity count as 0.

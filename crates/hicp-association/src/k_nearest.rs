@@ -10,7 +10,7 @@ use crate::stride::Stride;
 
 /// Pairs every model point with each of its k closest observed points, at a weight of 1/k each.
 ///
-/// The soft counterpart of [`crate::NearestNeighbor`], after the multiple matches of Granger & Pennec (2002): the k matches
+/// The soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec (2002): the k matches
 /// average out part of the noise of single ones, at the price of a bias toward the middle of the neighbourhood. A model
 /// point has a total weight of 1, also where fewer than k points were observed. Pairs of one point are in order of distance,
 /// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k) per point.

@@ -21,7 +21,7 @@
 //!
 //! | selections | associations | filters | weights |
 //! |---|---|---|---|
-//! | [`AllSamples`] | [`NearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
+//! | [`AllSamples`] | `NearestNeighbor` | [`MaxDistance`] | [`ConstantWeight`] |
 //! | [`VisibleSurface`] | [`KNearest`] | [`MaxNormalAngle`] | [`DistanceWeight`] |
 //! | [`ObservedSurface`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
 //! | [`WithoutBoundary`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
@@ -32,8 +32,8 @@
 //! | [`StableSampling`] | [`ObservationToModel`] | [`MinPairs`] | |
 //! | | [`ClosestPointOnMesh`] | | |
 //!
-//! Selections from [`WithoutBoundary`] on choose among the points of another one, and [`Reciprocal`] among the pairs of another association: they nest.
-//! Filters and weights are of one trait and chain as tuples, in order.
+//! Selections from [`WithoutBoundary`] on choose among the points of another one, and [`Reciprocal`] among the pairs of
+//! another association: they nest. Filters and weights are of one trait and chain as tuples, in order.
 //!
 //! Modules in reading order:
 //! - `selection` (trait), `all_samples`, `visible_surface`, `observed_surface`, `stride`; of another selection

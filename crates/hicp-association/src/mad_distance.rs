@@ -13,9 +13,10 @@ const SIGMA_PER_MAD: f32 = 1.4826;
 /// Removes pairs whose distance exceeds the median by more than `factor` robust standard deviations (X84, Hampel et al. 1986;
 /// for ICP Fusiello et al. 2002).
 ///
-/// Keeps d ≤ med + factor·max(1.4826·MAD, floor), with MAD the median of |d − med|. Pairs that are closer than the median are
-/// never outliers. The floor keeps what is spread by less than the sensor resolves; without one, a well aligned object whose distances are nearly all equal
-/// would lose every pair that is a rounding error further. Distances that are not finite count for nothing and go. Cost: O(pairs).
+/// Keeps d ≤ med + factor·max(1.4826·MAD, floor), with MAD the median of |d − med|. Pairs that are closer than the median
+/// are never outliers. The floor keeps what is spread by less than the sensor resolves; without one, a well aligned object
+/// whose distances are nearly all equal would lose every pair that is a rounding error further. Distances that are not
+/// finite count for nothing and go. Cost: O(pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MadDistance {
     /// Standard deviations beyond the median; NaN removes every pair.

@@ -10,8 +10,8 @@ use crate::scratch::Scratch;
 /// Removes pairs further apart than `factor` times the median distance (Diebel, Reutersward, Thrun, Davis & Gupta 2004).
 ///
 /// Follows the alignment without a length to be set: generous while the object is far off, strict in the end. Pairs at the
-/// limit are kept, so that equal distances all stay at a factor of 1 and more. The median is the upper of the two middle values of an
-/// even number. Distances that are not finite count for nothing and go. Cost: O(pairs).
+/// limit are kept, so that equal distances all stay at a factor of 1 and more. The median is the upper of the two middle
+/// values of an even number. Distances that are not finite count for nothing and go. Cost: O(pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MedianDistance {
     /// Largest distance over the median; NaN and negative values remove every pair.

@@ -13,14 +13,16 @@ use crate::stride::Stride;
 ///
 /// The intersection of the line (p, n) with the observed surface, in the form for point sets: among the k observed points
 /// closest to p, the one with the smallest distance |(c − p) − n (n·(c − p))| to the line; of equally distant ones the one
-/// closest to p. Both directions of the line count. Settles faster than the nearest neighbour on smooth surfaces, and is less stable on
-/// noisy or complex ones (Rusinkiewicz & Levoy 2001). Cost: O(n log n) once per observation, then O(log n + k) per point.
+/// closest to p. Both directions of the line count. Settles faster than the nearest neighbour on smooth surfaces, and is
+/// less stable on noisy or complex ones (Rusinkiewicz & Levoy 2001). Cost: O(n log n) once per observation, then O(log n +
+/// k) per point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalShooting {
     /// How many of the closest observed points are looked at; 0 counts as 1. With too few, the line's intersection is not
     /// among them when the surfaces are far apart.
     pub k: usize,
-    /// Pairs whose target is further from the line than this are not made; `None` makes all. NaN and negative lengths make none.
+    /// Pairs whose target is further from the line than this are not made; `None` makes all. NaN and negative lengths make
+    /// none.
     pub max_offset: Option<Length>,
     /// Which observed pixels are searched.
     pub targets: Stride,

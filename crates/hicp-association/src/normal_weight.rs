@@ -4,7 +4,8 @@ use hicp_core::{Correspondences, Problem};
 
 use crate::filter::OutlierFilter;
 
-/// Multiplies weights by n·m, the cosine of the angle between the two normals; by 0 beyond a right angle (Rusinkiewicz & Levoy 2001, §3.3).
+/// Multiplies weights by n·m, the cosine of the angle between the two normals; by 0 beyond a right angle (Rusinkiewicz &
+/// Levoy 2001, §3.3).
 ///
 /// Pairs of weight 0 stay in the list. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -9,17 +9,20 @@ use crate::closest_point_on_mesh::{ObjectView, faces};
 use crate::point_tree::PointTree;
 use crate::stride::Stride;
 
-/// Pairs every observed point with the closest of many points of the model: the search of Besl & McKay (1992) from the measured data to the model.
+/// Pairs every observed point with the closest of many points of the model: the search of Besl & McKay (1992) from the
+/// measured data to the model.
 ///
 /// What was observed belongs to the object, whereas much of the model was not observed: in this direction no model point is
 /// dragged to a place that has nothing to do with it. The search tree lies in the object frame over a dense area-uniform
 /// sampling of the model ([`hicp_core::sample_surface`]); it stands still while the estimate moves, so it is built once per
-/// model and shared by all threads, images and hypotheses. [`crate::ClosestPointOnMesh`] is exact and costs a few times as much.
+/// model and shared by all threads, images and hypotheses. [`crate::ClosestPointOnMesh`] is exact; it costs some three
+/// times as much with every element allowed, and half where many hidden samples must be passed over (thin walls: a mug,
+/// 1,800 observed points: 0.8 and 5.6 ms here, 2.7 ms there).
 ///
 /// A pair still holds the model's point as its source, moved by the current estimate, and the observed point as its target.
 /// `source` is ignored; `source_index` is the index of the sample, and all observed points tried are candidates. Of equally
-/// close samples the first is taken. Normals point out of the object where the mesh is closed, and toward the camera where nothing may be
-/// concluded from the winding. Select something cheap that is never empty, such as [`crate::AllSamples`].
+/// close samples the first is taken. Normals point out of the object where the mesh is closed, and toward the camera where
+/// nothing may be concluded from the winding. Select something cheap that is never empty, such as [`crate::AllSamples`].
 ///
 /// Cost: O(n log n) once per model and number of samples n, then O(log n) per observed point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +36,8 @@ pub struct ObservationToModel {
 }
 
 impl Default for ObservationToModel {
-    /// About 2,000 observed points to 20,000 points of the model (0.4 % of the diameter apart on a ball), those that face the camera.
+    /// About 2,000 observed points to 20,000 points of the model (1.3 % of the diameter apart on a ball), those that face
+    /// the camera.
     fn default() -> Self {
         Self {
             stride: Stride::AboutPoints(2000),

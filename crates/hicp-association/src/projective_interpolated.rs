@@ -10,14 +10,15 @@ use crate::pixel_projection::PixelProjection;
 /// Pairs a model point with the observed surface at the exact position that it projects to, interpolated between four pixels.
 ///
 /// Inverse depth is interpolated bilinearly, which is exact for a plane at any tilt, and so is the normal, which is brought
-/// back to unit length; the target lies on the ray of the model point. Not across depth edges: unless all four pixels have a surfel with a depth
-/// within `max_step` of that of the pixel that contains the projection, that pixel gives the target as in [`crate::Projective`]. So does it
-/// where the four normals cancel. The pair's `target_index` is that pixel in either case. Takes away the steps of up to half a
-/// pixel that the plain look-up makes along slanted surfaces. Cost: constant per point.
+/// back to unit length; the target lies on the ray of the model point. Not across depth edges: unless all four pixels have
+/// a surfel with a depth within `max_step` of that of the pixel that contains the projection, that pixel gives the target
+/// as in [`crate::Projective`]. So does it where the four normals cancel. The pair's `target_index` is that pixel in either
+/// case. Takes away the steps of up to half a pixel that the plain look-up makes along slanted surfaces. Cost: constant per
+/// point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveInterpolated {
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. 0, negative values and
-    /// NaN interpolate only between equal depths or nowhere.
+    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. 0, negative
+    /// values and NaN interpolate only between equal depths or nowhere.
     pub max_step: f32,
 }
 

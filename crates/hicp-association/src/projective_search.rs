@@ -9,10 +9,10 @@ use crate::pixel_projection::PixelProjection;
 /// Pairs a model point with the closest observed point within a window around the pixel that it projects to
 /// (Benjemaa & Schmitt 1997; Dorai et al. 1998).
 ///
-/// Between [`crate::Projective`], which it equals at radius 0, and a nearest-neighbour search: a window of ±r pixels bridges misalignments
-/// and holes of r pixels and needs no tree. Closest in three dimensions; of equally close points the first in row-major order.
-/// The window is cut at the border of the observed region, but a point that projects outside the image has no pair.
-/// Cost: O((2r + 1)²) per point.
+/// Between [`crate::Projective`], which it equals at radius 0, and a nearest-neighbour search: a window of ±r pixels
+/// bridges misalignments and holes of r pixels and needs no tree. Closest in three dimensions; of equally close points the
+/// first in row-major order. The window is cut at the border of the observed region, but a point that projects outside the
+/// image has no pair. Cost: O((2r + 1)²) per point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProjectiveSearch {
     /// Half side r of the window, pixels; above 64 counts as 64.

@@ -7,7 +7,8 @@ use crate::box_tree::distance_squared;
 use crate::point_tree::PointTree;
 use crate::scratch::Scratch;
 
-/// Keeps those pairs of another association in which no other model point is closer to the target (Pajdla & Van Gool 1995, ε = 0).
+/// Keeps those pairs of another association in which no other model point is closer to the target (Pajdla & Van Gool 1995,
+/// ε = 0).
 ///
 /// With a nearest-neighbour association inside, the pairs that are mutually nearest: model points without a counterpart (the
 /// hidden side, what the mask cut off) lose theirs to the points in front of them. Model points equally close to the target

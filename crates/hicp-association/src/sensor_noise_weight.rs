@@ -20,8 +20,8 @@ pub struct SensorNoiseWeight {
 
 /// Standard deviation of a measured depth: σ(z, θ) = c₀ + c₁ z + c₂ z² + t·z^1.5·Σ θᵢ/(π/2 − θᵢ)² metres, z in metres.
 ///
-/// θ are the tilts of the surface about the image's two axes, radians, clamped to 75°, beyond which the last term explodes. Only ratios of σ matter to
-/// [`SensorNoiseWeight`]. σ below 1 µm, and one that is not a number, counts as 1 µm.
+/// θ are the tilts of the surface about the image's two axes, radians, clamped to 75°, beyond which the last term explodes.
+/// Only ratios of σ matter to [`SensorNoiseWeight`]. σ below 1 µm, and one that is not a number, counts as 1 µm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorNoise {
     /// c₀, metres.

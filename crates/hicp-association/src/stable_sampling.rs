@@ -10,10 +10,11 @@ use crate::selection::PointSelection;
 /// Keeps `count` points of another selection that constrain all six degrees of freedom alike (geometrically stable sampling,
 /// Gelfand, Ikemoto, Rusinkiewicz & Levoy 2003).
 ///
-/// With vᵢ = [pᵢ × nᵢ; nᵢ], the point-to-plane error of a small motion x is Σ (vᵢ·x)², so the eigenvectors xₖ of Σ vᵢvᵢᵀ with small
-/// eigenvalues are motions in which the surfaces slide along each other. Points are drawn one after the other: whichever eigenvector has
-/// the smallest sum of (vᵢ·xₖ)² over the points drawn so far gets the point with the largest that is left. Positions are
-/// taken about their mean and divided by their mean distance from it, which makes rotations and translations comparable.
+/// With vᵢ = [pᵢ × nᵢ; nᵢ], the point-to-plane error of a small motion x is Σ (vᵢ·x)², so the eigenvectors xₖ of Σ vᵢvᵢᵀ
+/// with small eigenvalues are motions in which the surfaces slide along each other. Points are drawn one after the other:
+/// whichever eigenvector has the smallest sum of (vᵢ·xₖ)² over the points drawn so far gets the point with the largest that
+/// is left. Positions are taken about their mean and divided by their mean distance from it, which makes rotations and
+/// translations comparable.
 ///
 /// The order of the inner selection is kept; equal contributions go to the first. All points are kept when there are not
 /// more than `count`. Works best on what can be seen ([`crate::VisibleSurface`] inside): the hidden side constrains nothing.

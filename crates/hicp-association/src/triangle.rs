@@ -2,7 +2,8 @@
 
 use hicp_core::Point3;
 
-/// Returns the point of the triangle (a, b, c) that is closest to `point` (Ericson, Real-Time Collision Detection, 2005, §5.1.5).
+/// Returns the point of the triangle (a, b, c) that is closest to `point` (Ericson, Real-Time Collision Detection, 2005,
+/// §5.1.5).
 ///
 /// The regions of the three corners, the three edges and the face are told apart by barycentric coordinates that are not yet
 /// normalised. Exact up to rounding for triangles of non-zero area.

@@ -10,10 +10,10 @@ use crate::selection::PointSelection;
 
 /// Keeps one point of another selection in every cell of a cubic grid: the one closest to the cell's centre.
 ///
-/// Thins out dense regions only, so a rendered surface keeps its slanted parts, which a pixel grid samples sparsely per area. Chosen points are
-/// points of the surface with their own normals, unlike averages. The grid is anchored at the object's origin; the order of
-/// the inner selection is kept, and of equally central points the first. A cell size that is not positive keeps every point.
-/// Cost: the inner selection, and O(n log n).
+/// Thins out dense regions only, so a rendered surface keeps its slanted parts, which a pixel grid samples sparsely per
+/// area. Chosen points are points of the surface with their own normals, unlike averages. The grid is anchored at the
+/// object's origin; the order of the inner selection is kept, and of equally central points the first. A cell size that is
+/// not positive keeps every point. Cost: the inner selection, and O(n log n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelGrid<P> {
     /// The selection to choose from.

@@ -8,24 +8,26 @@ use crate::visible_surface::VisibleSurface;
 
 /// Drops those points of another selection that lie next to the silhouette or to a depth step of the rendered model.
 ///
-/// There a slight misalignment decides what a pixel shows, so projective pairs are wrong most often. The model is rendered at the stage's initial
-/// estimate (once, see [`Context::view`]) and every point judged by the pixel that it projects to: dropped when
-/// that pixel shows nothing, or when a pixel at a chessboard distance of r ≤ `width` shows nothing or surface nearer or
-/// further by more than r·`max_step` of the nearer depth. A point that is hidden is judged by what hides it. The border of the image is no silhouette.
-/// Points that project outside the image are dropped. Cost: the inner selection, one render, and O((2·width + 1)²) per point.
+/// There a slight misalignment decides what a pixel shows, so projective pairs are wrong most often. The model is rendered
+/// at the stage's initial estimate (once, see [`Context::view`]) and every point judged by the pixel that it projects to:
+/// dropped when that pixel shows nothing, or when a pixel at a chessboard distance of r ≤ `width` shows nothing or surface
+/// nearer or further by more than r·`max_step` of the nearer depth. A point that is hidden is judged by what hides it. The
+/// border of the image is no silhouette. Points that project outside the image are dropped. Cost: the inner selection, one
+/// render, and O((2·width + 1)²) per point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithoutBoundary<P> {
     /// The selection to choose from.
     pub inner: P,
     /// How many pixels wide the boundary is; above 64 counts as 64.
     pub width: u32,
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. NaN and negative values
-    /// make everything a boundary, unless `width` is 0.
+    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. NaN and negative
+    /// values make everything a boundary, unless `width` is 0.
     pub max_step: f32,
 }
 
 impl Default for WithoutBoundary<VisibleSurface> {
-    /// The visible surface but for one pixel along steps of 2 % of the depth: a surface tilted by 85° at a focal length of 570 pixels.
+    /// The visible surface but for one pixel along steps of 2 % of the depth: a surface tilted by 85° at a focal length of
+    /// 570 pixels.
     fn default() -> Self {
         Self {
             inner: VisibleSurface::default(),
