@@ -12,6 +12,7 @@ mod pipelines;
 mod refine;
 mod report;
 mod terminal;
+mod trace_lines;
 
 use std::process::ExitCode;
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::{CameraFile, IoError, LengthUnit};
-use hybrid_icp::{Model, Observation, Trace};
+use hybrid_icp::{Model, Observation};
 
 use crate::choice::PipelineArguments;
 use crate::doubts::{self, Names};
@@ -14,6 +14,7 @@ use crate::outputs;
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report::{self, Report};
 use crate::terminal::{say, warn};
+use crate::trace_lines::TraceLines;
 
 /// Refine one pose in one depth image.
 ///
@@ -52,6 +53,9 @@ pub(crate) struct Arguments {
     /// Where a picture goes: the depth image with the model's outline before (orange) and after (blue), as PNG.
     #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
+    /// Where a trace of every iteration goes: one JSON object per line, each with its pose as in a pose file.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
 }
 
 const USAGE: &str = "\
@@ -93,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
     let mut refiner = pipeline.refiner();
-    let mut trace = Trace::new();
+    let mut trace = TraceLines::new(arguments.trace.is_some());
     let start = Instant::now();
     let observation = Observation::new(depth, mask, camera_file.camera).with_context(|| {
         format!(
@@ -112,12 +116,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &init_file,
         &refined,
         reason,
-        &trace.stages,
+        &trace.trace.stages,
         time_ms,
     );
     let json = serde_json::to_string_pretty(&report)?;
     if let Some(path) = &arguments.output {
         hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+    }
+    if let Some(path) = &arguments.trace {
+        trace.write(path)?;
     }
     if let Some((path, mut picture)) = picture {
         let after = refined.outcome.camera_from_object;
@@ -147,6 +154,7 @@ fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
     let outputs: Vec<_> = [
         ("--output", &arguments.output),
         ("--overlay", &arguments.overlay),
+        ("--trace", &arguments.trace),
     ]
     .into_iter()
     .filter_map(|(option, path)| Some((option, path.as_deref()?)))

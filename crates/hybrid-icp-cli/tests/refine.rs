@@ -89,6 +89,35 @@ fn without_an_output_the_json_is_printed_alone() {
 }
 
 #[test]
+fn every_line_of_a_trace_can_be_the_start_of_another_run() {
+    let scene = Scene::new().with("--trace", "trace.jsonl");
+    let result = scene.result();
+    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let of = |event: &str| {
+        lines
+            .iter()
+            .filter(|l| l["event"] == event)
+            .collect::<Vec<_>>()
+    };
+    let stages = result["trace"].as_array().unwrap();
+    assert_eq!(of("stage_end").len(), stages.len());
+    assert_eq!(of("regime").len(), 2);
+    // An iteration that found no pairs evaluates nothing, and has no line.
+    assert!(of("iteration").len() <= result["iterations"].as_u64().unwrap() as usize);
+    let last = of("stage_end")[stages.len() - 1];
+    assert_eq!(last["cam_R_m2c"], result["cam_R_m2c"]);
+    assert_eq!(last["cam_t_m2c"], result["cam_t_m2c"]);
+    // From the pose of the last line the result is the same or better.
+    scene.write("init.json", last.to_string());
+    let again = scene.result();
+    assert_eq!(again["mve_initial"], result["mve"]);
+}
+
+#[test]
 fn forms_of_cameras_and_units_of_meshes_agree() {
     let reference = Scene::new().result();
     let near = |scene: &Scene, what: &str| {

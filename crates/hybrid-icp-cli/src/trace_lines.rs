@@ -1,0 +1,96 @@
+//! A trace of every iteration, one JSON object per line.
+
+use std::ops::ControlFlow;
+
+use hybrid_icp::{Isometry3, IterationEvent, Observer, RegimeEvent, StageEvent, Trace};
+use serde_json::{Value, json};
+
+/// Keeps the stages for the report and, if asked to, a line for everything that happens.
+///
+/// A line holds the pose as a pose file does, so any iteration can be looked at again: cut its line out, and it is the
+/// `--init` of another run.
+#[derive(Debug, Default)]
+pub(crate) struct TraceLines {
+    pub(crate) trace: Trace,
+    lines: Option<Vec<Value>>,
+}
+
+impl TraceLines {
+    pub(crate) fn new(wanted: bool) -> Self {
+        Self {
+            trace: Trace::new(),
+            lines: wanted.then(Vec::new),
+        }
+    }
+
+    /// Writes the lines.
+    pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
+        hicp_io::write_atomically(path, |file| {
+            self.lines
+                .iter()
+                .flatten()
+                .try_for_each(|line| writeln!(file, "{line}"))
+        })
+    }
+
+    fn stage(&self) -> usize {
+        self.trace.stages.len() + 1
+    }
+}
+
+fn with_pose(mut line: Value, pose: &Isometry3<f64>) -> Value {
+    let (rotation, translation_mm) = hicp_io::pose_to_bop(pose);
+    line["cam_R_m2c"] = json!(rotation);
+    line["cam_t_m2c"] = json!(translation_mm);
+    line
+}
+
+impl Observer for TraceLines {
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
+        let stage = self.stage();
+        if let Some(lines) = &mut self.lines {
+            let line = json!({
+                "event": "iteration",
+                "stage": stage,
+                "iteration": event.iteration,
+                "n_pairs": event.evaluation.n_pairs,
+                "mean_loss": event.evaluation.mean_loss,
+            });
+            lines.push(with_pose(line, event.camera_from_object));
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn on_regime(&mut self, event: &RegimeEvent) {
+        let stage = self.stage();
+        if let Some(lines) = &mut self.lines {
+            lines.push(json!({
+                "event": "regime",
+                "stage": stage,
+                "regime": event.regime.name(),
+                "score": event.score,
+            }));
+        }
+        self.trace.on_regime(event);
+    }
+
+    fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+        let stage = self.stage();
+        if let Some(lines) = &mut self.lines {
+            let outcome = event.outcome;
+            let line = json!({
+                "event": "stage_end",
+                "stage": stage,
+                "selection": event.selection,
+                "association": event.association,
+                "metric": event.metric,
+                "n_source": event.n_source,
+                "iterations": outcome.iterations,
+                "n_pairs": outcome.n_pairs(),
+                "termination": outcome.termination.name(),
+            });
+            lines.push(with_pose(line, &outcome.camera_from_object));
+        }
+        self.trace.on_stage_end(event);
+    }
+}
