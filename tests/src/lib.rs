@@ -116,3 +116,8 @@ pub fn symmetric_pose_distance(
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .expect("the identity is among the motions")
 }
+
+/// Runs the examples of the guide.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/build-your-own.md")]
+struct Guide;

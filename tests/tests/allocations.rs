@@ -5,7 +5,8 @@ use std::cell::Cell;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
-use hybrid_icp::{Preset, Refiner};
+use hybrid_icp::pipeline::{PARTS, Part, PartKind};
+use hybrid_icp::{PipelineFile, Preset, Refiner};
 
 /// Counts the allocations of the thread that asks.
 struct Counting;
@@ -56,7 +57,70 @@ fn a_warm_run_allocates_nothing() {
             assert_eq!(allocations, 0, "{preset}: {refined:?}");
         }
     }
-    // The counter itself works.
+    counter_works();
+}
+
+/// An ICP stage with one part of the catalogue in the place of its kind, or `None` for parts that are no component of a stage.
+fn stage_with(part: &Part) -> Option<String> {
+    let own = match part.name {
+        "schedule" => "{ type = \"schedule\", filters = [\"max-distance\", \"trimmed\"] }".to_owned(),
+        "weighted-sum" => {
+            "{ type = \"weighted-sum\", metrics = [\"point-to-plane\", \"point-to-point\"], weights = [1.0, 0.1] }".to_owned()
+        }
+        "time-limit" => "{ type = \"time-limit\", milliseconds = 1000 }".to_owned(),
+        name => format!("\"{name}\""),
+    };
+    let or = |kind, usual: &str| {
+        if part.kind == kind {
+            own.clone()
+        } else {
+            format!("\"{usual}\"")
+        }
+    };
+    let component = matches!(
+        part.kind,
+        PartKind::Selection
+            | PartKind::Association
+            | PartKind::Filter
+            | PartKind::Metric
+            | PartKind::Stop
+    );
+    component.then(|| {
+        format!(
+            "type = \"icp\"\nselection = {}\nassociation = {}\nfilter = [{}]\nmetric = {}\nstop = [{}, \"iteration-limit\"]",
+            or(PartKind::Selection, "visible-surface"),
+            or(PartKind::Association, "nearest-neighbor"),
+            or(PartKind::Filter, "max-normal-angle"),
+            or(PartKind::Metric, "point-to-plane"),
+            or(PartKind::Stop, "divergence"),
+        )
+    })
+}
+
+#[test]
+fn every_component_of_the_catalogue_is_silent_when_warm() {
+    let mut rng = rng(5);
+    let scene = scene(Household::Mug, 1.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let mut tried = 0;
+    for part in PARTS {
+        let Some(text) = stage_with(part) else {
+            continue;
+        };
+        let file = PipelineFile::parse(&text, part.name).expect("valid TOML");
+        let mut refiner = Refiner::boxed(file.build().expect("a valid pipeline"));
+        for _ in 0..2 {
+            refiner.refine(&scene.model, &scene.observation, &init);
+        }
+        let before = ALLOCATIONS.get();
+        refiner.refine(&scene.model, &scene.observation, &init);
+        assert_eq!(ALLOCATIONS.get() - before, 0, "{}", part.name);
+        tried += 1;
+    }
+    assert!(tried > 50, "{tried}");
+}
+
+fn counter_works() {
     let before = ALLOCATIONS.get();
     std::hint::black_box(vec![1_u8]);
     assert_eq!(ALLOCATIONS.get() - before, 1);
