@@ -1,5 +1,6 @@
 //! Scenes that the cross-crate tests share.
 
+pub mod starts;
 pub mod ycbv;
 
 use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
