@@ -115,6 +115,9 @@ fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
                         "[\"point-to-point\", \"point-to-plane\"]".to_owned()
                     }
                     ("weighted-sum", "weights") => "[0.5, 0.5]".to_owned(),
+                    ("schedule", "filters") => {
+                        "[{ type = \"max-distance\", limit = 0.5 }, \"max-distance\"]".to_owned()
+                    }
                     ("without-boundary", "selection") => {
                         format!("{{ type = \"visible-surface\", points = {POINTS} }}")
                     }

@@ -37,5 +37,5 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{preset:width$}  {}", preset.summary());
     }
-    say(&text)
+    say(text.trim_end())
 }
