@@ -1,5 +1,6 @@
 //! Scenes that the cross-crate tests share.
 
+pub mod nees;
 pub mod starts;
 pub mod ycbv;
 

@@ -17,7 +17,9 @@ const EIGEN_ITERATIONS: usize = 1000;
 /// JᵀWJ is at most a threshold times the largest (see [`crate::Observability`]).
 ///
 /// A plane leaves three of the six open, a sphere three, a cylinder two. The plain solution of such a system slides along them
-/// as noise and rounding will have it. Under `Damp`, `Freeze` and `Refuse` nothing slides.
+/// as noise and rounding will have it. Under `Freeze` and `Refuse` nothing slides. Under `Damp` nothing slides where the rows leave a
+/// direction open exactly, as those of a plane do. In depth images of a cylinder and a sphere, noise-free, the pixels alone lift its
+/// eigenvalues to 10⁻⁵ to 10⁻⁴, and the pose slid by 9 % and 32 % of the first step (`cargo test -p hicp-tests --test degeneracy_scenes`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Degeneracy {
     /// Tikhonov's damping, 10⁻⁶ of the mean diagonal: free directions do not move, well-determined ones are shortened by some

@@ -70,6 +70,7 @@ mod symmetric;
 mod weighted_sum;
 
 pub use conditioned::Conditioned;
+pub use covariance::sandwich_covariance;
 pub use degeneracy::Degeneracy;
 pub use frozen::{Frame, Frozen};
 pub use gauss_newton::GaussNewton;
