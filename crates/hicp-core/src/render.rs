@@ -211,6 +211,8 @@ impl RenderCache {
         }
         if !hit {
             self.rendered += 1;
+            // Whoever catches a renderer's panic must not find its half-filled view under the old key.
+            self.entries[chosen].key = None;
             let view = &mut self.entries[chosen].view;
             self.renderer.render(
                 model.mesh(),

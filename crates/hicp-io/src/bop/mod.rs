@@ -13,6 +13,7 @@ mod results;
 mod rle;
 mod scene;
 mod targets;
+mod write;
 
 pub use annotations::{GroundTruth, GroundTruthInfo, SceneCamera};
 pub use dataset::Dataset;
@@ -23,3 +24,6 @@ pub use results::{ResultRow, read_results, write_results};
 pub use rle::{Rle, RleError};
 pub use scene::Scene;
 pub use targets::{Target, read_targets};
+pub use write::{
+    write_models_info, write_scene_camera, write_scene_gt, write_scene_gt_info, write_targets,
+};
