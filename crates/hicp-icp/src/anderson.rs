@@ -13,7 +13,7 @@ const MEMORY: usize = 5;
 /// Extrapolates the poses of a stage that is run again and again (Anderson 1965; for ICP Pavlov et al. 2018, Zhang, Yao & Deng 2021).
 ///
 /// The stage is one step of a fixed-point iteration T ↦ G(T): an ICP stage that ends after one increment, such as one
-/// with `IterationLimit(2)`. From the last [`MEMORY`] residuals f = G(u) − u, as twists ln(T T₀⁻¹) about the initial pose, the next
+/// with `IterationLimit(2)`. From the last five residuals f = G(u) − u, as twists ln(T T₀⁻¹) about the initial pose, the next
 /// start is the combination whose residual would be smallest. An extrapolation after which the stage's mean loss is not
 /// lower than before is dropped for the plain iterate, and the memory is emptied, so the loss never rises.
 ///
