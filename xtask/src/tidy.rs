@@ -16,6 +16,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-switch", 3),
     ("hybrid-icp", 4),
     ("hicp-sim", 4),
+    ("hicp-testkit", 5),
     ("hybrid-icp-cli", 6),
 ];
 

@@ -1,0 +1,161 @@
+//! The laws of data associations.
+
+use hybrid_icp::{
+    Correspondences, DataAssociation, Isometry3, Mover, Observation, Pair, Point3, Problem, Surfel,
+};
+
+use crate::law::{BOXED, NAMED, PURE, Subject, bits};
+use crate::scenes::{cases, workspace};
+
+/// What [`check_association`] may take for granted of an association beyond the trait's contract.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AssociationLaws {
+    /// Every pair's source is `source[source_index]`, moved by the pose. False for one that starts from the observation.
+    pub sources_are_the_selected: bool,
+    /// Every pair's target is the observation's surfel of `target_index`. False for one that interpolates.
+    pub targets_are_the_observed: bool,
+}
+
+impl Default for AssociationLaws {
+    fn default() -> Self {
+        Self {
+            sources_are_the_selected: true,
+            targets_are_the_observed: true,
+        }
+    }
+}
+
+/// Checks a [`DataAssociation`]; `make` makes a fresh one.
+///
+/// # Laws
+///
+/// - Pure: a fresh and a used instance give the same pairs in the same order, and so does a boxed one.
+/// - Never panics: without a source, with one point, with points and poses that are not finite, with nothing observed.
+/// - Pairs are finite; weights are finite and not negative.
+/// - The source is the selected point, *moved*; the target is the observed surfel of its index (see [`AssociationLaws`]);
+///   indices are in range.
+/// - The pose noted in the pairs stays.
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a law is broken.
+pub fn check_association<T: DataAssociation + 'static>(
+    make: impl Fn() -> T,
+    laws: AssociationLaws,
+) {
+    let subject = Subject::new::<T>(Some(make().name()));
+    let mut used = make();
+    for case in cases() {
+        for (what, source) in sources(&case.problem) {
+            let input = format!("{what} of {}", case.label);
+            let input = input.as_str();
+            let associate = |association: &mut dyn DataAssociation| {
+                subject.calm(input, || {
+                    run(association, &case.problem, &source, &case.pose)
+                })
+            };
+            let expected = associate(&mut make());
+            let observation = case.problem.observation;
+            contract(&subject, input, laws, &source, observation, &expected);
+            subject.holds(
+                "the pose noted in the pairs stays",
+                input,
+                bits(expected.camera_from_object()) == bits(&case.pose),
+                || bits(expected.camera_from_object()),
+            );
+            subject.same(PURE, input, &expected, &associate(&mut used));
+            subject.same(PURE, input, &expected, &associate(&mut used));
+            let mut boxed: Box<dyn DataAssociation> = Box::new(make());
+            let through_box = subject.calm(input, || {
+                run(&mut boxed, &case.problem, &source, &case.pose)
+            });
+            subject.same(BOXED, input, &expected, &through_box);
+            subject.same(BOXED, input, &make().name(), &boxed.name());
+        }
+    }
+    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
+    subject.same(NAMED, "any", &make().name(), &used.name());
+}
+
+fn run<A: DataAssociation + ?Sized>(
+    association: &mut A,
+    problem: &Problem<'_>,
+    source: &[Surfel],
+    pose: &Isometry3<f64>,
+) -> Correspondences {
+    let mut workspace = workspace();
+    let mut pairs = Correspondences::new();
+    pairs.begin(pose, source.len());
+    association.associate(&mut workspace.context(problem), source, pose, &mut pairs);
+    pairs
+}
+
+fn sources(problem: &Problem<'_>) -> [(&'static str, Vec<Surfel>); 4] {
+    let samples = problem.model.samples();
+    let some: Vec<Surfel> = samples.iter().step_by(8).copied().collect();
+    let mut broken = some.clone();
+    broken.truncate(20);
+    broken[3].point = Point3::new(f32::NAN, 0.0, 0.0);
+    broken[7].point = Point3::new(0.0, f32::INFINITY, 0.0);
+    [
+        ("every eighth sample", some),
+        ("one sample", vec![samples[0]]),
+        ("no sample", Vec::new()),
+        ("samples that are not all finite", broken),
+    ]
+}
+
+fn contract(
+    subject: &Subject,
+    input: &str,
+    laws: AssociationLaws,
+    source: &[Surfel],
+    observation: &Observation,
+    pairs: &Correspondences,
+) {
+    let mover = Mover::new(pairs.camera_from_object());
+    for pair in pairs.as_slice() {
+        let found = || format!("{pair:?}");
+        subject.holds("pairs are finite", input, finite(pair), found);
+        subject.holds(
+            "weights are finite and not negative",
+            input,
+            pair.weight.is_finite() && pair.weight >= 0.0,
+            found,
+        );
+        if laws.sources_are_the_selected {
+            let Some(selected) = source.get(pair.source_index as usize) else {
+                subject.broken("source indices are in range", input, found());
+            };
+            let moved = mover.surfel(selected);
+            let off = (moved.point - pair.source.point).norm();
+            let turned = (moved.normal.into_inner() - pair.source.normal.into_inner()).norm();
+            subject.holds(
+                "sources are the selected points, moved by the pose",
+                input,
+                off <= 1e-5 * (1.0 + moved.point.coords.norm()) && turned < 1e-4,
+                || format!("{pair:?}, expected the source {moved:?}"),
+            );
+        }
+        let Some(observed) = observation.surfel(pair.target_index) else {
+            subject.broken(
+                "target indices are those of observed surfels",
+                input,
+                found(),
+            );
+        };
+        subject.holds(
+            "targets are the observed surfels of their indices",
+            input,
+            !laws.targets_are_the_observed || pair.target == *observed,
+            || format!("{pair:?}, expected the target {observed:?}"),
+        );
+    }
+}
+
+/// Whether all coordinates of a pair are finite.
+pub(crate) fn finite(pair: &Pair) -> bool {
+    [&pair.source, &pair.target].into_iter().all(|surfel| {
+        surfel.point.iter().all(|x| x.is_finite()) && surfel.normal.iter().all(|x| x.is_finite())
+    })
+}

@@ -1,0 +1,112 @@
+//! The laws of outlier filters.
+
+use hybrid_icp::{Correspondences, OutlierFilter, Pair};
+
+use crate::association::finite;
+use crate::law::{BOXED, PURE, Subject, bits};
+use crate::pairs::{good_pairs, hard_pairs};
+
+/// What [`check_filter`] may take for granted of a filter beyond the trait's contract.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FilterLaws {
+    /// Filtering twice is filtering once: fixed limits are, shares and weights are not.
+    pub idempotent: bool,
+    /// Weights stay: it only removes.
+    pub keeps_weights: bool,
+}
+
+/// Checks an [`OutlierFilter`]; `make` makes a fresh one.
+///
+/// # Laws
+///
+/// - Only removes pairs or changes their weights; keeps their order, and nothing stays nothing.
+/// - Weights of finite pairs stay finite and not negative.
+/// - The pose and the number of candidates noted in the pairs stay.
+/// - Pure: a fresh and a used instance give the same bits, and so does a boxed one and a chain of it alone.
+/// - Never panics: also with no pair, one, equal distances, and numbers that are not finite.
+/// - As declared in [`FilterLaws`].
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a law is broken.
+pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: FilterLaws) {
+    let subject = Subject::new::<T>(None);
+    let mut used = make();
+    for set in good_pairs().into_iter().chain(hard_pairs()) {
+        let input = set.label.as_str();
+        let filtered = |filter: &mut dyn OutlierFilter, pairs: &Correspondences| {
+            let mut pairs = pairs.clone();
+            subject.calm(input, || filter.filter(&set.problem, &mut pairs));
+            pairs
+        };
+        let expected = filtered(&mut make(), &set.pairs);
+        contract(&subject, input, laws, &set.pairs, &expected);
+        subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
+        subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
+        let mut boxed: Box<dyn OutlierFilter> = Box::new(make());
+        subject.same(BOXED, input, &expected, &filtered(&mut boxed, &set.pairs));
+        let mut chain = (make(),);
+        subject.same(
+            "a chain of one filter is that filter",
+            input,
+            &expected,
+            &filtered(&mut chain, &set.pairs),
+        );
+        if laws.idempotent {
+            subject.same(
+                "idempotent, as declared: filtering twice is filtering once",
+                input,
+                &expected,
+                &filtered(&mut make(), &expected),
+            );
+        }
+    }
+}
+
+fn contract(
+    subject: &Subject,
+    input: &str,
+    laws: FilterLaws,
+    before: &Correspondences,
+    after: &Correspondences,
+) {
+    subject.same(
+        "the pose and the candidates noted in the pairs stay",
+        input,
+        &(before.camera_from_object(), before.n_candidates()),
+        &(after.camera_from_object(), after.n_candidates()),
+    );
+    let identity = |pair: &Pair| {
+        bits(&Pair {
+            weight: 0.0,
+            ..*pair
+        })
+    };
+    let mut rest = before.as_slice().iter();
+    for pair in after.as_slice() {
+        let wanted = identity(pair);
+        let Some(origin) = rest.find(|candidate| identity(candidate) == wanted) else {
+            subject.broken(
+                "only removes or re-weights pairs, and keeps their order",
+                input,
+                format!("{pair:?}, which is not among the pairs that were left to come"),
+            );
+        };
+        if laws.keeps_weights {
+            subject.same(
+                "weights stay, as declared",
+                input,
+                &origin.weight,
+                &pair.weight,
+            );
+        }
+        if finite(pair) && origin.weight.is_finite() {
+            subject.holds(
+                "weights stay finite and not negative",
+                input,
+                pair.weight.is_finite() && pair.weight >= 0.0,
+                || format!("{pair:?}"),
+            );
+        }
+    }
+}

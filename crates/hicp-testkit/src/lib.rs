@@ -1,0 +1,75 @@
+//! Conformance kit of Hybrid ICP: one function per extension point that tries a component on small scenes and on what can go
+//! wrong, and panics with the law that it breaks, the input and the values found.
+//!
+//! **Should you use this crate?** As a development dependency, if you write a selection, an association, a filter, a metric, a
+//! stop rule, a score, a switcher, a stage or a renderer of your own: yes. To refine poses, use `hybrid-icp`.
+//!
+//! Each function takes a closure that makes the component afresh, so that a fresh instance can be compared with a used one, and
+//! the optional laws that this component declares. A call takes well below a second in a development profile.
+//!
+//! ```
+//! use hicp_testkit::{MetricLaws, check_metric};
+//! use hybrid_icp::{ErrorMetric, NormalEquations, Pair};
+//!
+//! /// The distance of the points along the normal of the model.
+//! #[derive(Debug)]
+//! struct AlongModelNormal;
+//!
+//! impl ErrorMetric for AlongModelNormal {
+//!     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+//!         let (p, c) = (pair.source.point.cast::<f64>(), pair.target.point.cast::<f64>());
+//!         let normal = pair.source.normal.cast::<f64>().into_inner();
+//!         system.add_row(&c, &normal, normal.dot(&(p - c)), f64::from(pair.weight));
+//!     }
+//! }
+//!
+//! // In a test:
+//! check_metric(|| AlongModelNormal, MetricLaws::default());
+//! ```
+//!
+//! | extension point | function | optional laws |
+//! |---|---|---|
+//! | `PointSelection` | [`check_selection`] | – |
+//! | `DataAssociation` | [`check_association`] | [`AssociationLaws`] |
+//! | `OutlierFilter` | [`check_filter`] | [`FilterLaws`] |
+//! | `ErrorMetric` | [`check_metric`], [`check_metric_forwards`] | [`MetricLaws`] |
+//! | `StopRule` | [`check_stop_rule`] | [`StopRuleLaws`] |
+//! | `Score` | [`check_score`] | [`ScoreLaws`] |
+//! | `Switcher` | [`check_switcher`] | [`SwitcherLaws`] |
+//! | `Stage` | [`check_stage`] | [`StageLaws`] |
+//! | `Renderer` | [`check_renderer`] | [`RendererLaws`] |
+//!
+//! # What the kit cannot check
+//!
+//! *A warm run makes no heap allocation.* Counting allocations takes a global allocator, which is the program's and not a
+//! library's to choose. In a test binary of its own, install one that counts per thread and passes every call on to
+//! `std::alloc::System`; refine twice with one `Refiner`, and compare the count before and after the second time.
+//! `tests/tests/allocations_custom.rs` in the repository is such a test, to be copied.
+//!
+//! Modules in reading order: `law` (messages), `scenes` and `pairs` (inputs), then one per extension point: `selection`,
+//! `association`, `filter`, `metric`, `stop`, `score` (and switchers), `stage`, `renderer`.
+
+// A test kit reports by panicking, and its own scenes are valid by construction.
+#![allow(clippy::panic, clippy::expect_used)]
+
+mod association;
+mod filter;
+mod law;
+mod metric;
+mod pairs;
+mod renderer;
+mod scenes;
+mod score;
+mod selection;
+mod stage;
+mod stop;
+
+pub use association::{AssociationLaws, check_association};
+pub use filter::{FilterLaws, check_filter};
+pub use metric::{MetricLaws, check_metric, check_metric_forwards};
+pub use renderer::{RendererLaws, check_renderer};
+pub use scenes::{Scene, scenes};
+pub use score::{ScoreLaws, SwitcherLaws, check_score, check_switcher};
+pub use selection::check_selection;
+pub use stage::{StageLaws, check_stage};
+pub use stop::{StopRuleLaws, check_stop_rule};

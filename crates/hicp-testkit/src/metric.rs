@@ -1,0 +1,342 @@
+//! The laws of error metrics.
+
+use hybrid_icp::{
+    Correspondences, ErrorMetric, Isometry3, Mover, NormalEquations, Pair, Step, Surfel, Vector3,
+    se3,
+};
+
+use crate::law::{BOXED, NAMED, PURE, Subject};
+use crate::pairs::{good_pairs, hard_pairs};
+
+/// Which laws [`check_metric`] holds a metric to; all of them by default.
+///
+/// A metric with a fixed frame (a prior, a camera axis) has no `frame` invariance; one with a length of its own (a known σ, a
+/// floor) none of `units`; one that looks at ranks or medians treats a weight of two unlike two pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MetricLaws {
+    /// Pairs moved by a rigid motion A have the same loss, and the increment A·T·A⁻¹.
+    pub frame: bool,
+    /// The order of the pairs does not matter, up to rounding.
+    pub order: bool,
+    /// Lengths in another unit give the same motion in that unit, and the loss in its square.
+    pub units: bool,
+    /// A weight of two is two pairs.
+    pub multiplicity: bool,
+    /// A tenth of the increment does not raise the mean loss.
+    pub downhill: bool,
+    /// `squared_error` is the sum of the squared rows of `linearize`.
+    pub rows: bool,
+}
+
+impl Default for MetricLaws {
+    fn default() -> Self {
+        Self {
+            frame: true,
+            order: true,
+            units: true,
+            multiplicity: true,
+            downhill: true,
+            rows: true,
+        }
+    }
+}
+
+/// Checks an [`ErrorMetric`]; `make` makes a fresh one.
+///
+/// # Laws
+///
+/// - Pure: a fresh and a used instance give the same bits in every method, and so does a boxed one.
+/// - Never panics, and never returns what is not finite: without pairs, with too few, with pairs that determine nothing or are
+///   not finite, `minimize`, `system` and `mean_loss` return `None` or finite numbers.
+/// - Losses are not negative; `minimize` reports the `mean_loss`.
+/// - Those of [`MetricLaws`].
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a law is broken.
+pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
+    let subject = Subject::new::<T>(Some(make().name()));
+    let mut used = make();
+    for (set, good) in (good_pairs().into_iter().map(|set| (set, true)))
+        .chain(hard_pairs().into_iter().map(|set| (set, false)))
+    {
+        let (input, pairs) = (set.label.as_str(), &set.pairs);
+        let answers =
+            |metric: &mut dyn ErrorMetric| subject.calm(input, || Answers::of(metric, pairs));
+        let expected = answers(&mut make());
+        expected.are_finite(&subject, input);
+        subject.same(PURE, input, &expected, &answers(&mut used));
+        subject.same(PURE, input, &expected, &answers(&mut used));
+        let mut boxed: Box<dyn ErrorMetric> = Box::new(make());
+        let through_box = subject.calm(input, || Answers::of(&mut boxed, pairs));
+        subject.same(BOXED, input, &expected, &through_box);
+        subject.same(BOXED, input, &make().name(), &boxed.name());
+        if let (Some(step), Some(loss)) = (&expected.step, expected.mean_loss) {
+            subject.holds(
+                "minimize reports the mean loss",
+                input,
+                close(step.mean_loss, loss, 1e-6),
+                || format!("{} from minimize, {loss} from mean_loss", step.mean_loss),
+            );
+        }
+        if good {
+            if expected.step.is_none() {
+                subject.broken("well-determined pairs give a step", input, "None");
+            }
+            let check = Check {
+                subject: &subject,
+                input,
+                pairs,
+            };
+            check.laws(&make, laws);
+        }
+    }
+    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
+    subject.same(NAMED, "any", &make().name(), &used.name());
+}
+
+/// Checks that a metric that wraps another changes nothing: every method gives the same bits on all inputs of the kit.
+///
+/// For pass-through wrappers (that count, log, or box): provided methods that are not forwarded show here.
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a method is not forwarded.
+pub fn check_metric_forwards<A: ErrorMetric, B: ErrorMetric>(
+    inner: impl Fn() -> A,
+    wrapper: impl Fn() -> B,
+) {
+    let subject = Subject::new::<B>(Some(wrapper().name()));
+    for set in good_pairs().into_iter().chain(hard_pairs()) {
+        let input = set.label.as_str();
+        let expected = Answers::of(&mut inner(), &set.pairs);
+        let found = subject.calm(input, || Answers::of(&mut wrapper(), &set.pairs));
+        let law = "forwards every method to what it wraps";
+        subject.same(law, input, &expected, &found);
+    }
+}
+
+/// What a metric says of pairs.
+#[derive(Debug)]
+struct Answers {
+    step: Option<Step>,
+    mean_loss: Option<f64>,
+    system: Option<NormalEquations>,
+    /// Squared error and rows of the first pairs.
+    #[allow(dead_code)] // Compared by its text.
+    single: Vec<(f64, NormalEquations)>,
+}
+
+impl Answers {
+    fn of<M: ErrorMetric + ?Sized>(metric: &mut M, pairs: &Correspondences) -> Self {
+        let single = pairs.as_slice().iter().take(50).map(|pair| {
+            let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
+            metric.linearize(&unweighted(pair), &mut rows);
+            (metric.squared_error(pair), rows)
+        });
+        Self {
+            single: single.collect(),
+            step: metric.minimize(pairs),
+            mean_loss: metric.mean_loss(pairs),
+            system: metric.system(pairs),
+        }
+    }
+
+    fn are_finite(&self, subject: &Subject, input: &str) {
+        let loss = |value: f64| value.is_finite() && value >= 0.0;
+        if let Some(step) = &self.step {
+            subject.holds(
+                "minimize gives nothing or a finite increment",
+                input,
+                se3::is_finite(&step.increment),
+                || format!("{step:?}"),
+            );
+            subject.holds(
+                "the loss is finite and not negative",
+                input,
+                loss(step.mean_loss),
+                || format!("{step:?}"),
+            );
+        }
+        if let Some(mean) = self.mean_loss {
+            subject.holds(
+                "the loss is finite and not negative",
+                input,
+                loss(mean),
+                || format!("a mean loss of {mean}"),
+            );
+        }
+        if let Some(system) = &self.system {
+            subject.holds(
+                "the loss is finite and not negative",
+                input,
+                loss(system.loss()),
+                || format!("a system of loss {}", system.loss()),
+            );
+        }
+    }
+}
+
+/// One set of pairs that determine a step.
+struct Check<'a> {
+    subject: &'a Subject,
+    input: &'a str,
+    pairs: &'a Correspondences,
+}
+
+impl Check<'_> {
+    fn laws<T: ErrorMetric>(&self, make: &impl Fn() -> T, laws: MetricLaws) {
+        let own = self.step(&mut make(), self.pairs);
+        if laws.rows {
+            self.rows(&make());
+        }
+        if laws.order {
+            let reversed = self.with(self.pairs.as_slice().iter().rev().copied());
+            let law = "the order of the pairs does not matter";
+            self.equal(law, &own, &self.step(&mut make(), &reversed), 1e-6);
+        }
+        if laws.multiplicity {
+            let third = |i: usize| i.is_multiple_of(3);
+            let indexed = || self.pairs.as_slice().iter().copied().enumerate();
+            let doubled = self.with(indexed().map(|(i, pair)| Pair {
+                weight: pair.weight * if third(i) { 2.0 } else { 1.0 },
+                ..pair
+            }));
+            let twice = self.with(
+                indexed()
+                    .flat_map(|(i, pair)| std::iter::repeat_n(pair, if third(i) { 2 } else { 1 })),
+            );
+            self.equal(
+                "a weight of two is two pairs",
+                &self.step(&mut make(), &doubled),
+                &self.step(&mut make(), &twice),
+                1e-6,
+            );
+        }
+        if laws.frame {
+            let motion =
+                Isometry3::new(Vector3::new(0.1, -0.2, 0.15), Vector3::new(0.4, -0.7, 0.9));
+            let found = self.step(&mut make(), &self.moved(&motion, true));
+            let expected = Step {
+                increment: motion * own.increment * motion.inverse(),
+                ..own
+            };
+            let law = "frame: moving all pairs by A leaves the loss, and turns the increment T into A·T·A⁻¹";
+            self.equal(law, &expected, &found, 1e-3);
+        }
+        if laws.units {
+            // A power of two, so that changing the unit rounds nothing.
+            let found = self.step(&mut make(), &self.scaled(1024.0));
+            let mut expected = own;
+            expected.mean_loss *= 1024.0 * 1024.0;
+            expected.increment.translation.vector *= 1024.0;
+            let law = "units: lengths times k move k times as far, turn the same, and lose k² times as much";
+            self.equal(law, &expected, &found, 1e-6);
+        }
+        if laws.downhill {
+            self.downhill(&mut make(), &own);
+        }
+    }
+
+    fn step(&self, metric: &mut dyn ErrorMetric, pairs: &Correspondences) -> Step {
+        let step = self.subject.calm(self.input, || metric.minimize(pairs));
+        step.unwrap_or_else(|| {
+            let law = "well-determined pairs give a step";
+            self.subject.broken(law, self.input, "None")
+        })
+    }
+
+    fn with(&self, pairs: impl Iterator<Item = Pair>) -> Correspondences {
+        let mut set = Correspondences::new();
+        set.begin(self.pairs.camera_from_object(), self.pairs.n_candidates());
+        set.extend(pairs);
+        set
+    }
+
+    /// The sources, and the targets too if asked, moved in the camera frame.
+    fn moved(&self, motion: &Isometry3<f64>, targets: bool) -> Correspondences {
+        let mover = Mover::new(motion);
+        let mut set = Correspondences::new();
+        let pose = motion * self.pairs.camera_from_object();
+        set.begin(&pose, self.pairs.n_candidates());
+        set.extend(self.pairs.as_slice().iter().map(|pair| Pair {
+            source: mover.surfel(&pair.source),
+            target: if targets {
+                mover.surfel(&pair.target)
+            } else {
+                pair.target
+            },
+            ..*pair
+        }));
+        set
+    }
+
+    fn scaled(&self, factor: f32) -> Correspondences {
+        let surfel = |surfel: &Surfel| Surfel {
+            point: surfel.point * factor,
+            ..*surfel
+        };
+        let mut pose = *self.pairs.camera_from_object();
+        pose.translation.vector *= f64::from(factor);
+        let mut set = Correspondences::new();
+        set.begin(&pose, self.pairs.n_candidates());
+        set.extend(self.pairs.as_slice().iter().map(|pair| Pair {
+            source: surfel(&pair.source),
+            target: surfel(&pair.target),
+            ..*pair
+        }));
+        set
+    }
+
+    /// Two steps agree in loss and motion; lengths are compared relative to the size of what was moved.
+    fn equal(&self, law: &str, expected: &Step, found: &Step, tolerance: f64) {
+        let (angle, distance) = se3::pose_distance(&expected.increment, &found.increment);
+        let scale = expected.increment.translation.vector.norm() + expected.mean_loss.sqrt();
+        let agree = close(expected.mean_loss, found.mean_loss, tolerance)
+            && angle <= tolerance
+            && distance <= tolerance * (scale + f64::MIN_POSITIVE);
+        self.subject.holds(law, self.input, agree, || {
+            format!("{found:?}\n    not {expected:?}")
+        });
+    }
+
+    fn rows(&self, metric: &dyn ErrorMetric) {
+        for pair in self.pairs.as_slice().iter().take(100) {
+            let error = metric.squared_error(pair);
+            for (weight, factor) in [(1.0, 1.0), (2.0, 2.0)] {
+                let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
+                metric.linearize(&Pair { weight, ..*pair }, &mut rows);
+                let law = "squared_error is the sum of the squared rows, and rows carry the weight";
+                let agree = close(rows.loss(), factor * error, 1e-6);
+                self.subject.holds(law, self.input, agree, || {
+                    format!(
+                        "rows of {} at a weight of {weight}, a squared error of {error}, for {pair:?}",
+                        rows.loss()
+                    )
+                });
+            }
+        }
+    }
+
+    fn downhill(&self, metric: &mut dyn ErrorMetric, step: &Step) {
+        let tenth = se3::exp(&(se3::log(&step.increment) * 0.1));
+        let after = metric.mean_loss(&self.moved(&tenth, false));
+        let lower = after.is_some_and(|after| after <= step.mean_loss * (1.0 + 1e-4) + 1e-13);
+        let law = "downhill: a tenth of the increment does not raise the mean loss";
+        self.subject.holds(law, self.input, lower, || {
+            format!("{after:?} after {}", step.mean_loss)
+        });
+    }
+}
+
+fn unweighted(pair: &Pair) -> Pair {
+    Pair {
+        weight: 1.0,
+        ..*pair
+    }
+}
+
+/// Whether two losses are equal up to rounding.
+fn close(a: f64, b: f64, tolerance: f64) -> bool {
+    (a - b).abs() <= tolerance * a.abs().max(b.abs()) + 1e-18
+}

@@ -1,0 +1,133 @@
+//! The pairs that filters and metrics are tried on.
+
+use hybrid_icp::{
+    Correspondences, DataAssociation, Isometry3, NearestNeighbor, Pair, Point3, PointSelection,
+    Problem, VisibleSurface,
+};
+
+use crate::scenes::{Scene, scenes, workspace};
+
+/// Pairs with words for messages.
+pub(crate) struct PairSet {
+    pub(crate) label: String,
+    pub(crate) problem: Problem<'static>,
+    pub(crate) pairs: Correspondences,
+}
+
+/// Some 200 nearest-neighbour pairs of the visible surface, with weights that differ.
+fn matched(scene: &'static Scene, pose: &Isometry3<f64>) -> Correspondences {
+    let mut workspace = workspace();
+    let problem = scene.problem();
+    let mut context = workspace.context(&problem);
+    let (mut source, mut pairs) = (Vec::new(), Correspondences::new());
+    VisibleSurface::default().select(&mut context, pose, &mut source);
+    let step = (source.len() / 200).max(1);
+    let source: Vec<_> = source.into_iter().step_by(step).collect();
+    pairs.begin(pose, source.len());
+    NearestNeighbor::default().associate(&mut context, &source, pose, &mut pairs);
+    // Weights with few digits, so that doubling and adding them is exact.
+    for (weight, pair) in [1.0, 0.5, 0.75, 1.0, 0.25]
+        .iter()
+        .cycle()
+        .zip(pairs.as_mut_slice())
+    {
+        pair.weight = *weight;
+    }
+    pairs
+}
+
+/// The pairs of every scene at a pose nearly right and at one far off.
+pub(crate) fn good_pairs() -> Vec<PairSet> {
+    scenes()
+        .iter()
+        .flat_map(|scene| {
+            [
+                ("a pose nearly right", scene.near),
+                ("a pose far off", scene.far),
+            ]
+            .map(|(what, pose)| PairSet {
+                label: format!("nearest-neighbour pairs of the {} at {what}", scene.name),
+                problem: scene.problem(),
+                pairs: matched(scene, &pose),
+            })
+        })
+        .collect()
+}
+
+/// Too few pairs, pairs that determine nothing, and pairs that are not finite.
+pub(crate) fn hard_pairs() -> Vec<PairSet> {
+    let scene = &scenes()[0];
+    let base = matched(scene, &scene.near);
+    let all = base.as_slice();
+    let with = |label: &str, pairs: Vec<Pair>| {
+        let mut set = Correspondences::new();
+        set.begin(base.camera_from_object(), pairs.len());
+        set.extend(pairs);
+        PairSet {
+            label: label.to_owned(),
+            problem: scene.problem(),
+            pairs: set,
+        }
+    };
+    let changed = |change: fn(usize, &mut Pair)| {
+        let mut pairs = all.to_vec();
+        for (i, pair) in pairs.iter_mut().enumerate() {
+            change(i, pair);
+        }
+        pairs
+    };
+    vec![
+        with("no pairs", Vec::new()),
+        with("one pair", all[..1].to_vec()),
+        with("two pairs", all[..2].to_vec()),
+        with("five pairs", all[..5].to_vec()),
+        with("one pair, many times", vec![all[0]; 40]),
+        with(
+            "pairs without any distance",
+            changed(|_, p| p.target = p.source),
+        ),
+        with("weights of zero", changed(|_, p| p.weight = 0.0)),
+        with(
+            "sources on a line",
+            changed(|i, p| {
+                p.source.point = Point3::new(
+                    0.0,
+                    0.0,
+                    0.4 + f32::from(u8::try_from(i % 100).unwrap_or(0)) * 1e-3,
+                );
+            }),
+        ),
+        with(
+            "sources in one point",
+            changed(|_, p| p.source.point = Point3::new(0.0, 0.0, 0.4)),
+        ),
+        with(
+            "one target of NaN",
+            changed(|i, p| {
+                if i == 5 {
+                    p.target.point.x = f32::NAN;
+                }
+            }),
+        ),
+        with(
+            "one source of NaN",
+            changed(|i, p| {
+                if i == 5 {
+                    p.source.point.y = f32::NAN;
+                }
+            }),
+        ),
+        with(
+            "all targets infinite",
+            changed(|_, p| p.target.point.z = f32::INFINITY),
+        ),
+        with(
+            "one weight of NaN",
+            changed(|i, p| {
+                if i == 5 {
+                    p.weight = f32::NAN;
+                }
+            }),
+        ),
+    ]
+}

@@ -1,0 +1,142 @@
+//! The laws of renderers.
+
+use hybrid_icp::{NO_TRIANGLE, PixelRegion, Problem, Rasterizer, RenderedView, Renderer};
+
+use crate::law::{BOXED, PURE, Subject};
+use crate::scenes::{Case, cases};
+
+/// What [`check_renderer`] may take for granted of a renderer beyond the trait's contract.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RendererLaws {
+    /// Largest share of the pixels on which it may differ from [`Rasterizer`]: by 1 mm in depth, or in whether there is
+    /// anything. 2 % by default; `None` for renderers that draw something else than the mesh.
+    pub differing_pixels: Option<f64>,
+}
+
+impl Default for RendererLaws {
+    fn default() -> Self {
+        Self {
+            differing_pixels: Some(0.02),
+        }
+    }
+}
+
+/// Checks a [`Renderer`]; `make` makes a fresh one.
+///
+/// # Laws
+///
+/// - The view lies within the region asked for; what is rendered of a part of the image is that part of the whole.
+/// - Depths are finite and not negative; a pixel has a depth exactly if it has a triangle, whose index is one of the mesh.
+/// - Behind the camera there is nothing.
+/// - Pure: a fresh and a used instance, into a fresh and a used view, give the same bits; so does a boxed one.
+/// - Never panics, also at poses that are not finite.
+/// - Agrees with the rasterizer, as declared.
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a law is broken.
+pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: RendererLaws) {
+    let subject = Subject::new::<T>(None);
+    let (mut used, mut used_view) = (make(), RenderedView::default());
+    for case in cases() {
+        let input = case.label.as_str();
+        let camera = case.problem.observation.camera();
+        let part = PixelRegion {
+            u_min: 70,
+            v_min: 40,
+            u_max: 95,
+            v_max: 70,
+        };
+        let mut whole = None;
+        for region in [camera.region(), part] {
+            let mut expected = RenderedView::default();
+            subject.calm(input, || draw(&mut make(), &case, &region, &mut expected));
+            contract(&subject, input, &case, &region, &expected);
+            for _ in 0..2 {
+                subject.calm(input, || draw(&mut used, &case, &region, &mut used_view));
+                subject.same(PURE, input, &expected, &used_view);
+            }
+            let mut boxed: Box<dyn Renderer> = Box::new(make());
+            let mut view = RenderedView::default();
+            subject.calm(input, || draw(&mut boxed, &case, &region, &mut view));
+            subject.same(BOXED, input, &expected, &view);
+            let whole = whole.get_or_insert_with(|| expected.clone());
+            let law = "a part of the image shows what the whole shows there";
+            for (u, v) in pixels(&region) {
+                let (own, there) = (expected.depth_at(u, v), whole.depth_at(u, v));
+                subject.holds(law, input, own.to_bits() == there.to_bits(), || {
+                    format!("{own} in the part and {there} in the whole at ({u}, {v})")
+                });
+            }
+        }
+        if let (Some(share), Some(whole)) = (laws.differing_pixels, &whole) {
+            agrees(&subject, input, &case, whole, share);
+        }
+    }
+}
+
+fn draw<R: Renderer + ?Sized>(
+    renderer: &mut R,
+    case: &Case,
+    region: &PixelRegion,
+    view: &mut RenderedView,
+) {
+    let Problem { model, observation } = case.problem;
+    renderer.render(model.mesh(), observation.camera(), &case.pose, region, view);
+}
+
+fn contract(
+    subject: &Subject,
+    input: &str,
+    case: &Case,
+    region: &PixelRegion,
+    view: &RenderedView,
+) {
+    let inside = view.region().is_empty() || view.region().intersection(region) == view.region();
+    subject.holds("the view lies within the region", input, inside, || {
+        format!("{:?} for {region:?}", view.region())
+    });
+    let triangles = case.problem.model.mesh().triangles().len();
+    for (depth, triangle) in view.depth().iter().zip(view.triangles()) {
+        let found = || format!("a depth of {depth} and the triangle {triangle}");
+        let law = "depths are finite and not negative";
+        subject.holds(law, input, depth.is_finite() && *depth >= 0.0, found);
+        let shows = *triangle != NO_TRIANGLE;
+        let law = "a pixel has a depth exactly if it has a triangle of the mesh";
+        let in_range = !shows || (*triangle as usize) < triangles;
+        subject.holds(law, input, (*depth > 0.0) == shows && in_range, found);
+    }
+    if behind(case) {
+        let law = "behind the camera there is nothing";
+        let nothing = view.depth().iter().all(|z| *z == 0.0);
+        subject.holds(law, input, nothing, || format!("{:?}", view.region()));
+    }
+}
+
+fn behind(case: &Case) -> bool {
+    let model = case.problem.model;
+    (case.pose * model.center()).z < -model.radius()
+}
+
+fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> {
+    let columns = region.u_min..region.u_max;
+    (region.v_min..region.v_max).flat_map(move |v| columns.clone().map(move |u| (u, v)))
+}
+
+#[allow(clippy::cast_precision_loss)] // Counts of pixels.
+fn agrees(subject: &Subject, input: &str, case: &Case, view: &RenderedView, share: f64) {
+    let region = case.problem.observation.camera().region();
+    let mut reference = RenderedView::default();
+    draw(&mut Rasterizer::default(), case, &region, &mut reference);
+    let (mut shown, mut differing) = (0_usize, 0_usize);
+    for (u, v) in pixels(&region) {
+        let (own, there) = (view.depth_at(u, v), reference.depth_at(u, v));
+        shown += usize::from(own > 0.0 || there > 0.0);
+        differing += usize::from((own > 0.0) != (there > 0.0) || (own - there).abs() > 1e-3);
+    }
+    let law = "agrees with the rasterizer, as declared";
+    let agrees = differing as f64 <= share * shown as f64;
+    subject.holds(law, input, agrees, || {
+        format!("{differing} of {shown} pixels differ")
+    });
+}

@@ -1,0 +1,143 @@
+//! The inputs that components are tried on: two small scenes, and what can go wrong with them.
+
+use std::sync::OnceLock;
+
+use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
+    Translation3, UnitQuaternion, Vector3, Workspace, render_depth_image,
+};
+
+/// A model seen in a small depth image, and where it truly is.
+#[derive(Debug)]
+pub struct Scene {
+    /// What it shows.
+    pub name: &'static str,
+    /// The object.
+    pub model: Model,
+    /// The image, 160×120 pixels with 0.5 % of noise.
+    pub observation: Observation,
+    /// The same camera, seeing nothing.
+    pub nothing: Observation,
+    /// The same image with a mask of a single pixel.
+    pub one_pixel: Observation,
+    /// The true pose, camera from object.
+    pub truth: Isometry3<f64>,
+    /// 4 mm and 4° off.
+    pub near: Isometry3<f64>,
+    /// 3 cm and 30° off.
+    pub far: Isometry3<f64>,
+}
+
+impl Scene {
+    /// The scene as a problem.
+    #[must_use]
+    pub fn problem(&self) -> Problem<'_> {
+        Problem::new(&self.model, &self.observation)
+    }
+
+    fn new(name: &'static str, object: Household, seed: u64) -> Self {
+        let mut rng = rng(seed);
+        let model = object.model().expect("the objects that ship are valid");
+        let camera = PinholeCamera::new(143.1, 143.4, 81.3, 60.5, 160, 120).expect("valid");
+        let truth = object_pose(&mut rng, &model.center(), 0.35..0.45, 0.02);
+        let clean = render_depth_image(model.mesh(), &camera, &truth);
+        let seen: Vec<bool> = clean.pixels().iter().map(|z| *z > 0.0).collect();
+        let depth: DepthImage = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean);
+        let middle = seen.iter().position(|s| *s).unwrap_or(0);
+        let one = (0..seen.len()).map(|i| i == middle).collect();
+        let observe = |mask: Vec<bool>| {
+            let mask = Mask::new(160, 120, mask).expect("sizes agree");
+            Observation::new(depth.clone(), mask, camera).expect("sizes agree")
+        };
+        Self {
+            name,
+            nothing: observe(vec![false; seen.len()]),
+            one_pixel: observe(one),
+            observation: observe(seen),
+            near: perturb(&mut rng, &truth, 0.004, 4.0_f64.to_radians()),
+            far: perturb(&mut rng, &truth, 0.03, 30.0_f64.to_radians()),
+            truth,
+            model,
+        }
+    }
+}
+
+/// The scenes that the kit uses: a mug (thin walls, a handle) and a carton (planes). Made once; deterministic.
+#[must_use]
+pub fn scenes() -> &'static [Scene] {
+    static SCENES: OnceLock<Vec<Scene>> = OnceLock::new();
+    SCENES.get_or_init(|| {
+        vec![
+            Scene::new("mug", Household::Mug, 11),
+            Scene::new("carton", Household::Carton, 23),
+        ]
+    })
+}
+
+/// Returns a workspace with the rasterizer.
+pub(crate) fn workspace() -> Workspace {
+    Workspace::new(Rasterizer::default())
+}
+
+/// A problem and a pose, with words for messages.
+pub(crate) struct Case {
+    pub(crate) label: String,
+    pub(crate) problem: Problem<'static>,
+    pub(crate) pose: Isometry3<f64>,
+}
+
+/// Every scene at good, bad and impossible poses, and with nothing or next to nothing observed.
+pub(crate) fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for scene in scenes() {
+        for (what, pose) in poses(scene) {
+            cases.push(Case {
+                label: format!("the {} at {what}", scene.name),
+                problem: scene.problem(),
+                pose,
+            });
+        }
+        for (what, observation) in [
+            ("an empty mask", &scene.nothing),
+            ("a mask of one pixel", &scene.one_pixel),
+        ] {
+            cases.push(Case {
+                label: format!("the {} seen through {what}", scene.name),
+                problem: Problem::new(&scene.model, observation),
+                pose: scene.near,
+            });
+        }
+    }
+    cases
+}
+
+fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 9] {
+    let moved = |translation: Vector3<f64>| {
+        Isometry3::from_parts(Translation3::from(translation), scene.truth.rotation)
+    };
+    let t = scene.truth.translation.vector;
+    [
+        ("the true pose", scene.truth),
+        ("a pose nearly right", scene.near),
+        ("a pose far off", scene.far),
+        ("a pose behind the camera", moved(-t)),
+        ("a pose beside the image", moved(t + Vector3::x() * 5.0)),
+        ("a pose around the camera", moved(Vector3::zeros())),
+        (
+            "a translation of NaN",
+            moved(Vector3::new(t.x, f64::NAN, t.z)),
+        ),
+        (
+            "an infinite translation",
+            moved(Vector3::new(t.x, t.y, f64::INFINITY)),
+        ),
+        (
+            "a rotation of NaN",
+            Isometry3::from_parts(
+                scene.truth.translation,
+                UnitQuaternion::new(Vector3::new(f64::NAN, 0.0, 0.0)),
+            ),
+        ),
+    ]
+}
