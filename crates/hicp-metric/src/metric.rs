@@ -82,7 +82,8 @@ pub trait ErrorMetric {
         for pair in pairs.as_slice() {
             self.linearize(pair, &mut system);
         }
-        Some(system)
+        // Sources were checked with the centroid; this catches targets and normals.
+        system.loss().is_finite().then_some(system)
     }
 
     /// Takes one step of minimisation over all pairs. Pure: `&mut self` is scratch.
