@@ -5,8 +5,7 @@
 //! stop rule, a score, a switcher, a stage or a renderer of your own: yes. To refine poses, use `hybrid-icp`.
 //!
 //! Each function takes a closure that makes the component afresh, so that a fresh instance can be compared with a used one, and
-//! the optional laws that this component declares. A call takes less than a second for parts of the library, [`check_stage`] as
-//! long as some hundred short runs.
+//! the optional laws that this component declares. A call takes well below a second in a development profile.
 //!
 //! ```
 //! use hicp_testkit::{MetricLaws, check_metric};

@@ -1,12 +1,7 @@
 //! Components that break one law each are caught, and the message names it.
 
-// Small numbers, and a test that panics where nothing was caught.
-#![allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::panic,
-    clippy::expect_used
-)]
+#![allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // Small numbers.
+
 // A helper of tests may fail as a test does.
 #![allow(clippy::expect_used, clippy::panic)]
 
