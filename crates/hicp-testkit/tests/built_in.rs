@@ -157,8 +157,8 @@ fn decorated_metrics() {
         check_metric(conditioned, all);
     }
     check_metric(GaussNewton::<PointToPlane>::default, all);
-    // Not over `Symmetric`: it leaves out pairs whose normals oppose, so its loss jumps where a trial step turns a pair, and
-    // which trials are rejected from far off hangs on rounding, and so on the frame.
+    // Not over `Symmetric`: λ scales the diagonal of JᵀWJ, which depends on the axes, so steps cut short by the iteration limit far
+    // off differ from frame to frame.
     check_metric(LevenbergMarquardt::<PointToPlane>::default, all);
     let frozen = |frame| Frozen {
         metric: PointToPlane,
