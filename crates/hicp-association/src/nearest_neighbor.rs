@@ -20,7 +20,7 @@ pub struct NearestNeighbor {
 
 impl Default for NearestNeighbor {
     /// About 4,000 observed points.
-    // Deviation: §III-A.1 searches all of C; a strided C ended at a mean VSD of .254 instead of .251 in half of the time.
+    // Deviation: §III-A.1 searches all of C; a strided C is faster to search at hardly any loss of accuracy. `Stride::Pixels(1)` searches all.
     fn default() -> Self {
         Self {
             targets: Stride::AboutPoints(4000),
