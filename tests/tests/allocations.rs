@@ -67,6 +67,9 @@ fn stage_with(part: &Part) -> Option<String> {
         "weighted-sum" => {
             "{ type = \"weighted-sum\", metrics = [\"point-to-plane\", \"point-to-point\"], weights = [1.0, 0.1] }".to_owned()
         }
+        "metric-schedule" => {
+            "{ type = \"metric-schedule\", metrics = [\"point-to-point\", \"pose-prior\"] }".to_owned()
+        }
         "time-limit" => "{ type = \"time-limit\", milliseconds = 1000 }".to_owned(),
         name => format!("\"{name}\""),
     };

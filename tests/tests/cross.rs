@@ -114,6 +114,9 @@ fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
                     ("weighted-sum", "metrics") => {
                         "[\"point-to-point\", \"point-to-plane\"]".to_owned()
                     }
+                    ("metric-schedule", "metrics") => {
+                        "[\"point-to-point\", \"point-to-plane\"]".to_owned()
+                    }
                     ("weighted-sum", "weights") => "[0.5, 0.5]".to_owned(),
                     ("schedule", "filters") => {
                         "[{ type = \"max-distance\", limit = 0.5 }, \"max-distance\"]".to_owned()

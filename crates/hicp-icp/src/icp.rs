@@ -89,6 +89,7 @@ where
                     .associate(&mut context, source, &candidate, pairs);
                 self.filter.begin(iteration);
                 self.filter.filter(problem, pairs);
+                self.metric.begin(iteration, init);
             }
             iteration += 1;
             if pairs.is_empty() {
@@ -148,8 +149,10 @@ where
                 pairs.begin(&pose, source.len());
                 self.association
                     .associate(&mut context, source, &pose, pairs);
-                self.filter.begin(iteration.saturating_sub(2));
+                let accepted_in = iteration.saturating_sub(2);
+                self.filter.begin(accepted_in);
                 self.filter.filter(problem, pairs);
+                self.metric.begin(accepted_in, init);
             }
             quality = Quality::of(pairs, &mut self.metric);
         }

@@ -1,6 +1,6 @@
 //! A metric with a policy for degenerate directions.
 
-use hicp_core::{Correspondences, Pair};
+use hicp_core::{Correspondences, Isometry3, Pair};
 
 use crate::degeneracy::Degeneracy;
 use crate::metric::{ErrorMetric, Step};
@@ -53,6 +53,10 @@ impl<M: ErrorMetric> ErrorMetric for Conditioned<M> {
             increment: self.system(pairs)?.solve()?,
             mean_loss: self.mean_loss(pairs)?,
         })
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
     }
 
     fn name(&self) -> &'static str {

@@ -1,6 +1,6 @@
 //! Degrees of freedom that are not refined.
 
-use hicp_core::{Correspondences, Pair, Point3, UnitQuaternion};
+use hicp_core::{Correspondences, Isometry3, Pair, Point3, UnitQuaternion};
 
 use crate::metric::{ErrorMetric, Step};
 use crate::normal_equations::NormalEquations;
@@ -69,6 +69,10 @@ impl<M: ErrorMetric> ErrorMetric for Frozen<M> {
             increment: self.system(pairs)?.solve()?,
             mean_loss: self.mean_loss(pairs)?,
         })
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
     }
 
     fn name(&self) -> &'static str {

@@ -91,6 +91,10 @@ impl<M: ErrorMetric> ErrorMetric for GaussNewton<M> {
         })
     }
 
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
+    }
+
     fn name(&self) -> &'static str {
         "gauss-newton"
     }

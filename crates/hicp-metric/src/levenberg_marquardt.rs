@@ -115,6 +115,10 @@ impl<M: ErrorMetric> ErrorMetric for LevenbergMarquardt<M> {
         })
     }
 
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
+    }
+
     fn name(&self) -> &'static str {
         "levenberg-marquardt"
     }

@@ -23,7 +23,7 @@
 //!
 //! **Decorators**, each a metric again: [`Robust`] (a [`Kernel`] against outliers), [`PosePrior`], [`Conditioned`] (a policy for
 //! [`Degeneracy`]), [`Frozen`] (degrees of freedom held), [`GaussNewton`] and [`LevenbergMarquardt`] (iterations over fixed
-//! pairs). From the inside out, that is the order in which they make sense: a kernel weighs data and not the prior, and a
+//! pairs), [`MetricSchedule`] (one metric per iteration). From the inside out, that is the order in which they make sense: a kernel weighs data and not the prior, and a
 //! solver heeds what was held:
 //!
 //! ```
@@ -46,7 +46,7 @@
 //! Modules in reading order: `metric` (trait); `point_to_point`, `point_to_plane`, `plane_to_point`, `symmetric`, `generalized`,
 //! `weighted_sum`; `normal_equations` and what they are asked: `degeneracy` (solving), `freedom` (held components),
 //! `observability`, `covariance`; the decorators `kernel` and `robust`, `pose_prior`, `conditioned`, `frozen`, `moved` with
-//! `gauss_newton` and `levenberg_marquardt`.
+//! `gauss_newton` and `levenberg_marquardt`, `metric_schedule`.
 
 mod conditioned;
 mod covariance;
@@ -58,6 +58,7 @@ mod generalized;
 mod kernel;
 mod levenberg_marquardt;
 mod metric;
+mod metric_schedule;
 mod moved;
 mod normal_equations;
 mod observability;
@@ -78,12 +79,13 @@ pub use generalized::Generalized;
 pub use kernel::Kernel;
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use metric::{ErrorMetric, Step};
+pub use metric_schedule::MetricSchedule;
 pub use normal_equations::NormalEquations;
 pub use observability::Observability;
 pub use plane_to_point::PlaneToPoint;
 pub use point_to_plane::PointToPlane;
 pub use point_to_point::PointToPoint;
-pub use pose_prior::PosePrior;
+pub use pose_prior::{PosePrior, Prior};
 pub use robust::{Robust, Scale};
 pub use symmetric::Symmetric;
 pub use weighted_sum::WeightedSum;

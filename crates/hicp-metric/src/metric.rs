@@ -104,6 +104,14 @@ pub trait ErrorMetric {
         })
     }
 
+    /// Says which iteration of a stage, from 0, the next pairs belong to, and the pose that the stage began at: for metrics
+    /// that change from one to the next ([`crate::MetricSchedule`]) or are tied to the start ([`crate::PosePrior`]).
+    ///
+    /// Pure all the same: equal calls of `begin` and equal pairs give equal results. Decorators pass it on.
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        let _ = (iteration, init);
+    }
+
     /// Name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
@@ -129,6 +137,10 @@ impl<T: ErrorMetric + ?Sized> ErrorMetric for Box<T> {
 
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         (**self).minimize(pairs)
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        (**self).begin(iteration, init);
     }
 
     fn name(&self) -> &'static str {

@@ -1,6 +1,6 @@
 //! Robust kernels over any metric.
 
-use hicp_core::{Correspondences, Pair};
+use hicp_core::{Correspondences, Isometry3, Pair};
 
 use crate::kernel::Kernel;
 use crate::metric::{ErrorMetric, Step};
@@ -155,6 +155,10 @@ impl<M: ErrorMetric> ErrorMetric for Robust<M> {
         let mean_loss = self.reweigh(pairs)?;
         let step = self.metric.minimize(&self.reweighted)?;
         Some(Step { mean_loss, ..step })
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
     }
 
     fn name(&self) -> &'static str {

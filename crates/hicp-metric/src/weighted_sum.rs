@@ -1,6 +1,6 @@
 //! Several metrics in one normal system.
 
-use hicp_core::{Correspondences, Pair};
+use hicp_core::{Correspondences, Isometry3, Pair};
 
 use crate::metric::{ErrorMetric, Step};
 use crate::normal_equations::NormalEquations;
@@ -129,6 +129,12 @@ macro_rules! sum {
                 step(self.system(pairs), self.mean_loss(pairs))
             }
 
+            #[allow(non_snake_case)]
+            fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+                let ($($member,)+) = &mut self.terms;
+                $($member.1.begin(iteration, init);)+
+            }
+
             fn name(&self) -> &'static str {
                 "weighted-sum"
             }
@@ -171,6 +177,12 @@ impl<M: ErrorMetric> ErrorMetric for WeightedSum<Vec<(f64, M)>> {
 
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         step(self.system(pairs), self.mean_loss(pairs))
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        for (_, metric) in &mut self.terms {
+            metric.begin(iteration, init);
+        }
     }
 
     fn name(&self) -> &'static str {

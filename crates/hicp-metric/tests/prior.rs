@@ -4,7 +4,7 @@
 mod scenes;
 
 use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Vector6, se3};
-use hicp_metric::{ErrorMetric, GaussNewton, PointToPlane, PointToPoint, PosePrior, Robust};
+use hicp_metric::{ErrorMetric, GaussNewton, PointToPlane, PointToPoint, PosePrior, Prior, Robust};
 use scenes::{Numbers, at, center, difference, messy};
 
 fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
@@ -14,12 +14,11 @@ fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
 }
 
 fn prior<M>(metric: M, mean: &Isometry3<f64>, information: Matrix6<f64>) -> PosePrior<M> {
-    PosePrior {
-        metric,
+    let prior = Prior::Gaussian {
         camera_from_object: *mean,
         information,
-        sigma_meters: 1e-3,
-    }
+    };
+    PosePrior::new(metric, prior, 1e-3)
 }
 
 /// A full, not diagonal, positive definite matrix.
@@ -187,4 +186,38 @@ fn boxed_and_decorated_it_stays_in_effect() {
             metric.name()
         );
     }
+}
+
+/// A prior about the start is the Gaussian that it says: of the object's origin and of turns about it, once told where.
+#[test]
+fn about_the_initial_pose() {
+    let mut numbers = Numbers(68);
+    let pairs = posed(&mut numbers, 80);
+    let pose = *pairs.camera_from_object();
+    let init = numbers.motion(&center(), 4.0, 0.01) * pose;
+    let (translation_meters, rotation_degrees) = (0.004, 3.0);
+    let prior = Prior::AboutInitial {
+        translation_meters,
+        rotation_degrees,
+    };
+    let mut metric = PosePrior::new(PointToPlane, prior, 1e-3);
+    assert_eq!(metric.minimize(&pairs), PointToPlane.minimize(&pairs));
+    metric.begin(0, &init);
+    let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+    let loss = metric.mean_loss(&pairs).unwrap() - PointToPlane.mean_loss(&pairs).unwrap();
+    // To first order the twist about the object's origin is its displacement and the rotation vector; 4° and 1 cm are small.
+    let turn = (pose.rotation * init.rotation.inverse()).scaled_axis();
+    let moved = pose.translation.vector - init.translation.vector;
+    let expected = moved.norm_squared() / translation_meters.powi(2)
+        + turn.norm_squared() / rotation_degrees.to_radians().powi(2);
+    let found = loss * weight * 1e6;
+    assert!(
+        (found - expected).abs() < 0.05 * expected,
+        "{found} {expected}"
+    );
+    // Wherever it was before, it begins anew.
+    metric.begin(7, &pose);
+    let mut fresh = PosePrior::new(PointToPlane, prior, 1e-3);
+    fresh.begin(0, &pose);
+    assert_eq!(metric.minimize(&pairs), fresh.minimize(&pairs));
 }

@@ -113,6 +113,16 @@ pub fn check_metric_forwards<A: ErrorMetric, B: ErrorMetric>(
         let found = subject.calm(input, || Answers::of(&mut wrapper(), &set.pairs));
         let law = "forwards every method to what it wraps";
         subject.same(law, input, &expected, &found);
+        // A metric tied to where the stage begins shows whether it is told.
+        let (mut expected, mut found) = (inner(), wrapper());
+        let init = Isometry3::translation(0.01, 0.02, 0.5);
+        expected.begin(1, &init);
+        found.begin(1, &init);
+        let (expected, found) = (
+            Answers::of(&mut expected, &set.pairs),
+            Answers::of(&mut found, &set.pairs),
+        );
+        subject.same(law, input, &expected, &found);
     }
 }
 

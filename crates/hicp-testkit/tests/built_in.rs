@@ -13,12 +13,13 @@ use hybrid_icp::{
     Conditioned, ConstantWeight, Convergence, Deadline, Degeneracy, DistanceWeight, Divergence,
     ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Guard, IterationLimit, KNearest,
     KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
-    MeanVsd, MedianDistance, MinPairs, Motion, NearestNeighbor, NormalCompatible, NormalShooting,
-    NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne, Oscillation,
-    PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal, Regime, Robust,
-    Scale, SensorNoiseWeight, StableSampling, Symmetric, Threshold, Thresholds, TimeLimit, Trimmed,
-    UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WeightedSum, WithoutBoundary,
+    MeanVsd, MedianDistance, MetricSchedule, MinPairs, Motion, NearestNeighbor, NormalCompatible,
+    NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
+    Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
+    Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
+    Regime, Robust, Scale, SensorNoiseWeight, StableSampling, Symmetric, Threshold, Thresholds,
+    TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WeightedSum,
+    WithoutBoundary,
 };
 
 #[test]
@@ -172,11 +173,12 @@ fn decorated_metrics() {
         ..all
     };
     check_metric(|| frozen(Frame::Camera), fixed);
-    let prior = || PosePrior {
-        metric: PointToPlane,
-        camera_from_object: scenes()[0].truth,
-        information: Matrix6::identity() * 1e4,
-        sigma_meters: 1e-3,
+    let prior = || {
+        let prior = Prior::Gaussian {
+            camera_from_object: scenes()[0].truth,
+            information: Matrix6::identity() * 1e4,
+        };
+        PosePrior::new(PointToPlane, prior, 1e-3)
     };
     check_metric(
         prior,
@@ -191,6 +193,7 @@ fn decorated_metrics() {
 fn decorators_that_change_nothing_forward_everything() {
     check_metric_forwards(|| PointToPoint, Frozen::<PointToPoint>::default);
     check_metric_forwards(|| Symmetric, PosePrior::<Symmetric>::default);
+    check_metric_forwards(|| Symmetric, || MetricSchedule::new(vec![Symmetric]));
     check_metric_forwards(|| Symmetric, || Box::new(Symmetric) as Box<dyn ErrorMetric>);
 }
 

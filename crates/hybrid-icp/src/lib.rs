@@ -71,8 +71,9 @@ pub use hicp_icp::{
 };
 pub use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, NormalEquations, Observability, PlaneToPoint, PointToPlane, PointToPoint,
-    PosePrior, Robust, Scale, Step, Symmetric, WeightedSum, sandwich_covariance,
+    LevenbergMarquardt, MetricSchedule, NormalEquations, Observability, PlaneToPoint, PointToPlane,
+    PointToPoint, PosePrior, Prior, Robust, Scale, Step, Symmetric, WeightedSum,
+    sandwich_covariance,
 };
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{

@@ -15,8 +15,8 @@ use hicp_icp::{
 };
 use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, PlaneToPoint, PointToPlane, PointToPoint, Robust, Scale, Symmetric,
-    WeightedSum,
+    LevenbergMarquardt, MetricSchedule, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
+    Robust, Scale, Symmetric, WeightedSum,
 };
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{Switch, SwitchAmong, Switcher, Threshold, Thresholds};
@@ -271,6 +271,18 @@ fn metric(part: &Reader<'_>) -> Result<Metric, PipelineError> {
             };
             Box::new(Robust::new(inner()?, kernel(part)?, scale))
         }
+        "pose-prior" => {
+            let prior = Prior::AboutInitial {
+                translation_meters: part.number("translation_meters")?,
+                rotation_degrees: part.number("rotation_degrees")?,
+            };
+            Box::new(PosePrior::new(
+                inner()?,
+                prior,
+                part.number("sigma_meters")?,
+            ))
+        }
+        "metric-schedule" => Box::new(MetricSchedule::new(each(part, "metrics", metric)?)),
         "frozen" => Box::new(Frozen {
             metric: inner()?,
             frame: match part.word("frame")? {
