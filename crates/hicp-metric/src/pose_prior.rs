@@ -9,6 +9,7 @@ use crate::normal_equations::{NormalEquations, blocks};
 ///
 /// As everywhere, ξ = ln(T T₀⁻¹)^∨ = [ρ; φ] is a left perturbation in the camera frame, translation first (metres, radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // One in a pipeline.
 pub enum Prior {
     /// Anything is as likely.
     Flat,

@@ -41,6 +41,8 @@ impl FromStr for Source {
 pub(crate) struct Pipeline {
     name: String,
     made_of: MadeOf,
+    toml: String,
+    overrides: Vec<String>,
 }
 
 #[derive(Clone, Debug)]
@@ -60,35 +62,55 @@ impl PipelineArguments {
 
     /// Reads the file, applies the overrides, and makes sure that the pipeline builds.
     pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
-        let (name, mut file) = match &self.pipeline {
-            Source::Preset(preset) if self.overrides.is_empty() => {
-                return Ok(Pipeline {
-                    name: preset.name().to_owned(),
-                    made_of: MadeOf::Preset(*preset),
-                });
+        match &self.pipeline {
+            Source::Preset(preset) if self.overrides.is_empty() => Ok(Pipeline {
+                name: preset.name().to_owned(),
+                made_of: MadeOf::Preset(*preset),
+                toml: preset.toml().to_owned(),
+                overrides: Vec::new(),
+            }),
+            Source::Preset(preset) => {
+                Pipeline::parse(preset.name(), preset.toml().to_owned(), &self.overrides)
             }
-            Source::Preset(preset) => (
-                preset.name().to_owned(),
-                PipelineFile::parse(preset.toml(), preset.name())?,
-            ),
-            Source::File(path) => (path.display().to_string(), PipelineFile::read(path)?),
-        };
-        for assignment in &self.overrides {
-            file.set(assignment)?;
+            Source::File(path) => {
+                let name = path.display().to_string();
+                let toml = PipelineFile::read_text(path)?;
+                Pipeline::parse(&name, toml, &self.overrides)
+            }
         }
-        file.build()?;
-        let name = std::iter::once(name)
-            .chain(self.overrides.iter().cloned())
-            .collect::<Vec<_>>()
-            .join(" ");
-        Ok(Pipeline {
-            name,
-            made_of: MadeOf::File(file),
-        })
     }
 }
 
 impl Pipeline {
+    /// Parses a pipeline, applies the overrides, and makes sure that it builds; `origin` is what messages call it.
+    pub(crate) fn parse(origin: &str, toml: String, overrides: &[String]) -> anyhow::Result<Self> {
+        let mut file = PipelineFile::parse(&toml, origin)?;
+        for assignment in overrides {
+            file.set(assignment)?;
+        }
+        file.build()?;
+        let name = std::iter::once(origin.to_owned())
+            .chain(overrides.iter().cloned())
+            .collect::<Vec<_>>()
+            .join(" ");
+        Ok(Self {
+            name,
+            made_of: MadeOf::File(file),
+            toml,
+            overrides: overrides.to_vec(),
+        })
+    }
+
+    /// The text that it was made from, before the overrides.
+    pub(crate) fn toml(&self) -> &str {
+        &self.toml
+    }
+
+    /// The overrides, in order.
+    pub(crate) fn overrides(&self) -> &[String] {
+        &self.overrides
+    }
+
     /// Name in reports: that of the preset or file, and the overrides.
     pub(crate) fn name(&self) -> &str {
         &self.name

@@ -10,6 +10,7 @@ mod outputs;
 mod overlay;
 mod pipelines;
 mod refine;
+mod replay;
 mod report;
 mod terminal;
 mod trace_lines;
@@ -45,6 +46,7 @@ Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
 enum Command {
     Demo(demo::Arguments),
     Refine(refine::Arguments),
+    Replay(replay::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(BopCommand),
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
         Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
     };

@@ -5,16 +5,42 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_io::{CameraFile, IoError, LengthUnit};
-use hybrid_icp::{Model, Observation};
+use hicp_io::{CameraFile, IoError, LengthUnit, PoseFile};
+use hybrid_icp::{DepthImage, Mask, Model, Observation, PinholeCamera};
 
 use crate::choice::PipelineArguments;
 use crate::doubts::{self, Names};
-use crate::outputs;
+use crate::outputs::{self, Named};
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report::{self, Report};
 use crate::terminal::{say, warn};
-use crate::trace_lines::TraceLines;
+use crate::trace_lines::{self, TraceLines};
+
+/// What a refinement reads.
+#[derive(Debug, Args)]
+pub(crate) struct Inputs {
+    /// The object's mesh: OBJ, PLY or STL.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: PathBuf,
+    /// Unit of the mesh's coordinates: m, mm or cm.
+    #[arg(long, value_name = "UNIT")]
+    pub(crate) model_unit: LengthUnit,
+    /// The depth image: 16-bit gray PNG, 0 where nothing was measured.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) depth: PathBuf,
+    /// Millimetres per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if not given.
+    #[arg(long, value_name = "MM_PER_UNIT", value_parser = scale, allow_negative_numbers = true)]
+    pub(crate) depth_scale: Option<f64>,
+    /// The object's mask: a PNG of the depth image's size, not zero on the object.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) mask: PathBuf,
+    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and height. Pixel centres are at integers.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) camera: PathBuf,
+    /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm), model to camera.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) init: PathBuf,
+}
 
 /// Refine one pose in one depth image.
 ///
@@ -24,27 +50,8 @@ use crate::trace_lines::TraceLines;
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
-    /// The object's mesh: OBJ, PLY or STL.
-    #[arg(long, value_name = "FILE")]
-    model: PathBuf,
-    /// Unit of the mesh's coordinates: m, mm or cm.
-    #[arg(long, value_name = "UNIT")]
-    model_unit: LengthUnit,
-    /// The depth image: 16-bit gray PNG, 0 where nothing was measured.
-    #[arg(long, value_name = "FILE")]
-    depth: PathBuf,
-    /// Millimetres per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if not given.
-    #[arg(long, value_name = "MM_PER_UNIT", value_parser = scale, allow_negative_numbers = true)]
-    depth_scale: Option<f64>,
-    /// The object's mask: a PNG of the depth image's size, not zero on the object.
-    #[arg(long, value_name = "FILE")]
-    mask: PathBuf,
-    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and height. Pixel centres are at integers.
-    #[arg(long, value_name = "FILE")]
-    camera: PathBuf,
-    /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm), model to camera.
-    #[arg(long, value_name = "FILE")]
-    init: PathBuf,
+    #[command(flatten)]
+    inputs: Inputs,
     #[command(flatten)]
     pipeline: PipelineArguments,
     /// Where the JSON result goes; standard output if not given.
@@ -53,7 +60,8 @@ pub(crate) struct Arguments {
     /// Where a picture goes: the depth image with the model's outline before (orange) and after (blue), as PNG.
     #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
-    /// Where a trace of every iteration goes: one JSON object per line, each with its pose as in a pose file.
+    /// Where a trace of every iteration goes: one JSON object per line, each with its pose as in a pose file; `hybrid-icp replay`
+    /// runs it again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
 }
@@ -83,29 +91,80 @@ fn scale(text: &str) -> Result<f64, String> {
     }
 }
 
+/// What was read.
+pub(crate) struct Read {
+    pub(crate) model: Model,
+    pub(crate) depth: DepthImage,
+    pub(crate) mask: Mask,
+    pub(crate) camera: PinholeCamera,
+    pub(crate) init: PoseFile,
+    pub(crate) depth_scale: f64,
+}
+
+impl Inputs {
+    /// Reads all files.
+    pub(crate) fn read(&self) -> anyhow::Result<Read> {
+        let (camera_file, depth_scale) = read_camera(self)?;
+        Ok(Read {
+            depth: hicp_io::read_depth_png(&self.depth, depth_scale)?,
+            mask: hicp_io::read_mask_png(&self.mask)?,
+            init: hicp_io::read_pose_json(&self.init)?,
+            model: Model::new(hicp_io::read_mesh(&self.model, self.model_unit)?),
+            camera: camera_file.camera,
+            depth_scale,
+        })
+    }
+
+    /// Makes the observation of what was read.
+    pub(crate) fn observe(
+        &self,
+        depth: DepthImage,
+        mask: Mask,
+        camera: PinholeCamera,
+    ) -> anyhow::Result<Observation> {
+        Observation::new(depth, mask, camera).with_context(|| {
+            format!(
+                "{} and {} do not fit together",
+                self.depth.display(),
+                self.mask.display()
+            )
+        })
+    }
+
+    /// The files, by the options that name them.
+    pub(crate) fn files(&self) -> [Named<'_>; 5] {
+        [
+            ("--model", &self.model),
+            ("--depth", &self.depth),
+            ("--mask", &self.mask),
+            ("--camera", &self.camera),
+            ("--init", &self.init),
+        ]
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     check_outputs(arguments)?;
     let pipeline = arguments.pipeline.choose()?;
-    let (camera_file, depth_scale) = read_camera(arguments)?;
-    let depth = hicp_io::read_depth_png(&arguments.depth, depth_scale)?;
-    let mask = hicp_io::read_mask_png(&arguments.mask)?;
-    let init_file = hicp_io::read_pose_json(&arguments.init)?;
+    let inputs = &arguments.inputs;
+    let Read {
+        model,
+        depth,
+        mask,
+        camera,
+        init: init_file,
+        depth_scale,
+    } = inputs.read()?;
     let init = init_file.camera_from_object;
-    let model = Model::new(hicp_io::read_mesh(&arguments.model, arguments.model_unit)?);
     let overlay = arguments.overlay.as_deref();
     let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
     let mut refiner = pipeline.refiner();
-    let mut trace = TraceLines::new(arguments.trace.is_some());
+    let header = || trace_lines::header(inputs, depth_scale, &pipeline);
+    let mut trace = TraceLines::new(arguments.trace.as_ref().map(|_| header()));
     let start = Instant::now();
-    let observation = Observation::new(depth, mask, camera_file.camera).with_context(|| {
-        format!(
-            "{} and {} do not fit together",
-            arguments.depth.display(),
-            arguments.mask.display()
-        )
-    })?;
+    let observation = inputs.observe(depth, mask, camera)?;
     let refined = refiner.refine_observed(&model, &observation, &init, &mut trace);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
 
@@ -133,12 +192,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         picture.write(path)?;
     }
     let names = Names {
-        model: arguments.model.display(),
-        model_unit: arguments.model_unit,
-        depth: arguments.depth.display(),
+        model: inputs.model.display(),
+        model_unit: inputs.model_unit,
+        depth: inputs.depth.display(),
         depth_scale,
-        mask: arguments.mask.display(),
-        init: arguments.init.display(),
+        mask: inputs.mask.display(),
+        init: inputs.init.display(),
     };
     for doubt in doubts::about_units(&model, &observation, &init, &names) {
         warn(doubt);
@@ -159,13 +218,7 @@ fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
     .into_iter()
     .filter_map(|(option, path)| Some((option, path.as_deref()?)))
     .collect();
-    let mut inputs = vec![
-        ("--model", arguments.model.as_path()),
-        ("--depth", &arguments.depth),
-        ("--mask", &arguments.mask),
-        ("--camera", &arguments.camera),
-        ("--init", &arguments.init),
-    ];
+    let mut inputs = arguments.inputs.files().to_vec();
     inputs.extend(
         arguments
             .pipeline
@@ -177,7 +230,7 @@ fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Reads the camera and the depth scale, once the sizes of all that has one are known to agree.
-fn read_camera(arguments: &Arguments) -> anyhow::Result<(CameraFile, f64)> {
+fn read_camera(arguments: &Inputs) -> anyhow::Result<(CameraFile, f64)> {
     let (depth, mask) = (arguments.depth.display(), arguments.mask.display());
     let size = hicp_io::read_png_size(&arguments.depth)?;
     let mask_size = hicp_io::read_png_size(&arguments.mask)?;

@@ -5,10 +5,13 @@ use std::ops::ControlFlow;
 use hybrid_icp::{Isometry3, IterationEvent, Observer, RegimeEvent, StageEvent, Trace};
 use serde_json::{Value, json};
 
+use crate::choice::Pipeline;
+use crate::refine::Inputs;
+
 /// Keeps the stages for the report and, if asked to, a line for everything that happens.
 ///
 /// A line holds the pose as a pose file does, so any iteration can be looked at again: cut its line out, and it is the
-/// `--init` of another run.
+/// `--init` of another run. The first line says what ran on which files, so that `hybrid-icp replay` can run it again.
 #[derive(Debug, Default)]
 pub(crate) struct TraceLines {
     pub(crate) trace: Trace,
@@ -16,19 +19,24 @@ pub(crate) struct TraceLines {
 }
 
 impl TraceLines {
-    pub(crate) fn new(wanted: bool) -> Self {
+    /// Starts with a header, or keeps no lines.
+    pub(crate) fn new(header: Option<Value>) -> Self {
         Self {
             trace: Trace::new(),
-            lines: wanted.then(Vec::new),
+            lines: header.map(|header| vec![header]),
         }
+    }
+
+    /// The lines so far.
+    pub(crate) fn lines(&self) -> &[Value] {
+        self.lines.as_deref().unwrap_or_default()
     }
 
     /// Writes the lines.
     pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
         hicp_io::write_atomically(path, |file| {
-            self.lines
+            self.lines()
                 .iter()
-                .flatten()
                 .try_for_each(|line| writeln!(file, "{line}"))
         })
     }
@@ -36,6 +44,23 @@ impl TraceLines {
     fn stage(&self) -> usize {
         self.trace.stages.len() + 1
     }
+}
+
+/// The first line of a trace: everything that the others follow from.
+pub(crate) fn header(inputs: &Inputs, depth_scale: f64, pipeline: &Pipeline) -> Value {
+    let mut line = json!({
+        "event": "start",
+        "version": env!("CARGO_PKG_VERSION"),
+        "pipeline": pipeline.name(),
+        "toml": pipeline.toml(),
+        "set": pipeline.overrides(),
+        "model_unit": inputs.model_unit.to_string(),
+        "depth_scale": depth_scale,
+    });
+    for (option, path) in inputs.files() {
+        line[option.trim_start_matches('-')] = json!(path);
+    }
+    line
 }
 
 fn with_pose(mut line: Value, pose: &Isometry3<f64>) -> Value {

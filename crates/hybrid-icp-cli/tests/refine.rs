@@ -118,6 +118,42 @@ fn every_line_of_a_trace_can_be_the_start_of_another_run() {
 }
 
 #[test]
+fn a_trace_is_replayed_to_the_last_digit() {
+    let scene = Scene::new()
+        .with("--trace", "trace.jsonl")
+        .with("--set", "times=1");
+    scene.result();
+    let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
+    let said = replay().exits(0).out;
+    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    assert!(said.contains(&format!("{} lines, all as they were", text.lines().count())));
+    // A line that was not so.
+    let (number, line) = text
+        .lines()
+        .enumerate()
+        .find(|(_, line)| line.contains("mean_loss"))
+        .unwrap();
+    let mut changed: Value = serde_json::from_str(line).unwrap();
+    changed["n_pairs"] = 1.into();
+    scene.write("trace.jsonl", text.replace(line, &changed.to_string()));
+    let complaint = format!("trace.jsonl:{} differs", number + 1);
+    replay().exits(1).complains(&[&complaint]);
+    // Not a trace at all.
+    for (content, expected) in [
+        ("", "empty, expected a trace"),
+        ("{", "trace.jsonl:1: expected JSON"),
+        ("{\"event\": \"iteration\"}", "expected \"start\""),
+        (
+            "{\"event\": \"start\", \"version\": 3}",
+            "\"version\" is 3, expected a text",
+        ),
+    ] {
+        scene.write("trace.jsonl", content.to_owned());
+        replay().exits(1).complains(&[expected]);
+    }
+}
+
+#[test]
 fn forms_of_cameras_and_units_of_meshes_agree() {
     let reference = Scene::new().result();
     let near = |scene: &Scene, what: &str| {

@@ -61,11 +61,20 @@ impl PipelineFile {
     /// [`PipelineError`] when it cannot be read or is not TOML.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, PipelineError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|source| PipelineError::Read {
+        Self::parse(&Self::read_text(path)?, &path.to_string_lossy())
+    }
+
+    /// Reads the text of a file, for who wants to keep it beside what it builds.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError::Read`] when it cannot be read.
+    pub fn read_text(path: impl AsRef<Path>) -> Result<String, PipelineError> {
+        let path = path.as_ref();
+        std::fs::read_to_string(path).map_err(|source| PipelineError::Read {
             path: path.to_owned(),
             source,
-        })?;
-        Self::parse(&text, &path.to_string_lossy())
+        })
     }
 
     /// Parses text; `origin` is what messages call it.
