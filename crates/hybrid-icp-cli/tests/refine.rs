@@ -148,7 +148,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
             "\"version\" is 3, expected a text",
         ),
     ] {
-        scene.write("trace.jsonl", content.to_owned());
+        scene.write("trace.jsonl", content);
         replay().exits(1).complains(&[expected]);
     }
 }
