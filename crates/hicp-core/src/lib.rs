@@ -22,7 +22,7 @@
 //! ```
 //!
 //! Modules in reading order, by file: `so3`, `se3` (rigid motions), `camera`, `image`, `region`, `surfel`, `observation` and
-//! its `normals`, `mesh`, `sampling`, `symmetry`, `model`, `derived` (shared caches), `render`, `problem`, `correspondences`, `error`.
+//! its `normals`, `mesh`, `sampling`, `symmetry`, `model`, `derived` (shared caches), `render`, `problem`, `correspondences`, `vectorized` (loops for AVX2), `error`.
 
 // Counts and pixel coordinates become floating point numbers all over this crate; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
@@ -48,6 +48,7 @@ pub mod se3;
 pub mod so3;
 mod surfel;
 mod symmetry;
+mod vectorized;
 
 pub use camera::{MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
 pub use correspondences::{Correspondences, Mover, Pair};
@@ -71,3 +72,4 @@ pub use rotation::{ROTATION_TOLERANCE, rotation_from_matrix};
 pub use sampling::sample_surface;
 pub use surfel::Surfel;
 pub use symmetry::{CONTINUOUS_STEPS, Symmetries, SymmetryAxis};
+pub use vectorized::{VectorLoop, vectorized};

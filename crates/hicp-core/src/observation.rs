@@ -94,17 +94,24 @@ impl Observation {
             camera: &camera,
             depth: &patch,
         };
-        estimate_normals(&depth_patch, |column, row, normal| {
-            let Some(normal) = normal else {
-                surfels.push(nothing);
-                return;
-            };
-            let z = patch[row * width + column];
-            surfels.push(Surfel {
-                point: Point3::new(xs[column] * z, ys[row] * z, z),
-                normal,
-            });
-            n_surfels += 1;
+        estimate_normals(&depth_patch, |row, first, normals| {
+            let start = row * width;
+            surfels.resize(start + first, nothing);
+            let (depth, xs) = (&patch[start + first..], &xs[first..]);
+            let pixels = normals.iter().zip(depth).zip(xs);
+            surfels.extend(pixels.map(|((normal, z), x)| {
+                let has_normal = *normal != [0.0; 3];
+                n_surfels += usize::from(has_normal);
+                if has_normal {
+                    Surfel {
+                        point: Point3::new(x * z, ys[row] * z, *z),
+                        normal: UnitVector3::new_unchecked(Vector3::from(*normal)),
+                    }
+                } else {
+                    nothing
+                }
+            }));
+            surfels.resize(start + width, nothing);
         });
         Ok(Self {
             id: Id::next(),

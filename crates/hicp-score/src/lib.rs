@@ -21,6 +21,7 @@
 // Counts become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
+mod agreement;
 mod error;
 mod mean_vsd;
 mod pose_error;

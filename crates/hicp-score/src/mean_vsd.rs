@@ -1,9 +1,10 @@
 //! The mean VSD estimate.
 
-use hicp_core::{Context, Isometry3};
+use hicp_core::{Context, Isometry3, vectorized};
 
+use crate::agreement::{Agreement, Row};
 use crate::score::Score;
-use crate::tolerances::{AgreementCounts, N_TOLERANCES, mean};
+use crate::tolerances::{N_TOLERANCES, errors, mean};
 
 /// The mean VSD estimate (MVE) of §IV-A: VSD with the measured distances and the segmentation mask in the place of the true ones.
 ///
@@ -50,41 +51,32 @@ impl MeanVsd {
         let image_width = observation.depth().width() as usize;
         let view = context.view(camera_from_object);
         let region = view.region();
-
-        let mut union = observation.n_measured() as u64;
-        let mut counts = AgreementCounts::new(problem.model.diameter());
-        let (inverse_fx, inverse_fy) = (1.0 / camera.fx(), 1.0 / camera.fy());
-        for (v, row) in (region.v_min..region.v_max).zip(view.depth().chunks(region.width().max(1)))
-        {
-            let y = (f64::from(v) - camera.cy()) * inverse_fy;
-            let start = v as usize * image_width + region.u_min as usize;
-            let observed = &depth[start..start + row.len()];
-            let masked = &mask[start..start + row.len()];
-            for (((u, rendered), observed), masked) in
-                (region.u_min..).zip(row).zip(observed).zip(masked)
-            {
-                if *rendered <= 0.0 {
-                    continue;
+        let rendered = view.depth().chunks_exact(region.width().max(1));
+        let inverse_fy = 1.0 / camera.fy();
+        let rows = (region.v_min..region.v_max)
+            .zip(rendered)
+            .map(|(v, rendered)| {
+                let start = v as usize * image_width + region.u_min as usize;
+                let columns = start..start + rendered.len();
+                Row {
+                    rendered,
+                    observed: &depth[columns.clone()],
+                    masked: &mask[columns],
+                    u: region.u_min,
+                    y: (f64::from(v) - camera.cy()) * inverse_fy,
                 }
-                let (rendered, observed) = (f64::from(*rendered), f64::from(*observed));
-                let x = (f64::from(u) - camera.cx()) * inverse_fx;
-                if *masked {
-                    if observed > 0.0 {
-                        let distance_per_depth = (x * x + y * y + 1.0).sqrt();
-                        counts.add((rendered - observed).abs() * distance_per_depth);
-                    }
-                } else {
-                    let hidden = self.occlusion_tolerance.is_some_and(|tolerance| {
-                        let distance_per_depth = (x * x + y * y + 1.0).sqrt();
-                        observed > 0.0 && (rendered - observed) * distance_per_depth > tolerance
-                    });
-                    if !hidden {
-                        union += 1;
-                    }
-                }
-            }
-        }
-        counts.errors(union)
+            });
+        let found = vectorized(Agreement {
+            rows,
+            cx: camera.cx(),
+            inverse_fx: 1.0 / camera.fx(),
+            diameter: problem.model.diameter(),
+            occlusion_tolerance: self.occlusion_tolerance.unwrap_or(f64::INFINITY),
+        });
+        errors(
+            found.correct,
+            observation.n_measured() as u64 + found.outside,
+        )
     }
 }
 

@@ -49,16 +49,30 @@ impl AgreementCounts {
     ///
     /// An empty union is an error of 1: nothing was seen where something should be.
     pub(crate) fn errors(&self, union: u64) -> [f64; N_TOLERANCES] {
-        let mut correct = 0;
-        std::array::from_fn(|k| {
-            correct += self.histogram[k];
-            if union == 0 {
-                1.0
-            } else {
-                (union - correct) as f64 / union as f64
-            }
-        })
+        let mut sum = 0;
+        errors(
+            self.histogram
+                .first_chunk()
+                .copied()
+                .unwrap_or_default()
+                .map(|count: u64| {
+                    sum += count;
+                    sum
+                }),
+            union,
+        )
     }
+}
+
+/// Returns the share of `union` pixels that are not `correct`, for every tolerance; all 1 for an empty union.
+pub(crate) fn errors(correct: [u64; N_TOLERANCES], union: u64) -> [f64; N_TOLERANCES] {
+    correct.map(|correct| {
+        if union == 0 {
+            1.0
+        } else {
+            (union - correct) as f64 / union as f64
+        }
+    })
 }
 
 /// Returns the mean of the errors over the tolerances.

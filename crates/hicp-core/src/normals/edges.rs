@@ -1,0 +1,233 @@
+//! Depth edges: between which neighbours the surface is torn.
+
+use super::{DepthPatch, used};
+use crate::region::PixelRegion;
+use crate::vectorized::{VectorLoop, vectorized};
+
+/// The depth edges of a patch.
+pub(super) struct Edges {
+    /// Which pixels have an edge within the window's radius, counted along the longer of rows and columns.
+    pub(super) near: BitRows,
+    /// Which pixels are joined to their right neighbour: both are used, and the step between them is no edge.
+    pub(super) right: BitRows,
+    /// Which pixels are joined to the one below.
+    pub(super) below: BitRows,
+}
+
+impl Edges {
+    /// `None` when there is no edge at all. Neighbours without depth are no edges; nothing is fitted to them anyway.
+    pub(super) fn find(patch: &DepthPatch<'_>, edge_step: f32, radius: usize) -> Option<Self> {
+        let (width, height) = (patch.region.width(), patch.region.height());
+        let row = |v: usize| &patch.depth[v * width..(v + 1) * width];
+        let mut near = BitRows::new(&patch.region);
+        let (mut right, mut below) = (BitRows::new(&patch.region), BitRows::new(&patch.region));
+        let mut steps = Steps::default();
+        let mut any = false;
+        for v in 0..height {
+            let span = used(row(v));
+            if span.is_empty() {
+                continue;
+            }
+            let here = &row(v)[span.clone()];
+            steps.judge(here, &here[1..], edge_step);
+            right.set(v, span.start, &steps.joined);
+            any |= near.set(v, span.start, &steps.edges);
+            any |= near.set(v, span.start + 1, &steps.edges);
+            if v + 1 < height {
+                steps.judge(here, &row(v + 1)[span.clone()], edge_step);
+                below.set(v, span.start, &steps.joined);
+                any |= near.set(v, span.start, &steps.edges);
+                any |= near.set(v + 1, span.start, &steps.edges);
+            }
+        }
+        any.then(|| {
+            near.dilate(radius);
+            Self { near, right, below }
+        })
+    }
+}
+
+/// The steps between the pixels of two rows: 1 where that is so.
+#[derive(Default)]
+struct Steps {
+    edges: Vec<u8>,
+    joined: Vec<u8>,
+}
+
+impl Steps {
+    /// Judges the steps from the pixels of one row to those of another, as many as the shorter has.
+    fn judge(&mut self, from: &[f32], to: &[f32], edge_step: f32) {
+        let n = from.len().min(to.len());
+        self.edges.resize(n, 0);
+        self.joined.resize(n, 0);
+        vectorized(Judge {
+            from: &from[..n],
+            to: &to[..n],
+            edge_step,
+            edges: &mut self.edges,
+            joined: &mut self.joined,
+        });
+    }
+}
+
+struct Judge<'a> {
+    from: &'a [f32],
+    to: &'a [f32],
+    edge_step: f32,
+    edges: &'a mut [u8],
+    joined: &'a mut [u8],
+}
+
+impl VectorLoop for Judge<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        judge(self.from, self.to, self.edge_step, self.edges, self.joined);
+    }
+}
+
+/// All slices are of one length; as parameters they are known not to overlap.
+#[inline(always)]
+fn judge(from: &[f32], to: &[f32], edge_step: f32, edges: &mut [u8], joined: &mut [u8]) {
+    let n = from.len();
+    let (to, edges, joined) = (&to[..n], &mut edges[..n], &mut joined[..n]);
+    for i in 0..n {
+        let (a, b) = (from[i], to[i]);
+        let nearer = if a < b { a } else { b };
+        let both = nearer > 0.0;
+        let torn = (a - b).abs() > edge_step * nearer;
+        edges[i] = u8::from(both & torn);
+        joined[i] = u8::from(both & !torn);
+    }
+}
+
+/// One bit per pixel.
+pub(super) struct BitRows {
+    words: Vec<u64>,
+    words_per_row: usize,
+}
+
+impl BitRows {
+    fn new(region: &PixelRegion) -> Self {
+        // One word more than needed, so that any bits of a row lie in two neighbouring words.
+        let words_per_row = region.width() / 64 + 2;
+        Self {
+            words: vec![0; words_per_row * region.height()],
+            words_per_row,
+        }
+    }
+
+    fn row_mut(&mut self, v: usize) -> &mut [u64] {
+        &mut self.words[v * self.words_per_row..][..self.words_per_row]
+    }
+
+    /// Sets the bits of row `v` from column `first` on that are 1 in `bytes`; returns whether there were any.
+    fn set(&mut self, v: usize, first: usize, bytes: &[u8]) -> bool {
+        let row = self.row_mut(v);
+        let mut any = false;
+        for (bytes, u) in bytes.chunks(8).zip((first..).step_by(8)) {
+            let mut eight = [0; 8];
+            eight[..bytes.len()].copy_from_slice(bytes);
+            let eight = u64::from_le_bytes(eight);
+            if eight == 0 {
+                continue;
+            }
+            any = true;
+            // Byte i, 0 or 1, becomes bit 56 + i: the partial products do not meet.
+            let bits = eight.wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            row[u / 64] |= bits << (u % 64);
+            // The shift by 64 in two steps.
+            row[u / 64 + 1] |= bits >> 1 >> (63 - u % 64);
+        }
+        any
+    }
+
+    /// The columns of row `v` that are set, among the first `width`.
+    pub(super) fn columns(&self, v: usize, width: usize) -> impl Iterator<Item = usize> {
+        let row = &self.words[v * self.words_per_row..][..self.words_per_row];
+        row.iter().enumerate().flat_map(move |(index, word)| {
+            let mut left = *word;
+            std::iter::from_fn(move || {
+                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+                left &= left - 1;
+                Some(64 * index + bit).filter(|u| *u < width)
+            })
+        })
+    }
+
+    /// Returns the bits of `count` < 64 pixels from (u, v) to the right, the first in the lowest bit.
+    pub(super) fn get(&self, u: usize, v: usize, count: usize) -> u64 {
+        let word = v * self.words_per_row + u / 64;
+        let shift = u % 64;
+        let bits = self.words[word] >> shift | (self.words[word + 1] << 1) << (63 - shift);
+        bits & ((1 << count) - 1)
+    }
+
+    /// Sets every pixel within `radius` rows and columns of one that is set.
+    fn dilate(&mut self, radius: usize) {
+        for _ in 0..radius {
+            for row in self.words.chunks_exact_mut(self.words_per_row) {
+                let mut left = 0;
+                for index in 0..row.len() {
+                    let word = row[index];
+                    let right = row.get(index + 1).map_or(0, |next| next << 63);
+                    row[index] = word | word << 1 | word >> 1 | left | right;
+                    left = word >> 63;
+                }
+            }
+        }
+        let n = self.words_per_row;
+        let height = self.words.len() / n;
+        // What reaches `covered` rows reaches twice as far, and one more, when shifted by covered + 1; beyond the border nothing is kept.
+        let mut covered = 0;
+        while covered < radius {
+            let step = (covered + 1).min(radius - covered);
+            let before = self.words.clone();
+            for (v, row) in self.words.chunks_exact_mut(n).enumerate() {
+                let above = v.checked_sub(step);
+                let under = (v + step < height).then_some(v + step);
+                for other in above.into_iter().chain(under) {
+                    for (word, bits) in row.iter_mut().zip(&before[other * n..]) {
+                        *word |= bits;
+                    }
+                }
+            }
+            covered += step;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dilation_is_by_rows_and_columns() {
+        let region = PixelRegion {
+            u_min: 3,
+            u_max: 203,
+            v_min: 2,
+            v_max: 42,
+        };
+        let seeds = [(0, 0), (63, 20), (64, 5), (130, 39), (199, 12)];
+        for radius in 0..=10 {
+            let mut bits = BitRows::new(&region);
+            for (u, v) in seeds {
+                bits.set(v, u, &[1]);
+            }
+            bits.dilate(radius);
+            for v in 0..region.height() {
+                for u in 0..region.width() {
+                    let near =
+                        |(x, y): &(usize, usize)| u.abs_diff(*x).max(v.abs_diff(*y)) <= radius;
+                    assert_eq!(
+                        bits.get(u, v, 1) == 1,
+                        seeds.iter().any(near),
+                        "{u} {v} {radius}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Surface normals from a depth image that is not free of noise.
+//!
+//! A plane seen by a pinhole camera has an inverse depth that is *affine* in the pixel coordinates, so a normal is a linear
+//! least-squares fit of 1/z over a window of pixels, exact for planes at any tilt. The window's sums are carried along
+//! columns and rows, so the cost per pixel does not depend on its size; the size follows the noise found in the image.
+//! Windows never mix two sides of a depth edge: near one, a small window takes only the neighbours that are joined to the
+//! pixel by steps that are no edges.
+
+mod edges;
+mod gated;
+mod window;
+
+use std::ops::Range;
+
+use edges::Edges;
+use gated::gated_normal;
+use window::{ColumnSums, Rays, RowFits};
+
+use crate::camera::PinholeCamera;
+use crate::region::PixelRegion;
+
+/// The window is chosen so that the standard error of the slope (tangent of the tilt) stays below this, if it can be.
+const SLOPE_ERROR: f64 = 0.1;
+/// Smallest and largest window half sides, pixels.
+const RADIUS: std::ops::RangeInclusive<usize> = 2..=10;
+/// A step between neighbours steeper than a surface seen at this angle (degrees off frontal) is a depth edge …
+const EDGE_TILT_DEGREES: f64 = 85.0;
+/// … unless noise explains it: steps below this many of *their* standard deviations, √2 times a depth's, are not edges.
+const EDGE_SIGMAS: f64 = 5.0;
+/// Pixels examined for the noise estimate.
+const NOISE_SAMPLES: usize = 4096;
+/// Depths below this many metres carry no normal: their inverses would drown those of the pixels around in rounding.
+const MIN_DEPTH_METERS: f32 = 1e-4;
+
+/// Depth inside a region: metres, 0 where the pixel is not to be used. Row-major.
+pub(crate) struct DepthPatch<'a> {
+    pub(crate) region: PixelRegion,
+    pub(crate) camera: &'a PinholeCamera,
+    pub(crate) depth: &'a [f32],
+}
+
+/// Calls `found(row, first_column, normals)` for every row, from its first used pixel to its last; normals are in the camera frame
+/// and face the camera, and are zero where there is none.
+///
+/// Column and row count from the region's corner. Pixels without depth have no normal, nor those with too few neighbours on
+/// their own side of the depth edges (flying pixels, single-pixel lines).
+pub(crate) fn estimate_normals(
+    patch: &DepthPatch<'_>,
+    mut found: impl FnMut(usize, usize, &[[f32; 3]]),
+) {
+    let (width, height) = (patch.region.width(), patch.region.height());
+    if width == 0 || height == 0 {
+        return;
+    }
+    let noise = relative_noise(patch);
+    let focal = patch.camera.fx().min(patch.camera.fy());
+    let radius = window_radius(focal * noise);
+    #[allow(clippy::cast_possible_truncation)] // A relative step; f32 is the precision of depth.
+    let edge_step = (EDGE_TILT_DEGREES.to_radians().tan() / focal)
+        .max(EDGE_SIGMAS * std::f64::consts::SQRT_2 * noise) as f32;
+    let edges = Edges::find(patch, edge_step, radius);
+    let rays = Rays::new(patch);
+
+    let row = |v: usize| patch.depth.get(v * width..(v + 1) * width);
+    let mut columns = ColumnSums::new(width, radius);
+    for v in 0..radius.min(height) {
+        columns.slide(v, row(v));
+    }
+    let mut fits = RowFits::default();
+    for v in 0..height {
+        columns.slide(v + radius, row(v + radius));
+        let depth = row(v).unwrap_or_default();
+        let span = used(depth);
+        fits.fit(&columns, &rays, v, span.clone(), depth);
+        if let Some(edges) = &edges {
+            for u in edges.near.columns(v, width) {
+                if depth[u] >= MIN_DEPTH_METERS {
+                    let normal = gated_normal(patch, edges, &rays, (u, v), edge_step);
+                    fits.normals[u - span.start] =
+                        normal.map_or([0.0; 3], |normal| normal.into_inner().into());
+                }
+            }
+        }
+        found(v, span.start, &fits.normals);
+    }
+}
+
+/// The columns from the first pixel with depth to the last; empty when there is none.
+fn used(depth: &[f32]) -> Range<usize> {
+    let is_used = |z: &f32| *z > 0.0;
+    match (
+        depth.iter().position(is_used),
+        depth.iter().rposition(is_used),
+    ) {
+        (Some(first), Some(last)) => first..last + 1,
+        _ => 0..0,
+    }
+}
+
+/// Standard deviation of depth over depth, from the median second difference along rows.
+///
+/// Second differences of a smooth surface are tiny and those across edges few, so their median is noise:
+/// for white noise of deviation σ they are spread by √6 σ.
+fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
+    let width = patch.region.width();
+    let triples = patch.depth.len().saturating_sub(2);
+    let step = triples / NOISE_SAMPLES + 1;
+    let mut differences: Vec<f32> = (0..triples)
+        .step_by(step)
+        .filter(|i| i % width + 2 < width)
+        .filter_map(|i| {
+            let z = &patch.depth[i..i + 3];
+            (z[0] > 0.0 && z[1] > 0.0 && z[2] > 0.0)
+                .then(|| ((z[0] - 2.0 * z[1] + z[2]) / z[1]).abs())
+        })
+        .collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let middle = differences.len() / 2;
+    let (_, median, _) = differences.select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median) / (0.6745 * 6.0_f64.sqrt())
+}
+
+/// The smallest half side at which the slope's standard error, noise/√Σu², is within [`SLOPE_ERROR`].
+fn window_radius(slope_noise_per_pixel: f64) -> usize {
+    let needed = (slope_noise_per_pixel / SLOPE_ERROR).powi(2);
+    RADIUS
+        .clone()
+        .find(|r| {
+            let (side, r) = ((2 * r + 1) as f64, *r as f64);
+            // Σu² over a full (2r+1)² window.
+            side * side * r * (r + 1.0) / 3.0 >= needed
+        })
+        .unwrap_or(*RADIUS.end())
+}

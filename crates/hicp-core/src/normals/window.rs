@@ -1,0 +1,370 @@
+//! Plane fits over sliding windows, a row at a time.
+//!
+//! Sums over a window's rows are kept per column, each in an array of its own; a row's windows are differences of those
+//! carried along the row, and the fits are made for several pixels at once.
+
+use std::ops::Range;
+
+use nalgebra::{UnitVector3, Vector3};
+
+use super::{DepthPatch, MIN_DEPTH_METERS, used};
+use crate::vectorized::{VectorLoop, vectorized};
+
+/// Fewest pixels that a plane is fitted to.
+const MIN_SUPPORT: f64 = 6.0;
+/// Pixels fitted at a time.
+const LANES: usize = 8;
+
+/// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
+///
+/// Columns of zeros on both sides stand for what lies outside of the patch.
+pub(super) struct ColumnSums {
+    n: Vec<f64>,
+    v: Vec<f64>,
+    vv: Vec<f64>,
+    w: Vec<f64>,
+    vw: Vec<f64>,
+    width: usize,
+    radius: usize,
+    /// 1/z of the window's rows, so that what leaves is to the bit what entered; row r is at r modulo the number of rows.
+    inverse: Vec<f64>,
+    /// The columns that those rows use.
+    spans: Vec<Range<usize>>,
+}
+
+impl ColumnSums {
+    pub(super) fn new(width: usize, radius: usize) -> Self {
+        let rows = 2 * radius + 1;
+        // A block of lanes may begin at the last column.
+        let columns = || vec![0.0; width + 2 * (radius + 1) + LANES];
+        Self {
+            n: columns(),
+            v: columns(),
+            vv: columns(),
+            w: columns(),
+            vw: columns(),
+            width,
+            radius,
+            inverse: vec![0.0; width * rows],
+            spans: vec![0..0; rows],
+        }
+    }
+
+    /// Takes the next row in (`None` below the patch) and the one that it pushes out of the window out.
+    pub(super) fn slide(&mut self, entering: usize, depth: Option<&[f32]>) {
+        let slot = entering % self.spans.len();
+        let leaving = std::mem::replace(&mut self.spans[slot], 0..0);
+        if !leaving.is_empty() {
+            let v = entering as f64 - self.spans.len() as f64;
+            let (inverse, sums) = self.columns(slot, &leaving);
+            vectorized(SlideOut { inverse, sums, v });
+        }
+        let Some(depth) = depth else { return };
+        let span = used(depth);
+        if !span.is_empty() {
+            let depth = &depth[span.clone()];
+            let (inverse, sums) = self.columns(slot, &span);
+            vectorized(SlideIn {
+                depth,
+                inverse,
+                sums,
+                v: entering as f64,
+            });
+        }
+        self.spans[slot] = span;
+    }
+
+    /// A kept row's inverse depths and the sums n, v, vv, w, vw in some of its columns.
+    fn columns(&mut self, slot: usize, span: &Range<usize>) -> (&mut [f64], [&mut [f64]; 5]) {
+        let kept = slot * self.width;
+        let first = self.radius + 1;
+        let sums = [
+            &mut self.n,
+            &mut self.v,
+            &mut self.vv,
+            &mut self.w,
+            &mut self.vw,
+        ];
+        (
+            &mut self.inverse[kept + span.start..kept + span.end],
+            sums.map(|sums| &mut sums[first + span.start..first + span.end]),
+        )
+    }
+}
+
+/// A row that leaves the window.
+struct SlideOut<'a> {
+    inverse: &'a [f64],
+    sums: [&'a mut [f64]; 5],
+    v: f64,
+}
+
+impl VectorLoop for SlideOut<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [n, v, vv, w, vw] = self.sums;
+        add_row(self.inverse, n, v, vv, w, vw, self.v, -1.0);
+    }
+}
+
+/// A row that enters it.
+struct SlideIn<'a> {
+    depth: &'a [f32],
+    inverse: &'a mut [f64],
+    sums: [&'a mut [f64]; 5],
+    v: f64,
+}
+
+impl VectorLoop for SlideIn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (inverse, z) in self.inverse.iter_mut().zip(self.depth) {
+            let w = 1.0 / f64::from(*z);
+            *inverse = if *z >= MIN_DEPTH_METERS { w } else { 0.0 };
+        }
+        let [n, v, vv, w, vw] = self.sums;
+        add_row(self.inverse, n, v, vv, w, vw, self.v, 1.0);
+    }
+}
+
+/// Adds a row of inverse depths to the sums, or with a sign of −1 removes it. The slices are of one length.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // As parameters they are known not to overlap.
+fn add_row(
+    inverse: &[f64],
+    n: &mut [f64],
+    v: &mut [f64],
+    vv: &mut [f64],
+    w: &mut [f64],
+    vw: &mut [f64],
+    row: f64,
+    sign: f64,
+) {
+    let len = inverse.len();
+    let (n, v, vv) = (&mut n[..len], &mut v[..len], &mut vv[..len]);
+    let (w, vw) = (&mut w[..len], &mut vw[..len]);
+    for u in 0..len {
+        let inverse = inverse[u];
+        let one = if inverse > 0.0 { sign } else { 0.0 };
+        let signed = inverse * sign;
+        n[u] += one;
+        v[u] += one * row;
+        vv[u] += one * (row * row);
+        w[u] += signed;
+        vw[u] += signed * row;
+    }
+}
+
+/// The sums of several windows, one per lane: n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw, Σvw.
+type Sums = [[f64; LANES]; 9];
+
+/// The fits of a row.
+#[derive(Default)]
+pub(super) struct RowFits {
+    /// Unit normals toward the camera; zero where there is none.
+    pub(super) normals: Vec<[f32; 3]>,
+    blocks: Vec<Sums>,
+}
+
+impl RowFits {
+    /// Fits the windows around the pixels of row `v` in the columns of `span`.
+    pub(super) fn fit(
+        &mut self,
+        columns: &ColumnSums,
+        rays: &Rays,
+        v: usize,
+        span: Range<usize>,
+        depth: &[f32],
+    ) {
+        let blocks = span.len().div_ceil(LANES);
+        self.blocks.resize(blocks, [[0.0; LANES]; 9]);
+        self.normals.resize(blocks * LANES, [0.0; 3]);
+        vectorized(Fit {
+            columns,
+            rays,
+            v,
+            first: span.start,
+            blocks: &mut self.blocks,
+            normals: &mut self.normals,
+        });
+        self.normals.truncate(span.len());
+        for (normal, z) in self.normals.iter_mut().zip(&depth[span]) {
+            if *z < MIN_DEPTH_METERS {
+                *normal = [0.0; 3];
+            }
+        }
+    }
+}
+
+/// Fits the windows around a row's pixels from column `first` on.
+struct Fit<'a> {
+    columns: &'a ColumnSums,
+    rays: &'a Rays,
+    v: usize,
+    first: usize,
+    blocks: &'a mut [Sums],
+    normals: &'a mut [[f32; 3]],
+}
+
+#[inline(always)]
+fn lanes(numbers: &[f64], from: usize) -> [f64; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&numbers[from..from + LANES]);
+    lanes
+}
+
+impl Fit<'_> {
+    /// What each window gains at its right and loses at its left when it moves on by one pixel.
+    #[inline(always)]
+    fn differences(&mut self) {
+        let (columns, radius) = (self.columns, self.columns.radius);
+        for (block, from) in self.blocks.iter_mut().zip((self.first..).step_by(LANES)) {
+            // Column from + radius, and from − radius − 1, which the zeros on the left put at index `from`.
+            let (gained, lost) = (from + 2 * radius + 1, from);
+            let sums = [&columns.n, &columns.v, &columns.vv, &columns.w, &columns.vw];
+            let [gn, gv, gvv, gw, gvw] = sums.map(|sums| lanes(sums, gained));
+            let [ln, lv, lvv, lw, lvw] = sums.map(|sums| lanes(sums, lost));
+            for lane in 0..LANES {
+                let u = (from + lane) as f64;
+                let (g, l) = (u + radius as f64, u - radius as f64 - 1.0);
+                block[0][lane] = gn[lane] - ln[lane];
+                block[1][lane] = g * gn[lane] - l * ln[lane];
+                block[2][lane] = gv[lane] - lv[lane];
+                block[3][lane] = g * g * gn[lane] - l * l * ln[lane];
+                block[4][lane] = g * gv[lane] - l * lv[lane];
+                block[5][lane] = gvv[lane] - lvv[lane];
+                block[6][lane] = gw[lane] - lw[lane];
+                block[7][lane] = g * gw[lane] - l * lw[lane];
+                block[8][lane] = gvw[lane] - lvw[lane];
+            }
+        }
+    }
+
+    /// The window around the pixel before the first one.
+    #[inline(always)]
+    fn window_before(&self) -> [f64; 9] {
+        let (columns, radius) = (self.columns, self.columns.radius);
+        let mut window = [0.0; 9];
+        for index in self.first..self.first + 2 * radius + 1 {
+            let u = index as f64 - radius as f64 - 1.0;
+            let (n, v, w) = (columns.n[index], columns.v[index], columns.w[index]);
+            let (vv, vw) = (columns.vv[index], columns.vw[index]);
+            let column = [n, u * n, v, u * u * n, u * v, vv, w, u * w, vw];
+            for (sum, column) in window.iter_mut().zip(column) {
+                *sum += column;
+            }
+        }
+        window
+    }
+}
+
+impl VectorLoop for Fit<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        self.differences();
+        let mut window = self.window_before();
+        for block in self.blocks.iter_mut() {
+            for lane in 0..LANES {
+                for (sum, lanes) in window.iter_mut().zip(block.iter_mut()) {
+                    *sum += lanes[lane];
+                    lanes[lane] = *sum;
+                }
+            }
+        }
+        let y = self.rays.y[self.v];
+        let fits = self.blocks.iter().zip(self.normals.chunks_exact_mut(LANES));
+        for ((block, normals), from) in fits.zip((self.first..).step_by(LANES)) {
+            let x = lanes(&self.rays.x, from);
+            let mut fitted = [[0.0_f32; LANES]; 3];
+            for lane in 0..LANES {
+                let sums = WindowSums(block.map(|sums| sums[lane]));
+                let normal = sums.fit(self.rays, (from + lane) as f64, self.v as f64, x[lane], y);
+                fitted[0][lane] = normal[0];
+                fitted[1][lane] = normal[1];
+                fitted[2][lane] = normal[2];
+            }
+            for (lane, normal) in normals.iter_mut().enumerate() {
+                *normal = fitted.map(|fitted| fitted[lane]);
+            }
+        }
+    }
+}
+
+/// The sums of one window, in the order of [`Sums`].
+#[derive(Clone, Copy, Default)]
+pub(super) struct WindowSums([f64; 9]);
+
+impl WindowSums {
+    pub(super) fn add_pixel(&mut self, u: f64, v: f64, w: f64) {
+        let pixel = [1.0, u, v, u * u, u * v, v * v, w, u * w, v * w];
+        for (sum, pixel) in self.0.iter_mut().zip(pixel) {
+            *sum += pixel;
+        }
+    }
+
+    /// Returns the normal at pixel (u, v), facing the camera.
+    pub(super) fn normal(self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
+        let normal = self.fit(rays, u as f64, v as f64, rays.x[u], rays.y[v]);
+        (normal != [0.0; 3]).then(|| UnitVector3::new_unchecked(Vector3::from(normal)))
+    }
+
+    /// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀), facing the camera; zero when there is none.
+    ///
+    /// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation)] // Normals are kept in f32.
+    fn fit(self, rays: &Rays, u0: f64, v0: f64, x: f64, y: f64) -> [f32; 3] {
+        let [n, u, v, uu, uv, vv, w, uw, vw] = self.0;
+        // Central moments times n: integers but for those with w, and no division.
+        let suu = n * uu - u * u;
+        let suv = n * uv - u * v;
+        let svv = n * vv - v * v;
+        let suw = n * uw - u * w;
+        let svw = n * vw - v * w;
+        let determinant = suu * svv - suv * suv;
+        // b, c and w₀ times n · determinant: only their ratios matter.
+        let b = suw * svv - svw * suv;
+        let c = svw * suu - suw * suv;
+        let w0 = w * determinant + b * (n * u0 - u) + c * (n * v0 - v);
+        let (nx, ny) = (n * b * rays.fx, n * c * rays.fy);
+        let nz = w0 - x * nx - y * ny;
+        let norm = (nx * nx + ny * ny + nz * nz).sqrt();
+        // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
+        let determined = (n >= MIN_SUPPORT) & (determinant > 1e-3 * n * (suu + svv));
+        let fitted = determined & (w0 > 0.0) & (norm < f64::INFINITY);
+        let scale = -1.0 / norm;
+        let component = |n: f64| if fitted { (n * scale) as f32 } else { 0.0 };
+        [component(nx), component(ny), component(nz)]
+    }
+}
+
+/// Ray slopes (x/z, y/z) of the region's columns and rows.
+pub(super) struct Rays {
+    fx: f64,
+    fy: f64,
+    /// With zeros after the last column, as many as lanes.
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Rays {
+    pub(super) fn new(patch: &DepthPatch<'_>) -> Self {
+        let (camera, region) = (patch.camera, patch.region);
+        let columns =
+            (region.u_min..region.u_max).map(|u| (f64::from(u) - camera.cx()) / camera.fx());
+        Self {
+            fx: camera.fx(),
+            fy: camera.fy(),
+            x: columns.chain([0.0; LANES]).collect(),
+            y: (region.v_min..region.v_max)
+                .map(|v| (f64::from(v) - camera.cy()) / camera.fy())
+                .collect(),
+        }
+    }
+}

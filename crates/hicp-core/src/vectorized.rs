@@ -1,0 +1,64 @@
+//! Loops compiled for the vector units of the machine at hand.
+
+/// A loop that [`vectorized`] runs: plain Rust over arrays, which the compiler turns into vector instructions.
+///
+/// Mark `run` and what it calls `#[inline(always)]`, or it stays compiled for the baseline.
+pub trait VectorLoop {
+    /// What it returns.
+    type Output;
+
+    /// Runs.
+    fn run(self) -> Self::Output;
+}
+
+/// Runs a loop with AVX2 where the processor has it, found at run time, and as compiled for the baseline elsewhere.
+///
+/// Either way the bits are the same: the code is the same, lanes are added up in an order that it states, and neither
+/// contracts a product and a sum into one rounding.
+#[inline]
+pub fn vectorized<L: VectorLoop>(vector_loop: L) -> L::Output {
+    pulp::Arch::new().dispatch(Adapter(vector_loop))
+}
+
+struct Adapter<L>(L);
+
+impl<L: VectorLoop> pulp::NullaryFnOnce for Adapter<L> {
+    type Output = L::Output;
+
+    #[inline(always)]
+    fn call(self) -> L::Output {
+        self.0.run()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Clone)]
+    struct Sum([Vec<f64>; 2]);
+
+    impl VectorLoop for Sum {
+        type Output = [f64; 4];
+
+        #[inline(always)]
+        fn run(self) -> [f64; 4] {
+            let mut sums = [0.0; 4];
+            let [a, b] = &self.0;
+            for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
+                for lane in 0..4 {
+                    sums[lane] += a[lane] * b[lane];
+                }
+            }
+            sums
+        }
+    }
+
+    /// A product that is rounded before it is added differs from one that is not in half of such sums.
+    #[test]
+    fn the_bits_are_those_of_the_baseline() {
+        let numbers = |seed: f64| (0..4000).map(|i| (seed + f64::from(i)).sin()).collect();
+        let sum = Sum([numbers(0.1), numbers(0.7)]);
+        assert_eq!(sum.clone().run(), vectorized(sum));
+    }
+}

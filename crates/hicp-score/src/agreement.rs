@@ -1,0 +1,101 @@
+//! Counting agreeing pixels, many at a time.
+
+use hicp_core::VectorLoop;
+
+use crate::tolerances::{N_TOLERANCES, tolerances};
+
+/// Pixels counted at a time.
+const LANES: usize = 8;
+
+/// A row of pixels: what was rendered, what was measured, and the mask, from the same column on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row<'a> {
+    pub(crate) rendered: &'a [f32],
+    pub(crate) observed: &'a [f32],
+    pub(crate) masked: &'a [bool],
+    /// Column of the first pixel.
+    pub(crate) u: u32,
+    /// (v − cy) / fy.
+    pub(crate) y: f64,
+}
+
+/// Sums a region up, row by row.
+#[derive(Debug)]
+pub(crate) struct Agreement<R> {
+    pub(crate) rows: R,
+    pub(crate) cx: f64,
+    pub(crate) inverse_fx: f64,
+    pub(crate) diameter: f64,
+    /// See [`crate::MeanVsd::occlusion_tolerance`]; infinite for none.
+    pub(crate) occlusion_tolerance: f64,
+}
+
+/// What was found.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// Pixels of the intersection that differ by less than each tolerance.
+    pub(crate) correct: [u64; N_TOLERANCES],
+    /// Rendered pixels outside the mask that count against the pose.
+    pub(crate) outside: u64,
+}
+
+impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn run(self) -> Found {
+        let limits = tolerances();
+        let inverse_diameter = 1.0 / self.diameter;
+        let mut correct = [[0_u64; LANES]; N_TOLERANCES];
+        let mut outside = [0_u64; LANES];
+        for row in self.rows {
+            let squared_y = row.y * row.y + 1.0;
+            let width = row.rendered.len();
+            let mut first = 0;
+            while first < width {
+                // The last pixels of a row are filled up with ones that do not count.
+                let n = (width - first).min(LANES);
+                let (mut rendered, mut observed) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+                let mut masked = [false; LANES];
+                if n == LANES {
+                    rendered.copy_from_slice(&row.rendered[first..first + LANES]);
+                    observed.copy_from_slice(&row.observed[first..first + LANES]);
+                    masked.copy_from_slice(&row.masked[first..first + LANES]);
+                } else {
+                    rendered[..n].copy_from_slice(&row.rendered[first..]);
+                    observed[..n].copy_from_slice(&row.observed[first..]);
+                    masked[..n].copy_from_slice(&row.masked[first..]);
+                }
+                let mut relative = [0.0; LANES];
+                for lane in 0..LANES {
+                    let (z, measured) = (f64::from(rendered[lane]), f64::from(observed[lane]));
+                    let u = f64::from(row.u) + (first + lane) as f64;
+                    let x = (u - self.cx) * self.inverse_fx;
+                    let distance_per_depth = (x * x + squared_y).sqrt();
+                    let behind = (z - measured) * distance_per_depth;
+                    let seen = z > 0.0;
+                    let known = measured > 0.0;
+                    let counted = seen & known & masked[lane];
+                    let hidden = known & (behind > self.occlusion_tolerance);
+                    outside[lane] += u64::from(seen & !masked[lane] & !hidden);
+                    relative[lane] = if counted {
+                        behind.abs() * inverse_diameter
+                    } else {
+                        f64::INFINITY
+                    };
+                }
+                for (correct, limit) in correct.iter_mut().zip(limits) {
+                    for lane in 0..LANES {
+                        correct[lane] += u64::from(relative[lane] < limit);
+                    }
+                }
+                first += LANES;
+            }
+        }
+        let sum = |lanes: [u64; LANES]| lanes.iter().sum::<u64>();
+        Found {
+            correct: correct.map(sum),
+            outside: sum(outside),
+        }
+    }
+}
