@@ -14,7 +14,10 @@ use crate::filter::OutlierFilter;
 /// constant per pair.
 ///
 /// For where the mask or the depth beside edges is wrong. Right pairs at the rim are worth keeping: steep surface is there, and
-/// it is what holds an object across the optical axis.
+/// it is what holds an object across the optical axis. On simulated images with an exact mask, removing them raised the RMS error
+/// of projective point-to-plane by 3 % to 28 % for two solid objects and from 0.05 mm to 0.11 mm for a thin hammer; for that
+/// hammer at 0.5 % of noise alone did it help, from 0.36 mm to 0.26 mm
+/// (`cargo run --release -p hicp-tests --example nees_report 300`).
 ///
 /// Noise is not told from steps: where the depth of neighbours differs by as much as the limit, pairs go at random, and more
 /// of those on steep surface than on level.
