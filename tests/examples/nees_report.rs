@@ -52,6 +52,11 @@ fn main() {
                 ("fixed", Pairs::FixedAtTruth, exact),
                 ("ICP", Pairs::Icp, off),
                 ("ICP, selected anew", Pairs::Reselected, off),
+                (
+                    "ICP, selected anew, without boundary targets",
+                    Pairs::ReselectedInside,
+                    off,
+                ),
             ] {
                 row(
                     &format!("{label}; projective, point-to-plane"),

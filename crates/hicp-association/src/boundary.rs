@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Observation, PixelRegion};
+use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
 /// The largest width that counts, pixels.
 const MAX_WIDTH: u32 = 64;
@@ -10,11 +10,26 @@ const MAX_WIDTH: u32 = 64;
 /// What is taken for the boundary of a surface in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundaryRule {
-    pub(crate) width: u32,
-    pub(crate) max_step: f32,
+    width: u32,
+    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth.
+    max_step: f32,
 }
 
 impl BoundaryRule {
+    /// Makes the rule for the images of a camera: a surface on the optical axis, tilted by an angle, falls by tan(tilt)/f of
+    /// its depth from one pixel to the next, f the smaller focal length.
+    pub(crate) fn new(width: u32, max_tilt_degrees: f32, camera: &PinholeCamera) -> Self {
+        let focal = camera.fx().min(camera.fy());
+        #[allow(clippy::cast_possible_truncation)]
+        // A relative step; f32 is the precision of depth.
+        let max_step = if max_tilt_degrees >= 90.0 {
+            f32::INFINITY
+        } else {
+            (f64::from(max_tilt_degrees).to_radians().tan() / focal) as f32
+        };
+        Self { width, max_step }
+    }
+
     /// Returns whether pixel (u, v) of an image lies at a boundary: whether it shows no surface (`depth_at` returns 0 or
     /// less), or a pixel at a chessboard distance of r ≤ width shows none or one that is nearer or further by more than
     /// r·max_step of the nearer depth.

@@ -11,7 +11,7 @@ use crate::visible_surface::VisibleSurface;
 /// There a slight misalignment decides what a pixel shows, so projective pairs are wrong most often. The model is rendered
 /// at the stage's initial estimate (once, see [`Context::view`]) and every point judged by the pixel that it projects to:
 /// dropped when that pixel shows nothing, or when a pixel at a chessboard distance of r ≤ `width` shows nothing or surface
-/// nearer or further by more than r·`max_step` of the nearer depth. A point that is hidden is judged by what hides it. The
+/// nearer or further by more than r·tan(`max_tilt_degrees`)/f of the nearer depth, f the smaller focal length in pixels. A point that is hidden is judged by what hides it. The
 /// border of the image is no silhouette. Points that project outside the image are dropped. Cost: the inner selection, one
 /// render, and O((2·width + 1)²) per point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,19 +20,18 @@ pub struct WithoutBoundary<P> {
     pub inner: P,
     /// How many pixels wide the boundary is; above 64 counts as 64.
     pub width: u32,
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. NaN and negative
-    /// values make everything a boundary, unless `width` is 0.
-    pub max_step: f32,
+    /// Largest tilt of a surface against the image plane, degrees: what is steeper is a depth step. From 90 on nothing is. NaN
+    /// and negative values make everything a boundary, unless `width` is 0.
+    pub max_tilt_degrees: f32,
 }
 
 impl Default for WithoutBoundary<VisibleSurface> {
-    /// The visible surface but for one pixel along steps of 2 % of the depth: a surface tilted by 85° at a focal length of
-    /// 570 pixels.
+    /// The visible surface but for one pixel along the silhouette and where it is steeper than 85°.
     fn default() -> Self {
         Self {
             inner: VisibleSurface::default(),
             width: 1,
-            max_step: 0.02,
+            max_tilt_degrees: 85.0,
         }
     }
 }
@@ -47,10 +46,7 @@ impl<P: PointSelection> PointSelection for WithoutBoundary<P> {
         self.inner.select(context, camera_from_object, source);
         let camera = *context.problem.observation.camera();
         let image = camera.region();
-        let rule = BoundaryRule {
-            width: self.width,
-            max_step: self.max_step,
-        };
+        let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, &camera);
         let view = context.view(camera_from_object);
         source.retain(|surfel| {
             let point = camera_from_object * surfel.point.cast::<f64>();

@@ -20,7 +20,9 @@ use hicp_association::{
     MaxNormalAngle, MedianDistance, MinPairs, NormalWeight, OneToOne, OutlierFilter, SensorNoise,
     SensorNoiseWeight, Stride, Trimmed, VarTrimmed,
 };
-use hicp_core::{Pair, Point3, Surfel, UnitVector3, Vector3};
+use hicp_core::{
+    DepthImage, Mask, Observation, Pair, PinholeCamera, Point3, Surfel, UnitVector3, Vector3,
+};
 use proptest::prelude::*;
 
 fn scene() -> &'static Scene {
@@ -418,7 +420,17 @@ fn boundary_targets_follow_their_definition() {
             let masked = observation.mask().get(u, v)?;
             observation.depth().get(u, v).filter(|z| masked && *z > 0.0)
         };
-        for (width, max_step) in [(0, 0.02), (1, 0.02), (2, 0.02), (1, 10.0), (1, f32::NAN)] {
+        let focal = observation.camera().fx().min(observation.camera().fy());
+        for (width, max_tilt_degrees) in [
+            (0, 60.0),
+            (1, 60.0),
+            (2, 60.0),
+            (1, 85.0),
+            (1, 90.0),
+            (1, f32::NAN),
+        ] {
+            let slope = f64::from(max_tilt_degrees).to_radians().tan();
+            let max_step = (slope / focal) as f32;
             let reach = i64::from(width);
             let expected: Vec<Pair> = pairs
                 .iter()
@@ -438,7 +450,11 @@ fn boundary_targets_follow_their_definition() {
                 })
                 .copied()
                 .collect();
-            let kept = scene.filter(&mut BoundaryTargets { width, max_step }, &pairs);
+            let mut filter = BoundaryTargets {
+                width,
+                max_tilt_degrees,
+            };
+            let kept = scene.filter(&mut filter, &pairs);
             assert_eq!(kept, expected);
             assert_eq!(kept.len() == pairs.len(), width == 0);
             assert_eq!(kept.is_empty(), max_step.is_nan());
@@ -463,4 +479,43 @@ fn strides_and_lengths_take_any_value() {
     let model = &scene().model;
     assert_eq!(Length::Meters(-1.0).meters(model), -1.0);
     assert!(Length::Diameters(f32::NAN).meters(model).is_nan());
+}
+
+/// A limit in depth per pixel that fits one camera takes slanted surface for an edge in the next, with a quarter of the pixels.
+#[test]
+fn what_is_an_edge_does_not_depend_on_the_resolution() {
+    for zoom in [0.25, 1.0, 4.0] {
+        let camera = PinholeCamera::new(120.0 * zoom, 120.0 * zoom, 31.5, 23.5, 64, 48).unwrap();
+        // A plane through (0, 0, 0.5), tilted by 80° about the image's vertical; then one by 88°.
+        for (degrees, is_edge) in [(80.0_f64, false), (88.0, true)] {
+            let slope = degrees.to_radians().tan();
+            let depth = |u: f64| 0.5 / (1.0 - slope * (u - 31.5) / (120.0 * zoom));
+            // Near the axis alone: further out the rays meet the plane at another angle.
+            let columns = 30..34;
+            let pixels = (0..48).flat_map(|_| {
+                (0..64).map(|u| {
+                    if columns.contains(&u) {
+                        depth(f64::from(u)) as f32
+                    } else {
+                        0.0
+                    }
+                })
+            });
+            let depth = DepthImage::from_meters(64, 48, pixels.collect()).unwrap();
+            let scene = Scene {
+                observation: Observation::new(depth, Mask::full(64, 48), camera).unwrap(),
+                ..ball_scene()
+            };
+            let target = Surfel {
+                point: Point3::new(0.0, 0.0, 0.5),
+                normal: -Vector3::z_axis(),
+            };
+            // Columns 31 and 32 of row 24 have neighbours on both sides.
+            let region = scene.observation.region();
+            let index = |u: u32| (24 - region.v_min) * region.width() as u32 + u - region.u_min;
+            let pairs = [31, 32].map(|u| Pair::new(0, target, index(u), target));
+            let kept = scene.filter(&mut BoundaryTargets::default(), &pairs);
+            assert_eq!(kept.len(), if is_edge { 0 } else { 2 }, "{zoom} {degrees}");
+        }
+    }
 }

@@ -360,12 +360,17 @@ fn without_boundary_follows_its_definition() {
         let pose = scene.nearby(3);
         let stride = Stride::Pixels(1);
         let all = scene.select(&mut VisibleSurface { stride }, &pose);
-        for (width, max_step) in [(0, 0.02), (1, 0.02), (2, 0.01), (1, 1.0), (3, f32::NAN)] {
+        let camera = scene.observation.camera();
+        let focal = camera.fx().min(camera.fy());
+        for (width, max_tilt_degrees) in [(0, 60.0), (1, 60.0), (2, 45.0), (1, 85.0), (3, f32::NAN)]
+        {
+            let slope = f64::from(max_tilt_degrees).to_radians().tan();
+            let max_step = (slope / focal) as f32;
             let inner = VisibleSurface { stride };
             let mut selection = WithoutBoundary {
                 inner,
                 width,
-                max_step,
+                max_tilt_degrees,
             };
             let kept = scene.select(&mut selection, &pose);
             assert_eq!(

@@ -175,6 +175,39 @@ mod tests {
         assert!(judge(&mut rule, about).is_continue());
     }
 
+    /// Lengths compared with squares of lengths, cosines with angles: thresholds that are off by orders of magnitude.
+    #[test]
+    fn limits_are_metres_and_degrees_not_their_squares_or_cosines() {
+        let origin = Isometry3::identity();
+        let turn =
+            |degrees: f64| Isometry3::rotation(hicp_core::Vector3::y() * degrees.to_radians());
+        let shift = |meters: f64| Isometry3::translation(0.0, meters, 0.0);
+        for (meters, degrees) in [(1e-4, 0.01), (0.02, 3.0), (0.5, 170.0)] {
+            let mut motion = Motion {
+                translation_meters: meters,
+                rotation_degrees: degrees,
+            };
+            let mut bound = Bound {
+                translation_meters: meters,
+                rotation_degrees: degrees,
+            };
+            let mut oscillation = Oscillation::new(meters, degrees);
+            for (by, small) in [(0.999, true), (1.001, false)] {
+                for moved in [shift(meters * by), turn(degrees * by)] {
+                    assert_eq!(check(&mut motion, &origin, &moved).is_break(), small);
+                    // The initial pose is `at(0.0)`.
+                    let pose = at(0.0) * moved;
+                    assert_eq!(check(&mut bound, &pose, &origin).is_continue(), small);
+                    // There, far away, and back to almost there.
+                    oscillation.start();
+                    assert!(check(&mut oscillation, &origin, &origin).is_continue());
+                    assert!(check(&mut oscillation, &at(10.0), &origin).is_continue());
+                    assert_eq!(check(&mut oscillation, &moved, &origin).is_break(), small);
+                }
+            }
+        }
+    }
+
     #[test]
     fn bounds_reject_what_is_outside() {
         let mut rule = Bound::default();

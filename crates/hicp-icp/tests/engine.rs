@@ -4,10 +4,11 @@
 
 mod script;
 
-use hicp_core::Isometry3;
+use hicp_core::{Correspondences, Isometry3, Pair};
 use hicp_icp::{
-    Convergence, Divergence, Evaluation, IterationLimit, Stage, StopRule, Termination, Verdict,
+    Convergence, Divergence, Evaluation, Icp, IterationLimit, Stage, StopRule, Termination, Verdict,
 };
+use hicp_metric::{ErrorMetric, NormalEquations, Step};
 use script::support::{bits, pose};
 use script::{Line, Log, returned, run, run_observed, scripted};
 
@@ -234,6 +235,50 @@ fn steps_without_end_stop_at_the_last_finite_pose() {
     );
     assert_eq!(outcome.termination, Termination::NoPairs);
     assert_eq!(returned(&outcome), f64::MAX);
+}
+
+/// Steps by a metre until an evaluation from which on the step is not a number.
+#[derive(Clone)]
+struct Breaking {
+    script: script::Scripted,
+    from: f32,
+    with: f64,
+}
+
+impl ErrorMetric for Breaking {
+    fn linearize(&self, _: &Pair, _: &mut NormalEquations) {}
+
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+        let step = self.script.minimize(pairs)?;
+        let broken = pairs.as_slice()[0].source.point.x >= self.from;
+        let by = if broken { self.with } else { 1.0 };
+        Some(Step {
+            increment: Isometry3::translation(by, 0.0, 0.0),
+            ..step
+        })
+    }
+}
+
+/// A step that is skipped in silence, and success reported, hides that nothing was done.
+#[test]
+fn a_step_that_is_not_a_number_ends_the_run_at_the_last_evaluated_pose_and_says_so() {
+    for with in [f64::NAN, f64::INFINITY] {
+        for from in [0.0, 1.0, 3.0] {
+            let script = script::Scripted::new(&FALLING);
+            let mut stage = Icp {
+                selection: script.clone(),
+                association: script.clone(),
+                filter: (),
+                metric: Breaking { script, from, with },
+                stop: IterationLimit(10),
+            };
+            let outcome = run(&mut stage, &Isometry3::identity());
+            assert_eq!(outcome.termination, Termination::Degenerate);
+            assert_eq!(returned(&outcome), f64::from(from));
+            let kept = Verdict::KeptInitial(Termination::Degenerate);
+            assert_eq!(outcome.verdict == kept, from == 0.0);
+        }
+    }
 }
 
 #[test]

@@ -147,6 +147,18 @@ mod tests {
         assert_eq!(pose.translation_mm, [0.1, -0.2, 1035.65777]);
     }
 
+    /// Guessing metres from a small number and millimetres from a large one is right until an object is near or far.
+    #[test]
+    fn translations_are_millimetres_whatever_their_size() {
+        for mm in [0.5, 1.0, 99.0, 101.0, 1035.0, 250_000.0] {
+            let pose = read(&format!(
+                r#"{{"cam_R_m2c":[1,0,0,0,1,0,0,0,1],"cam_t_m2c":[0,0,{mm}]}}"#
+            ));
+            let z = pose.unwrap().camera_from_object.translation.z;
+            assert!((z - mm / 1000.0).abs() < 1e-15 * mm, "{mm}: {z}");
+        }
+    }
+
     #[test]
     fn every_fault_is_named() {
         let good = "[1,0,0,0,1,0,0,0,1]";

@@ -181,6 +181,25 @@ fn mean_loss_minimize_and_system_agree() {
 }
 
 /// No pair, one pair, pairs all in one place, pairs without weight: a step or none, never a number that is none.
+/// A sum would fall as pairs are lost, and rise as they are found.
+#[test]
+fn the_loss_is_a_mean_that_does_not_depend_on_how_many_pairs_there_are() {
+    let mut numbers = Numbers(19);
+    let pairs = messy(&mut numbers, 40);
+    let mut thrice = pairs.clone();
+    thrice.extend(pairs.as_slice().iter().copied());
+    thrice.extend(pairs.as_slice().iter().copied());
+    for mut metric in metrics() {
+        let (once, more) = (
+            metric.minimize(&pairs).unwrap().mean_loss,
+            metric.minimize(&thrice).unwrap().mean_loss,
+        );
+        assert!((once - more).abs() < 1e-12 * once, "{}", metric.name());
+        let more = metric.mean_loss(&thrice).unwrap();
+        assert!((once - more).abs() < 1e-12 * once, "{}", metric.name());
+    }
+}
+
 #[test]
 fn few_and_coincident_pairs_give_no_nonsense() {
     let mut numbers = Numbers(16);

@@ -111,7 +111,7 @@ fn selection(part: &Reader<'_>) -> Result<Selection, PipelineError> {
         "without-boundary" => Box::new(WithoutBoundary {
             inner: inner()?,
             width: part.count("width")?,
-            max_step: part.number("max_step")? as f32,
+            max_tilt_degrees: part.number("max_tilt_degrees")? as f32,
         }),
         "uniform-count" => Box::new(UniformCount {
             inner: inner()?,
@@ -215,7 +215,7 @@ fn filter(part: &Reader<'_>) -> Result<Filter, PipelineError> {
         "one-to-one" => Box::new(OneToOne::default()),
         "boundary-targets" => Box::new(BoundaryTargets {
             width: part.count("width")?,
-            max_step: part.number("max_step")? as f32,
+            max_tilt_degrees: part.number("max_tilt_degrees")? as f32,
         }),
         "min-pairs" => Box::new(MinPairs {
             count: part.count("count")? as usize,
