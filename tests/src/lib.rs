@@ -33,7 +33,8 @@ impl Scene {
         .expect("sizes agree")
     }
 
-    /// The same view with an upright bar at `meters` before the camera, over a `share` of the width of the mask's middle.
+    /// The same view with an upright bar over a `share` of the width of the mask's middle, flat, and nearer than the nearest
+    /// point of the object by `meters`.
     ///
     /// `masked` says whether the segmentation takes the bar for the object, as detectors do with hands and grippers.
     pub fn behind_a_bar(&self, share: f64, meters: f32, masked: bool) -> Observation {
@@ -48,8 +49,14 @@ impl Scene {
             let (u, v) = (i as u32 % width, i as u32 / width);
             region.contains(u, v) && (f64::from(u) - middle).abs() < half
         };
-        let depth = self.observation.depth().pixels().iter().enumerate();
-        let depth = depth.map(|(i, z)| if on_bar(i) { meters } else { *z });
+        let depth = self.observation.depth().pixels();
+        let nearest = depth
+            .iter()
+            .copied()
+            .filter(|z| *z > 0.0)
+            .fold(f32::INFINITY, f32::min);
+        let depth = depth.iter().enumerate();
+        let depth = depth.map(|(i, z)| if on_bar(i) { nearest - meters } else { *z });
         let mask = self.observation.mask().pixels().iter().enumerate();
         let mask = mask.map(|(i, on)| *on && (masked || !on_bar(i)));
         Observation::new(

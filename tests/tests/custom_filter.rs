@@ -69,7 +69,7 @@ fn it_keeps_the_laws() {
 fn it_finds_the_object_where_the_mask_holds_something_else_too() {
     let mut starts = starts(3, 0.5);
     for Start { scene, .. } in &mut starts {
-        scene.observation = scene.behind_a_bar(0.3, 0.25, true);
+        scene.observation = scene.behind_a_bar(0.3, 0.02, true);
     }
     let plain = measure_stage(&mut projective(()), &starts);
     let mine = measure_stage(&mut projective(graduated()), &starts);

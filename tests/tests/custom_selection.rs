@@ -70,7 +70,7 @@ fn it_keeps_the_laws() {
 fn behind_an_obstacle_it_refines_where_the_whole_visible_surface_is_misled() {
     let mut starts = starts(3, 0.5);
     for Start { scene, .. } in &mut starts {
-        scene.observation = scene.behind_a_bar(0.4, 0.2, false);
+        scene.observation = scene.behind_a_bar(0.4, 0.05, false);
     }
     let plain = measure_stage(&mut nearest(VisibleSurface::default()), &starts);
     let mine = measure_stage(&mut nearest(unhidden()), &starts);
