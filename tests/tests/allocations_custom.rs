@@ -9,7 +9,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use custom_association::SoftProjective;
-use custom_metric::FreeSpace;
+use custom_metric::AlongRay;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
 use hybrid_icp::{
@@ -50,13 +50,13 @@ fn warm_allocations(association: impl DataAssociation + Send + 'static) -> (usiz
     let mut rng = rng(3);
     let scene = scene(Household::Mug, 1.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
-    let free_space = FreeSpace { hidden_share: 0.1 };
+    let along_ray = AlongRay { min_cosine: 0.2 };
     let mut refiner = Refiner::new(Icp {
         selection: VisibleSurface::default(),
         association,
         filter: (),
         metric: WeightedSum {
-            terms: ((1.0, PointToPlane), (0.2, free_space)),
+            terms: ((1.0, PointToPlane), (0.5, along_ray)),
         },
         stop: (Divergence::count_aware(), IterationLimit(20)),
     });
