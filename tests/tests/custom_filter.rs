@@ -1,5 +1,6 @@
 //! A filter of one's own: weights that grow stricter from iteration to iteration.
 
+use hicp_sim::MEAN_ROTATION_ERROR_DEGREES;
 use hicp_testkit::{FilterLaws, check_filter};
 use hicp_tests::starts::{Start, measure_stage, starts};
 use hybrid_icp::{
@@ -74,6 +75,7 @@ fn it_finds_the_object_where_the_mask_holds_something_else_too() {
     let plain = measure_stage(&mut projective(()), &starts);
     let mine = measure_stage(&mut projective(graduated()), &starts);
     assert!(mine.degrees < 0.5 * plain.degrees, "{mine:?}\n{plain:?}");
+    assert!(mine.degrees < 0.5 * MEAN_ROTATION_ERROR_DEGREES, "{mine:?}");
     assert!(
         mine.millimeters < 0.5 * plain.millimeters,
         "{mine:?}\n{plain:?}"

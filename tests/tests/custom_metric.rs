@@ -72,7 +72,6 @@ fn alone_and_beside_planes_it_ends_nearer_the_truth_than_planes_alone() {
     let planes = measure_stage(&mut projective(PointToPlane), &starts);
     let mine = measure_stage(&mut projective(ALONG_RAY), &starts);
     let both = measure_stage(&mut projective(with_planes()), &starts);
-    eprintln!("{mine:?}\n{both:?}\n{planes:?}");
     assert!(mine.degrees < 0.7 * planes.degrees, "{mine:?}\n{planes:?}");
     assert!(
         mine.millimeters < 0.7 * planes.millimeters,
