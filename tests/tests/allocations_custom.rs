@@ -90,7 +90,8 @@ impl DataAssociation for Wasteful {
         pairs: &mut Correspondences,
     ) {
         let mut soft = SOFT;
-        soft.associate(context, &source.to_vec(), pose, pairs);
+        let copy: Vec<Surfel> = source.iter().copied().collect();
+        soft.associate(context, &copy, pose, pairs);
     }
 }
 

@@ -11,7 +11,7 @@ use hybrid_icp::{
 
 mod scene;
 
-/// Ends a stage when two increments in a row would move the image of the object by less than a share of a pixel: what nobody
+/// Ends a stage when two increments in a row would move the image of the object by less than some pixels: what nobody
 /// sees is not worth another turn.
 struct SubPixel {
     pixels: f64,
@@ -32,7 +32,7 @@ impl StopRule for SubPixel {
             .translation
             .vector;
         let turned = progress.increment.rotation.angle() * self.radius_meters;
-        let motion = self.focal_length * ((moved - position).norm() + turned) / position.z;
+        let motion = self.focal_length * ((moved - position).norm() + turned) / position.z.abs();
         self.quiet = if motion < self.pixels {
             self.quiet + 1
         } else {
@@ -49,7 +49,7 @@ impl StopRule for SubPixel {
 fn main() -> Result<(), Box<dyn Error>> {
     let given = scene::Scene::new()?;
     let sub_pixel = SubPixel {
-        pixels: 0.05,
+        pixels: 1.0,
         focal_length: given.camera.fx(),
         radius_meters: given.problem()?.0.radius(),
         quiet: 0,

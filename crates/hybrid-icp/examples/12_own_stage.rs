@@ -24,7 +24,7 @@ impl<S: Stage> Stage for AlongTheRay<S> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
-        let mut mve = |session: &mut Session<'_>, outcome: &Outcome| {
+        let mve = |session: &mut Session<'_>, outcome: &Outcome| {
             let mut context = session.workspace.context(problem);
             MeanVsd::default().score(&mut context, &outcome.camera_from_object)
         };
