@@ -32,29 +32,20 @@ impl DataAssociation for SoftProjective {
         let radius = i16::from(self.radius_pixels);
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            let Some(pixel) = observation.camera().project(&source.point.cast()) else {
+            let pixel = observation.camera().project(&source.point.cast());
+            let Some(pixel) = pixel.filter(|_| source.point.z.is_finite()) else {
                 continue;
             };
-            if !source.point.z.is_finite() {
-                continue;
-            }
+            let (u, v) = (pixel.x as f32, pixel.y as f32);
             let first = pairs.len();
-            for (dv, du) in (-radius..=radius).flat_map(|v| (-radius..=radius).map(move |u| (v, u)))
-            {
-                let (u, v) = (
-                    pixel.x as f32 + f32::from(du),
-                    pixel.y as f32 + f32::from(dv),
-                );
-                let Some(index) = observation.index_near(u, v) else {
-                    continue;
-                };
-                let Some(target) = observation.surfel(index) else {
-                    continue;
-                };
-                let mut pair = Pair::new(source_index, source, index, *target);
+            let offsets = (-radius..=radius).map(f32::from);
+            let window = (offsets.clone()).flat_map(|dv| offsets.clone().map(move |du| (du, dv)));
+            pairs.extend(window.filter_map(|(du, dv)| {
+                let index = observation.index_near(u + du, v + dv)?;
+                let mut pair = Pair::new(source_index, source, index, *observation.surfel(index)?);
                 pair.weight = (-0.5 * (pair.distance() / self.sigma_meters).powi(2)).exp();
-                pairs.push(pair);
-            }
+                Some(pair)
+            }));
             let own = &mut pairs.as_mut_slice()[first..];
             let sum: f32 = own.iter().map(|pair| pair.weight).sum();
             own.iter_mut().for_each(|pair| pair.weight /= sum.max(1e-6));

@@ -65,7 +65,7 @@ fn as_a_guard_it_lets_pass_what_covers_the_mask_better_and_nothing_else() {
             let init = perturb(&mut rng, &scene.truth, translation, angle);
             let problem = Problem::new(&scene.model, &scene.observation);
             let mut score = |pose| Silhouette.score(&mut workspace.context(&problem), pose);
-            let mut refine = |stage| {
+            let refine = |stage| {
                 Refiner::boxed(stage)
                     .refine(&scene.model, &scene.observation, &init)
                     .outcome
