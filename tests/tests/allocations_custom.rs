@@ -90,7 +90,7 @@ impl DataAssociation for Wasteful {
         pairs: &mut Correspondences,
     ) {
         let mut soft = SOFT;
-        let copy: Vec<Surfel> = source.iter().copied().collect();
+        let copy = source.to_vec();
         soft.associate(context, &copy, pose, pairs);
     }
 }
