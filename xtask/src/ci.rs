@@ -55,7 +55,7 @@ pub(crate) fn run(root: &Path) -> Findings {
     readme(root)
 }
 
-/// Runs the façade's numbered examples; each fails unless it refines what it is given.
+/// Runs the façade's numbered examples; each fails unless it does what it says.
 fn examples(root: &Path) -> Findings {
     let folder = "crates/hybrid-icp/examples";
     let entries =
