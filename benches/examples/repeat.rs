@@ -1,7 +1,7 @@
 //! Runs one pipeline over and over, for a profiler: `cargo run --release -p hicp-benches --example repeat -- hybrid 200`.
 //!
 //! Cold runs: each makes its observation anew. Prints the 5th percentile of the time per object, which other work on the machine hardly moves.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::time::Instant;
 

@@ -32,6 +32,40 @@ impl Scene {
         )
         .expect("sizes agree")
     }
+
+    /// The same view with an upright bar over a `share` of the width of the mask's middle, flat, and nearer than the nearest
+    /// point of the object by `meters`.
+    ///
+    /// `masked` says whether the segmentation takes the bar for the object, as detectors do with hands and grippers.
+    pub fn behind_a_bar(&self, share: f64, meters: f32, masked: bool) -> Observation {
+        let (width, height) = (
+            self.observation.camera().width(),
+            self.observation.camera().height(),
+        );
+        let region = self.observation.mask().bounding_region();
+        let half = region.width() as f64 * share / 2.0;
+        let middle = f64::from(region.u_min + region.u_max) / 2.0;
+        let on_bar = |i: usize| {
+            let (u, v) = (i as u32 % width, i as u32 / width);
+            region.contains(u, v) && (f64::from(u) - middle).abs() < half
+        };
+        let depth = self.observation.depth().pixels();
+        let nearest = depth
+            .iter()
+            .copied()
+            .filter(|z| *z > 0.0)
+            .fold(f32::INFINITY, f32::min);
+        let depth = depth.iter().enumerate();
+        let depth = depth.map(|(i, z)| if on_bar(i) { nearest - meters } else { *z });
+        let mask = self.observation.mask().pixels().iter().enumerate();
+        let mask = mask.map(|(i, on)| *on && (masked || !on_bar(i)));
+        Observation::new(
+            DepthImage::from_meters(width, height, depth.collect()).expect("sizes agree"),
+            Mask::new(width, height, mask.collect()).expect("sizes agree"),
+            *self.observation.camera(),
+        )
+        .expect("sizes agree")
+    }
 }
 
 /// Returns the median; the mean of the two middle values of an even number. Sorts the values; NaN without any.

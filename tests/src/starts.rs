@@ -3,7 +3,9 @@
 use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
 };
-use hybrid_icp::{Isometry3, PipelineFile, Problem, Rasterizer, Session, Verdict, Workspace};
+use hybrid_icp::{
+    Isometry3, PipelineFile, Problem, Rasterizer, Session, Stage, Verdict, Workspace,
+};
 
 use crate::{Scene, median, scene, symmetric_pose_distance};
 
@@ -61,6 +63,11 @@ pub struct Row {
 pub fn measure(pipeline: &str, starts: &[Start]) -> Row {
     let file = PipelineFile::parse(pipeline, "row").unwrap_or_else(|e| panic!("{e}"));
     let mut stage = file.build().unwrap_or_else(|e| panic!("{e}\n{pipeline}"));
+    measure_stage(&mut stage, starts)
+}
+
+/// Runs a stage from every start.
+pub fn measure_stage(stage: &mut dyn Stage, starts: &[Start]) -> Row {
     let mut workspace = Workspace::new(Rasterizer::default());
     let (mut degrees, mut millimeters, mut iterations) = (Vec::new(), Vec::new(), Vec::new());
     let mut kept = 0.0;

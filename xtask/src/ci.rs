@@ -51,7 +51,40 @@ pub(crate) fn run(root: &Path) -> Findings {
         ],
         &none,
     )?;
+    examples(root)?;
     readme(root)
+}
+
+/// Runs the façade's numbered examples; each fails unless it does what it says.
+fn examples(root: &Path) -> Findings {
+    let folder = "crates/hybrid-icp/examples";
+    let entries =
+        std::fs::read_dir(root.join(folder)).map_err(|error| vec![format!("{folder}: {error}")])?;
+    let mut names: Vec<String> = entries
+        .flatten()
+        .filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            Some(name.strip_suffix(".rs")?.to_owned())
+        })
+        .collect();
+    names.sort();
+    let none: [(&str, &str); 0] = [];
+    for name in names {
+        cargo(
+            root,
+            &format!("example {name}"),
+            &[
+                "run",
+                "--quiet",
+                "--package",
+                "hybrid-icp",
+                "--example",
+                &name,
+            ],
+            &none,
+        )?;
+    }
+    Ok(())
 }
 
 /// Runs the commands of the README's first block, but for the tests, which have run.

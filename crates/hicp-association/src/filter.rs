@@ -10,6 +10,9 @@ pub trait OutlierFilter {
     fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences);
 
     /// Says which iteration of a stage, from 0, the next pairs belong to, for filters that change from one to the next.
+    ///
+    /// Pure given the iteration: only the number announced last counts, not which came before. A stage announces 0 to a filter
+    /// that has seen others, and goes back by one to measure the pose that it returns after a rejected one.
     fn begin(&mut self, iteration: usize) {
         let _ = iteration;
     }

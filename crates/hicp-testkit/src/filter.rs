@@ -4,7 +4,7 @@ use hybrid_icp::{Correspondences, OutlierFilter, Pair};
 
 use crate::association::finite;
 use crate::law::{BOXED, PURE, Subject, bits};
-use crate::pairs::{good_pairs, hard_pairs};
+use crate::pairs::{PairSet, good_pairs, hard_pairs};
 
 /// What [`check_filter`] may take for granted of a filter beyond the trait's contract.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,6 +23,7 @@ pub struct FilterLaws {
 /// - Weights of finite pairs stay finite and not negative.
 /// - The pose and the number of candidates noted in the pairs stay.
 /// - Pure: a fresh and a used instance give the same bits, and so does a boxed one and a chain of it alone.
+/// - Pure given the iteration: what [`OutlierFilter::begin`] announced last decides, not which iterations were begun before.
 /// - Never panics: also with no pair, one, equal distances, and numbers that are not finite.
 /// - As declared in [`FilterLaws`].
 ///
@@ -33,34 +34,73 @@ pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: Filt
     let subject = Subject::new::<T>(None);
     let mut used = make();
     for set in good_pairs().into_iter().chain(hard_pairs()) {
-        let input = set.label.as_str();
-        let filtered = |filter: &mut dyn OutlierFilter, pairs: &Correspondences| {
-            let mut pairs = pairs.clone();
-            subject.calm(input, || filter.filter(&set.problem, &mut pairs));
-            pairs
-        };
-        let expected = filtered(&mut make(), &set.pairs);
-        contract(&subject, input, laws, &set.pairs, &expected);
-        subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
-        subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
-        let mut boxed: Box<dyn OutlierFilter> = Box::new(make());
-        subject.same(BOXED, input, &expected, &filtered(&mut boxed, &set.pairs));
-        let mut chain = (make(),);
-        subject.same(
-            "a chain of one filter is that filter",
-            input,
-            &expected,
-            &filtered(&mut chain, &set.pairs),
-        );
-        if laws.idempotent {
+        for iteration in ITERATIONS {
+            let input = format!("{}, iteration {iteration}", set.label);
+            let input = input.as_str();
+            let filtered = |filter: &mut dyn OutlierFilter, pairs: &Correspondences| {
+                subject.calm(input, || run(filter, &set, iteration, pairs))
+            };
+            let expected = filtered(&mut make(), &set.pairs);
+            contract(&subject, input, laws, &set.pairs, &expected);
+            for before in histories(iteration) {
+                let mut filter = make();
+                for earlier in &before {
+                    subject.calm(input, || run(&mut filter, &set, *earlier, &set.pairs));
+                }
+                let input = format!("{input}, after the iterations {before:?}");
+                let found = filtered(&mut filter, &set.pairs);
+                subject.same(SCHEDULED, &input, &expected, &found);
+            }
+            subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
+            subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
+            let mut boxed: Box<dyn OutlierFilter> = Box::new(make());
+            subject.same(BOXED, input, &expected, &filtered(&mut boxed, &set.pairs));
             subject.same(
-                "idempotent, as declared: filtering twice is filtering once",
+                "a chain of one filter is that filter",
                 input,
                 &expected,
-                &filtered(&mut make(), &expected),
+                &filtered(&mut (make(),), &set.pairs),
             );
+            if laws.idempotent {
+                subject.same(
+                    "idempotent, as declared: filtering twice is filtering once",
+                    input,
+                    &expected,
+                    &filtered(&mut make(), &expected),
+                );
+            }
         }
     }
+}
+
+/// The iterations in which filters are tried.
+const ITERATIONS: [usize; 4] = [0, 1, 4, 49];
+
+/// Schedules, in messages.
+const SCHEDULED: &str = "pure given the iteration: which iterations came before decides nothing";
+
+/// Iterations that may have come before one: the regular ones, none of them, later ones of a run before, and the same, as
+/// after a rejected pose.
+fn histories(iteration: usize) -> [Vec<usize>; 4] {
+    [
+        (0..iteration).collect(),
+        vec![iteration + 30],
+        vec![0, 1, 2, 3],
+        vec![iteration, iteration + 1],
+    ]
+}
+
+/// Filters a copy of the pairs as a stage does in an iteration.
+fn run(
+    filter: &mut dyn OutlierFilter,
+    set: &PairSet,
+    iteration: usize,
+    pairs: &Correspondences,
+) -> Correspondences {
+    let mut pairs = pairs.clone();
+    filter.begin(iteration);
+    filter.filter(&set.problem, &mut pairs);
+    pairs
 }
 
 fn contract(

@@ -46,6 +46,10 @@
 //! `std::alloc::System`; refine twice with one `Refiner`, and compare the count before and after the second time.
 //! `tests/tests/allocations_custom.rs` in the repository is such a test, to be copied.
 //!
+//! *Observers* have one law, that looking changes nothing, and it is the engine that keeps it.
+//!
+//! `tests/tests/custom_*.rs` in the repository show a component for every extension point, checked and in a whole pipeline.
+//!
 //! Modules in reading order: `law` (messages), `scenes` and `pairs` (inputs), then one per extension point: `selection`,
 //! `association`, `filter`, `metric`, `stop`, `score` (and switchers), `stage`, `renderer`.
 

@@ -271,6 +271,39 @@ fn filters() {
     });
 }
 
+/// Keeps fewer pairs from iteration to iteration, by a memory of those begun so far.
+struct Remembers {
+    turns: usize,
+    remember: fn(usize, usize) -> usize,
+}
+
+impl OutlierFilter for Remembers {
+    fn begin(&mut self, iteration: usize) {
+        self.turns = (self.remember)(self.turns, iteration);
+    }
+
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let limit = 0.05 / (1.0 + self.turns as f32);
+        pairs.retain(|pair| pair.distance() < limit);
+    }
+}
+
+#[test]
+fn filters_that_remember_what_iterations_came_before() {
+    let remembers = |remember| move || Remembers { turns: 0, remember };
+    let law = "pure given the iteration";
+    caught(law, || {
+        let counts = |turns, _| turns + 1;
+        check_filter(remembers(counts), FilterLaws::default());
+    });
+    caught(law, || {
+        let never_back = |turns: usize, iteration| turns.max(iteration);
+        check_filter(remembers(never_back), FilterLaws::default());
+    });
+    // The same without the memory is a schedule.
+    check_filter(remembers(|_, iteration| iteration), FilterLaws::default());
+}
+
 /// Counts turns and forgets to begin anew.
 struct Forgets(usize);
 

@@ -17,9 +17,9 @@ use hybrid_icp::{
     NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
     Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
     Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
-    Regime, Robust, Scale, SensorNoiseWeight, StableSampling, Symmetric, Threshold, Thresholds,
-    TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WeightedSum,
-    WithoutBoundary,
+    Regime, Robust, Scale, Schedule, SensorNoiseWeight, StableSampling, Symmetric, Threshold,
+    Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd,
+    WeightedSum, WithoutBoundary,
 };
 
 #[test]
@@ -88,6 +88,9 @@ fn filters() {
     let chain = || (MaxDistance::diameters(0.2), Trimmed::new(0.8), NormalWeight);
     check_filter(chain, weighs);
     check_filter(|| vec![Trimmed::new(0.8), Trimmed::new(0.5)], removes);
+    let narrowing = || Schedule::new([0.5, 0.02, 0.3].map(MaxDistance::diameters).to_vec());
+    check_filter(narrowing, limits);
+    check_filter(|| (Schedule::new(vec![narrowing()]), NormalWeight), weighs);
 }
 
 #[test]

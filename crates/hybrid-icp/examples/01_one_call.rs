@@ -1,0 +1,44 @@
+//! One call: a depth image, a mask, a camera, a mesh and a rough pose go in, a better pose and how far to trust it come out.
+//!
+//! `cargo run --release -p hybrid-icp --example 01_one_call`
+
+#![allow(clippy::print_stdout)]
+
+use std::error::Error;
+
+use hybrid_icp::{Model, Observation, Preset, Refiner, Verdict};
+
+mod scene;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // Yours come from a camera, a segmentation and a pose estimator; `hicp-io` reads PNGs and meshes.
+    let given = scene::Scene::new()?;
+
+    let observation = Observation::new(given.depth, given.mask, given.camera)?; // Once per image.
+    let model = Model::new(given.mesh); // Once per object.
+    let mut refiner = Refiner::preset(Preset::Hybrid); // Once per thread.
+
+    let refined = refiner.refine(&model, &observation, &given.detected);
+
+    // Refining never fails; whether it helped is in the outcome and in the score.
+    match refined.outcome.verdict {
+        Verdict::Refined => println!("refined, {}", refined.outcome.termination),
+        Verdict::KeptInitial(why) => println!("kept the detected pose: {why}"),
+    }
+    println!(
+        "mean VSD estimate {:.3}, before {:.3}",
+        refined.mve, refined.mve_initial
+    );
+    if refined.mve >= 0.3 || refined.mve > refined.mve_initial {
+        return Err("this pose does not explain the image".into());
+    }
+    println!("{}", refined.outcome.camera_from_object);
+    if let Some(quality) = refined.outcome.quality {
+        println!(
+            "{:.0} % of the points matched, {:.2} mm from the observed surface (RMS)",
+            quality.fitness * 100.0,
+            quality.plane_rmse * 1e3
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! An error metric of one's own: what a pair costs, and how that changes with the pose.
+//!
+//! `cargo run --release -p hybrid-icp --example 06_own_metric`
+
+use std::error::Error;
+
+use hybrid_icp::{
+    Divergence, ErrorMetric, Icp, IterationLimit, Motion, NormalEquations, Pair, PointToPlane,
+    Projective, Vector3, VisibleSurface, WeightedSum,
+};
+
+mod scene;
+
+/// E = (p_z − c_z)²: the difference of depths.
+struct DepthDifference;
+
+impl ErrorMetric for DepthDifference {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let model = pair.source.point.cast::<f64>();
+        let observed = pair.target.point.cast::<f64>();
+        // One row: where the point is, the direction in which moving it changes the residual, and the residual. Gauss–Newton,
+        // information, covariance and observability follow from it.
+        let residual = model.z - observed.z;
+        system.add_row(&model, &Vector3::z(), residual, f64::from(pair.weight));
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    scene::Scene::new()?.refine(Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter: (),
+        // Depths alone leave three directions free; point-to-plane holds them.
+        metric: WeightedSum {
+            terms: ((1.0, PointToPlane), (0.2, DepthDifference)),
+        },
+        stop: (
+            Divergence::count_aware(),
+            Motion::default(),
+            IterationLimit(50),
+        ),
+    })
+}

@@ -1,0 +1,61 @@
+//! A switcher of one's own: which stage suits the estimate at hand.
+//!
+//! `cargo run --release -p hybrid-icp --example 08_own_switcher`
+
+use std::error::Error;
+
+use hybrid_icp::{Context, Isometry3, Preset, Regime, RegimeEvent, Repeat, Switch, Switcher};
+
+mod scene;
+
+/// Misaligned when too many pixels of the rendered model lie beside the mask. It looks at the outline alone, where the mean VSD
+/// estimate of the paper looks at depth.
+struct BesideTheMask {
+    limit: f64,
+}
+
+impl Switcher for BesideTheMask {
+    fn regime(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> RegimeEvent {
+        let mask = context.problem.observation.mask();
+        // Ask the context: the stage that selects from this render gets it for nothing.
+        let view = context.view(camera_from_object);
+        let region = view.region();
+        let (mut rendered, mut beside) = (0_u32, 0_u32);
+        for v in region.v_min..region.v_max {
+            for u in region.u_min..region.u_max {
+                if view.depth_at(u, v) > 0.0 {
+                    rendered += 1;
+                    beside += u32::from(mask.get(u, v) != Some(true));
+                }
+            }
+        }
+        let share = if rendered == 0 {
+            1.0
+        } else {
+            f64::from(beside) / f64::from(rendered)
+        };
+        RegimeEvent {
+            regime: if share > self.limit {
+                Regime::MISALIGNED
+            } else {
+                Regime::ALIGNED
+            },
+            score: Some(share),
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    scene::Scene::new()?.refine(Repeat {
+        times: 2,
+        stage: Switch {
+            switcher: BesideTheMask { limit: 0.2 },
+            aligned: Preset::ProjectiveCascadePointPlane.build(),
+            misaligned: Preset::NnPointToPoint.build(),
+        },
+    })
+}

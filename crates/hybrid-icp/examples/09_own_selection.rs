@@ -1,0 +1,56 @@
+//! A point selection of one's own: which part of the model is registered.
+//!
+//! `cargo run --release -p hybrid-icp --example 09_own_selection`
+
+use std::error::Error;
+
+use hybrid_icp::{
+    Context, Divergence, Icp, Isometry3, IterationLimit, Motion, PointSelection, PointToPlane,
+    Projective, Surfel, VisibleSurface,
+};
+
+mod scene;
+
+/// What another selection chooses, but for surface that the camera sees at a grazing angle: its depth is the least certain.
+struct NotGrazing<P> {
+    inner: P,
+    min_cosine: f32,
+}
+
+impl<P: PointSelection> PointSelection for NotGrazing<P> {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        self.inner.select(context, camera_from_object, source);
+        // Selected points are in the object frame; so is the camera, seen from there.
+        let eye = camera_from_object
+            .inverse()
+            .translation
+            .vector
+            .cast::<f32>();
+        source.retain(|surfel| {
+            let toward_camera = (eye - surfel.point.coords).normalize();
+            surfel.normal.dot(&toward_camera) > self.min_cosine
+        });
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    scene::Scene::new()?.refine(Icp {
+        selection: NotGrazing {
+            inner: VisibleSurface::default(),
+            min_cosine: 0.3,
+        },
+        association: Projective,
+        filter: (),
+        metric: PointToPlane,
+        stop: (
+            Divergence::count_aware(),
+            Motion::default(),
+            IterationLimit(50),
+        ),
+    })
+}

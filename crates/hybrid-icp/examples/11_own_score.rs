@@ -1,0 +1,47 @@
+//! A score of one's own: how bad a pose is, judged from the image alone.
+//!
+//! `cargo run --release -p hybrid-icp --example 11_own_score`
+
+use std::error::Error;
+
+use hybrid_icp::{Context, Isometry3, KeepBest, Preset, Score};
+
+mod scene;
+
+/// The mean difference of depth over the masked pixels, each up to a limit, which is also what a pixel without render costs.
+struct DepthError {
+    limit_meters: f32,
+}
+
+impl Score for DepthError {
+    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        let observation = context.problem.observation;
+        let view = context.view(camera_from_object);
+        let region = observation.region();
+        let (mut sum, mut count) = (0.0, 0_u32);
+        for v in region.v_min..region.v_max {
+            for u in region.u_min..region.u_max {
+                let measured = observation.depth().get(u, v).unwrap_or(0.0);
+                if observation.mask().get(u, v) == Some(true) && measured > 0.0 {
+                    let difference = (view.depth_at(u, v) - measured).abs();
+                    sum += f64::from(difference.min(self.limit_meters));
+                    count += 1;
+                }
+            }
+        }
+        // A score is never NaN: where nothing was measured, nothing speaks for the pose.
+        if count == 0 {
+            f64::from(self.limit_meters)
+        } else {
+            sum / f64::from(count)
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    scene::Scene::new()?.refine(KeepBest {
+        times: 3,
+        stage: Preset::ProjectiveCascadePointPlane.build(),
+        score: DepthError { limit_meters: 0.02 },
+    })
+}

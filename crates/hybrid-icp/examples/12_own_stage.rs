@@ -1,0 +1,59 @@
+//! A stage of one's own: how a better pose is made from a pose.
+//!
+//! `cargo run --release -p hybrid-icp --example 12_own_stage`
+
+use std::error::Error;
+
+use hybrid_icp::{
+    Isometry3, MeanVsd, Outcome, Preset, Problem, Score, Session, Stage, Translation3, Verdict,
+};
+
+mod scene;
+
+/// Starts another stage from several distances along the viewing ray, where detectors that look at colour err most, and
+/// returns what explains the image best.
+struct AlongTheRay<S> {
+    stage: S,
+    offsets_meters: Vec<f64>,
+}
+
+impl<S: Stage> Stage for AlongTheRay<S> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let mve = |session: &mut Session<'_>, outcome: &Outcome| {
+            let mut context = session.workspace.context(problem);
+            MeanVsd::default().score(&mut context, &outcome.camera_from_object)
+        };
+        let mut best = self.stage.run(problem, init, session);
+        let mut best_mve = mve(session, &best);
+        let mut iterations = best.iterations;
+        let ray = (init * problem.model.center()).coords.normalize();
+        for offset in &self.offsets_meters {
+            let start = Translation3::from(ray * *offset) * init;
+            let outcome = self.stage.run(problem, &start, session);
+            iterations += outcome.iterations;
+            // A start that was kept was never evaluated: a stage returns what was, or the initial pose.
+            if outcome.verdict == Verdict::Refined {
+                let score = mve(session, &outcome);
+                if score < best_mve {
+                    (best, best_mve) = (outcome, score);
+                }
+            }
+        }
+        Outcome { iterations, ..best }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut given = scene::Scene::new()?;
+    // A detector that is 4 cm off in depth.
+    given.detected = Isometry3::translation(0.0, 0.0, 0.04) * given.detected;
+    given.refine(AlongTheRay {
+        stage: Preset::Hybrid.build(),
+        offsets_meters: vec![-0.06, -0.04, -0.02, 0.02, 0.04, 0.06],
+    })
+}

@@ -1,0 +1,91 @@
+//! An observer of one's own: the error at every iteration, within a budget.
+
+use std::ops::ControlFlow;
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::scene;
+use hybrid_icp::{
+    Isometry3, IterationEvent, Observer, Preset, Refiner, StageEvent, Termination, se3,
+};
+
+// --- The component ---
+
+/// Writes down how far off a known truth every evaluated pose is, for a plot of convergence, and ends the run when all stages
+/// together have used up a number of iterations, which no stop rule of one stage can know.
+#[derive(Debug)]
+struct ErrorCurve {
+    truth: Isometry3<f64>,
+    budget: usize,
+    /// Stage, metric loss, degrees, millimetres.
+    rows: Vec<(usize, f64, f64, f64)>,
+    ended: Vec<(&'static str, Termination)>,
+}
+
+impl Observer for ErrorCurve {
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
+        let (angle, distance) = se3::pose_distance(event.camera_from_object, &self.truth);
+        let loss = event.evaluation.mean_loss;
+        self.rows
+            .push((self.ended.len(), loss, angle.to_degrees(), distance * 1e3));
+        if self.rows.len() >= self.budget {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+        self.ended.push((event.metric, event.outcome.termination));
+    }
+}
+
+// --- Its tests ---
+
+fn observe(budget: usize) -> (ErrorCurve, hybrid_icp::Refinement, hybrid_icp::Refinement) {
+    let mut rng = rng(2);
+    let scene = scene(Household::Iron, 0.5, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.006, 0.1);
+    let (truth, rows, ended) = (scene.truth, Vec::new(), Vec::new());
+    let mut curve = ErrorCurve {
+        truth,
+        budget,
+        rows,
+        ended,
+    };
+    let mut refiner = Refiner::preset(Preset::ProjectiveCascadePointPlane);
+    let observed = refiner.refine_observed(&scene.model, &scene.observation, &init, &mut curve);
+    let unobserved = refiner.refine(&scene.model, &scene.observation, &init);
+    (curve, observed, unobserved)
+}
+
+#[test]
+fn the_curve_begins_at_the_start_and_holds_the_returned_pose() {
+    let (curve, observed, unobserved) = observe(usize::MAX);
+    assert_eq!(observed, unobserved, "looking changes nothing");
+    let (stage, _, degrees, millimeters) = curve.rows[0];
+    assert_eq!(stage, 0);
+    assert!((degrees - 0.1_f64.to_degrees()).abs() < 1e-6 && (millimeters - 6.0).abs() < 1e-6);
+    let metrics: Vec<_> = curve.ended.iter().map(|(metric, _)| *metric).collect();
+    assert_eq!(metrics, ["point-to-point", "point-to-plane"]);
+    let (angle, _) = se3::pose_distance(&observed.outcome.camera_from_object, &curve.truth);
+    let returned = curve
+        .rows
+        .iter()
+        .position(|row| row.2 == angle.to_degrees());
+    assert!(
+        returned.is_some_and(|row| row > 0) && angle.to_degrees() < 0.5 * degrees,
+        "{curve:?}"
+    );
+}
+
+#[test]
+fn the_budget_is_that_of_all_stages_together() {
+    let (all, ..) = observe(usize::MAX);
+    let first_stage = all.rows.iter().filter(|row| row.0 == 0).count();
+    let (curve, stopped, unobserved) = observe(first_stage + 2);
+    assert!(all.rows.len() > first_stage + 2);
+    assert_eq!(curve.rows, all.rows[..first_stage + 2]);
+    assert_eq!(curve.ended[1].1, Termination::Stopped);
+    assert_eq!(stopped.outcome.termination, Termination::Stopped);
+    assert!(stopped.outcome.iterations < unobserved.outcome.iterations);
+}

@@ -1,0 +1,131 @@
+//! A renderer of one's own: what the sensor would return rather than what a perfect camera would see.
+
+use hicp_sim::{Household, RelativeGaussian, perturb, rng};
+use hicp_testkit::{RendererLaws, check_renderer};
+use hicp_tests::{Scene, median, scene};
+use hybrid_icp::{
+    DepthImage, Isometry3, MeanVsd, NO_TRIANGLE, Observation, PinholeCamera, PixelRegion, Preset,
+    Problem, Rasterizer, RenderedView, Renderer, Score, Session, Stage, TriMesh, Workspace,
+};
+
+// --- The component ---
+
+/// Renders and takes away what is seen at a grazing angle: structured light and time of flight return nothing there, so nothing
+/// should be selected there, and nothing missing there be held against a pose.
+#[derive(Debug, Default)]
+struct Grazing {
+    inner: Rasterizer,
+    /// Cosine of the widest angle between the ray and the normal that still returns light.
+    min_cosine: f64,
+}
+
+impl Renderer for Grazing {
+    fn render(
+        &mut self,
+        mesh: &TriMesh,
+        camera: &PinholeCamera,
+        camera_from_object: &Isometry3<f64>,
+        region: &PixelRegion,
+        view: &mut RenderedView,
+    ) {
+        self.inner
+            .render(mesh, camera, camera_from_object, region, view);
+        let drawn = view.region();
+        let (depth, triangles) = view.buffers_mut();
+        for v in drawn.v_min..drawn.v_max {
+            for u in drawn.u_min..drawn.u_max {
+                let i = (v - drawn.v_min) as usize * drawn.width() + (u - drawn.u_min) as usize;
+                if triangles[i] == NO_TRIANGLE {
+                    continue;
+                }
+                let Some(normal) = mesh.normal(triangles[i] as usize) else {
+                    continue;
+                };
+                let ray = camera.unproject(u.into(), v.into(), 1.0).coords.normalize();
+                let normal = camera_from_object.rotation * normal.cast::<f64>().into_inner();
+                if normal.dot(&ray).abs() < self.min_cosine {
+                    (depth[i], triangles[i]) = (0.0, NO_TRIANGLE);
+                }
+            }
+        }
+    }
+}
+
+// --- Its tests ---
+
+fn grazing() -> Grazing {
+    Grazing {
+        inner: Rasterizer::default(),
+        min_cosine: 75.0_f64.to_radians().cos(),
+    }
+}
+
+/// The scene as a sensor records it that returns nothing at grazing angles; the mask, made from colour, knows of no angle.
+fn sensed(object: Household, seed: u64) -> (Scene, Isometry3<f64>) {
+    let mut rng = rng(seed);
+    let mut scene = scene(object, 0.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.005, 0.1);
+    let camera = *scene.observation.camera();
+    let mut view = RenderedView::default();
+    grazing().render(
+        scene.model.mesh(),
+        &camera,
+        &scene.truth,
+        &camera.region(),
+        &mut view,
+    );
+    let (width, height) = (camera.width(), camera.height());
+    let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+    let depth = pixels.map(|(u, v)| view.depth_at(u, v)).collect();
+    let depth = DepthImage::from_meters(width, height, depth).unwrap();
+    let depth = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &depth);
+    scene.observation = Observation::new(depth, scene.observation.mask().clone(), camera).unwrap();
+    (scene, init)
+}
+
+#[test]
+fn it_keeps_the_laws() {
+    // It leaves out on purpose what the rasterizer draws.
+    check_renderer(
+        grazing,
+        RendererLaws {
+            differing_pixels: None,
+        },
+    );
+}
+
+#[test]
+fn without_limit_it_is_the_rasterizer() {
+    check_renderer(
+        Grazing::default,
+        RendererLaws {
+            differing_pixels: Some(0.0),
+        },
+    );
+}
+
+#[test]
+fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
+    let mut mine = Workspace::new(grazing());
+    let mut plain = Workspace::new(Rasterizer::default());
+    let mut ratios = Vec::new();
+    for (seed, object) in (0..).zip(Household::ALL) {
+        let (scene, init) = sensed(object, seed);
+        let problem = Problem::new(&scene.model, &scene.observation);
+        let shown = |workspace: &mut Workspace| {
+            let mut context = workspace.context(&problem);
+            let depth = context.view(&scene.truth).depth();
+            depth.iter().filter(|z| **z > 0.0).count()
+        };
+        let (few, all) = (shown(&mut mine), shown(&mut plain));
+        assert!(few < all, "{few} of {all} pixels of the {}", object.name());
+        assert_eq!(few, scene.observation.n_measured(), "{}", object.name());
+
+        let mut stage = Preset::Hybrid.build();
+        let outcome = stage.run(&problem, &init, &mut Session::new(&mut mine, &mut ()));
+        let mut score = |pose| MeanVsd::default().score(&mut mine.context(&problem), pose);
+        ratios.push(score(&outcome.camera_from_object) / score(&init));
+    }
+    let ratio = median(&mut ratios);
+    assert!(ratio < 0.5, "{ratios:?}");
+}

@@ -1,0 +1,92 @@
+//! A score of one's own: the silhouette against the mask.
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_testkit::{ScoreLaws, check_score};
+use hicp_tests::scene;
+use hybrid_icp::{
+    Context, Guard, Isometry3, Preset, Problem, Rasterizer, Refiner, Score, Verdict, Workspace,
+};
+
+// --- The component ---
+
+/// 1 − the intersection over union of the rendered silhouette and the mask: 0 for a silhouette that is the mask, 1 for one
+/// beside it. It looks at no depth, so it judges glass and shiny metal, too.
+#[derive(Clone, Copy, Debug)]
+struct Silhouette;
+
+impl Score for Silhouette {
+    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        let observation = context.problem.observation;
+        let (mask, box_of_mask) = (observation.mask(), observation.region());
+        let rows = box_of_mask.v_min..box_of_mask.v_max;
+        let masked = rows
+            .flat_map(|v| (box_of_mask.u_min..box_of_mask.u_max).map(move |u| (u, v)))
+            .filter(|(u, v)| mask.get(*u, *v) == Some(true))
+            .count();
+        let view = context.view(camera_from_object);
+        let region = view.region();
+        let (mut both, mut union) = (0_u32, masked as u32);
+        for v in region.v_min..region.v_max {
+            for u in region.u_min..region.u_max {
+                if view.depth_at(u, v) > 0.0 {
+                    let inside = mask.get(u, v) == Some(true);
+                    both += u32::from(inside);
+                    union += u32::from(!inside);
+                }
+            }
+        }
+        1.0 - f64::from(both) / f64::from(union.max(1))
+    }
+
+    fn name(&self) -> &'static str {
+        "silhouette"
+    }
+}
+
+// --- Its tests ---
+
+#[test]
+fn it_keeps_the_laws() {
+    let laws = ScoreLaws {
+        worst: 1.0,
+        ..ScoreLaws::default()
+    };
+    check_score(|| Silhouette, laws);
+}
+
+#[test]
+fn as_a_guard_it_lets_pass_what_covers_the_mask_better_and_nothing_else() {
+    let (mut passed, mut refused) = (0, 0);
+    let mut workspace = Workspace::new(Rasterizer::default());
+    for (seed, object) in (0..).zip(Household::ALL) {
+        for (translation, angle) in [(0.005, 0.1), (0.08, 1.5)] {
+            let mut rng = rng(seed);
+            let scene = scene(object, 0.5, &mut rng);
+            let init = perturb(&mut rng, &scene.truth, translation, angle);
+            let problem = Problem::new(&scene.model, &scene.observation);
+            let mut score = |pose| Silhouette.score(&mut workspace.context(&problem), pose);
+            let refine = |stage| {
+                Refiner::boxed(stage)
+                    .refine(&scene.model, &scene.observation, &init)
+                    .outcome
+            };
+            let plain = refine(Preset::NnPointToPoint.build());
+            let guarded = refine(Box::new(Guard {
+                stage: Preset::NnPointToPoint.build(),
+                score: Silhouette,
+            }));
+            if score(&plain.camera_from_object) < score(&init) {
+                passed += 1;
+                assert_eq!(guarded, plain);
+            } else {
+                refused += 1;
+                assert_eq!(guarded.camera_from_object, init);
+                assert!(matches!(guarded.verdict, Verdict::KeptInitial(_)));
+            }
+        }
+    }
+    assert!(
+        passed > 3 && refused > 3,
+        "{passed} passed, {refused} refused"
+    );
+}

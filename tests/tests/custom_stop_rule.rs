@@ -1,0 +1,81 @@
+//! A stop rule of one's own: patience.
+
+use std::ops::ControlFlow;
+
+use hicp_testkit::{StopRuleLaws, check_stop_rule};
+use hicp_tests::starts::{measure_stage, starts};
+use hybrid_icp::{
+    Icp, IterationLimit, PointToPlane, Progress, Projective, Stage, StopRule, Termination,
+    VisibleSurface,
+};
+
+// --- The component ---
+
+/// Ends a stage as converged when the lowest loss so far has not fallen by a relative gain for a number of turns: losses that
+/// go up and down on their way, as those of projective association do, are given time; noise is not.
+#[derive(Clone, Copy, Debug)]
+struct Patience {
+    turns: usize,
+    gain: f64,
+    best: f64,
+    waited: usize,
+}
+
+impl Patience {
+    fn new(turns: usize, gain: f64) -> Self {
+        let (best, waited) = (f64::INFINITY, 0);
+        Self {
+            turns,
+            gain,
+            best,
+            waited,
+        }
+    }
+}
+
+impl StopRule for Patience {
+    fn start(&mut self) {
+        *self = Self::new(self.turns, self.gain);
+    }
+
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        let loss = progress.current.mean_loss;
+        if loss < self.best * (1.0 - self.gain) {
+            (self.best, self.waited) = (loss, 0);
+        } else {
+            self.waited += 1;
+        }
+        if self.waited >= self.turns {
+            return ControlFlow::Break(Termination::Converged);
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+// --- Its tests ---
+
+fn projective<S: StopRule>(stop: S) -> impl Stage {
+    Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter: (),
+        metric: PointToPlane,
+        stop,
+    }
+}
+
+#[test]
+fn it_keeps_the_laws() {
+    check_stop_rule(|| Patience::new(3, 0.01), StopRuleLaws::default());
+}
+
+#[test]
+fn it_ends_soon_and_loses_little() {
+    let starts = starts(2, 0.5);
+    let full = measure_stage(&mut projective(IterationLimit(50)), &starts);
+    let rule = (Patience::new(3, 0.01), IterationLimit(50));
+    let mine = measure_stage(&mut projective(rule), &starts);
+    assert_eq!(full.iterations, 50.0);
+    assert!(mine.iterations < 25.0, "{mine:?}\n{full:?}");
+    assert!(mine.degrees < 1.25 * full.degrees, "{mine:?}\n{full:?}");
+}
