@@ -20,13 +20,13 @@ impl NormalEquations {
     #[must_use]
     pub fn information(&self) -> Matrix6<f64> {
         let scaled = self.scaled_from_camera();
-        scaled.transpose() * self.full_hessian() * scaled
+        scaled.transpose() * self.scaled_hessian() * scaled
     }
 
     /// Returns JᵀWr, half the gradient of the loss for the twist of [`NormalEquations::information`]: zero at a minimum.
     #[must_use]
     pub fn gradient(&self) -> Vector6<f64> {
-        self.scaled_from_camera().transpose() * self.gradient
+        self.scaled_from_camera().transpose() * self.scaled_gradient()
     }
 
     /// Returns the covariance Σ = s² (JᵀWJ)⁻¹ of ξ = [ρ; φ], in the frame and order of [`NormalEquations::information`],
@@ -51,7 +51,7 @@ impl NormalEquations {
         #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
         let variance = self.loss() / spare as f64;
         let basis = self.basis();
-        let (mut reduced, _) = reduce(&basis, &self.full_hessian(), &self.gradient);
+        let (mut reduced, _) = reduce(&basis, &self.scaled_hessian(), &self.scaled_gradient());
         self.fill_held(&mut reduced);
         let eigenvalues = eigen(reduced)?.eigenvalues;
         if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {
@@ -85,7 +85,7 @@ pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
     pairs: &Correspondences,
 ) -> Option<Matrix6<f64>> {
     let system = metric.system(pairs)?;
-    let hessian = system.full_hessian();
+    let hessian = system.scaled_hessian();
     let eigenvalues = eigen(hessian)?.eigenvalues;
     if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {
         return None;
@@ -94,7 +94,7 @@ pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
     for pair in pairs.as_slice().iter().filter(|pair| pair.weight > 0.0) {
         let mut own = NormalEquations::new(system.pivot, system.length);
         metric.linearize(pair, &mut own);
-        middle += own.gradient * own.gradient.transpose();
+        middle += own.scaled_gradient() * own.scaled_gradient().transpose();
         count += 1;
     }
     let spare = count.checked_sub(6).filter(|spare| *spare > 0)?;

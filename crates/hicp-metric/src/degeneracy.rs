@@ -86,7 +86,7 @@ impl NormalEquations {
             });
         }
         let mean_diagonal = self.damping_trace() / 6.0;
-        let finite = self.hessian.trace().is_finite() && mean_diagonal.is_finite();
+        let finite = self.scaled_hessian().trace().is_finite() && mean_diagonal.is_finite();
         if self.rows < n_free || !finite || mean_diagonal <= 0.0 {
             return None;
         }
@@ -112,12 +112,12 @@ impl NormalEquations {
         if self.rows < 6 || !mean_diagonal.is_finite() || mean_diagonal <= 0.0 {
             return None;
         }
-        let hessian = self.full_hessian();
+        let hessian = self.scaled_hessian();
         let damped = hessian + Matrix6::identity() * (DAMPING * mean_diagonal);
         let factor = damped.cholesky()?;
         let mut z = Vector6::zeros();
         for _ in 0..PASSES {
-            z -= factor.solve(&(self.gradient + hessian * z));
+            z -= factor.solve(&(self.scaled_gradient() + hessian * z));
         }
         let mut rotation = z.fixed_rows_mut::<3>(3);
         rotation /= self.length;
@@ -126,13 +126,13 @@ impl NormalEquations {
 
     /// The unknowns from a Cholesky decomposition, damped absolutely and by Marquardt's λ.
     fn factored(&self, damping: f64, lambda: f64) -> Option<Vector6<f64>> {
-        let mut hessian = self.full_hessian();
+        let mut hessian = self.scaled_hessian();
         self.damp(&mut hessian, lambda);
         hessian += Matrix6::identity() * damping;
         if self.freedom.is_none() {
-            return Some(hessian.cholesky()?.solve(&-self.gradient));
+            return Some(hessian.cholesky()?.solve(&-self.scaled_gradient()));
         }
-        let (mut reduced, gradient) = reduce(&self.basis(), &hessian, &self.gradient);
+        let (mut reduced, gradient) = reduce(&self.basis(), &hessian, &self.scaled_gradient());
         self.fill_held(&mut reduced);
         let mut y = reduced.cholesky()?.solve(&-gradient);
         self.clear_held(&mut y);
@@ -141,7 +141,11 @@ impl NormalEquations {
 
     /// The unknowns from an eigen-decomposition, degenerate directions left out.
     fn remapped(&self, lambda: f64) -> Option<Vector6<f64>> {
-        let (hessian, gradient) = reduce(&self.basis(), &self.full_hessian(), &self.gradient);
+        let (hessian, gradient) = reduce(
+            &self.basis(),
+            &self.scaled_hessian(),
+            &self.scaled_gradient(),
+        );
         let eigen = eigen(hessian)?;
         let largest = eigen.eigenvalues.max();
         let mut y = Vector6::zeros();
@@ -161,7 +165,11 @@ impl NormalEquations {
 
     /// Whether a direction that is not held is degenerate.
     fn is_degenerate(&self) -> Option<bool> {
-        let (hessian, _) = reduce(&self.basis(), &self.full_hessian(), &self.gradient);
+        let (hessian, _) = reduce(
+            &self.basis(),
+            &self.scaled_hessian(),
+            &self.scaled_gradient(),
+        );
         let eigen = eigen(hessian)?;
         let limit = self.threshold.max(0.0) * eigen.eigenvalues.max();
         let determined = eigen.eigenvalues.iter().filter(|v| **v > limit).count();

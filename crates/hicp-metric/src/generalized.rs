@@ -58,7 +58,7 @@ impl Generalized {
 }
 
 impl ErrorMetric for Generalized {
-    #[inline]
+    #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         let point = pair.source.point.cast::<f64>();
         let offset = point - pair.target.point.cast::<f64>();

@@ -1,6 +1,6 @@
 //! The trait of error metrics.
 
-use hicp_core::{Correspondences, Isometry3, Pair, type_label};
+use hicp_core::{Correspondences, Isometry3, Pair, VectorLoop, type_label, vectorized};
 
 use crate::normal_equations::NormalEquations;
 
@@ -78,10 +78,10 @@ pub trait ErrorMetric {
     /// `None` without weight or with points that are not finite. The provided method sums the rows of
     /// [`ErrorMetric::linearize`] about the centroid, with lengths scaled by the RMS radius.
     fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let mut system = NormalEquations::about_sources(pairs.as_slice())?;
-        for pair in pairs.as_slice() {
-            self.linearize(pair, &mut system);
-        }
+        let system = vectorized(Linearize {
+            metric: self,
+            pairs: pairs.as_slice(),
+        })?;
         // Sources were checked with the centroid; this catches targets and normals.
         system.loss().is_finite().then_some(system)
     }
@@ -115,6 +115,25 @@ pub trait ErrorMetric {
     /// Name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
+    }
+}
+
+/// Sums the rows of all pairs.
+struct Linearize<'a, M: ?Sized> {
+    metric: &'a M,
+    pairs: &'a [Pair],
+}
+
+impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
+    type Output = Option<NormalEquations>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let mut system = NormalEquations::about_sources(self.pairs)?;
+        for pair in self.pairs {
+            self.metric.linearize(pair, &mut system);
+        }
+        Some(system)
     }
 }
 

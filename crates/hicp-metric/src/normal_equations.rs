@@ -4,6 +4,7 @@ use hicp_core::{Matrix3, Matrix6, Pair, Point3, Vector3, Vector6, so3::hat};
 
 use crate::degeneracy::Degeneracy;
 use crate::freedom::Freedom;
+use crate::row_sums::RowSums;
 
 /// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
 ///
@@ -17,10 +18,7 @@ use crate::freedom::Freedom;
 pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
     pub(crate) length: f64,
-    /// The lower triangle only.
-    pub(crate) hessian: Matrix6<f64>,
-    pub(crate) gradient: Vector6<f64>,
-    loss: f64,
+    sums: RowSums,
     pub(crate) rows: usize,
     /// Trace of the rows alone, once a prior was added: its stiffness must not raise the damping.
     row_trace: Option<f64>,
@@ -36,9 +34,7 @@ impl NormalEquations {
         Self {
             pivot,
             length,
-            hessian: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
-            loss: 0.0,
+            sums: RowSums::zeros(),
             rows: 0,
             row_trace: None,
             freedom: None,
@@ -51,24 +47,28 @@ impl NormalEquations {
     ///
     /// `None` without weight or with numbers that are not finite.
     #[must_use]
+    #[inline]
     pub fn about_sources(pairs: &[Pair]) -> Option<Self> {
-        let (mut sum, mut squares, mut weight) = (Vector3::zeros(), 0.0, 0.0);
         // Relative to the first point that counts, so that an object far from the origin loses no digits.
         let first = pairs.iter().find(|pair| pair.weight > 0.0)?;
         let origin = first.source.point.cast::<f64>();
+        // x, y, z and the weight itself.
+        let [mut sums, mut squares] = [[0.0; 4]; 2];
         for pair in pairs {
-            let (offset, w) = (
-                pair.source.point.cast::<f64>() - origin,
-                f64::from(pair.weight),
-            );
-            sum += offset * w;
-            squares += offset.norm_squared() * w;
-            weight += w;
+            let offset = pair.source.point.cast::<f64>() - origin;
+            let (values, weight) = ([offset.x, offset.y, offset.z, 1.0], f64::from(pair.weight));
+            for lane in 0..4 {
+                let weighted = weight * values[lane];
+                sums[lane] += weighted;
+                squares[lane] += weighted * values[lane];
+            }
         }
+        let [x, y, z, weight] = sums;
+        let squares = squares[0] + squares[1] + squares[2];
         if !(weight > 0.0 && squares.is_finite()) {
             return None;
         }
-        let mean = sum / weight;
+        let mean = Vector3::new(x, y, z) / weight;
         let variance = squares / weight - mean.norm_squared();
         // All points in one place: any length will do, the rotation is undetermined and stays damped.
         let length = if variance > 1e-12 {
@@ -82,7 +82,7 @@ impl NormalEquations {
     /// Adds one scalar residual r of weight w whose change under the increment is `direction` · (displacement of `point`).
     ///
     /// That is the row J = [dᵀ, ((p − pivot) × d)ᵀ]. `point` is in the camera frame; r and d·(displacement) share a unit (metres for distances).
-    #[inline]
+    #[inline(always)]
     pub fn add_row(
         &mut self,
         point: &Point3<f64>,
@@ -91,7 +91,7 @@ impl NormalEquations {
         weight: f64,
     ) {
         let lever = (point - self.pivot).cross(direction) / self.length;
-        let row = [
+        let jacobian = [
             direction.x,
             direction.y,
             direction.z,
@@ -99,15 +99,7 @@ impl NormalEquations {
             lever.y,
             lever.z,
         ];
-        // The lower triangle only; `solve` reads no more.
-        for column in 0..6 {
-            let weighted = weight * row[column];
-            for (line, entry) in row.iter().enumerate().skip(column) {
-                self.hessian[(line, column)] += weighted * entry;
-            }
-            self.gradient[column] += weighted * residual;
-        }
-        self.loss += weight * residual * residual;
+        self.sums.add_row(jacobian, residual, weight);
         self.rows += usize::from(weight > 0.0);
     }
 
@@ -120,7 +112,7 @@ impl NormalEquations {
     /// Returns Σ w r², the weighted sum of squared residuals at the identity increment.
     #[must_use]
     pub fn loss(&self) -> f64 {
-        self.loss
+        self.sums.loss()
     }
 
     /// Point about which rotations turn, camera frame, metres.
@@ -145,12 +137,14 @@ impl NormalEquations {
         jacobian: &Matrix6<f64>,
         information: &Matrix6<f64>,
     ) {
-        self.row_trace.get_or_insert(self.hessian.trace());
+        self.row_trace.get_or_insert(self.sums.trace());
         let jacobian = jacobian * self.camera_from_scaled();
         let weighted = jacobian.transpose() * information;
-        self.hessian += weighted * jacobian;
-        self.gradient += weighted * residual;
-        self.loss += residual.dot(&(information * residual));
+        self.sums.add(
+            &(weighted * jacobian),
+            &(weighted * residual),
+            residual.dot(&(information * residual)),
+        );
         self.rows += (0..6).filter(|&i| information[(i, i)] > 0.0).count();
     }
 
@@ -166,18 +160,18 @@ impl NormalEquations {
         if self.row_trace.is_some() || other.row_trace.is_some() {
             self.row_trace = Some(trace);
         }
-        self.hessian += change.transpose() * other.full_hessian() * change * factor;
-        self.gradient += change.transpose() * other.gradient * factor;
-        self.loss += factor * other.loss;
+        self.sums.add(
+            &(change.transpose() * other.scaled_hessian() * change * factor),
+            &(change.transpose() * other.scaled_gradient() * factor),
+            factor * other.loss(),
+        );
         self.rows += other.rows;
     }
 
     /// Multiplies every weight by a factor.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
-        self.hessian *= factor;
-        self.gradient *= factor;
-        self.loss *= factor;
+        self.sums.scale(factor);
         self.row_trace = self.row_trace.map(|trace| trace * factor);
         self
     }
@@ -186,14 +180,17 @@ impl NormalEquations {
     pub(crate) fn damping_trace(&self) -> f64 {
         self.row_trace
             .filter(|trace| *trace > 0.0)
-            .unwrap_or_else(|| self.hessian.trace())
+            .unwrap_or_else(|| self.sums.trace())
     }
 
     /// JᵀWJ in scaled unknowns, both triangles.
-    pub(crate) fn full_hessian(&self) -> Matrix6<f64> {
-        let mut full = self.hessian;
-        full.fill_upper_triangle_with_lower_triangle();
-        full
+    pub(crate) fn scaled_hessian(&self) -> Matrix6<f64> {
+        self.sums.hessian()
+    }
+
+    /// JᵀWr in scaled unknowns.
+    pub(crate) fn scaled_gradient(&self) -> Vector6<f64> {
+        self.sums.gradient()
     }
 
     /// The matrix S of ξ = S z: z the scaled twist about the pivot, ξ the plain one about the camera origin.
@@ -287,9 +284,9 @@ mod tests {
                 let f = |a: f64, b: f64| rows.half_loss(&(unit(i) * (a * h) + unit(j) * (b * h)));
                 let second =
                     (f(1.0, 1.0) - f(1.0, -1.0) - f(-1.0, 1.0) + f(-1.0, -1.0)) / (4.0 * h * h);
-                let found = at_zero.hessian[(i, j)];
+                let found = at_zero.scaled_hessian()[(i, j)];
                 // Differences cancel to ε/h² and are off by h² times the fourth derivative, which levers of 1/L reach.
-                let scale = at_zero.hessian.diagonal().amax();
+                let scale = at_zero.scaled_hessian().diagonal().amax();
                 assert!(
                     (found - second).abs() < 1e-5 * scale,
                     "{i} {j}: {found} {second}"
@@ -315,9 +312,9 @@ mod tests {
             let f = |a: f64| with_residual.half_loss(&(unit(i) * (a * h)));
             let slope = (f(1.0) - f(-1.0)) / (2.0 * h);
             assert!(
-                (system.gradient[i] - slope).abs() < 1e-6,
+                (system.scaled_gradient()[i] - slope).abs() < 1e-6,
                 "{i}: {} {slope}",
-                system.gradient[i]
+                system.scaled_gradient()[i]
             );
         }
         let loss = 2.0 * with_residual.half_loss(&Vector6::zeros());

@@ -60,7 +60,7 @@ impl NormalEquations {
     /// `None` where a number is not finite. Cost: an eigen-decomposition of a 6×6 matrix.
     #[must_use]
     pub fn observability(&self) -> Option<Observability> {
-        let eigen = eigen(self.full_hessian())?;
+        let eigen = eigen(self.scaled_hessian())?;
         let mut order = [0, 1, 2, 3, 4, 5];
         order.sort_unstable_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
         let largest = eigen.eigenvalues[order[5]];

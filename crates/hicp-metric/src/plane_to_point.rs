@@ -14,7 +14,7 @@ use crate::normal_equations::NormalEquations;
 pub struct PlaneToPoint;
 
 impl ErrorMetric for PlaneToPoint {
-    #[inline]
+    #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         let observed = pair.target.point.cast::<f64>();
         let normal = pair.source.normal.cast::<f64>().into_inner();

@@ -13,7 +13,7 @@ use crate::normal_equations::NormalEquations;
 pub struct PointToPlane;
 
 impl ErrorMetric for PointToPlane {
-    #[inline]
+    #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         let point = pair.source.point.cast::<f64>();
         let normal = pair.target.normal.cast::<f64>().into_inner();

@@ -24,6 +24,7 @@ const MIN_PAIRS: usize = 3;
 pub struct PointToPoint;
 
 impl ErrorMetric for PointToPoint {
+    #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         let point = pair.source.point.cast::<f64>();
         let difference = point - pair.target.point.cast::<f64>();

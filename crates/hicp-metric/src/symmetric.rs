@@ -40,7 +40,7 @@ impl Symmetric {
 }
 
 impl ErrorMetric for Symmetric {
-    #[inline]
+    #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         if let Some((normal, residual)) = Self::residual(pair) {
             // Half of the motion at each point: the lever of their midpoint.

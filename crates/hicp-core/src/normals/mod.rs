@@ -8,6 +8,7 @@
 
 mod edges;
 mod gated;
+mod lanes;
 mod window;
 
 use std::ops::Range;

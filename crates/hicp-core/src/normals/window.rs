@@ -7,13 +7,12 @@ use std::ops::Range;
 
 use nalgebra::{UnitVector3, Vector3};
 
+use super::lanes::{LANES, Lanes};
 use super::{DepthPatch, MIN_DEPTH_METERS, used};
 use crate::vectorized::{VectorLoop, vectorized};
 
 /// Fewest pixels that a plane is fitted to.
 const MIN_SUPPORT: f64 = 6.0;
-/// Pixels fitted at a time.
-const LANES: usize = 8;
 
 /// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
 ///
@@ -210,13 +209,6 @@ struct Fit<'a> {
     normals: &'a mut [[f32; 3]],
 }
 
-#[inline(always)]
-fn lanes(numbers: &[f64], from: usize) -> [f64; LANES] {
-    let mut lanes = [0.0; LANES];
-    lanes.copy_from_slice(&numbers[from..from + LANES]);
-    lanes
-}
-
 impl Fit<'_> {
     /// What each window gains at its right and loses at its left when it moves on by one pixel.
     #[inline(always)]
@@ -226,21 +218,26 @@ impl Fit<'_> {
             // Column from + radius, and from − radius − 1, which the zeros on the left put at index `from`.
             let (gained, lost) = (from + 2 * radius + 1, from);
             let sums = [&columns.n, &columns.v, &columns.vv, &columns.w, &columns.vw];
-            let [gn, gv, gvv, gw, gvw] = sums.map(|sums| lanes(sums, gained));
-            let [ln, lv, lvv, lw, lvw] = sums.map(|sums| lanes(sums, lost));
+            let [gn, gv, gvv, gw, gvw] = sums.map(|sums| Lanes::of(sums, gained));
+            let [ln, lv, lvv, lw, lvw] = sums.map(|sums| Lanes::of(sums, lost));
+            let mut g = Lanes::all((from + radius) as f64);
+            let mut l = Lanes::all(from as f64 - radius as f64 - 1.0);
             for lane in 0..LANES {
-                let u = (from + lane) as f64;
-                let (g, l) = (u + radius as f64, u - radius as f64 - 1.0);
-                block[0][lane] = gn[lane] - ln[lane];
-                block[1][lane] = g * gn[lane] - l * ln[lane];
-                block[2][lane] = gv[lane] - lv[lane];
-                block[3][lane] = g * g * gn[lane] - l * l * ln[lane];
-                block[4][lane] = g * gv[lane] - l * lv[lane];
-                block[5][lane] = gvv[lane] - lvv[lane];
-                block[6][lane] = gw[lane] - lw[lane];
-                block[7][lane] = g * gw[lane] - l * lw[lane];
-                block[8][lane] = gvw[lane] - lvw[lane];
+                g.0[lane] += lane as f64;
+                l.0[lane] += lane as f64;
             }
+            *block = [
+                gn - ln,
+                g * gn - l * ln,
+                gv - lv,
+                g * g * gn - l * l * ln,
+                g * gv - l * lv,
+                gvv - lvv,
+                gw - lw,
+                g * gw - l * lw,
+                gvw - lvw,
+            ]
+            .map(|difference| difference.0);
         }
     }
 
@@ -280,20 +277,55 @@ impl VectorLoop for Fit<'_> {
         let y = self.rays.y[self.v];
         let fits = self.blocks.iter().zip(self.normals.chunks_exact_mut(LANES));
         for ((block, normals), from) in fits.zip((self.first..).step_by(LANES)) {
-            let x = lanes(&self.rays.x, from);
-            let mut fitted = [[0.0_f32; LANES]; 3];
-            for lane in 0..LANES {
-                let sums = WindowSums(block.map(|sums| sums[lane]));
-                let normal = sums.fit(self.rays, (from + lane) as f64, self.v as f64, x[lane], y);
-                fitted[0][lane] = normal[0];
-                fitted[1][lane] = normal[1];
-                fitted[2][lane] = normal[2];
+            let mut u = Lanes::all(from as f64);
+            for (lane, u) in u.0.iter_mut().enumerate() {
+                *u += lane as f64;
             }
+            let x = Lanes::of(&self.rays.x, from);
+            let fit = plane_fit(block.map(Lanes), self.rays, u, self.v as f64, x, y);
+            let [x, y, z] = fit.map(Lanes::single);
             for (lane, normal) in normals.iter_mut().enumerate() {
-                *normal = fitted.map(|fitted| fitted[lane]);
+                *normal = [x[lane], y[lane], z[lane]];
             }
         }
     }
+}
+
+/// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀), facing the camera; zero where there is none.
+///
+/// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
+#[inline(always)]
+fn plane_fit(sums: [Lanes; 9], rays: &Rays, u0: Lanes, v0: f64, x: Lanes, y: f64) -> [Lanes; 3] {
+    let [n, u, v, uu, uv, vv, w, uw, vw] = sums;
+    let [v0, y, fx, fy] = [v0, y, rays.fx, rays.fy].map(Lanes::all);
+    // Central moments times n: integers but for those with w, and no division.
+    let suu = n * uu - u * u;
+    let suv = n * uv - u * v;
+    let svv = n * vv - v * v;
+    let suw = n * uw - u * w;
+    let svw = n * vw - v * w;
+    let determinant = suu * svv - suv * suv;
+    // b, c and w₀ times n · determinant: only their ratios matter.
+    let b = suw * svv - svw * suv;
+    let c = svw * suu - suw * suv;
+    let w0 = w * determinant + b * (n * u0 - u) + c * (n * v0 - v);
+    let (nx, ny) = (n * b * fx, n * c * fy);
+    let nz = w0 - x * nx - y * ny;
+    let norm = (nx * nx + ny * ny + nz * nz).map(f64::sqrt);
+    // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
+    let determined = determinant - Lanes::all(1e-3) * n * (suu + svv);
+    let scale = norm.map(|norm| -1.0 / norm);
+    let mut normal = [nx * scale, ny * scale, nz * scale];
+    for lane in 0..LANES {
+        let fitted = (n.0[lane] >= MIN_SUPPORT)
+            & (determined.0[lane] > 0.0)
+            & (w0.0[lane] > 0.0)
+            & (norm.0[lane] < f64::INFINITY);
+        for component in &mut normal {
+            component.0[lane] = if fitted { component.0[lane] } else { 0.0 };
+        }
+    }
+    normal
 }
 
 /// The sums of one window, in the order of [`Sums`].
@@ -310,37 +342,17 @@ impl WindowSums {
 
     /// Returns the normal at pixel (u, v), facing the camera.
     pub(super) fn normal(self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
-        let normal = self.fit(rays, u as f64, v as f64, rays.x[u], rays.y[v]);
+        let (x, y) = (Lanes::all(rays.x[u]), rays.y[v]);
+        let fit = plane_fit(
+            self.0.map(Lanes::all),
+            rays,
+            Lanes::all(u as f64),
+            v as f64,
+            x,
+            y,
+        );
+        let normal = fit.map(|component| component.single()[0]);
         (normal != [0.0; 3]).then(|| UnitVector3::new_unchecked(Vector3::from(normal)))
-    }
-
-    /// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀), facing the camera; zero when there is none.
-    ///
-    /// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
-    #[inline(always)]
-    #[allow(clippy::cast_possible_truncation)] // Normals are kept in f32.
-    fn fit(self, rays: &Rays, u0: f64, v0: f64, x: f64, y: f64) -> [f32; 3] {
-        let [n, u, v, uu, uv, vv, w, uw, vw] = self.0;
-        // Central moments times n: integers but for those with w, and no division.
-        let suu = n * uu - u * u;
-        let suv = n * uv - u * v;
-        let svv = n * vv - v * v;
-        let suw = n * uw - u * w;
-        let svw = n * vw - v * w;
-        let determinant = suu * svv - suv * suv;
-        // b, c and w₀ times n · determinant: only their ratios matter.
-        let b = suw * svv - svw * suv;
-        let c = svw * suu - suw * suv;
-        let w0 = w * determinant + b * (n * u0 - u) + c * (n * v0 - v);
-        let (nx, ny) = (n * b * rays.fx, n * c * rays.fy);
-        let nz = w0 - x * nx - y * ny;
-        let norm = (nx * nx + ny * ny + nz * nz).sqrt();
-        // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
-        let determined = (n >= MIN_SUPPORT) & (determinant > 1e-3 * n * (suu + svv));
-        let fitted = determined & (w0 > 0.0) & (norm < f64::INFINITY);
-        let scale = -1.0 / norm;
-        let component = |n: f64| if fitted { (n * scale) as f32 } else { 0.0 };
-        [component(nx), component(ny), component(nz)]
     }
 }
 

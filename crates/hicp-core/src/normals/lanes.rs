@@ -1,0 +1,79 @@
+//! Numbers that are calculated with side by side.
+
+use std::ops::{Add, Mul, Sub};
+
+/// Numbers side by side.
+pub(super) const LANES: usize = 8;
+
+/// Several numbers; every operation is one on each of them, which compilers recognise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lanes(pub(super) [f64; LANES]);
+
+impl Lanes {
+    #[inline(always)]
+    pub(super) fn all(number: f64) -> Self {
+        Self([number; LANES])
+    }
+
+    /// The numbers from an index on.
+    #[inline(always)]
+    pub(super) fn of(numbers: &[f64], from: usize) -> Self {
+        let mut lanes = [0.0; LANES];
+        lanes.copy_from_slice(&numbers[from..from + LANES]);
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    pub(super) fn map(mut self, operation: impl Fn(f64) -> f64) -> Self {
+        for lane in &mut self.0 {
+            *lane = operation(*lane);
+        }
+        self
+    }
+
+    /// In single precision.
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation)]
+    pub(super) fn single(self) -> [f32; LANES] {
+        let mut lanes = [0.0; LANES];
+        for (lane, number) in lanes.iter_mut().zip(self.0) {
+            *lane = number as f32;
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn with(mut self, other: Self, operation: impl Fn(f64, f64) -> f64) -> Self {
+        for (lane, other) in self.0.iter_mut().zip(other.0) {
+            *lane = operation(*lane, other);
+        }
+        self
+    }
+}
+
+impl Add for Lanes {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Lanes {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Lanes {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+}
