@@ -1,6 +1,6 @@
 //! Barfoot & Furgale's fusion of any number of pose estimates.
 
-use hicp_core::{Isometry3, Matrix6, Vector6, se3};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Vector3, Vector6, se3};
 
 use crate::error::FusionError;
 use crate::estimate::{PoseEstimate, information, symmetrized};
@@ -75,6 +75,8 @@ pub struct Fusion {
 struct Term {
     object_from_camera: Isometry3<f64>,
     information: Matrix6<f64>,
+    /// The blocks of the information: ρρ, ρφ, φφ.
+    blocks: [Matrix3<f64>; 3],
 }
 
 /// V, its Gauss–Newton Hessian and half its gradient at a pose.
@@ -110,9 +112,12 @@ impl Fusion {
         camera_from_object: &Isometry3<f64>,
         weight_covariance: &Matrix6<f64>,
     ) {
+        let information = information(weight_covariance);
+        let block = |i, j| information.fixed_view::<3, 3>(i, j).into_owned();
         self.terms.push(Term {
             object_from_camera: camera_from_object.inverse(),
-            information: information(weight_covariance),
+            information,
+            blocks: [block(0, 0), block(0, 3), block(3, 3)],
         });
     }
 
@@ -211,21 +216,39 @@ impl Fusion {
         symmetrized(&(fused.covariance * middle * fused.covariance))
     }
 
+    /// By blocks: G = [D B; 0 D] and Σ⁻¹ = [W₁₁ W₁₂; W₁₂ᵀ W₂₂], all 3×3.
     fn linearize(&self, camera_from_object: &Isometry3<f64>) -> Linearization {
-        let mut sum = Linearization {
-            cost: 0.0,
-            hessian: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
-        };
+        let mut cost = 0.0;
+        let (mut g1, mut g2) = (Vector3::zeros(), Vector3::zeros());
+        let (mut h11, mut h12, mut h22) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
         for term in &self.terms {
-            let xi = se3::log(&(camera_from_object * term.object_from_camera));
-            let jacobian = se3::left_jacobian_inverse(&xi);
-            let weighted = term.information * xi;
-            sum.cost += 0.5 * xi.dot(&weighted);
-            sum.gradient += jacobian.tr_mul(&weighted);
-            sum.hessian += jacobian.tr_mul(&(term.information * jacobian));
+            let relative = camera_from_object * term.object_from_camera;
+            let (xi, d, b) = se3::log_and_left_jacobian_inverse(&relative);
+            let [w11, w12, w22] = &term.blocks;
+            let rho = Vector3::new(xi[0], xi[1], xi[2]);
+            let phi = Vector3::new(xi[3], xi[4], xi[5]);
+            let (y1, y2) = (w11 * rho + w12 * phi, w12.tr_mul(&rho) + w22 * phi);
+            cost += 0.5 * (rho.dot(&y1) + phi.dot(&y2));
+            let (dt, bt) = (d.transpose(), b.transpose());
+            g1 += dt * y1;
+            g2 += bt * y1 + dt * y2;
+            let right = w11 * b + w12 * d;
+            h11 += dt * (w11 * d);
+            h12 += dt * right;
+            h22 += bt * right + dt * (w12.transpose() * b + w22 * d);
         }
-        sum
+        let mut hessian = Matrix6::zeros();
+        hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h11);
+        hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h12);
+        hessian
+            .fixed_view_mut::<3, 3>(3, 0)
+            .copy_from(&h12.transpose());
+        hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h22);
+        Linearization {
+            cost,
+            hessian,
+            gradient: Vector6::new(g1.x, g1.y, g1.z, g2.x, g2.y, g2.z),
+        }
     }
 
     /// A⁻¹; where rounding left A indefinite, the covariance of the surest estimate.
