@@ -1,9 +1,9 @@
 //! Fusing all estimates at once: `average` and `weighted-average`.
 
-use hicp_core::Matrix6;
+use hicp_core::{Isometry3, Matrix6, se3};
 
 use crate::config::FuserConfig;
-use crate::estimate::PoseEstimate;
+use crate::estimate::{PoseEstimate, symmetrized};
 use crate::fuser::{Fuser, Update};
 use crate::fusion::{Fused, Fusion, Solution};
 use crate::motion::{CameraMotion, Carrier, Transport};
@@ -28,9 +28,14 @@ pub(crate) enum Weights {
 pub struct BatchFuser {
     config: FuserConfig,
     weights: Weights,
+    /// In the anchor's frame.
     held: Vec<Held>,
+    /// In the current camera frame.
     fused: Option<PoseEstimate>,
+    /// Invariant: its terms are those of `held`.
     fusion: Fusion,
+    /// From the camera frame in which the estimates are held: fusing is equivariant, so they need not move with the camera.
+    camera_from_anchor: Isometry3<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +64,7 @@ impl BatchFuser {
             held: Vec::new(),
             fused: None,
             fusion: Fusion::new(config.limits),
+            camera_from_anchor: Isometry3::identity(),
         }
     }
 
@@ -76,28 +82,37 @@ impl BatchFuser {
 
     /// Fuses what is held, from what was fused before.
     fn fuse(&mut self) -> Solution {
-        let Some(last) = self.held.last().map(|held| held.estimate) else {
+        let anchor_from_camera = self.camera_from_anchor.inverse();
+        let Some(start) = self.fused.map(|fused| fused.camera_from_object) else {
             return Solution::NONE;
         };
-        if self.held.len() == 1 {
-            self.fused = Some(last);
-            return Solution::NONE;
-        }
-        self.fusion.clear();
-        for held in &self.held {
-            self.fusion
-                .push_weighted(&held.estimate.camera_from_object, &held.weight);
-        }
-        let start = self.fused.unwrap_or(last).camera_from_object;
-        let Some(fused) = self.fusion.solve(&start) else {
+        let Some(fused) = self.fusion.solve(&(anchor_from_camera * start)) else {
             return Solution::NONE;
         };
-        self.fused = Some(PoseEstimate {
+        let mut estimate = PoseEstimate {
             camera_from_object: fused.camera_from_object,
             covariance: self.covariance(&fused),
             mve: None,
-        });
+        };
+        carry(&mut estimate, &self.camera_from_anchor);
+        self.fused = Some(estimate);
         fused.solution
+    }
+
+    fn push(&mut self, held: Held) {
+        self.fusion
+            .push_weighted(&held.estimate.camera_from_object, &held.weight);
+        self.held.push(held);
+    }
+
+    /// Takes all that is held to the current camera frame.
+    fn rebase(&mut self) {
+        let motion = std::mem::replace(&mut self.camera_from_anchor, Isometry3::identity());
+        let adjoint = se3::adjoint(&motion);
+        for held in &mut self.held {
+            carry(&mut held.estimate, &motion);
+            held.weight = symmetrized(&(adjoint * held.weight * adjoint.transpose()));
+        }
     }
 
     fn covariance(&self, fused: &Fused) -> Matrix6<f64> {
@@ -114,18 +129,26 @@ impl BatchFuser {
 impl Fuser for BatchFuser {
     fn propagate(&mut self, motion: &CameraMotion) {
         let carrier = Carrier::new(motion, self.config.transport);
+        if let Some(fused) = &mut self.fused {
+            carrier.estimate(fused);
+        }
+        if self.config.transport == Transport::Adjoint && motion.covariance().is_none() {
+            self.camera_from_anchor = motion.apply(&self.camera_from_anchor);
+            return;
+        }
+        self.rebase();
+        self.fusion.clear();
         for held in &mut self.held {
             carrier.estimate(&mut held.estimate);
             held.weight = match self.weights {
                 Weights::Own => held.estimate.covariance,
                 Weights::Constant => carrier.carried(&held.weight),
             };
-        }
-        if let Some(fused) = &mut self.fused {
-            carrier.estimate(fused);
+            self.fusion
+                .push_weighted(&held.estimate.camera_from_object, &held.weight);
         }
         // Carried by the adjoint, what was fused is what would be; kept as they are, the covariances weigh otherwise here.
-        if self.config.transport == Transport::Kept {
+        if self.config.transport == Transport::Kept && self.held.len() > 1 {
             self.fuse();
         }
     }
@@ -137,14 +160,30 @@ impl Fuser for BatchFuser {
             .is_some_and(|n| self.held.len() >= n.max(1))
         {
             self.held.remove(0);
+            self.fusion.remove_first();
         }
-        self.held.push(Held {
-            estimate: *estimate,
-            weight: match self.weights {
-                Weights::Own => estimate.covariance,
-                Weights::Constant => self.config.unit.at(&estimate.camera_from_object),
-            },
+        let mut anchored = *estimate;
+        if self.held.is_empty() {
+            self.camera_from_anchor = Isometry3::identity();
+        } else {
+            carry(&mut anchored, &self.camera_from_anchor.inverse());
+        }
+        let weight = match self.weights {
+            Weights::Own => anchored.covariance,
+            Weights::Constant => {
+                let weight = self.config.unit.at(&estimate.camera_from_object);
+                let adjoint = se3::adjoint(&self.camera_from_anchor.inverse());
+                symmetrized(&(adjoint * weight * adjoint.transpose()))
+            }
+        };
+        self.push(Held {
+            estimate: anchored,
+            weight,
         });
+        if self.held.len() == 1 {
+            self.fused = Some(*estimate);
+            return Update::Accepted(Solution::NONE);
+        }
         Update::Accepted(self.fuse())
     }
 
@@ -154,7 +193,9 @@ impl Fuser for BatchFuser {
 
     fn reset(&mut self) {
         self.held.clear();
+        self.fusion.clear();
         self.fused = None;
+        self.camera_from_anchor = Isometry3::identity();
     }
 
     fn name(&self) -> &'static str {
@@ -163,4 +204,12 @@ impl Fuser for BatchFuser {
             Weights::Own => "weighted-average",
         }
     }
+}
+
+/// Writes an estimate in the next frame.
+fn carry(estimate: &mut PoseEstimate, next_from_this: &Isometry3<f64>) {
+    let adjoint = se3::adjoint(next_from_this);
+    estimate.camera_from_object = next_from_this * estimate.camera_from_object;
+    estimate.camera_from_object.rotation.renormalize();
+    estimate.covariance = symmetrized(&(adjoint * estimate.covariance * adjoint.transpose()));
 }

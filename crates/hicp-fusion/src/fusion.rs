@@ -121,6 +121,13 @@ impl Fusion {
         });
     }
 
+    /// Takes out the estimate that was added first.
+    pub(crate) fn remove_first(&mut self) {
+        if !self.terms.is_empty() {
+            self.terms.remove(0);
+        }
+    }
+
     /// Number of estimates.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -208,9 +215,10 @@ impl Fusion {
         let mut middle = Matrix6::zeros();
         for (term, own) in self.terms.iter().zip(own) {
             let xi = se3::log(&(fused.camera_from_object * term.object_from_camera));
-            let gain = se3::left_jacobian_inverse(&xi).transpose()
-                * term.information
-                * se3::left_jacobian_inverse(&-xi);
+            let left = se3::left_jacobian_inverse(&xi);
+            // 𝓙(−ξ)⁻¹ = 𝓙(ξ)⁻¹ + ξ⋏, as x/(1 − e⁻ˣ) = x/(eˣ − 1) + x.
+            let right = left + se3::curly_hat(&xi);
+            let gain = left.tr_mul(&(term.information * right));
             middle += gain * own * gain.transpose();
         }
         symmetrized(&(fused.covariance * middle * fused.covariance))
