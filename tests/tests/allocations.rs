@@ -5,8 +5,9 @@ use std::cell::Cell;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
+use hybrid_icp::fusion::{CameraMotion, FusionMethod};
 use hybrid_icp::pipeline::{PARTS, Part, PartKind};
-use hybrid_icp::{PipelineFile, Preset, Refiner};
+use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator};
 
 /// Counts the allocations of the thread that asks.
 struct Counting;
@@ -121,6 +122,33 @@ fn every_component_of_the_catalogue_is_silent_when_warm() {
         tried += 1;
     }
     assert!(tried > 50, "{tried}");
+}
+
+#[test]
+fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
+    let mut rng = rng(7);
+    // A bottle: its symmetries are looked at too.
+    let scene = scene(Household::Bottle, 1.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let uncertain = CameraMotion::none()
+        .with_covariance(&(hybrid_icp::Matrix6::identity() * 1e-8))
+        .expect("a covariance");
+    for method in FusionMethod::ALL {
+        let stage = Preset::Hybrid.build();
+        let mut estimator =
+            SequentialEstimator::for_object(stage, method, &scene.model, &init).expect("valid");
+        let mut steps = |init: &Isometry3<f64>| {
+            estimator.restart(init).expect("valid");
+            for motion in [CameraMotion::none(), uncertain, CameraMotion::none()] {
+                estimator.step(&scene.model, &scene.observation, &motion);
+            }
+        };
+        steps(&init);
+        let before = ALLOCATIONS.get();
+        steps(&init);
+        assert_eq!(ALLOCATIONS.get() - before, 0, "{method}");
+    }
+    counter_works();
 }
 
 fn counter_works() {

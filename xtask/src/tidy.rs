@@ -12,6 +12,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-association", 1),
     ("hicp-metric", 1),
     ("hicp-score", 1),
+    ("hicp-fusion", 1),
     ("hicp-icp", 2),
     ("hicp-switch", 3),
     ("hybrid-icp", 4),

@@ -67,6 +67,26 @@ pub fn left_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
     blocks(&inverse, &(-inverse * q_matrix(xi) * inverse), &inverse)
 }
 
+/// Returns ξ = ln(T)^∨ and the blocks D and B of 𝓙(ξ)⁻¹ = [D B; 0 D], which share most of their work.
+///
+/// ```
+/// use hicp_core::{Vector6, se3};
+/// let motion = se3::exp(&Vector6::new(0.1, -0.2, 0.3, 0.5, -1.0, 0.7));
+/// let (xi, d, b) = se3::log_and_left_jacobian_inverse(&motion);
+/// let whole = se3::left_jacobian_inverse(&xi);
+/// assert_eq!(xi, se3::log(&motion));
+/// assert_eq!((d, b), (whole.fixed_view::<3, 3>(3, 3).into(), whole.fixed_view::<3, 3>(0, 3).into()));
+/// ```
+#[must_use]
+pub fn log_and_left_jacobian_inverse(
+    motion: &Isometry3<f64>,
+) -> (Vector6<f64>, Matrix3<f64>, Matrix3<f64>) {
+    let phi = so3::log(&motion.rotation);
+    let inverse = so3::left_jacobian_inverse(&phi);
+    let xi = join(&(inverse * motion.translation.vector), &phi);
+    (xi, inverse, -inverse * q_matrix(&xi) * inverse)
+}
+
 /// Returns the rotation angle (radians) and the translation distance (metres) between two poses of one object.
 ///
 /// The rotation is that of `a · b⁻¹`; the translation is |t_a − t_b|, the distance between the object origins (BOP's RE and TE).
@@ -88,7 +108,6 @@ pub fn is_finite(pose: &Isometry3<f64>) -> bool {
 /// Q(ξ) with the coefficients of the reference; series below [`SERIES_ANGLE`], where m₃ alone would lose ten digits.
 fn q_matrix(xi: &Vector6<f64>) -> Matrix3<f64> {
     let (rho, phi) = split(xi);
-    let (r, p) = (hat(&rho), hat(&phi));
     let a2 = phi.norm_squared();
     let a = a2.sqrt();
     let (m1, m2, m3) = if a < SERIES_ANGLE {
@@ -106,9 +125,16 @@ fn q_matrix(xi: &Vector6<f64>) -> Matrix3<f64> {
             (2.0 * a - 3.0 * s + a * c) / (2.0 * a2 * a2 * a),
         )
     };
-    let (pr, rp) = (p * r, r * p);
-    let prp = pr * p;
-    r * 0.5 + (pr + rp + prp) * m1 + (p * pr + rp * p - prp * 3.0) * m2 + (prp * p + p * prp) * m3
+    // With s = φ·ρ and c = φ×ρ the products are outer ones: PR = ρφᵀ − sI, RP = φρᵀ − sI, PRP = −sP, PPR − (…)ᵀ = (φ×c)^.
+    let s = phi.dot(&rho);
+    let skew = rho * 0.5 + phi * (s * (m2 - m1)) + phi.cross(&phi.cross(&rho)) * m2;
+    let outer = rho * phi.transpose() * m1;
+    let diagonal = 2.0 * s * (m3 * a2 - m1);
+    hat(&skew)
+        + outer
+        + outer.transpose()
+        + phi * phi.transpose() * (-2.0 * s * m3)
+        + Matrix3::from_diagonal_element(diagonal)
 }
 
 fn split(xi: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {

@@ -2,7 +2,7 @@
 //! wrong, and panics with the law that it breaks, the input and the values found.
 //!
 //! **Should you use this crate?** As a development dependency, if you write a selection, an association, a filter, a metric, a
-//! stop rule, a score, a switcher, a stage or a renderer of your own: yes. To refine poses, use `hybrid-icp`.
+//! stop rule, a score, a switcher, a stage, a fuser or a renderer of your own: yes. To refine poses, use `hybrid-icp`.
 //!
 //! Each function takes a closure that makes the component afresh, so that a fresh instance can be compared with a used one, and
 //! the optional laws that this component declares. A call takes well below a second in a development profile.
@@ -37,6 +37,7 @@
 //! | `Score` | [`check_score`] | [`ScoreLaws`] |
 //! | `Switcher` | [`check_switcher`] | [`SwitcherLaws`] |
 //! | `Stage` | [`check_stage`] | [`StageLaws`] |
+//! | `Fuser` | [`check_fuser`] | [`FuserLaws`] |
 //! | `Renderer` | [`check_renderer`] | [`RendererLaws`] |
 //!
 //! # What the kit cannot check
@@ -51,13 +52,15 @@
 //! `tests/tests/custom_*.rs` in the repository show a component for every extension point, checked and in a whole pipeline.
 //!
 //! Modules in reading order: `law` (messages), `scenes` and `pairs` (inputs), then one per extension point: `selection`,
-//! `association`, `filter`, `metric`, `stop`, `score` (and switchers), `stage`, `renderer`.
+//! `association`, `filter`, `metric`, `stop`, `score` (and switchers), `stage`,
+//! `fuser`, `renderer`.
 
 // A test kit reports by panicking, and its own scenes are valid by construction.
 #![allow(clippy::panic, clippy::expect_used)]
 
 mod association;
 mod filter;
+mod fuser;
 mod law;
 mod metric;
 mod pairs;
@@ -70,6 +73,7 @@ mod stop;
 
 pub use association::{AssociationLaws, check_association};
 pub use filter::{FilterLaws, check_filter};
+pub use fuser::{FuserLaws, check_fuser};
 pub use metric::{MetricLaws, check_metric, check_metric_forwards};
 pub use renderer::{RendererLaws, check_renderer};
 pub use scenes::{Scene, scenes};

@@ -37,12 +37,13 @@
 //! right and y down; pixel centres are at integers.
 //!
 //! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), [`pipeline`] (from a file),
-//! `refiner` (one call), `trace` (what ran).
+//! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `trace` (what ran).
 
 pub mod pipeline;
 mod preset;
 pub mod presets;
 mod refiner;
+mod sequential;
 mod suggest;
 mod trace;
 
@@ -63,6 +64,7 @@ pub use hicp_core::{
     SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3, Vector6,
     rotation_from_matrix, se3, so3,
 };
+pub use hicp_fusion as fusion;
 pub use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
     Evaluation, Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer,
@@ -83,6 +85,7 @@ pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thr
 pub use pipeline::{PipelineError, PipelineFile};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
+pub use sequential::{SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
 
 /// Compiles the README's examples.

@@ -1,0 +1,314 @@
+//! Barfoot & Furgale's fusion of any number of pose estimates.
+
+use hicp_core::{Isometry3, Matrix3, Matrix6, Vector3, Vector6, se3};
+
+use crate::error::FusionError;
+use crate::estimate::{PoseEstimate, information, symmetrized};
+
+/// When the iteration of [`Fusion`] ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FusionLimits {
+    /// The most evaluations of the cost.
+    pub max_iterations: usize,
+    /// Length |ε| of a step, metres and radians in one, below which it is the last.
+    pub tolerance: f64,
+}
+
+impl Default for FusionLimits {
+    /// 50 evaluations, 10⁻¹⁰. Estimates that spread over 0.1 rad take about 6 evaluations, over 0.4 rad about 9.
+    fn default() -> Self {
+        Self {
+            max_iterations: 50,
+            tolerance: 1e-10,
+        }
+    }
+}
+
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// Evaluations of the cost; 0 where nothing was solved.
+    pub iterations: usize,
+    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the pose evaluated last; about 3(K − 1) for K estimates whose covariances are right.
+    pub cost: f64,
+    /// Whether the last step was shorter than the tolerance. If not, the pose is the best that was evaluated.
+    pub converged: bool,
+}
+
+impl Solution {
+    /// What a method reports that solves nothing.
+    pub(crate) const NONE: Self = Self {
+        iterations: 0,
+        cost: 0.0,
+        converged: true,
+    };
+}
+
+/// Several estimates as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fused {
+    /// The pose.
+    pub camera_from_object: Isometry3<f64>,
+    /// Its covariance if those of the estimates are right and their errors independent: A⁻¹ at the minimum (Laplace).
+    pub covariance: Matrix6<f64>,
+    /// How the iteration ended.
+    pub solution: Solution,
+}
+
+/// The fusion of Barfoot & Furgale (T-RO 2014, §V): the pose that minimises V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ with
+/// ξₖ = ln(T Tₖ⁻¹)^∨, by Gauss–Newton on SE(3).
+///
+/// Per evaluation, with Gₖ = 𝓙(ξₖ)⁻¹ (the *left* Jacobian for this sign of ξ):
+/// A = Σ Gₖᵀ Σₖ⁻¹ Gₖ, b = Σ Gₖᵀ Σₖ⁻¹ ξₖ, ε = −A⁻¹ b, T ← exp(ε^) T. A step that raises V is halved until it does not, so that
+/// estimates scattered over half turns, between which V has several minima, end in one of them.
+///
+/// The workspace keeps its memory: pushing no more estimates than before allocates nothing. Cost: per estimate an inversion, and
+/// per evaluation and estimate a logarithm, a Jacobian and two products of 6×6 matrices.
+#[derive(Clone, Debug, Default)]
+pub struct Fusion {
+    /// When to end.
+    pub limits: FusionLimits,
+    terms: Vec<Term>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    object_from_camera: Isometry3<f64>,
+    information: Matrix6<f64>,
+    /// The blocks of the information: ρρ, ρφ, φφ.
+    blocks: [Matrix3<f64>; 3],
+}
+
+/// V, its Gauss–Newton Hessian and half its gradient at a pose.
+struct Linearization {
+    cost: f64,
+    hessian: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl Fusion {
+    /// Makes a workspace.
+    #[must_use]
+    pub fn new(limits: FusionLimits) -> Self {
+        Self {
+            limits,
+            terms: Vec::new(),
+        }
+    }
+
+    /// Forgets the estimates, keeps the memory.
+    pub fn clear(&mut self) {
+        self.terms.clear();
+    }
+
+    /// Adds an estimate. Directions without variance count as known to [`crate::MIN_STANDARD_DEVIATION`].
+    pub fn push(&mut self, estimate: &PoseEstimate) {
+        self.push_weighted(&estimate.camera_from_object, &estimate.covariance);
+    }
+
+    /// Adds a pose with the covariance that weighs it.
+    pub(crate) fn push_weighted(
+        &mut self,
+        camera_from_object: &Isometry3<f64>,
+        weight_covariance: &Matrix6<f64>,
+    ) {
+        let information = information(weight_covariance);
+        let block = |i, j| information.fixed_view::<3, 3>(i, j).into_owned();
+        self.terms.push(Term {
+            object_from_camera: camera_from_object.inverse(),
+            information,
+            blocks: [block(0, 0), block(0, 3), block(3, 3)],
+        });
+    }
+
+    /// Takes out the estimate that was added first.
+    pub(crate) fn remove_first(&mut self) {
+        if !self.terms.is_empty() {
+            self.terms.remove(0);
+        }
+    }
+
+    /// Number of estimates.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Returns whether there is no estimate.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// Returns V at a pose.
+    #[must_use]
+    pub fn cost(&self, camera_from_object: &Isometry3<f64>) -> f64 {
+        let half_square = |term: &Term| {
+            let xi = se3::log(&(camera_from_object * term.object_from_camera));
+            0.5 * xi.dot(&(term.information * xi))
+        };
+        self.terms.iter().map(half_square).sum()
+    }
+
+    /// Minimises V from a start; `None` without estimates.
+    #[must_use]
+    pub fn solve(&self, start: &Isometry3<f64>) -> Option<Fused> {
+        if self.terms.is_empty() {
+            return None;
+        }
+        let mut pose = *start;
+        let mut at = self.linearize(&pose);
+        let mut iterations = 1;
+        let mut converged = false;
+        while iterations < self.limits.max_iterations.max(1) {
+            let Some(factor) = at.hessian.cholesky() else {
+                break;
+            };
+            let mut step = -factor.solve(&at.gradient);
+            if !step.iter().all(|x| x.is_finite()) {
+                break;
+            }
+            if step.norm() < self.limits.tolerance {
+                // Below the tolerance the step is an improvement beyond question, and not worth an evaluation.
+                pose = moved(&pose, &step);
+                converged = true;
+                break;
+            }
+            // Invariant: `at` belongs to `pose`, and its cost never rises by more than rounding.
+            let (candidate, linearization) = loop {
+                let candidate = moved(&pose, &step);
+                let linearization = self.linearize(&candidate);
+                iterations += 1;
+                if linearization.cost <= at.cost * (1.0 + 1e-12) + f64::MIN_POSITIVE
+                    || iterations >= self.limits.max_iterations
+                    || step.norm() < self.limits.tolerance
+                {
+                    break (candidate, linearization);
+                }
+                step *= 0.5;
+            };
+            if linearization.cost > at.cost * (1.0 + 1e-12) + f64::MIN_POSITIVE {
+                // The smallest step raises V: as near to a minimum as rounding allows, or out of evaluations.
+                converged = step.norm() < self.limits.tolerance;
+                break;
+            }
+            (pose, at) = (candidate, linearization);
+        }
+        Some(Fused {
+            camera_from_object: pose,
+            covariance: self.covariance(&at)?,
+            solution: Solution {
+                iterations,
+                cost: at.cost,
+                converged,
+            },
+        })
+    }
+
+    /// Returns the covariance of the fused pose when the estimates, weighed as they were pushed, have covariances of their own:
+    /// A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. One matrix per estimate, in the order of pushing.
+    pub(crate) fn covariance_from<'a>(
+        &self,
+        fused: &Fused,
+        own: impl Iterator<Item = &'a Matrix6<f64>>,
+    ) -> Matrix6<f64> {
+        let mut middle = Matrix6::zeros();
+        for (term, own) in self.terms.iter().zip(own) {
+            let xi = se3::log(&(fused.camera_from_object * term.object_from_camera));
+            let left = se3::left_jacobian_inverse(&xi);
+            // 𝓙(−ξ)⁻¹ = 𝓙(ξ)⁻¹ + ξ⋏, as x/(1 − e⁻ˣ) = x/(eˣ − 1) + x.
+            let right = left + se3::curly_hat(&xi);
+            let gain = left.tr_mul(&(term.information * right));
+            middle += gain * own * gain.transpose();
+        }
+        symmetrized(&(fused.covariance * middle * fused.covariance))
+    }
+
+    /// By blocks: G = [D B; 0 D] and Σ⁻¹ = [W₁₁ W₁₂; W₁₂ᵀ W₂₂], all 3×3.
+    fn linearize(&self, camera_from_object: &Isometry3<f64>) -> Linearization {
+        let mut cost = 0.0;
+        let (mut g1, mut g2) = (Vector3::zeros(), Vector3::zeros());
+        let (mut h11, mut h12, mut h22) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        for term in &self.terms {
+            let relative = camera_from_object * term.object_from_camera;
+            let (xi, d, b) = se3::log_and_left_jacobian_inverse(&relative);
+            let [w11, w12, w22] = &term.blocks;
+            let rho = Vector3::new(xi[0], xi[1], xi[2]);
+            let phi = Vector3::new(xi[3], xi[4], xi[5]);
+            let (y1, y2) = (w11 * rho + w12 * phi, w12.tr_mul(&rho) + w22 * phi);
+            cost += 0.5 * (rho.dot(&y1) + phi.dot(&y2));
+            let (dt, bt) = (d.transpose(), b.transpose());
+            g1 += dt * y1;
+            g2 += bt * y1 + dt * y2;
+            let right = w11 * b + w12 * d;
+            h11 += dt * (w11 * d);
+            h12 += dt * right;
+            h22 += bt * right + dt * (w12.transpose() * b + w22 * d);
+        }
+        let mut hessian = Matrix6::zeros();
+        hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h11);
+        hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h12);
+        hessian
+            .fixed_view_mut::<3, 3>(3, 0)
+            .copy_from(&h12.transpose());
+        hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h22);
+        Linearization {
+            cost,
+            hessian,
+            gradient: Vector6::new(g1.x, g1.y, g1.z, g2.x, g2.y, g2.z),
+        }
+    }
+
+    /// A⁻¹; where rounding left A indefinite, the covariance of the surest estimate.
+    fn covariance(&self, at: &Linearization) -> Option<Matrix6<f64>> {
+        let inverse = at.hessian.cholesky().map(|factor| factor.inverse());
+        if let Some(inverse) = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite())) {
+            return Some(symmetrized(&inverse));
+        }
+        self.terms
+            .iter()
+            .map(|term| term.information)
+            .max_by(|a, b| a.trace().total_cmp(&b.trace()))
+            .map(|surest| information(&symmetrized(&surest)))
+    }
+}
+
+/// exp(ε^) T, its quaternion brought back to unit length.
+fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
+    let mut moved = se3::exp(step) * pose;
+    moved.rotation.renormalize();
+    moved
+}
+
+/// Fuses estimates, from the one with the smallest tr Σ: see [`Fusion`].
+///
+/// Allocates; keep a [`Fusion`] where that matters.
+///
+/// # Errors
+///
+/// [`FusionError::Empty`] without estimates. Not converging is no error: `solution` says so.
+///
+/// ```
+/// use hicp_core::{Isometry3, Matrix6};
+/// use hicp_fusion::{FusionError, FusionLimits, PoseEstimate, fuse};
+/// # fn main() -> Result<(), FusionError> {
+/// // Two cameras disagree by 2 mm; the second is half as sure (twice the standard deviation).
+/// let a = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.500), Matrix6::identity() * 1e-6)?;
+/// let b = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.502), Matrix6::identity() * 4e-6)?;
+/// let fused = fuse(&[a, b], FusionLimits::default())?;
+/// assert!((fused.camera_from_object.translation.z - 0.5004).abs() < 1e-12);
+/// assert!((fused.covariance[(0, 0)] - 0.8e-6).abs() < 1e-12);
+/// assert!(fused.solution.converged);
+/// # Ok(()) }
+/// ```
+pub fn fuse(estimates: &[PoseEstimate], limits: FusionLimits) -> Result<Fused, FusionError> {
+    let mut fusion = Fusion::new(limits);
+    for estimate in estimates {
+        fusion.push(estimate);
+    }
+    estimates
+        .iter()
+        .min_by(|a, b| a.covariance.trace().total_cmp(&b.covariance.trace()))
+        .and_then(|surest| fusion.solve(&surest.camera_from_object))
+        .ok_or(FusionError::Empty)
+}

@@ -1,0 +1,123 @@
+//! The six methods by name.
+
+use std::str::FromStr;
+
+use thiserror::Error;
+
+use crate::batch::BatchFuser;
+use crate::config::FuserConfig;
+use crate::fuser::Fuser;
+use crate::recursive::RecursiveFuser;
+use crate::single::{LastEstimate, MostConfident};
+
+/// A fuser behind a box: the same bits as without.
+pub type BoxedFuser = Box<dyn Fuser + Send>;
+
+/// A method of §V-A, by its name in the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FusionMethod {
+    /// [`LastEstimate`].
+    LastEstimate,
+    /// [`BatchFuser::average`].
+    Average,
+    /// [`BatchFuser::weighted_average`].
+    WeightedAverage,
+    /// [`RecursiveFuser::filtering_constant`].
+    FilteringConstant,
+    /// [`RecursiveFuser::filtering`].
+    Filtering,
+    /// [`MostConfident`].
+    MostConfident,
+}
+
+impl FusionMethod {
+    /// Every method, in the paper's order.
+    pub const ALL: [Self; 6] = [
+        Self::LastEstimate,
+        Self::Average,
+        Self::WeightedAverage,
+        Self::FilteringConstant,
+        Self::Filtering,
+        Self::MostConfident,
+    ];
+
+    /// Name on the command line and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LastEstimate => "last-estimate",
+            Self::Average => "average",
+            Self::WeightedAverage => "weighted-average",
+            Self::FilteringConstant => "filtering-constant",
+            Self::Filtering => "filtering",
+            Self::MostConfident => "most-confident",
+        }
+    }
+
+    /// One line about it.
+    #[must_use]
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::LastEstimate => "the latest estimate",
+            Self::Average => "all estimates, weighed alike",
+            Self::WeightedAverage => "all estimates, weighed by their covariances",
+            Self::FilteringConstant => {
+                "the latest estimate with a unit covariance, fused with what was fused before"
+            }
+            Self::Filtering => {
+                "the latest estimate with its covariance, fused with what was fused before"
+            }
+            Self::MostConfident => "the estimate with the lowest uncertainty so far",
+        }
+    }
+
+    /// Returns whether the result depends on the covariances of the estimates, which in the paper take an MVE.
+    #[must_use]
+    pub fn uses_covariances(self) -> bool {
+        matches!(
+            self,
+            Self::WeightedAverage | Self::Filtering | Self::MostConfident
+        )
+    }
+
+    /// Builds the method.
+    #[must_use]
+    pub fn build(self, config: FuserConfig) -> BoxedFuser {
+        match self {
+            Self::LastEstimate => Box::new(LastEstimate::new(config.transport)),
+            Self::Average => Box::new(BatchFuser::average(config)),
+            Self::WeightedAverage => Box::new(BatchFuser::weighted_average(config)),
+            Self::FilteringConstant => Box::new(RecursiveFuser::filtering_constant(config)),
+            Self::Filtering => Box::new(RecursiveFuser::filtering(config)),
+            Self::MostConfident => Box::new(MostConfident::new(config.transport)),
+        }
+    }
+}
+
+impl std::fmt::Display for FusionMethod {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no method has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("no fusion method is named {name:?}; the names are: {}", FusionMethod::ALL.map(FusionMethod::name).join(", "))]
+pub struct UnknownMethod {
+    /// The name given.
+    pub name: String,
+}
+
+impl FromStr for FusionMethod {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == name)
+            .ok_or_else(|| UnknownMethod {
+                name: name.to_owned(),
+            })
+    }
+}

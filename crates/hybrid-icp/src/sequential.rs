@@ -1,0 +1,300 @@
+//! Sequential ICP: estimates fused while the camera moves (§V).
+
+use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
+use hicp_fusion::{
+    BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
+    Gated, MveCovariance, PoseEstimate, SymmetryAware, UnitCovariance, Update,
+};
+use hicp_icp::{Observer, Outcome, Quality, Session, Stage, Termination, Workspace};
+use hicp_raster::Rasterizer;
+use hicp_score::{MeanVsd, Score};
+
+use crate::preset::BoxedStage;
+
+/// How a [`SequentialEstimator`] judges each estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SequentialConfig {
+    /// Where the covariance of an estimate comes from.
+    pub covariance: CovarianceModel,
+    /// The score of each estimate against its image; `None` saves its render where the fuser and the covariance need no MVE.
+    pub score: Option<MeanVsd>,
+}
+
+impl Default for SequentialConfig {
+    /// e_MVE·I₆ with the MVE that recognises occlusion.
+    fn default() -> Self {
+        Self {
+            covariance: CovarianceModel::default(),
+            score: Some(MeanVsd::default()),
+        }
+    }
+}
+
+/// What became of one image.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SequentialEvent {
+    /// There was an estimate, and this is what the fuser did with it.
+    Estimated(Update),
+    /// No pair was ever found, for instance because nothing was seen: there is no estimate, and what was held stands.
+    NoEstimate(Termination),
+    /// The estimate or its covariance was refused; what was held stands.
+    Refused(FusionError),
+}
+
+/// The object's pose after one image, and how it came about. Poses and covariances are in the camera frame of that image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SequentialStep {
+    /// The fused pose; the initial one, carried along, while there is no estimate.
+    pub camera_from_object: Isometry3<f64>,
+    /// Its covariance (ξ = [ρ; φ], left perturbation, metres and radians); `None` while there is no estimate.
+    pub covariance: Option<Matrix6<f64>>,
+    /// Where ICP started: what was fused before, moved with the camera.
+    pub init: Isometry3<f64>,
+    /// What ICP made of this image alone.
+    pub outcome: Outcome,
+    /// The mean VSD estimate of `outcome`, where it was scored.
+    pub mve: Option<f64>,
+    /// What became of it.
+    pub event: SequentialEvent,
+}
+
+/// Estimates the pose of an object that stands still from images along the path of a moving camera (§V).
+///
+/// Each image is registered from the pose fused so far, moved with the camera; the fuser takes the result, and its estimate is the
+/// answer and the next start (§V-A). The estimator keeps no time, starts no thread and reads nothing: feed it images and motions as they come.
+///
+/// A pose that ICP could not evaluate (no pairs at all) is not an estimate, and is not fused: it would be the fused pose once more.
+///
+/// Cost of a step: the pipeline's, one render and one score for the MVE where asked for, and the fuser's, which is microseconds.
+///
+/// ```
+/// use hybrid_icp::fusion::{CameraMotion, FusionMethod};
+/// use hybrid_icp::{
+///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, SequentialEstimator, TriMesh, presets,
+/// };
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
+/// let plate = vec![
+///     Point3::new(-0.1, -0.1, 0.0), Point3::new(0.1, -0.1, 0.0), Point3::new(0.1, 0.1, 0.0), Point3::new(-0.1, 0.1, 0.0),
+/// ];
+/// let model = Model::new(TriMesh::new(plate, vec![[0, 2, 1], [0, 3, 2]])?);
+/// // The plate stands 60 cm in front of the camera, which advances by 2 cm per image; the detector is 3 cm off.
+/// let init = Isometry3::translation(0.0, 0.0, 0.63);
+/// let mut estimator = SequentialEstimator::for_object(presets::hybrid(), FusionMethod::Average, &model, &init)?;
+/// let mut motion = CameraMotion::none();
+/// for distance in [0.60_f32, 0.58, 0.56] {
+///     let depth = hybrid_icp::render_depth_image(
+///         model.mesh(), &camera, &Isometry3::translation(0.0, 0.0, f64::from(distance)));
+///     let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
+///     let step = estimator.step(&model, &Observation::new(depth, mask, camera)?, &motion);
+///     assert!((step.camera_from_object.translation.z - f64::from(distance)).abs() < 1e-4);
+///     motion = CameraMotion::new(Isometry3::translation(0.0, 0.0, -0.02))?;
+/// }
+/// # Ok(()) }
+/// ```
+pub struct SequentialEstimator {
+    stage: BoxedStage,
+    fuser: BoxedFuser,
+    config: SequentialConfig,
+    workspace: Workspace,
+    /// The initial pose in the current camera frame.
+    init: Isometry3<f64>,
+}
+
+impl SequentialEstimator {
+    /// Makes an estimator from any stage and any fuser; `init` is the rough pose in the first camera frame.
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError`] when the initial pose is not a rigid motion of sensible size.
+    pub fn new(
+        stage: impl Stage + Send + 'static,
+        fuser: impl Fuser + Send + 'static,
+        config: SequentialConfig,
+        init: &Isometry3<f64>,
+    ) -> Result<Self, FusionError> {
+        let mut estimator = Self {
+            stage: Box::new(stage),
+            fuser: Box::new(fuser),
+            config,
+            workspace: Workspace::new(Rasterizer::default()),
+            init: *init,
+        };
+        estimator.restart(init)?;
+        Ok(estimator)
+    }
+
+    /// Makes an estimator for an object: uncertainty is the MVE about the object's centre, rotations count by its radius, estimates
+    /// with an MVE above 0.4 are left out, and symmetric poses are brought together.
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError`] as for [`SequentialEstimator::new`], or when the model's size is out of range.
+    pub fn for_object(
+        stage: impl Stage + Send + 'static,
+        method: FusionMethod,
+        model: &Model,
+        init: &Isometry3<f64>,
+    ) -> Result<Self, FusionError> {
+        let unit = UnitCovariance::about_object(model.center(), model.radius())?;
+        let config = FuserConfig {
+            unit,
+            ..FuserConfig::default()
+        };
+        // Without calibrated covariances a Mahalanobis distance means nothing.
+        let gate = Gate {
+            max_mahalanobis_squared: None,
+            ..Gate::default()
+        };
+        let fuser = SymmetryAware::new(
+            Gated::new(method.build(config), gate)?,
+            model.symmetries().clone(),
+            model.center(),
+            model.radius(),
+        )?;
+        let mve = MveCovariance {
+            unit,
+            ..MveCovariance::default()
+        };
+        let judge = SequentialConfig {
+            covariance: CovarianceModel::Mve(mve),
+            ..SequentialConfig::default()
+        };
+        Self::new(stage, fuser, judge, init)
+    }
+
+    /// Makes the estimator of §V to the letter: covariances e_MVE·I₆, kept as they are when the camera moves, no gate; the MVE
+    /// is computed only for the methods that need it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`SequentialEstimator::new`].
+    pub fn paper(
+        stage: impl Stage + Send + 'static,
+        method: FusionMethod,
+        init: &Isometry3<f64>,
+    ) -> Result<Self, FusionError> {
+        let config = SequentialConfig {
+            covariance: CovarianceModel::default(),
+            score: method.uses_covariances().then(MeanVsd::paper),
+        };
+        Self::new(stage, method.build(FuserConfig::paper()), config, init)
+    }
+
+    /// Forgets everything but the memory, and starts from a rough pose in the current camera frame.
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError`] when it is not a rigid motion of sensible size.
+    pub fn restart(&mut self, init: &Isometry3<f64>) -> Result<(), FusionError> {
+        // The checks of an estimate are those of an initial pose.
+        self.init = *PoseEstimate::new(*init, Matrix6::zeros())?.camera_from_object();
+        self.fuser.reset();
+        Ok(())
+    }
+
+    /// Moves the camera without an image: the pose is then that in the new frame.
+    pub fn move_camera(&mut self, motion: &CameraMotion) {
+        self.fuser.propagate(motion);
+        self.init = motion.apply(&self.init);
+    }
+
+    /// The pose in the current camera frame: fused, or while there is no estimate the initial one.
+    #[must_use]
+    pub fn camera_from_object(&self) -> Isometry3<f64> {
+        self.fuser
+            .estimate()
+            .map_or(self.init, |fused| *fused.camera_from_object())
+    }
+
+    /// The fused estimate in the current camera frame, once there is one.
+    #[must_use]
+    pub fn estimate(&self) -> Option<PoseEstimate> {
+        self.fuser.estimate()
+    }
+
+    /// The fuser.
+    #[must_use]
+    pub fn fuser(&self) -> &dyn Fuser {
+        &*self.fuser
+    }
+
+    /// Takes in an image of the object and how the camera moved since the one before ([`CameraMotion::none`] for the first).
+    ///
+    /// Never fails on data: what happened is in the step. Deterministic.
+    pub fn step(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        motion: &CameraMotion,
+    ) -> SequentialStep {
+        self.step_observed(model, observation, motion, &mut ())
+    }
+
+    /// Takes in an image and tells an observer what ICP does.
+    pub fn step_observed(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        motion: &CameraMotion,
+        observer: &mut dyn Observer,
+    ) -> SequentialStep {
+        self.move_camera(motion);
+        let init = self.camera_from_object();
+        let problem = Problem::new(model, observation);
+        let outcome = self.stage.run(
+            &problem,
+            &init,
+            &mut Session::new(&mut self.workspace, observer),
+        );
+        let (mve, event) = self.take(&problem, &outcome);
+        let fused = self.fuser.estimate();
+        SequentialStep {
+            camera_from_object: self.camera_from_object(),
+            covariance: fused.map(|fused| *fused.covariance()),
+            init,
+            outcome,
+            mve,
+            event,
+        }
+    }
+
+    /// Judges what ICP made of an image and gives it to the fuser.
+    fn take(&mut self, problem: &Problem<'_>, outcome: &Outcome) -> (Option<f64>, SequentialEvent) {
+        if outcome.evaluation.is_none() {
+            return (None, SequentialEvent::NoEstimate(outcome.termination));
+        }
+        let pose = &outcome.camera_from_object;
+        let workspace = &mut self.workspace;
+        let score = self.config.score.as_mut();
+        let mve = score.map(|score| score.score(&mut workspace.context(problem), pose));
+        let registration = match self.config.covariance {
+            CovarianceModel::Inflated(_) => outcome.quality.as_ref().and_then(Quality::covariance),
+            _ => None,
+        };
+        let covariance = self
+            .config
+            .covariance
+            .covariance(pose, mve, registration.as_ref());
+        let estimate = PoseEstimate::new(*pose, covariance).and_then(|estimate| match mve {
+            Some(mve) => estimate.with_mve(mve),
+            None => Ok(estimate),
+        });
+        let event = match estimate {
+            Ok(estimate) => SequentialEvent::Estimated(self.fuser.update(&estimate)),
+            Err(error) => SequentialEvent::Refused(error),
+        };
+        (mve, event)
+    }
+}
+
+impl std::fmt::Debug for SequentialEstimator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SequentialEstimator")
+            .field("fuser", &self.fuser.name())
+            .field("config", &self.config)
+            .field("init", &self.init)
+            .finish_non_exhaustive()
+    }
+}
