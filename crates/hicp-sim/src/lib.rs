@@ -15,23 +15,28 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `household` (objects), `solid` (their parts), `sampling` (poses, perturbations), `noise`.
+//! Modules in reading order: `household` (objects), `shapes`, `solid` and
+//! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `noise`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
 mod household;
 mod noise;
+mod profile;
 mod sampling;
+mod shapes;
 mod solid;
+mod stream;
 
-pub use household::Household;
+pub use household::{Household, Proportions};
 pub use noise::RelativeGaussian;
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
 };
 pub use solid::Solid;
+pub use stream::stream;
 
 /// The generator that all simulations use: small, fast, and the same on every machine and in every version.
 pub type SimRng = rand_pcg::Pcg64Mcg;
@@ -40,31 +45,4 @@ pub type SimRng = rand_pcg::Pcg64Mcg;
 #[must_use]
 pub fn rng(seed: u64) -> SimRng {
     rand::SeedableRng::seed_from_u64(seed)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use hicp_core::Facing;
-
-    #[test]
-    fn every_object_is_closed_outward_and_of_household_size() {
-        for object in Household::ALL {
-            let model = object.model().unwrap();
-            let mesh = model.mesh();
-            assert_eq!(mesh.facing(), Facing::Outward, "{}", object.name());
-            let diameter = model.diameter();
-            assert!(
-                (0.08..=0.35).contains(&diameter),
-                "{}: {diameter}",
-                object.name()
-            );
-            let triangles = mesh.triangles().len();
-            assert!(
-                (2000..=10_000).contains(&triangles),
-                "{}: {triangles}",
-                object.name()
-            );
-        }
-    }
 }
