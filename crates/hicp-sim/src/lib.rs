@@ -16,25 +16,36 @@
 //! ```
 //!
 //! Modules in reading order: `household` (objects), `shapes`, `solid` and
-//! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `noise`.
+//! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `case`
+//! (one image and a start), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `error`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
+mod case;
+mod corruption;
+mod error;
 mod household;
+mod mask;
 mod noise;
 mod profile;
 mod sampling;
+mod sensor;
 mod shapes;
 mod solid;
 mod stream;
 
+pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
+pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
+pub use error::SimError;
 pub use household::{Household, Proportions};
-pub use noise::RelativeGaussian;
+pub use mask::MaskDefects;
+pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
 };
+pub use sensor::{DEPTH_EDGE_METERS, DepthSensor, Dropout};
 pub use solid::Solid;
 pub use stream::stream;
 
