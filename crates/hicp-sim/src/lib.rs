@@ -17,30 +17,38 @@
 //!
 //! Modules in reading order: `household` (objects), `shapes`, `solid` and
 //! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `case`
-//! (one image and a start), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `error`.
+//! (one image and a start), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `tsdf`, `meshing`, `components`,
+//! `reconstruction` (noisy models), `error`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
 mod case;
+mod components;
 mod corruption;
 mod error;
 mod household;
 mod mask;
+mod meshing;
 mod noise;
 mod profile;
+mod reconstruction;
 mod sampling;
 mod sensor;
 mod shapes;
 mod solid;
 mod stream;
+mod tsdf;
 
 pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
+pub use components::{Component, components, join};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
 pub use error::SimError;
 pub use household::{Household, Proportions};
 pub use mask::MaskDefects;
+pub use meshing::ScalarGrid;
 pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
+pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
@@ -48,6 +56,7 @@ pub use sampling::{
 pub use sensor::{DEPTH_EDGE_METERS, DepthSensor, Dropout};
 pub use solid::Solid;
 pub use stream::stream;
+pub use tsdf::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
 
 /// The generator that all simulations use: small, fast, and the same on every machine and in every version.
 pub type SimRng = rand_pcg::Pcg64Mcg;
