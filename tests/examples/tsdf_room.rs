@@ -6,22 +6,16 @@
 
 use std::path::PathBuf;
 
-use hicp_io::{LengthUnit, read_depth_png, write_ply};
+use hicp_io::{LengthUnit, write_ply};
 use hicp_sim::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen, components};
-use hicp_tests::room::frames;
-use hybrid_icp::{Point3, Vector3};
+use hicp_tests::room::{bounds, frames};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = PathBuf::from(arguments.next().ok_or("a folder of frames is needed")?);
     let voxel_meters: f64 = arguments.next().map_or(Ok(0.015), |text| text.parse())?;
-    let _ = (
-        read_depth_png::<PathBuf>,
-        Vector3::<f64>::zeros,
-        Point3::<f64>::origin,
-    );
     let frames = frames(&folder)?;
-    let (min, max) = hicp_tests::room::bounds(&frames);
+    let (min, max) = bounds(&frames);
     let mut volume = TsdfVolume::new(TsdfConfig {
         min,
         max,

@@ -1,6 +1,7 @@
 //! Scenes that the cross-crate tests share.
 
 pub mod nees;
+pub mod room;
 pub mod starts;
 pub mod ycbv;
 
