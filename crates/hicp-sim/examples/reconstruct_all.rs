@@ -1,6 +1,7 @@
 //! Reconstructs every household object at the four noise levels of §VI-B.3 and prints how far the surfaces are apart.
 //!
 //! `cargo run --release -p hicp-sim --example reconstruct_all`
+#![allow(clippy::print_stdout, reason = "a report")]
 
 use std::time::Instant;
 

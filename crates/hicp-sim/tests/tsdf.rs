@@ -1,5 +1,9 @@
 //! Volumes give back the surfaces that were integrated into them.
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests, figures to look at"
+)]
 
 use std::collections::{HashMap, HashSet};
 
