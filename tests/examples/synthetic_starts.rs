@@ -4,10 +4,8 @@
 
 use std::time::Instant;
 
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
-};
-use hicp_tests::{median, scene, symmetric_pose_distance};
+use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
+use hicp_tests::{OBJECTS, median, scene, symmetric_pose_distance};
 use hybrid_icp::{Preset, Problem, Refiner, Score, Vsd};
 
 const STARTS_PER_OBJECT: usize = 20;
@@ -28,7 +26,7 @@ fn main() {
         .map_or(0.0, |text| text.parse().expect("a noise level in percent"));
     let mut refiners =
         Preset::ALL.map(|preset| (preset, Refiner::preset(preset), Column::default()));
-    for (seed, object) in (0..).zip(Household::ALL) {
+    for (seed, object) in (0..).zip(OBJECTS) {
         let mut rng = rng(seed);
         for _ in 0..STARTS_PER_OBJECT {
             let scene = scene(object, noise, &mut rng);

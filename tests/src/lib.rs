@@ -1,6 +1,7 @@
 //! Scenes that the cross-crate tests share.
 
 pub mod nees;
+pub mod room;
 pub mod starts;
 pub mod ycbv;
 
@@ -9,6 +10,20 @@ use hybrid_icp::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
     Symmetries, Workspace, se3,
 };
+
+/// The ten objects that the starts, and the figures quoted from them, are about.
+pub const OBJECTS: [Household; 10] = [
+    Household::Mug,
+    Household::Bottle,
+    Household::Bowl,
+    Household::Carton,
+    Household::Bracket,
+    Household::Hammer,
+    Household::Plate,
+    Household::Iron,
+    Household::Car,
+    Household::Pan,
+];
 
 /// A model seen in a depth image, and where it truly is.
 #[derive(Debug)]

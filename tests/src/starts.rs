@@ -1,13 +1,11 @@
 //! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a table row of how a pipeline does on them.
 
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
-};
+use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hybrid_icp::{
     Isometry3, PipelineFile, Problem, Rasterizer, Session, Stage, Verdict, Workspace,
 };
 
-use crate::{Scene, median, scene, symmetric_pose_distance};
+use crate::{OBJECTS, Scene, median, scene, symmetric_pose_distance};
 
 /// A scene and the pose to start from.
 #[derive(Debug)]
@@ -20,7 +18,7 @@ pub struct Start {
 
 /// Makes the starts of the `synthetic_starts` example: so many per object, of all ten.
 pub fn starts(per_object: usize, noise_percent: f64) -> Vec<Start> {
-    let objects = (0..).zip(Household::ALL);
+    let objects = (0..).zip(OBJECTS);
     objects
         .flat_map(|(seed, object)| {
             let mut rng = rng(seed);

@@ -1,16 +1,14 @@
 //! Hybrid ICP from the paper's mean initialisation error (§VI-A.5), noise-free and with a full mask.
 
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
-};
-use hicp_tests::{scene, symmetric_pose_distance};
+use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
+use hicp_tests::{OBJECTS, scene, symmetric_pose_distance};
 use hybrid_icp::{Preset, Refiner};
 
 #[test]
 fn the_median_start_is_refined_to_a_fraction_of_a_degree_and_of_a_millimetre() {
     let mut refiner = Refiner::preset(Preset::Hybrid);
     let (mut angles, mut distances) = (Vec::new(), Vec::new());
-    for (seed, object) in (0..).zip(Household::ALL) {
+    for (seed, object) in (0..).zip(OBJECTS) {
         let mut rng = rng(seed);
         for _ in 0..20 {
             let scene = scene(object, 0.0, &mut rng);

@@ -15,23 +15,48 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `household` (objects), `solid` (their parts), `sampling` (poses, perturbations), `noise`.
+//! Modules in reading order: `household` (objects), `shapes`, `solid` and
+//! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `case`
+//! (one image and a start), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `tsdf`, `meshing`, `components`,
+//! `reconstruction` (noisy models), `error`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
+mod case;
+mod components;
+mod corruption;
+mod error;
 mod household;
+mod mask;
+mod meshing;
 mod noise;
+mod profile;
+mod reconstruction;
 mod sampling;
+mod sensor;
+mod shapes;
 mod solid;
+mod stream;
+mod tsdf;
 
-pub use household::Household;
-pub use noise::RelativeGaussian;
+pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
+pub use components::{Component, components, join};
+pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
+pub use error::SimError;
+pub use household::{Household, Proportions};
+pub use mask::MaskDefects;
+pub use meshing::ScalarGrid;
+pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
+pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
 };
+pub use sensor::{DEPTH_EDGE_METERS, DepthSensor, Dropout};
 pub use solid::Solid;
+pub use stream::stream;
+pub use tsdf::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
 
 /// The generator that all simulations use: small, fast, and the same on every machine and in every version.
 pub type SimRng = rand_pcg::Pcg64Mcg;
@@ -40,31 +65,4 @@ pub type SimRng = rand_pcg::Pcg64Mcg;
 #[must_use]
 pub fn rng(seed: u64) -> SimRng {
     rand::SeedableRng::seed_from_u64(seed)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use hicp_core::Facing;
-
-    #[test]
-    fn every_object_is_closed_outward_and_of_household_size() {
-        for object in Household::ALL {
-            let model = object.model().unwrap();
-            let mesh = model.mesh();
-            assert_eq!(mesh.facing(), Facing::Outward, "{}", object.name());
-            let diameter = model.diameter();
-            assert!(
-                (0.08..=0.35).contains(&diameter),
-                "{}: {diameter}",
-                object.name()
-            );
-            let triangles = mesh.triangles().len();
-            assert!(
-                (2000..=10_000).contains(&triangles),
-                "{}: {triangles}",
-                object.name()
-            );
-        }
-    }
 }

@@ -2,6 +2,8 @@
 //!
 //! Every builder makes a closed, outward-facing part in metres; a [`Solid`] collects parts, which may overlap.
 
+use std::collections::HashMap;
+
 use hicp_core::{Isometry3, MeshError, Point3, TriMesh, Vector3};
 
 /// A collection of closed parts.
@@ -29,16 +31,51 @@ impl Solid {
         self
     }
 
-    /// Makes the mesh.
+    /// Returns the solid moved by `pose`.
+    #[must_use]
+    pub fn moved(mut self, pose: &Isometry3<f64>) -> Self {
+        for p in &mut self.vertices {
+            *p = pose * *p;
+        }
+        self
+    }
+
+    /// Returns the solid stretched along the axes by positive factors.
+    #[must_use]
+    pub fn scaled(mut self, factors: &Vector3<f64>) -> Self {
+        for p in &mut self.vertices {
+            p.coords.component_mul_assign(factors);
+        }
+        self
+    }
+
+    /// Makes the mesh. Corners at the same position become one vertex.
     ///
     /// # Errors
     ///
     /// [`MeshError`] when there is no part, or its sizes are not finite.
     pub fn to_mesh(&self) -> Result<TriMesh, MeshError> {
-        TriMesh::new(
-            self.vertices.iter().map(|p| p.cast::<f32>()).collect(),
-            self.triangles.clone(),
-        )
+        let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.vertices.len());
+        let mut vertices: Vec<Point3<f32>> = Vec::new();
+        let index_of: Vec<u32> = self
+            .vertices
+            .iter()
+            .map(|p| {
+                // Adding 0 turns -0 into +0.
+                let p = p.cast::<f32>().map(|x| x + 0.0);
+                let key = [p.x, p.y, p.z].map(f32::to_bits);
+                *first_at.entry(key).or_insert_with(|| {
+                    vertices.push(p);
+                    to_index(vertices.len() - 1)
+                })
+            })
+            .collect();
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|corners| corners.map(|i| index_of[i as usize]))
+            .collect();
+        TriMesh::new(vertices, triangles)
     }
 
     /// Makes a cuboid about the origin with the given side lengths, each face divided into `divisions`² cells.
@@ -70,6 +107,13 @@ impl Solid {
     /// material); points of radius 0 lie on the axis. `steps` is the number of segments around.
     #[must_use]
     pub fn lathe(profile: &[(f64, f64)], steps: usize) -> Self {
+        Self::lathe_shaped(profile, steps, |_| 1.0)
+    }
+
+    /// Turns a closed profile about the z axis as [`Solid::lathe`] does, with every radius multiplied by `shape(angle)`,
+    /// a positive function of the angle in radians, 0 to 2π: a hexagon's, for instance.
+    #[must_use]
+    pub fn lathe_shaped(profile: &[(f64, f64)], steps: usize, shape: impl Fn(f64) -> f64) -> Self {
         let mut solid = Self::new();
         let angle = |j: usize| std::f64::consts::TAU * (j % steps) as f64 / steps as f64;
         for (i, &from) in profile.iter().enumerate() {
@@ -80,6 +124,7 @@ impl Solid {
             let point = |end: usize, j: usize| {
                 let (r, z) = if end == 0 { from } else { to };
                 let (s, c) = angle(j).sin_cos();
+                let r = r * shape(angle(j));
                 Point3::new(r * c, r * s, z)
             };
             solid.grid(1, steps, |end, j| point(1 - end, j));

@@ -27,7 +27,7 @@ use crate::{doubts, outputs};
 /// time. Everything but the time follows from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The object: mug, bottle, bowl, carton, bracket, hammer, plate, iron, car or pan.
+    /// The object: one of those that `hybrid-icp objects` writes, such as mug, carton, teapot or laptop.
     #[arg(long, value_name = "NAME", default_value = "hammer", value_parser = object)]
     object: Household,
     /// Depth noise: standard deviation in percent of the depth.

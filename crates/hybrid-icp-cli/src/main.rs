@@ -6,6 +6,7 @@ mod bop_refine;
 mod choice;
 mod demo;
 mod doubts;
+mod objects;
 mod outputs;
 mod overlay;
 mod pipelines;
@@ -38,6 +39,7 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp pipelines
+  hybrid-icp objects --out objects
 
 `hybrid-icp help refine` tells all about a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
@@ -51,6 +53,7 @@ enum Command {
     #[command(subcommand)]
     Bop(BopCommand),
     Pipelines(pipelines::Arguments),
+    Objects(objects::Arguments),
 }
 
 #[derive(Debug, Subcommand)]
@@ -65,6 +68,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
+        Command::Objects(arguments) => objects::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,364 @@
+//! Cases of the single-image studies: an object, its true pose, an image, and a pose to start from.
+
+use hicp_core::{
+    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
+};
+use hicp_raster::{Rasterizer, render_depth_image};
+use hicp_score::{Score, Vsd};
+use rand::RngExt;
+
+use crate::SimRng;
+use crate::error::{SimError, check_range};
+use crate::sampling::{
+    DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
+    object_pose, perturb,
+};
+use crate::stream::stream;
+
+/// How initial poses are put off the truth (§VI-A.4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InitialPose {
+    /// By a fixed amount in random directions (§VI-B.2 and §VI-B.3).
+    Fixed {
+        /// Distance, metres.
+        translation_meters: f64,
+        /// Angle, degrees.
+        rotation_degrees: f64,
+    },
+    /// By random amounts, so that the initial VSD of every tenth case (with ten bins) lies in the same bin (§VI-B.1).
+    Binned(VsdBins),
+}
+
+impl InitialPose {
+    /// The mean error of a sampling-based estimator: 6.2 mm and 9.5° (§VI-A.5).
+    #[must_use]
+    pub fn mean_error() -> Self {
+        Self::Fixed {
+            translation_meters: MEAN_TRANSLATION_ERROR_METERS,
+            rotation_degrees: MEAN_ROTATION_ERROR_DEGREES,
+        }
+    }
+}
+
+/// Rejection sampling to equal counts in equally wide bins of the initial VSD (§VI-B.1).
+///
+/// δ_t is uniform in [0, `max_translation_meters`] and δ_θ is 1.92° per millimetre of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VsdBins {
+    /// Number of bins over [0, 1]; the last one holds 1.
+    pub count: usize,
+    /// Largest translation error, metres.
+    pub max_translation_meters: f64,
+    /// Initial poses tried around one object pose before another object pose is drawn.
+    pub tries_per_pose: u32,
+    /// Object poses tried before the bin counts as impossible to fill.
+    pub max_poses: u32,
+}
+
+impl Default for VsdBins {
+    /// Ten bins and 0.15 m, as in the paper; 500 tries around each of at most 40 poses.
+    fn default() -> Self {
+        Self {
+            count: 10,
+            max_translation_meters: 0.15,
+            tries_per_pose: 500,
+            max_poses: 40,
+        }
+    }
+}
+
+/// How cases are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CaseConfig {
+    /// The camera.
+    pub camera: PinholeCamera,
+    /// Largest distance of the object's centre along the optical axis, metres; the smallest is the object's diameter (§VI-A.3).
+    pub max_distance_meters: f64,
+    /// How far from the object's centre the optical axis may pass, metres.
+    pub axis_offset_meters: f64,
+    /// How initial poses are drawn.
+    pub init: InitialPose,
+}
+
+impl CaseConfig {
+    /// The paper's single-image setting: distances up to 0.6 m. The axis passes within 0.02 m of the centre, which the paper
+    /// calls "in the proximity".
+    #[must_use]
+    pub fn new(camera: PinholeCamera, init: InitialPose) -> Self {
+        Self {
+            camera,
+            max_distance_meters: 0.6,
+            axis_offset_meters: 0.02,
+            init,
+        }
+    }
+}
+
+/// An object seen once, perfectly, and a pose to refine. All variants of a study get the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Name of the object; part of what the random numbers follow from.
+    pub object: String,
+    /// Seed of the study.
+    pub seed: u64,
+    /// Index of the case among those of its object.
+    pub index: u64,
+    /// The camera.
+    pub camera: PinholeCamera,
+    /// The true pose.
+    pub camera_from_object: Isometry3<f64>,
+    /// The pose to start from.
+    pub init: Isometry3<f64>,
+    /// The bin of `vsd_initial`, from 0, where there are bins.
+    pub bin: Option<usize>,
+    /// Mean VSD of `init` against the truth (§VI-A.2).
+    pub vsd_initial: f64,
+    /// Number of initial poses drawn to get this one.
+    pub tries: u32,
+    /// The rendered depth, without noise and without anything else in sight.
+    pub depth: DepthImage,
+    /// The pixels where the object is seen.
+    pub mask: Mask,
+}
+
+/// Makes cases; keeps the renderer's memory between them. One per thread.
+///
+/// A case follows from the configuration, the model, its name, the seed and the index alone: in whatever order and on however
+/// many threads cases are made, they are the same. Cost: a render per initial pose tried ([`Case::tries`]), a render per
+/// object pose tried, and one into a whole image.
+///
+/// ```
+/// use hicp_core::PinholeCamera;
+/// use hicp_sim::{CaseConfig, CaseMaker, Corruption, Household, InitialPose, VsdBins};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let camera = PinholeCamera::new(143.0, 143.0, 79.5, 59.5, 160, 120)?;
+/// let config = CaseConfig::new(camera, InitialPose::Binned(VsdBins::default()));
+/// let mug = Household::Mug.model()?;
+/// let case = CaseMaker::new(config)?.case(&mug, "mug", 1, 13)?;
+/// assert_eq!(case.bin, Some(3)); // case 13 of ten bins
+/// assert!((0.3..0.4).contains(&case.vsd_initial));
+/// let observation = Corruption::default().observe(&case)?;
+/// assert_eq!(observation.depth(), &case.depth);
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct CaseMaker {
+    config: CaseConfig,
+    renders: RenderCache,
+    /// Scores look at an observation's camera; this one shows nothing.
+    nothing: Observation,
+}
+
+impl CaseMaker {
+    /// Makes a maker of cases.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Parameter`] when a length, an angle or a count of the configuration is out of its range.
+    pub fn new(config: CaseConfig) -> Result<Self, SimError> {
+        let length = |what, value| check_range(what, value, 0.0..=100.0, "metres from 0 to 100");
+        length("largest distance", config.max_distance_meters)?;
+        length("offset of the optical axis", config.axis_offset_meters)?;
+        match config.init {
+            InitialPose::Fixed {
+                translation_meters,
+                rotation_degrees,
+            } => {
+                length("initial translation error", translation_meters)?;
+                check_range(
+                    "initial rotation error",
+                    rotation_degrees,
+                    0.0..=180.0,
+                    "degrees from 0 to 180",
+                )?;
+            }
+            InitialPose::Binned(bins) => {
+                length(
+                    "largest initial translation error",
+                    bins.max_translation_meters,
+                )?;
+                for (what, count) in [
+                    ("number of VSD bins", bins.count as f64),
+                    ("tries per object pose", f64::from(bins.tries_per_pose)),
+                    ("number of object poses tried", f64::from(bins.max_poses)),
+                ] {
+                    check_range(what, count, 1.0..=1e9, "at least 1")?;
+                }
+            }
+        }
+        let (width, height) = (config.camera.width(), config.camera.height());
+        let area = config.camera.region().area();
+        let nothing = DepthImage::from_meters(width, height, vec![0.0; area])?;
+        let unmasked = Mask::new(width, height, vec![false; area])?;
+        Ok(Self {
+            config,
+            renders: RenderCache::new(Rasterizer::default()),
+            nothing: Observation::new(nothing, unmasked, config.camera)?,
+        })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &CaseConfig {
+        &self.config
+    }
+
+    /// Makes a case. With bins, case i is of bin i modulo their number.
+    ///
+    /// The object pose of a case is the same for every [`InitialPose`], unless all tries around it missed the bin.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::TooLarge`] when the object's diameter leaves no distance to draw, and [`SimError::UnfilledBin`].
+    pub fn case(
+        &mut self,
+        model: &Model,
+        object: &str,
+        seed: u64,
+        index: u64,
+    ) -> Result<Case, SimError> {
+        if model.diameter() >= self.config.max_distance_meters {
+            return Err(SimError::TooLarge {
+                object: object.to_owned(),
+                diameter: model.diameter(),
+                max_distance: self.config.max_distance_meters,
+            });
+        }
+        let mut poses = stream(seed, &[object, "pose"], index);
+        let mut inits = stream(seed, &[object, "init"], index);
+        let (camera_from_object, start) = match self.config.init {
+            InitialPose::Fixed {
+                translation_meters,
+                rotation_degrees,
+            } => {
+                let truth = self.draw_pose(model, &mut poses);
+                let angle = rotation_degrees.to_radians();
+                let init = perturb(&mut inits, &truth, translation_meters, angle);
+                let vsd = self.vsd(model, &truth, &init);
+                (
+                    truth,
+                    Start {
+                        init,
+                        vsd,
+                        bin: None,
+                        tries: 1,
+                    },
+                )
+            }
+            InitialPose::Binned(bins) => {
+                #[allow(clippy::cast_possible_truncation)]
+                // Below the number of bins.
+                let bin = (index % bins.count as u64) as usize;
+                let found = self.start_in_bin(model, &bins, bin, &mut poses, &mut inits);
+                found.ok_or_else(|| SimError::UnfilledBin {
+                    object: object.to_owned(),
+                    index,
+                    bin,
+                    bins: bins.count,
+                    low: bin as f64 / bins.count as f64,
+                    high: (bin + 1) as f64 / bins.count as f64,
+                    tried: bins.max_poses.saturating_mul(bins.tries_per_pose),
+                    poses: bins.max_poses,
+                })?
+            }
+        };
+        let camera = self.config.camera;
+        let depth = render_depth_image(model.mesh(), &camera, &camera_from_object);
+        let seen = depth.pixels().iter().map(|z| *z > 0.0).collect();
+        Ok(Case {
+            object: object.to_owned(),
+            seed,
+            index,
+            camera,
+            camera_from_object,
+            init: start.init,
+            bin: start.bin,
+            vsd_initial: start.vsd,
+            tries: start.tries,
+            mask: Mask::new(camera.width(), camera.height(), seen)?,
+            depth,
+        })
+    }
+
+    fn draw_pose(&self, model: &Model, rng: &mut SimRng) -> Isometry3<f64> {
+        let distances = model.diameter()..self.config.max_distance_meters;
+        object_pose(
+            rng,
+            &model.center(),
+            distances,
+            self.config.axis_offset_meters,
+        )
+    }
+
+    /// Draws initial poses, and now and then another object pose, until one falls into the bin.
+    ///
+    /// Drawing both anew at every try would favour object poses from which the bin is easy to hit.
+    fn start_in_bin(
+        &mut self,
+        model: &Model,
+        bins: &VsdBins,
+        bin: usize,
+        poses: &mut SimRng,
+        inits: &mut SimRng,
+    ) -> Option<(Isometry3<f64>, Start)> {
+        let mut tries = 0;
+        for _ in 0..bins.max_poses {
+            let truth = self.draw_pose(model, poses);
+            for _ in 0..bins.tries_per_pose {
+                tries += 1;
+                let translation = bins.max_translation_meters * inits.random::<f64>();
+                let init = perturb(inits, &truth, translation, rotation_of(translation));
+                let vsd = self.vsd(model, &truth, &init);
+                if bins.bin_of(vsd) == bin {
+                    return Some((
+                        truth,
+                        Start {
+                            init,
+                            vsd,
+                            bin: Some(bin),
+                            tries,
+                        },
+                    ));
+                }
+            }
+        }
+        None
+    }
+
+    /// Returns the mean VSD of a pose against the true one, both rendered in the configured camera (§VI-A.2).
+    pub fn vsd(
+        &mut self,
+        model: &Model,
+        truth: &Isometry3<f64>,
+        camera_from_object: &Isometry3<f64>,
+    ) -> f64 {
+        let problem = Problem::new(model, &self.nothing);
+        let mut context = Context::new(problem, &mut self.renders);
+        Vsd::new(*truth).score(&mut context, camera_from_object)
+    }
+}
+
+/// An initial pose and how it was found.
+struct Start {
+    init: Isometry3<f64>,
+    vsd: f64,
+    bin: Option<usize>,
+    tries: u32,
+}
+
+impl VsdBins {
+    /// Returns the bin of a VSD in [0, 1], from 0.
+    #[must_use]
+    pub fn bin_of(&self, vsd: f64) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // Not negative, and cut to the last bin.
+        let bin = (vsd * self.count as f64) as usize;
+        bin.min(self.count.saturating_sub(1))
+    }
+}
+
+/// Returns the rotation error that goes with a translation error in metres: 1.92° per millimetre (§VI-A.5), radians.
+#[must_use]
+pub fn rotation_of(translation_meters: f64) -> f64 {
+    (translation_meters * 1e3 * DEGREES_PER_MILLIMETER).to_radians()
+}

@@ -1,0 +1,138 @@
+//! Connected parts of a mesh.
+
+use hicp_core::{MeshError, Point3, TriMesh};
+
+/// A connected part of a mesh.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// The part by itself.
+    pub mesh: TriMesh,
+    /// Its area, m².
+    pub area: f64,
+    /// The volume that it encloses when it is closed, m³; negative when it faces inward, around a cavity.
+    pub volume: f64,
+}
+
+/// Returns the parts of a mesh that hang together by shared vertices, the largest area first. Cost: O(triangles).
+///
+/// # Errors
+///
+/// [`MeshError`] when a part has no area.
+pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
+    let part_of = parts(mesh);
+    // Parts are numbered by their first triangle.
+    let mut number: Vec<Option<usize>> = vec![None; mesh.vertices().len()];
+    let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
+    for corners in mesh.triangles() {
+        let part = part_of[corners[0] as usize] as usize;
+        let index = *number[part].get_or_insert_with(|| {
+            triangles.push(Vec::new());
+            triangles.len() - 1
+        });
+        triangles[index].push(*corners);
+    }
+    let mut new_index: Vec<Option<u32>> = vec![None; mesh.vertices().len()];
+    let mut components = Vec::with_capacity(triangles.len());
+    for mut triangles in triangles {
+        let mut vertices: Vec<Point3<f32>> = Vec::new();
+        for index in triangles.iter_mut().flatten() {
+            let old = *index as usize;
+            *index = *new_index[old].get_or_insert_with(|| {
+                vertices.push(mesh.vertices()[old]);
+                // No more than the mesh has.
+                u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
+            });
+        }
+        let mesh = TriMesh::new(vertices, triangles)?;
+        components.push(Component {
+            area: mesh.area(),
+            volume: volume(&mesh),
+            mesh,
+        });
+    }
+    components.sort_by(|a, b| b.area.total_cmp(&a.area));
+    Ok(components)
+}
+
+/// Puts meshes together into one.
+///
+/// # Errors
+///
+/// [`MeshError`] when there is none.
+pub fn join<'a>(meshes: impl IntoIterator<Item = &'a TriMesh>) -> Result<TriMesh, MeshError> {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for mesh in meshes {
+        let offset = u32::try_from(vertices.len()).unwrap_or(u32::MAX);
+        vertices.extend_from_slice(mesh.vertices());
+        triangles.extend(
+            mesh.triangles()
+                .iter()
+                .map(|corners| corners.map(|i| i.saturating_add(offset))),
+        );
+    }
+    TriMesh::new(vertices, triangles)
+}
+
+/// Returns the signed volume of a closed mesh, m³: the sum over tetrahedra to one of its vertices.
+fn volume(mesh: &TriMesh) -> f64 {
+    let origin = mesh.corners(0)[0].cast::<f64>();
+    let tetrahedra = (0..mesh.triangles().len()).map(|t| {
+        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>() - origin);
+        a.dot(&b.cross(&c)) / 6.0
+    });
+    tetrahedra.sum()
+}
+
+/// Returns for every vertex the smallest vertex of its part.
+fn parts(mesh: &TriMesh) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0_u32..).take(mesh.vertices().len()).collect();
+    for &[a, b, c] in mesh.triangles() {
+        for (one, other) in [(a, b), (b, c)] {
+            let (one, other) = (root(&mut parent, one), root(&mut parent, other));
+            parent[one.max(other) as usize] = one.min(other);
+        }
+    }
+    (0_u32..)
+        .take(parent.len())
+        .map(|vertex| root(&mut parent, vertex))
+        .collect()
+}
+
+fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
+    while parent[vertex as usize] != vertex {
+        let grandparent = parent[parent[vertex as usize] as usize];
+        parent[vertex as usize] = grandparent;
+        vertex = grandparent;
+    }
+    vertex
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Solid;
+    use hicp_core::{Isometry3, Vector3};
+
+    #[test]
+    fn parts_come_apart_and_together() {
+        let (small, large) = (
+            Solid::cuboid(Vector3::new(0.1, 0.1, 0.1), 2),
+            Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 2),
+        );
+        let mesh = small
+            .with(&large, &Isometry3::translation(1.0, 0.0, 0.0))
+            .to_mesh()
+            .unwrap();
+        let parts = components(&mesh).unwrap();
+        let volumes: Vec<f64> = parts.iter().map(|part| part.volume).collect();
+        assert_eq!(volumes.len(), 2);
+        assert!(
+            (volumes[0] - 0.006).abs() < 1e-8 && (volumes[1] - 0.001).abs() < 1e-8,
+            "{volumes:?}"
+        );
+        let joined = join(parts.iter().map(|part| &part.mesh)).unwrap();
+        assert_eq!(joined.triangles().len(), mesh.triangles().len());
+        assert!((joined.area() - mesh.area()).abs() < 1e-9);
+        assert!(join([]).is_err());
+    }
+}

@@ -1,0 +1,126 @@
+//! Everything that makes an image of a case imperfect, in one value.
+
+use hicp_core::{DepthImage, Mask, Observation, PixelRegion};
+
+use crate::case::Case;
+use crate::error::{SimError, check_range};
+use crate::mask::{Cut, MaskDefects, map_mask, pixels};
+use crate::sensor::DepthSensor;
+use crate::stream::stream;
+
+/// How far the board of [`Corruption::occluded_share`] stands in front of the object's nearest point, metres.
+pub const OCCLUDER_GAP_METERS: f64 = 0.05;
+
+/// What lies between a perfect image of an object and what a pipeline is given. The default changes nothing.
+///
+/// First the scene (a wall behind, a board in front), then the sensor, then the segmentation. Every step has its own stream
+/// of random numbers, of the case and not of the step's parameters: levels of one step are paired, and no step changes another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Corruption {
+    /// A wall across the optical axis, so many metres behind the farthest visible point of the object; `None` for nothing.
+    /// Without one, pixels that a dilated mask adds have no depth.
+    pub wall_behind_meters: Option<f64>,
+    /// Share of the object's visible pixels that a board in front of it hides, beyond a straight edge in a random direction.
+    /// They leave the mask, and their depth is the board's.
+    pub occluded_share: f64,
+    /// The depth sensor.
+    pub sensor: DepthSensor,
+    /// The segmentation.
+    pub mask: MaskDefects,
+}
+
+impl Corruption {
+    /// Returns the imperfect depth image and mask of a case. A function of the case and of this value alone.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Parameter`] when a parameter is out of its range.
+    pub fn apply(&self, case: &Case) -> Result<(DepthImage, Mask), SimError> {
+        check_range(
+            "occluded share",
+            self.occluded_share,
+            0.0..=1.0,
+            "a number from 0 to 1",
+        )?;
+        let wall = self.wall_behind_meters.unwrap_or(0.0);
+        check_range(
+            "distance of the wall in metres",
+            wall,
+            0.0..=100.0,
+            "a number from 0 to 100",
+        )?;
+        let of = |step: &str| stream(case.seed, &[&case.object, step], case.index);
+
+        let (mut depth, mut mask) = (case.depth.clone(), case.mask.clone());
+        let cut = Cut::new(&mut of("occluder"), &mask, self.occluded_share);
+        if self.wall_behind_meters.is_some() || cut.is_some() {
+            depth = self.scene(&depth, &mask, cut.as_ref())?;
+        }
+        if let Some(cut) = cut {
+            mask = map_mask(&mask, |u, v, set| set && !cut.removes(u, v))?;
+        }
+        let depth = self
+            .sensor
+            .measure(&mut of("sensor"), &depth, &case.camera)?;
+        let mask = self.mask.apply(&mut of("mask"), &mask)?;
+        Ok((depth, mask))
+    }
+
+    /// Returns what a pipeline is given of a case: [`Corruption::apply`], observed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Corruption::apply`].
+    pub fn observe(&self, case: &Case) -> Result<Observation, SimError> {
+        let (depth, mask) = self.apply(case)?;
+        Ok(Observation::new(depth, mask, case.camera)?)
+    }
+
+    /// Puts the wall and the board into a perfect depth image.
+    fn scene(
+        &self,
+        depth: &DepthImage,
+        mask: &Mask,
+        cut: Option<&Cut>,
+    ) -> Result<DepthImage, SimError> {
+        let measured = || depth.pixels().iter().copied().filter(|z| *z > 0.0);
+        let (nearest, farthest) = measured().fold((f32::INFINITY, 0.0_f32), |(low, high), z| {
+            (low.min(z), high.max(z))
+        });
+        #[allow(clippy::cast_possible_truncation)]
+        // f32 is the precision of depth images.
+        let (wall, board) = (
+            self.wall_behind_meters
+                .map(|behind| (f64::from(farthest) + behind) as f32),
+            (f64::from(nearest) - OCCLUDER_GAP_METERS).max(f64::from(nearest) * 0.5) as f32,
+        );
+        let hidden = around(&mask.bounding_region(), mask);
+        let image = PixelRegion::of_image(depth.width(), depth.height());
+        let new = pixels(&image)
+            .zip(depth.pixels())
+            .map(|((u, v), z)| match cut {
+                Some(cut) if hidden.contains(u, v) && cut.removes(u, v) => board,
+                _ if *z > 0.0 => *z,
+                _ => wall.unwrap_or(0.0),
+            });
+        Ok(DepthImage::from_meters(
+            depth.width(),
+            depth.height(),
+            new.collect(),
+        )?)
+    }
+}
+
+/// Widens a region by a quarter of its size on every side, within the image.
+fn around(region: &PixelRegion, image: &Mask) -> PixelRegion {
+    let (du, dv) = (
+        (region.u_max - region.u_min) / 4,
+        (region.v_max - region.v_min) / 4,
+    );
+    PixelRegion {
+        u_min: region.u_min.saturating_sub(du),
+        v_min: region.v_min.saturating_sub(dv),
+        u_max: (region.u_max + du).min(image.width()),
+        v_max: (region.v_max + dv).min(image.height()),
+    }
+}

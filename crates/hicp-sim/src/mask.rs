@@ -1,0 +1,251 @@
+//! What segmentations get wrong: masks too small, too large, or with a part missing.
+
+use hicp_core::{Mask, PixelRegion};
+use rand::{Rng, RngExt};
+
+use crate::error::{SimError, check_range};
+
+/// Imperfections of a segmentation mask, applied in the order of the fields. The default changes nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MaskDefects {
+    /// Share of the mask's pixels that a straight cut in a random direction removes, 0 to 1.
+    pub missing_share: f64,
+    /// Radius of the disc by which the mask is eroded, pixels; beyond the image counts as inside.
+    pub erosion_pixels: u32,
+    /// Radius of the disc by which the mask is dilated, pixels.
+    pub dilation_pixels: u32,
+}
+
+/// Largest radius of an erosion or dilation, pixels.
+const MAX_RADIUS: u32 = 256;
+
+impl MaskDefects {
+    /// Returns the mask as an imperfect segmentation would give it. Cost: O(pixels of the mask's box · radius).
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Parameter`] when the share is not in [0, 1] or a radius is above 256 pixels.
+    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, mask: &Mask) -> Result<Mask, SimError> {
+        check_range(
+            "missing share of the mask",
+            self.missing_share,
+            0.0..=1.0,
+            "a number from 0 to 1",
+        )?;
+        for (what, radius) in [
+            ("erosion in pixels", self.erosion_pixels),
+            ("dilation in pixels", self.dilation_pixels),
+        ] {
+            check_range(
+                what,
+                f64::from(radius),
+                0.0..=f64::from(MAX_RADIUS),
+                "at most 256",
+            )?;
+        }
+        let mut mask = mask.clone();
+        // Drawn in any case, so that shares of one stream cut in one direction.
+        let cut = Cut::new(rng, &mask, self.missing_share);
+        if let Some(cut) = cut {
+            mask = map_mask(&mask, |u, v, set| set && !cut.removes(u, v))?;
+        }
+        if self.erosion_pixels > 0 {
+            mask = grow(&mask, self.erosion_pixels, false)?;
+        }
+        if self.dilation_pixels > 0 {
+            mask = grow(&mask, self.dilation_pixels, true)?;
+        }
+        Ok(mask)
+    }
+}
+
+/// A straight line that has a given share of a mask's pixels on its far side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cut {
+    direction: (f64, f64),
+    offset: f64,
+}
+
+impl Cut {
+    /// Draws a direction and places the line; `None` when the share cuts nothing. Always draws one number.
+    pub(crate) fn new<R: Rng + ?Sized>(rng: &mut R, mask: &Mask, share: f64) -> Option<Self> {
+        let (sine, cosine) = (std::f64::consts::TAU * rng.random::<f64>()).sin_cos();
+        let mut cut = Self {
+            direction: (cosine, sine),
+            offset: f64::INFINITY,
+        };
+        let region = mask.bounding_region();
+        let mut positions: Vec<f64> = pixels(&region)
+            .filter(|(u, v)| mask.get(*u, *v) == Some(true))
+            .map(|(u, v)| cut.position(u, v))
+            .collect();
+        positions.sort_by(f64::total_cmp);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // Between 0 and the number of pixels.
+        let kept = ((1.0 - share) * positions.len() as f64).round() as usize;
+        cut.offset = *positions.get(kept)?;
+        Some(cut)
+    }
+
+    fn position(&self, u: u32, v: u32) -> f64 {
+        self.direction.0 * f64::from(u) + self.direction.1 * f64::from(v)
+    }
+
+    /// Returns whether a pixel, of the mask or not, lies on the far side.
+    pub(crate) fn removes(&self, u: u32, v: u32) -> bool {
+        self.position(u, v) >= self.offset
+    }
+}
+
+/// Returns the mask with `new(u, v, set)` at every pixel.
+pub(crate) fn map_mask(
+    mask: &Mask,
+    mut new: impl FnMut(u32, u32, bool) -> bool,
+) -> Result<Mask, SimError> {
+    let image = PixelRegion::of_image(mask.width(), mask.height());
+    let set = pixels(&image)
+        .zip(mask.pixels())
+        .map(|((u, v), set)| new(u, v, *set));
+    Ok(Mask::new(mask.width(), mask.height(), set.collect())?)
+}
+
+/// The pixels of a region, row by row.
+pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let PixelRegion {
+        u_min,
+        u_max,
+        v_min,
+        v_max,
+    } = *region;
+    (v_min..v_max).flat_map(move |v| (u_min..u_max).map(move |u| (u, v)))
+}
+
+/// Spreads the pixels of one value over a disc: set ones to dilate, unset ones to erode.
+fn grow(mask: &Mask, radius: u32, value: bool) -> Result<Mask, SimError> {
+    let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
+    let mut grown = mask.pixels().to_vec();
+    let r = i64::from(radius);
+    // Half the width of the disc in the row `dy` away from its middle.
+    let half_width = |dy: i64| {
+        #[allow(clippy::cast_possible_truncation)]
+        // At most the radius.
+        let x = ((r * r - dy * dy) as f64).sqrt() as i64;
+        x
+    };
+    let is = |u: i64, v: i64| {
+        let (u, v) = (
+            u32::try_from(u).unwrap_or(u32::MAX),
+            u32::try_from(v).unwrap_or(u32::MAX),
+        );
+        mask.get(u, v) == Some(value)
+    };
+    for v in 0..height {
+        for u in 0..width {
+            // Only from the border of what spreads: its inside adds nothing.
+            let border = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+            if !is(u, v) || border.iter().all(|(dx, dy)| is(u + dx, v + dy)) {
+                continue;
+            }
+            for y in (v - r).max(0)..=(v + r).min(height - 1) {
+                let reach = half_width(y - v);
+                let (from, to) = ((u - reach).max(0), (u + reach).min(width - 1));
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                // Clamped to the image.
+                let (from, to) = ((y * width + from) as usize, (y * width + to) as usize);
+                grown[from..=to].fill(value);
+            }
+        }
+    }
+    Ok(Mask::new(mask.width(), mask.height(), grown)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng;
+
+    fn disc(radius: f64) -> Mask {
+        let set = (0..100 * 80)
+            .map(|i| f64::hypot(f64::from(i % 100) - 50.0, f64::from(i / 100) - 40.0) <= radius);
+        Mask::new(100, 80, set.collect()).unwrap()
+    }
+
+    fn count(mask: &Mask) -> usize {
+        mask.pixels().iter().filter(|set| **set).count()
+    }
+
+    fn apply(missing_share: f64, erosion_pixels: u32, dilation_pixels: u32, mask: &Mask) -> Mask {
+        let defects = MaskDefects {
+            missing_share,
+            erosion_pixels,
+            dilation_pixels,
+        };
+        defects.apply(&mut rng(4), mask).unwrap()
+    }
+
+    #[test]
+    fn no_defect_leaves_the_mask() {
+        assert_eq!(apply(0.0, 0, 0, &disc(20.0)), disc(20.0));
+    }
+
+    #[test]
+    fn erosion_and_dilation_are_those_of_the_definition() {
+        // By definition: a pixel survives erosion when the whole disc around it is set, and is set by dilation when any is.
+        let mask = apply(0.3, 0, 0, &disc(23.0));
+        for radius in [1_u32, 2, 5] {
+            let (eroded, dilated) = (apply(0.0, radius, 0, &mask), apply(0.0, 0, radius, &mask));
+            let r = i64::from(radius);
+            for (u, v) in pixels(&PixelRegion::of_image(100, 80)) {
+                let around = |wanted: bool| {
+                    (-r..=r)
+                        .flat_map(|dy| (-r..=r).map(move |dx| (dx, dy)))
+                        .any(|(dx, dy)| {
+                            let at = (
+                                u32::try_from(i64::from(u) + dx),
+                                u32::try_from(i64::from(v) + dy),
+                            );
+                            let (Ok(x), Ok(y)) = at else { return false };
+                            dx * dx + dy * dy <= r * r && mask.get(x, y) == Some(wanted)
+                        })
+                };
+                assert_eq!(eroded.get(u, v), Some(!around(false)), "{u} {v}");
+                assert_eq!(dilated.get(u, v), Some(around(true)), "{u} {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_missing_part_has_its_share_and_is_connected_to_the_rim() {
+        let full = disc(30.0);
+        for share in [0.1, 0.25, 0.5] {
+            let cut = apply(share, 0, 0, &full);
+            let missing = 1.0 - count(&cut) as f64 / count(&full) as f64;
+            assert!((missing - share).abs() < 0.01, "{share}: {missing}");
+        }
+        assert_eq!(count(&apply(1.0, 0, 0, &full)), 0);
+        // A larger share of the same stream cuts a larger part in the same direction.
+        let (small, large) = (apply(0.1, 0, 0, &full), apply(0.4, 0, 0, &full));
+        assert!(
+            large
+                .pixels()
+                .iter()
+                .zip(small.pixels())
+                .all(|(l, s)| !l || *s)
+        );
+    }
+
+    #[test]
+    fn an_empty_mask_stays_empty_and_wrong_shares_are_named() {
+        let empty = Mask::new(10, 10, vec![false; 100]).unwrap();
+        assert_eq!(count(&apply(0.5, 3, 3, &empty)), 0);
+        let wrong = MaskDefects {
+            missing_share: f64::NAN,
+            ..MaskDefects::default()
+        };
+        let error = wrong.apply(&mut rng(1), &empty).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "missing share of the mask is NaN, expected a number from 0 to 1"
+        );
+    }
+}

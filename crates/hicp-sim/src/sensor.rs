@@ -1,0 +1,273 @@
+//! A depth sensor: what it fails to measure, its noise, and its steps.
+
+use hicp_core::{DepthImage, PinholeCamera};
+use rand::Rng;
+
+use crate::error::{SimError, check_range};
+use crate::noise::{DepthNoise, map_depths};
+
+/// What a sensor makes of a perfect depth image: missing pixels, then noise, then rounding. The default changes nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DepthSensor {
+    /// Noise.
+    pub noise: DepthNoise,
+    /// Step to which depths are rounded, metres (a D435 counts in 0.001 by default); `None` or 0 for none.
+    pub quantization_meters: Option<f64>,
+    /// Pixels that stay without depth.
+    pub dropout: Dropout,
+}
+
+/// Where a sensor measures nothing. Decided on the perfect image; the default loses nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dropout {
+    /// Largest angle between a surface's normal and the ray to the camera at which it is still measured, degrees; `None` for all.
+    pub max_incidence_degrees: Option<f64>,
+    /// How many pixels on both sides of a depth edge are lost; 0 for none. Missing depth next to a surface is an edge.
+    pub edge_pixels: u32,
+}
+
+/// Depth difference between neighbouring pixels that makes a depth edge, metres.
+pub const DEPTH_EDGE_METERS: f64 = 0.02;
+
+impl DepthSensor {
+    /// Returns what the sensor measures of a perfect depth image. Missing pixels do not change the noise of the others.
+    ///
+    /// Cost: O(pixels), times the square of the edge width where edges are lost.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError`] when image and camera are not of one size, or a parameter is out of its range.
+    pub fn measure<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        perfect: &DepthImage,
+        camera: &PinholeCamera,
+    ) -> Result<DepthImage, SimError> {
+        let step = self.quantization_meters.unwrap_or(0.0);
+        check_range(
+            "quantization in metres",
+            step,
+            0.0..=1.0,
+            "a number from 0 to 1",
+        )?;
+        let lost = self.dropout.lost(perfect, camera)?;
+        let mut measured = self.noise.apply(rng, perfect);
+        if step > 0.0 {
+            measured = map_depths(&measured, |z| (z / step).round() * step);
+        }
+        if self.dropout == Dropout::default() {
+            return Ok(measured);
+        }
+        let pixels = measured.pixels().iter().zip(lost);
+        let pixels = pixels
+            .map(|(z, lost)| if lost { 0.0 } else { *z })
+            .collect();
+        Ok(DepthImage::from_meters(
+            measured.width(),
+            measured.height(),
+            pixels,
+        )?)
+    }
+}
+
+impl Dropout {
+    /// Returns for every pixel whether it is lost, row-major.
+    fn lost(&self, depth: &DepthImage, camera: &PinholeCamera) -> Result<Vec<bool>, SimError> {
+        let (width, height) = (depth.width(), depth.height());
+        if (width, height) != (camera.width(), camera.height()) {
+            return Err(SimError::Image(hicp_core::ImageError::SizeMismatch {
+                first: "depth image",
+                first_width: width,
+                first_height: height,
+                second: "camera",
+                second_width: camera.width(),
+                second_height: camera.height(),
+            }));
+        }
+        if let Some(degrees) = self.max_incidence_degrees {
+            check_range(
+                "largest incidence angle in degrees",
+                degrees,
+                0.0..=90.0,
+                "a number from 0 to 90",
+            )?;
+        }
+        check_range(
+            "edge width in pixels",
+            f64::from(self.edge_pixels),
+            0.0..=64.0,
+            "at most 64",
+        )?;
+        let min_cosine = self
+            .max_incidence_degrees
+            .map(|degrees| degrees.to_radians().cos());
+        let mut lost = Vec::with_capacity(depth.pixels().len());
+        for v in 0..height {
+            for u in 0..width {
+                let grazing = min_cosine.is_some_and(|min| {
+                    incidence_cosine(depth, camera, u, v).is_some_and(|c| c < min)
+                });
+                lost.push(grazing || self.near_edge(depth, u, v));
+            }
+        }
+        Ok(lost)
+    }
+
+    fn near_edge(&self, depth: &DepthImage, u: u32, v: u32) -> bool {
+        let n = self.edge_pixels;
+        let Some(z) = depth.get(u, v).filter(|z| *z > 0.0 && n > 0) else {
+            return false;
+        };
+        let (rows, columns) = (v.saturating_sub(n)..=v + n, u.saturating_sub(n)..=u + n);
+        rows.flat_map(|v| columns.clone().map(move |u| (u, v)))
+            .filter_map(|(u, v)| depth.get(u, v))
+            .any(|other| other <= 0.0 || f64::from((other - z).abs()) > DEPTH_EDGE_METERS)
+    }
+}
+
+/// Returns the cosine of the angle between the surface's normal and the ray at a pixel, `None` where nothing is seen.
+///
+/// The inverse depth of a plane is affine in the pixel, w = a x + b y + c with (a, b, c) along the normal, so the slopes of
+/// w are all that is needed. Of the two one-sided slopes the smaller is taken, which does not look across an edge.
+fn incidence_cosine(depth: &DepthImage, camera: &PinholeCamera, u: u32, v: u32) -> Option<f64> {
+    let inverse = |u: Option<u32>, v: Option<u32>| {
+        let z = depth.get(u?, v?).filter(|z| *z > 0.0)?;
+        Some(1.0 / f64::from(z))
+    };
+    let here = inverse(Some(u), Some(v))?;
+    let slope = |before: Option<f64>, after: Option<f64>| {
+        let backward = before.map(|w| here - w);
+        let forward = after.map(|w| w - here);
+        match (backward, forward) {
+            (Some(b), Some(f)) => Some(if b.abs() < f.abs() { b } else { f }),
+            (one, other) => one.or(other),
+        }
+    };
+    let across = slope(
+        inverse(u.checked_sub(1), Some(v)),
+        inverse(u.checked_add(1), Some(v)),
+    )?;
+    let down = slope(
+        inverse(Some(u), v.checked_sub(1)),
+        inverse(Some(u), v.checked_add(1)),
+    )?;
+    let (x, y) = (
+        (f64::from(u) - camera.cx()) / camera.fx(),
+        (f64::from(v) - camera.cy()) / camera.fy(),
+    );
+    let (a, b) = (across * camera.fx(), down * camera.fy());
+    let c = here - a * x - b * y;
+    Some(here / ((a * a + b * b + c * c) * (x * x + y * y + 1.0)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng;
+
+    fn camera() -> PinholeCamera {
+        PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64).unwrap()
+    }
+
+    /// A plane through the optical axis at 1 m whose normal is turned by `degrees` about y.
+    fn tilted(degrees: f64) -> DepthImage {
+        let (s, c) = degrees.to_radians().sin_cos();
+        #[allow(clippy::cast_possible_truncation)]
+        let depth = |u: u32| (c / (c + s * (f64::from(u) - 31.5) / 100.0)) as f32;
+        let pixels = (0..64 * 64).map(|i| depth(i % 64)).collect();
+        DepthImage::from_meters(64, 64, pixels).unwrap()
+    }
+
+    #[test]
+    fn the_incidence_angle_is_that_of_the_plane() {
+        for degrees in [0.0, 20.0, 50.0, 70.0] {
+            let cosine = incidence_cosine(&tilted(degrees), &camera(), 31, 31).unwrap();
+            // Pixel 31 is 0.3 degrees off the axis.
+            let angle = cosine.min(1.0).acos().to_degrees();
+            assert!((angle - degrees).abs() < 0.5, "{degrees}: {angle}");
+        }
+    }
+
+    #[test]
+    fn grazing_surfaces_and_edges_are_lost_and_the_rest_is_untouched() {
+        let sensor = |max_incidence_degrees, edge_pixels| DepthSensor {
+            dropout: Dropout {
+                max_incidence_degrees,
+                edge_pixels,
+            },
+            ..DepthSensor::default()
+        };
+        let count = |depth: &DepthImage| depth.pixels().iter().filter(|z| **z > 0.0).count();
+        let measure = |sensor: DepthSensor, depth: &DepthImage| {
+            sensor.measure(&mut rng(1), depth, &camera()).unwrap()
+        };
+        let plane = tilted(60.0);
+        assert_eq!(measure(DepthSensor::default(), &plane), plane);
+        assert_eq!(count(&measure(sensor(Some(40.0), 0), &plane)), 0);
+        assert_eq!(count(&measure(sensor(Some(89.0), 0), &plane)), 64 * 64);
+
+        // A square of 20 pixels, 0.1 m in front of a wall, on an image that is empty below.
+        let pixels = (0..64 * 64).map(|i| {
+            let (u, v) = (i % 64, i / 64);
+            let square = (20..40).contains(&u) && (10..30).contains(&v);
+            if v >= 50 {
+                0.0
+            } else if square {
+                0.5_f32
+            } else {
+                0.6
+            }
+        });
+        let scene = DepthImage::from_meters(64, 64, pixels.collect()).unwrap();
+        let lost = count(&scene) - count(&measure(sensor(None, 1), &scene));
+        // One pixel inside and one outside (with corners) of the square's outline, and the row above the empty part.
+        assert_eq!(lost, (20 * 20 - 18 * 18) + (22 * 22 - 20 * 20) + 64);
+    }
+
+    #[test]
+    fn depths_are_rounded_and_lost_pixels_leave_the_noise_of_the_others() {
+        let mut sensor = DepthSensor {
+            noise: DepthNoise::Relative(crate::RelativeGaussian { percent: 1.0 }),
+            quantization_meters: Some(0.001),
+            ..DepthSensor::default()
+        };
+        let plane = tilted(60.0);
+        let all = sensor.measure(&mut rng(2), &plane, &camera()).unwrap();
+        assert!(
+            all.pixels()
+                .iter()
+                .all(|z| (f64::from(*z) * 1e3 - (f64::from(*z) * 1e3).round()).abs() < 1e-3)
+        );
+        sensor.dropout.max_incidence_degrees = Some(60.0);
+        let some = sensor.measure(&mut rng(2), &plane, &camera()).unwrap();
+        let kept = some.pixels().iter().filter(|z| **z > 0.0).count();
+        assert!((500..3600).contains(&kept), "{kept}");
+        assert!(
+            some.pixels()
+                .iter()
+                .zip(all.pixels())
+                .all(|(a, b)| *a == 0.0 || a == b)
+        );
+    }
+
+    #[test]
+    fn parameters_out_of_range_are_named() {
+        let wrong = DepthSensor {
+            quantization_meters: Some(-1.0),
+            ..DepthSensor::default()
+        };
+        let error = wrong
+            .measure(&mut rng(1), &tilted(0.0), &camera())
+            .unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "quantization in metres is -1, expected a number from 0 to 1"
+        );
+        let small = PinholeCamera::new(10.0, 10.0, 3.0, 3.0, 8, 8).unwrap();
+        assert!(
+            DepthSensor::default()
+                .measure(&mut rng(1), &tilted(0.0), &small)
+                .is_err()
+        );
+    }
+}

@@ -1,0 +1,255 @@
+//! Truncated signed distance fields (Curless & Levoy, "A Volumetric Method for Building Complex Models from Range Images", 1996).
+
+use hicp_core::{DepthImage, ImageError, Isometry3, PinholeCamera, Point3, TriMesh, Vector3};
+
+use crate::error::{SimError, check_range};
+use crate::meshing::ScalarGrid;
+
+/// Largest number of voxels: two numbers of 4 bytes each.
+pub const MAX_VOXELS: usize = 400_000_000;
+
+/// Where a volume is and how fine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TsdfConfig {
+    /// Lowest corner, metres, in the volume's frame: the object's, or the world's.
+    pub min: Point3<f64>,
+    /// Highest corner, metres.
+    pub max: Point3<f64>,
+    /// Distance between voxels, metres.
+    pub voxel_meters: f64,
+    /// Distance from the surface up to which signed distances are kept, metres; a few voxels, and more than twice the noise.
+    pub truncation_meters: f64,
+}
+
+/// What a pixel without depth says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EmptyPixels {
+    /// Nothing: a sensor that failed to measure.
+    Unknown,
+    /// There is nothing along its ray: a render of an object alone.
+    Free,
+}
+
+/// What a voxel that no image reached stands for when the surface is extracted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unseen {
+    /// The inside of the object, so that the surface is closed, also along the border of the volume.
+    Solid,
+    /// Nothing is known: the surface ends there.
+    Open,
+}
+
+/// A volume that depth images are integrated into.
+///
+/// Every voxel holds the weighted mean of its signed distances to the surfaces seen, along the rays, in front positive. An
+/// image says nothing about voxels that lie farther behind its surface than the truncation, and farther in front counts as
+/// the truncation. Weights are 1 in front of the surface and to half the truncation behind it, and fall linearly to 0 from
+/// there on, so that the far side of a thin wall is not overruled by what is seen of its near side. (Falling from the
+/// surface on keeps thin walls thinner, but noise then eats plates of a few millimetres.)
+#[derive(Clone, Debug)]
+pub struct TsdfVolume {
+    config: TsdfConfig,
+    size: [usize; 3],
+    /// Per voxel the mean signed distance in metres and the sum of the weights, x fastest.
+    voxels: Vec<(f32, f32)>,
+    images: u32,
+}
+
+impl TsdfVolume {
+    /// Makes an empty volume.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError`] when a length is not positive and finite, the corners are in the wrong order, or there would be more
+    /// than [`MAX_VOXELS`] voxels.
+    pub fn new(config: TsdfConfig) -> Result<Self, SimError> {
+        for (what, value) in [
+            ("voxel size", config.voxel_meters),
+            ("truncation", config.truncation_meters),
+        ] {
+            check_range(what, value, 1e-6..=1e3, "metres from 1e-6 to 1000")?;
+        }
+        let extent = config.max - config.min;
+        for (what, value) in ["volume along x", "volume along y", "volume along z"]
+            .into_iter()
+            .zip(extent.iter())
+        {
+            check_range(what, *value, 1e-6..=1e6, "metres from 1e-6 to 1e6")?;
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // Positive and at most 10¹².
+        let size = [extent.x, extent.y, extent.z]
+            .map(|side| (side / config.voxel_meters).ceil() as usize + 1);
+        let count = size
+            .iter()
+            .try_fold(1_usize, |product, n| product.checked_mul(*n));
+        let Some(count) = count.filter(|count| *count <= MAX_VOXELS) else {
+            let [x, y, z] = size;
+            return Err(SimError::VolumeSize {
+                x,
+                y,
+                z,
+                limit: MAX_VOXELS,
+            });
+        };
+        Ok(Self {
+            config,
+            size,
+            voxels: vec![(0.0, 0.0); count],
+            images: 0,
+        })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &TsdfConfig {
+        &self.config
+    }
+
+    /// Number of voxels along x, y and z.
+    #[must_use]
+    pub fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    /// Number of images integrated.
+    #[must_use]
+    pub fn images(&self) -> u32 {
+        self.images
+    }
+
+    /// Integrates a depth image taken at `camera_from_volume`. Cost: O(voxels), some nanoseconds each.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Image`] when image and camera are not of one size.
+    pub fn integrate(
+        &mut self,
+        depth: &DepthImage,
+        camera: &PinholeCamera,
+        camera_from_volume: &Isometry3<f64>,
+        empty: EmptyPixels,
+    ) -> Result<(), SimError> {
+        let (width, height) = (depth.width(), depth.height());
+        if (width, height) != (camera.width(), camera.height()) {
+            return Err(SimError::Image(ImageError::SizeMismatch {
+                first: "depth image",
+                first_width: width,
+                first_height: height,
+                second: "camera",
+                second_width: camera.width(),
+                second_height: camera.height(),
+            }));
+        }
+        self.images += 1;
+        let [nx, ny, nz] = self.size;
+        let spacing = self.config.voxel_meters;
+        let step = camera_from_volume.rotation * Vector3::x() * spacing;
+        let mut rows = self.voxels.chunks_exact_mut(nx);
+        let truncation = self.config.truncation_meters;
+        for k in 0..nz {
+            for j in 0..ny {
+                let offset = Vector3::new(0.0, j as f64, k as f64) * spacing;
+                let start = (camera_from_volume * (self.config.min + offset)).coords;
+                let Some(row) = rows.next() else { break };
+                for (i, voxel) in row.iter_mut().enumerate() {
+                    let p = start + step * i as f64;
+                    if p.z <= 0.0 {
+                        continue;
+                    }
+                    let u = camera.fx() * p.x / p.z + camera.cx() + 0.5;
+                    let v = camera.fy() * p.y / p.z + camera.cy() + 0.5;
+                    if !(u >= 0.0 && v >= 0.0 && u < f64::from(width) && v < f64::from(height)) {
+                        continue;
+                    }
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                    // Inside the image.
+                    let measured =
+                        f64::from(depth.pixels()[v as usize * width as usize + u as usize]);
+                    if measured <= 0.0 {
+                        if empty == EmptyPixels::Free {
+                            merge(voxel, truncation, 1.0);
+                        }
+                        continue;
+                    }
+                    let along_axis = measured - p.z;
+                    // Along the ray it is farther than along the optical axis.
+                    if along_axis >= truncation {
+                        merge(voxel, truncation, 1.0);
+                    } else if along_axis > -truncation {
+                        let distance = along_axis * p.norm() / p.z;
+                        let weight = (2.0 + 2.0 * distance / truncation).min(1.0);
+                        if weight > 0.0 {
+                            merge(voxel, distance.min(truncation), weight);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the surface between what is in front (positive) and behind.
+    ///
+    /// With [`Unseen::Solid`] it is closed; with [`Unseen::Open`] it ends where nothing was seen. Normals point to where it
+    /// is free. Always manifold, see [`ScalarGrid::surface`]; it may consist of several parts
+    /// ([`components`](crate::components)), cavities among them. Cost: O(voxels).
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::NoSurface`] when there is none.
+    pub fn surface(&self, unseen: Unseen) -> Result<TriMesh, SimError> {
+        let solid = unseen == Unseen::Solid;
+        #[allow(clippy::cast_possible_truncation)]
+        // f32 is the precision of voxels.
+        let truncation = self.config.truncation_meters as f32;
+        let value = |(distance, weight): &(f32, f32)| match (*weight > 0.0, solid) {
+            (true, _) => *distance,
+            (false, true) => -truncation,
+            (false, false) => f32::NAN,
+        };
+        let grid = if solid {
+            // One layer of free space around it closes the surface.
+            let size = self.size.map(|n| n + 2);
+            let mut values = vec![truncation; size.iter().product()];
+            for (row, k_j) in self.voxels.chunks_exact(self.size[0]).zip(0..) {
+                let (j, k) = (k_j % self.size[1] + 1, k_j / self.size[1] + 1);
+                let start = (k * size[1] + j) * size[0] + 1;
+                for (new, voxel) in values[start..start + row.len()].iter_mut().zip(row) {
+                    *new = value(voxel);
+                }
+            }
+            ScalarGrid {
+                origin: self.config.min - Vector3::repeat(self.config.voxel_meters),
+                spacing: self.config.voxel_meters,
+                size,
+                values,
+            }
+        } else {
+            ScalarGrid {
+                origin: self.config.min,
+                spacing: self.config.voxel_meters,
+                size: self.size,
+                values: self.voxels.iter().map(value).collect(),
+            }
+        };
+        match grid.surface() {
+            Err(SimError::Mesh(_)) => Err(SimError::NoSurface {
+                images: self.images,
+            }),
+            result => result,
+        }
+    }
+}
+
+/// Takes one more distance into a voxel's weighted mean.
+#[allow(clippy::cast_possible_truncation)]
+// f32 is the precision of voxels.
+fn merge(voxel: &mut (f32, f32), distance: f64, weight: f64) {
+    let (mean, sum) = (f64::from(voxel.0), f64::from(voxel.1));
+    let total = sum + weight;
+    *voxel = (
+        (mean + (distance - mean) * weight / total) as f32,
+        total as f32,
+    );
+}

@@ -1,0 +1,150 @@
+//! `hybrid-icp objects`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::{Args, ValueEnum};
+use hicp_io::{LengthUnit, write_atomically, write_obj, write_ply, write_rgb_png};
+use hicp_sim::{Household, Proportions};
+use hybrid_icp::{
+    Isometry3, Model, PinholeCamera, Rasterizer, RenderedView, Renderer, UnitQuaternion, Vector3,
+};
+
+use crate::overlay::{Picture, Rgb};
+use crate::terminal::say;
+
+/// Write the twenty procedural household objects as meshes in metres, with a contact sheet to look at them.
+///
+/// Writes one mesh per object, `contact_sheet.png` (tuning objects in the upper two rows, test objects in the lower two) and
+/// `objects.csv`, which names them in the order of the sheet, with their sizes and symmetries.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The folder to write to; made when it is not there. Files of the same names are replaced.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The format of the meshes.
+    #[arg(long, value_enum, default_value_t = Format::Ply)]
+    format: Format,
+    /// Other specimens of the same categories: proportions drawn from this seed.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Binary PLY.
+    Ply,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+/// Side of a cell of the contact sheet, pixels.
+const CELL: u32 = 240;
+/// Cells in a row.
+const COLUMNS: u32 = 5;
+const BACKGROUND: Rgb = [255, 255, 255];
+/// Yellow, as CAD models are in the paper's pictures.
+const SURFACE: [f64; 3] = [240.0, 200.0, 90.0];
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let folder = &arguments.out;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let proportions = arguments
+        .seed
+        .map_or_else(Proportions::default, Proportions::from_seed);
+    let objects = || Household::TUNING.into_iter().chain(Household::TEST);
+    let rows = u32::try_from(objects().count())
+        .unwrap_or(0)
+        .div_ceil(COLUMNS);
+    let (width, height) = (COLUMNS * CELL, rows * CELL);
+    let mut sheet = Picture {
+        width,
+        height,
+        rgb: BACKGROUND.repeat(width as usize * height as usize),
+    };
+    let mut table = String::from(
+        "row,column,object,set,file,triangles,diameter_mm,discrete_symmetries,continuous_symmetries\n",
+    );
+    for (object, cell) in objects().zip(0..) {
+        let model = object.model_with(proportions)?;
+        let file = match arguments.format {
+            Format::Ply => format!("{}.ply", object.name()),
+            Format::Obj => format!("{}.obj", object.name()),
+        };
+        match arguments.format {
+            Format::Ply => write_ply(folder.join(&file), model.mesh(), LengthUnit::Meters)?,
+            Format::Obj => write_obj(folder.join(&file), model.mesh(), LengthUnit::Meters)?,
+        }
+        let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+        shade(&mut sheet, &model, column * CELL, row * CELL)?;
+        let set = if Household::TUNING.contains(&object) {
+            "tuning"
+        } else {
+            "test"
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            table,
+            "{},{},{},{set},{file},{},{:.1},{},{}",
+            row + 1,
+            column + 1,
+            object.name(),
+            model.mesh().triangles().len(),
+            model.diameter() * 1e3,
+            model.symmetries().discrete.len(),
+            model.symmetries().continuous.len(),
+        );
+    }
+    write_rgb_png(folder.join("contact_sheet.png"), width, height, &sheet.rgb)?;
+    write_table(&folder.join("objects.csv"), &table)?;
+    say(format_args!(
+        "{}: {} meshes, contact_sheet.png, and objects.csv, which names them",
+        folder.display(),
+        objects().count()
+    ))
+}
+
+fn write_table(path: &Path, table: &str) -> Result<(), hicp_io::IoError> {
+    write_atomically(path, |writer| writer.write_all(table.as_bytes()))
+}
+
+/// Draws a model into the cell whose upper left corner is given, seen from above and aside, as large as fits.
+fn shade(sheet: &mut Picture, model: &Model, left: u32, top: u32) -> anyhow::Result<()> {
+    let middle = f64::from(CELL - 1) / 2.0;
+    let focal = 2.5 * f64::from(CELL);
+    let camera = PinholeCamera::new(focal, focal, middle, middle, CELL, CELL)?;
+    // Object z up in the picture, turned about it, then tipped toward the viewer.
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.6);
+    let tip =
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2 + 0.5);
+    let rotation = tip * turn;
+    let distance = model.radius() * focal / (0.46 * f64::from(CELL));
+    let shift = Vector3::new(0.0, 0.0, distance) - rotation * model.center().coords;
+    let camera_from_object = Isometry3::from_parts(shift.into(), rotation);
+    let mut view = RenderedView::default();
+    Rasterizer::default().render(
+        model.mesh(),
+        &camera,
+        &camera_from_object,
+        &camera.region(),
+        &mut view,
+    );
+    let light = Vector3::new(-0.4, -0.7, -0.6).normalize();
+    for v in 0..CELL {
+        for u in 0..CELL {
+            let Some(surfel) = view.surfel_at(u, v, model.mesh(), &camera, &camera_from_object)
+            else {
+                continue;
+            };
+            let lit = surfel.normal.cast::<f64>().dot(&light).max(0.0);
+            let pixel = 3 * ((top + v) as usize * sheet.width as usize + (left + u) as usize);
+            for (channel, full) in sheet.rgb[pixel..pixel + 3].iter_mut().zip(SURFACE) {
+                *channel = (full * (0.3 + 0.7 * lit)) as u8;
+            }
+        }
+    }
+    Ok(())
+}
