@@ -21,7 +21,7 @@
 //!
 //! | selections | associations | filters | weights |
 //! |---|---|---|---|
-//! | [`AllSamples`] | `NearestNeighbor` | [`MaxDistance`] | [`ConstantWeight`] |
+//! | [`AllSamples`] | `NearestNeighbor`, [`WarmNearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
 //! | [`VisibleSurface`] | [`KNearest`] | [`MaxNormalAngle`] | [`DistanceWeight`] |
 //! | [`ObservedSurface`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
 //! | [`WithoutBoundary`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
@@ -39,10 +39,10 @@
 //! - `selection` (trait), `all_samples`, `visible_surface`, `observed_surface`, `stride`; of another selection
 //!   `uniform_count`, `random_sample`, `voxel_grid`, `normal_space`, `stable_sampling`, `without_boundary`;
 //! - `association` (trait), `projective`, `projective_search`, `projective_interpolated`; `nearest_neighbor` (feature `kiddo`, on
-//!   by default), `k_nearest`, `normal_compatible`, `normal_shooting`, `reciprocal`; from the observation `observation_to_model`, `closest_point_on_mesh`;
+//!   by default), `warm_nearest_neighbor`, `k_nearest`, `normal_compatible`, `normal_shooting`, `reciprocal`; from the observation `observation_to_model`, `closest_point_on_mesh`;
 //! - `filter` (trait), `max_distance`, `max_normal_angle`, `median_distance`, `mad_distance`, `trimmed`, `var_trimmed`, `one_to_one`,
 //!   `boundary_targets`, `min_pairs`, `schedule`; `constant_weight`, `distance_weight`, `normal_weight`, `sensor_noise_weight`;
-//! - what they share: `length`, `box_tree` with `point_tree`, `observed_points` and `triangle`, `pixel_projection`, `boundary`, `distances`, `keep`, `scratch`.
+//! - what they share: `length`, `wide_tree`, `box_tree` with `point_tree`, `observed_points` and `triangle`, `pixel_projection`, `boundary`, `distances`, `keep`, `scratch`.
 
 // Image sizes and counts become floating point numbers; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
@@ -94,6 +94,8 @@ mod uniform_count;
 mod var_trimmed;
 mod visible_surface;
 mod voxel_grid;
+mod warm_nearest_neighbor;
+mod wide_tree;
 mod without_boundary;
 
 pub use all_samples::AllSamples;
@@ -134,4 +136,5 @@ pub use uniform_count::UniformCount;
 pub use var_trimmed::VarTrimmed;
 pub use visible_surface::VisibleSurface;
 pub use voxel_grid::VoxelGrid;
+pub use warm_nearest_neighbor::WarmNearestNeighbor;
 pub use without_boundary::WithoutBoundary;

@@ -113,18 +113,19 @@ fn hostile_input_gives_no_pair_that_is_not_finite() {
 
 #[cfg(feature = "kiddo")]
 #[test]
-fn both_trees_find_the_same() {
+fn all_trees_find_the_same() {
     let scene = ball_scene();
     let source = scene.select(&mut AllSamples, &scene.truth);
     let targets = Stride::Pixels(2);
     let mut ours = KNearest::new(1, targets);
     let mut theirs = hicp_association::NearestNeighbor { targets };
+    // From pose to pose it begins with the matches of the last one.
+    let mut warm = hicp_association::WarmNearestNeighbor::new(targets);
     for seed in 0..5 {
         let pose = scene.nearby(seed);
-        assert_eq!(
-            scene.associate(&mut ours, &source, &pose),
-            scene.associate(&mut theirs, &source, &pose)
-        );
+        let expected = scene.associate(&mut theirs, &source, &pose);
+        assert_eq!(scene.associate(&mut ours, &source, &pose), expected);
+        assert_eq!(scene.associate(&mut warm, &source, &pose), expected);
     }
 }
 

@@ -19,7 +19,7 @@ use hybrid_icp::{
     Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
     Regime, Robust, Scale, Schedule, SensorNoiseWeight, StableSampling, Symmetric, Threshold,
     Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd,
-    WeightedSum, WithoutBoundary,
+    WarmNearestNeighbor, WeightedSum, WithoutBoundary,
 };
 
 #[test]
@@ -40,6 +40,7 @@ fn selections() {
 fn associations() {
     let strict = AssociationLaws::default();
     check_association(NearestNeighbor::default, strict);
+    check_association(WarmNearestNeighbor::default, strict);
     check_association(KNearest::default, strict);
     check_association(NormalCompatible::default, strict);
     check_association(NormalShooting::default, strict);

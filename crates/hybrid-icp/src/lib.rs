@@ -54,7 +54,7 @@ pub use hicp_association::{
     ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
     ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SensorNoise,
     SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
-    VoxelGrid, WithoutBoundary,
+    VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
 };
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,

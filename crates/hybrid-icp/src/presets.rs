@@ -9,7 +9,7 @@
 //! - Every stage ends by the same rules: the paper's divergence rules as written, convergence of the loss, 50 iterations.
 
 use hicp_association::{
-    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
+    AllSamples, DataAssociation, PointSelection, Projective, VisibleSurface, WarmNearestNeighbor,
 };
 use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, Stage};
 use hicp_metric::{ErrorMetric, PointToPlane, PointToPoint};
@@ -53,8 +53,8 @@ fn projective<M: ErrorMetric>(metric: M) -> PaperIcp<VisibleSurface, Projective,
     icp(VisibleSurface::default(), Projective, metric)
 }
 
-fn nearest<M: ErrorMetric>(metric: M) -> PaperIcp<AllSamples, NearestNeighbor, M> {
-    icp(AllSamples, NearestNeighbor::default(), metric)
+fn nearest<M: ErrorMetric>(metric: M) -> PaperIcp<AllSamples, WarmNearestNeighbor, M> {
+    icp(AllSamples, WarmNearestNeighbor::default(), metric)
 }
 
 /// `projective-point-to-point`: the visible surface, projective association, point-to-point.

@@ -7,7 +7,7 @@ use hicp_association::{
     ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
     ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SensorNoise,
     SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
-    VoxelGrid, WithoutBoundary,
+    VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
 };
 use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard, Icp,
@@ -158,6 +158,7 @@ fn association(part: &Reader<'_>) -> Result<Association, PipelineError> {
         "nearest-neighbor" => Box::new(NearestNeighbor {
             targets: stride(part)?,
         }),
+        "warm-nearest-neighbor" => Box::new(WarmNearestNeighbor::new(stride(part)?)),
         "projective" => Box::new(Projective),
         "k-nearest" => Box::new(KNearest::new(part.count("k")? as usize, stride(part)?)),
         "normal-compatible" => Box::new(NormalCompatible::new(

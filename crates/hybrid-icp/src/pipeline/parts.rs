@@ -472,6 +472,28 @@ pub const PARTS: &[Part] = &[
     },
     Part {
         kind: PartKind::Association,
+        name: "warm-nearest-neighbor",
+        rust: "WarmNearestNeighbor",
+        summary: "the closest observed point, searched from the one of the last iteration: the same pairs, faster",
+        source: "§III-A.1; Besl & McKay 1992, Greenspan & Godin 2001",
+        cost: "O(n log m), and O(m log m) once per observation",
+        parameters: &[
+            count(
+                "points",
+                "about how many observed points are searched, on a pixel grid",
+                1,
+                Some(4000),
+            ),
+            count(
+                "pixels",
+                "or the spacing of the grid; 0 leaves it to `points`",
+                0,
+                Some(0),
+            ),
+        ],
+    },
+    Part {
+        kind: PartKind::Association,
         name: "projective",
         rust: "Projective",
         summary: "the observed point at the pixel that the model point projects to",
