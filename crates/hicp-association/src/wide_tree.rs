@@ -226,13 +226,12 @@ impl Node {
     #[inline(always)]
     fn distances(&self, query: &[f32; 3]) -> [f32; WIDTH] {
         let mut distances = [0.0; WIDTH];
-        for axis in 0..3 {
-            for child in 0..WIDTH {
-                let below = self.min[axis][child] - query[axis];
-                let above = query[axis] - self.max[axis][child];
+        for ((min, max), query) in self.min.iter().zip(&self.max).zip(query) {
+            for ((distance, min), max) in distances.iter_mut().zip(min).zip(max) {
+                let (below, above) = (min - query, query - max);
                 let gap = if below > above { below } else { above };
                 let gap = if gap > 0.0 { gap } else { 0.0 };
-                distances[child] += gap * gap;
+                *distance += gap * gap;
             }
         }
         distances
@@ -253,8 +252,8 @@ impl Leaf {
             *distance = x * x + y * y + z * z;
         }
         let mut near = 0;
-        for slot in 0..LEAF_WIDTH {
-            near |= u32::from(distances[slot] <= best.distance_squared) << slot;
+        for (slot, distance) in distances.iter().enumerate() {
+            near |= u32::from(*distance <= best.distance_squared) << slot;
         }
         while near != 0 {
             let slot = near.trailing_zeros() as usize;
