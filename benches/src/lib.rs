@@ -2,6 +2,7 @@
 
 pub mod allocations;
 pub mod fused;
+pub mod instances;
 pub mod stages;
 pub mod work;
 
