@@ -36,7 +36,7 @@ except ImportError as error:  # Its wheel wants libusb-1.0, libGL and libgomp of
     o3d = None
 
 import scaling
-from vsd import vsd
+import vsd
 
 GATE = 0.03  # metres, that of our rows
 TRANSLATION_EPS = 1e-4  # metres
@@ -185,7 +185,7 @@ def numpy_vsd(instance):
     """VSD between the image and a render, in the place of the estimate: any two depth images cost the same."""
     estimate = np.where(instance.mask, instance.depth + np.float32(0.004), np.float32(0.0))
     ns, errors = timed(
-        lambda: vsd(instance.depth, instance.depth, estimate, instance.meta["camera"], instance.meta["diameter"])
+        lambda: vsd.vsd(instance.depth, instance.depth, estimate, instance.meta["camera"], instance.meta["diameter"])
     )
     return {"ns": ns, "score": float(np.mean(errors))}
 
@@ -364,6 +364,7 @@ def main():
     parser.add_argument("--noise", type=float, default=0.0, help="depth noise, percent of the depth")
     parser.add_argument("--no-scaling", action="store_true", help="leave out what `bop refine` is measured on")
     arguments = parser.parse_args()
+    vsd.check()
     work = arguments.target / "peers"
     programs = arguments.target / "release"
 

@@ -30,3 +30,25 @@ def vsd(depth_test, depth_truth, depth_estimate, camera, diameter):
     apart = np.abs(truth[both] - estimate[both]) / diameter
     missed = union - np.count_nonzero(both)
     return [(np.count_nonzero(apart >= tau) + missed) / union for tau in TOLERANCES]
+
+
+def check():
+    """Holds the code above against a case computed by bop_toolkit."""
+
+    def image(*rows):
+        return np.array([[float(x) for x in row.split()] for row in rows], dtype=np.float32) / 1000
+
+    nothing, far = "0 " * 7, "1000 " * 7
+    test = image(
+        "0 1000 1000 1000 1000 1000 1000", "1000 500 500 500 500 1000 1000", "1000 500 505 510 480 1000 1000",
+        "1000 500 0 510 480 1000 1000", "1000 500 505 300 500 1000 1000", far,
+    )  # fmt: skip
+    truth = image(
+        nothing, "0 500 500 500 500 0 0", "0 500 505 510 515 0 0", "0 500 505 510 515 0 0", "0 500 505 510 515 0 0", nothing
+    )
+    estimate = image(
+        nothing, "0 0 502 504 506 540 0", "0 0 507 530 519 525 0", "0 0 509 512 560 527 0", "0 0 509 512 514 527 0", nothing
+    )
+    errors = vsd(test, truth, estimate, (10, 12, 3, 2.5), 0.1)
+    expected = [11 / 17] + [10 / 17] * 3 + [9 / 17] * 6
+    assert np.allclose(errors, expected, atol=1e-12), errors

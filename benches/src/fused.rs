@@ -260,6 +260,7 @@ mod avx2 {
     #[target_feature(enable = "avx2,fma")]
     fn accumulate<const I: usize>(rows: &Rows, vectors: usize, total: &mut [f64]) {
         let mut sums = [_mm256_setzero_ps(); COLUMNS];
+        #[allow(clippy::needless_range_loop)] // Several columns at one index.
         for vector in 0..vectors.min(BLOCK) {
             let factor = rows[I][vector];
             for j in I..COLUMNS {
