@@ -183,7 +183,23 @@ fn table(rows: &[Row], against: Option<&str>) -> String {
         text.push_str(line.trim_end());
         text.push('\n');
     }
+    if let Some(ratio) = middle_ratio(rows) {
+        text.push_str(&format!(
+            "{:width$}  {:>12}  {:>12}  {ratio:>6.2}  the machine itself, if most benches were not touched\n",
+            "median", "", ""
+        ));
+    }
     text
+}
+
+/// The median of the ratios: what a machine that is faster or slower today does to all of them.
+fn middle_ratio(rows: &[Row]) -> Option<f64> {
+    let mut ratios: Vec<f64> = rows
+        .iter()
+        .filter_map(|row| Some(row.after.nanoseconds / row.before?.nanoseconds))
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
 }
 
 /// Whether two medians differ beyond noise: disjoint confidence intervals, and by more than [`NOISE`].
