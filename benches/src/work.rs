@@ -117,3 +117,77 @@ impl Observer for StageWork {
         self.last_pose = None;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{OBJECTS, case};
+    use hicp_sim::{perturb, rng};
+    use hybrid_icp::{
+        Context, Correspondences, DataAssociation, Icp, NearestNeighbor, PointToPlane, Problem,
+        Session, Stage, Surfel, VisibleSurface, Workspace, presets::paper_stop,
+    };
+
+    /// Counts the points that ask.
+    #[derive(Default)]
+    struct Asked {
+        inner: NearestNeighbor,
+        points: u64,
+    }
+
+    impl DataAssociation for Asked {
+        fn associate(
+            &mut self,
+            context: &mut Context<'_>,
+            source: &[Surfel],
+            camera_from_object: &Isometry3<f64>,
+            pairs: &mut Correspondences,
+        ) {
+            self.points += source.len() as u64;
+            self.inner
+                .associate(context, source, camera_from_object, pairs);
+        }
+
+        fn name(&self) -> &'static str {
+            self.inner.name()
+        }
+    }
+
+    /// What the observer makes of a stage's end is what the association was asked, with and without a rollback.
+    #[test]
+    fn queries_are_those_that_an_association_counts_itself() {
+        let (mut rolled_back, mut others) = (0, 0);
+        for object in OBJECTS {
+            let case = case(object);
+            let problem = Problem::new(&case.scene.model, &case.scene.observation);
+            let mut rng = rng(3);
+            for _ in 0..8 {
+                let init = perturb(&mut rng, &case.scene.truth, 0.01, 0.2);
+                let mut stage = Icp {
+                    selection: VisibleSurface::default(),
+                    association: Asked::default(),
+                    filter: (),
+                    metric: PointToPlane,
+                    stop: paper_stop(),
+                };
+                let renderer = CountingRenderer::default();
+                let mut workspace = Workspace::new(renderer.clone());
+                let mut work = StageWork::default();
+                let outcome = stage.run(
+                    &problem,
+                    &init,
+                    &mut Session::new(&mut workspace, &mut work),
+                );
+                assert_eq!(work.queries, stage.association.points, "{outcome:?}");
+                assert!(work.queries > 0);
+                assert_eq!(renderer.take().renders, workspace.renders());
+                if outcome.termination.is_rollback() {
+                    rolled_back += 1;
+                } else {
+                    others += 1;
+                }
+            }
+        }
+        assert!(rolled_back > 0 && others > 0, "{rolled_back} {others}");
+    }
+}
