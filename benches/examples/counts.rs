@@ -1,4 +1,4 @@
-//! What every preset does on a fixed set of scenes, in counts that no clock and no machine changes: `cargo xtask counts`.
+//! What every preset does on a fixed set of scenes, in counts that no clock changes, and no x86-64 processor: `cargo xtask counts`.
 //!
 //! Scenes: three objects, without noise and with 0.5 % of it, from a start that is nearly right and one that is far off.
 //! A line per preset. Columns:

@@ -28,7 +28,7 @@ cargo xtask COMMAND
           runs the benches whose id contains FILTER and prints a table; keeps it as a baseline, compares with one
   counts [--bless]
           pairs, iterations, renders, allocations and the like of every preset on fixed scenes, against benches/counts.txt;
-          no clock, no machine changes them
+          no clock changes them, and no x86-64 processor
   instructions [--bless]
           instructions of every step, against benches/instructions.txt within 3 %; wants valgrind and gungraun-runner
   peers [--instances N]
