@@ -34,7 +34,8 @@ pub(crate) fn bless(root: &Path) -> Findings {
 }
 
 fn count(root: &Path) -> Result<String, Vec<String>> {
-    // The profile of the tests, whose artifacts are there; the counts are those of any other.
+    // The profile of the tests, whose artifacts are there. Always the same one: optimisers may leave out an allocation of the
+    // cold run (release makes one fewer in some); all other counts are those of any profile.
     let arguments = [
         "run",
         "--quiet",
