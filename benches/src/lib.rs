@@ -1,5 +1,11 @@
 //! The scenes that the benches measure: fixed seeds, so that every run measures the same work.
 
+pub mod allocations;
+pub mod fused;
+pub mod instances;
+pub mod stages;
+pub mod work;
+
 use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
 };

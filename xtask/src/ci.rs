@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::{Findings, tidy};
+use crate::{Findings, counts, instructions, tidy};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run(root: &Path) -> Findings {
@@ -39,6 +39,8 @@ pub(crate) fn run(root: &Path) -> Findings {
         &["test", "--package", "hicp-benches", "--benches", "--quiet"],
         &none,
     )?;
+    step("work counts", || counts::check(root))?;
+    step("instruction counts", || instructions::check(root))?;
     cargo(
         root,
         "association without the k-d tree",

@@ -1,7 +1,12 @@
 //! Automation of the workspace: `cargo xtask help` lists the commands.
 
+mod bench;
 mod ci;
+mod counts;
 mod deviations;
+mod instructions;
+mod peers;
+mod process;
 mod tidy;
 
 use std::path::{Path, PathBuf};
@@ -14,10 +19,21 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   ci      everything that must pass before a change lands: formatting, clippy, tests, documentation,
-          benches in test mode, tidy, and the README's commands
+          benches in test mode, counts, instructions, tidy, and the README's commands
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
           crate documentation, nothing left open, docs/deviations.md up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
+
+  bench [--save NAME] [--against NAME] [FILTER]
+          runs the benches whose id contains FILTER and prints a table; keeps it as a baseline, compares with one
+  counts [--bless]
+          pairs, iterations, renders, allocations and the like of every preset on fixed scenes, against benches/counts.txt;
+          no clock changes them, and no x86-64 processor
+  instructions [--bless]
+          instructions of every step, against benches/instructions.txt within 3 %; wants valgrind and gungraun-runner
+  peers [--instances N]
+          small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
+          first time, a network
 ";
 
 fn main() -> ExitCode {
@@ -26,6 +42,12 @@ fn main() -> ExitCode {
         ["ci"] => ci::run(&root()),
         ["tidy"] => tidy::run(&root()),
         ["bless"] => deviations::bless(&root()),
+        ["bench", ref options @ ..] => bench::run(&root(), options),
+        ["counts"] => counts::check(&root()),
+        ["counts", "--bless"] => counts::bless(&root()),
+        ["instructions"] => instructions::check(&root()),
+        ["instructions", "--bless"] => instructions::bless(&root()),
+        ["peers", ref options @ ..] => peers::run(&root(), options),
         ["help" | "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())

@@ -1,0 +1,51 @@
+//! One iteration of projective point-to-plane over every visible pixel: by hand in AVX2, and through the traits.
+//!
+//! `cargo bench -p hicp-benches --bench fused`; the throughput is that of source points, so its inverse is the time per pixel and iteration.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use hicp_benches::fused::Fused;
+use hicp_benches::{OBJECTS, case};
+use hybrid_icp::{
+    Correspondences, DataAssociation, ErrorMetric, PointSelection, PointToPlane, Problem,
+    Projective, Rasterizer, Stride, VisibleSurface, Workspace,
+};
+
+fn fused(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("fused");
+    for object in OBJECTS {
+        let case = case(object);
+        let problem = Problem::new(&case.scene.model, &case.scene.observation);
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut context = workspace.context(&problem);
+        let mut source = Vec::new();
+        let stride = Stride::Pixels(1);
+        VisibleSurface { stride }.select(&mut context, &case.init, &mut source);
+        group.throughput(Throughput::Elements(source.len() as u64));
+
+        if let Some(fused) = Fused::new(&case.scene.observation, &source) {
+            let pivot = case.init * case.scene.model.center();
+            group.bench_function(BenchmarkId::new("avx2", case.name), |bencher| {
+                bencher.iter(|| fused.step(black_box(&case.init), &pivot));
+            });
+        } else {
+            println!("fused/avx2/{}: skipped, no AVX2 with FMA", case.name);
+        }
+
+        let mut association: Box<dyn DataAssociation> = Box::new(Projective);
+        let mut metric: Box<dyn ErrorMetric> = Box::new(PointToPlane);
+        let mut pairs = Correspondences::new();
+        group.bench_function(BenchmarkId::new("traits", case.name), |bencher| {
+            bencher.iter(|| {
+                pairs.begin(black_box(&case.init), source.len());
+                association.associate(&mut context, &source, &case.init, &mut pairs);
+                metric.minimize(&pairs)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, fused);
+criterion_main!(benches);

@@ -1,0 +1,179 @@
+//! Instruction counts of every step, through valgrind: they vary by less than a percent where a clock varies by tens.
+//!
+//! `cargo xtask instructions` runs this; by hand, `cargo bench -p hicp-benches --features instructions --bench instructions`,
+//! with valgrind and a `gungraun-runner` of the library's own version on the path. What a setup does is not counted.
+//! On a processor without AVX2 other code runs where the library chooses by processor, and the counts are others.
+#![allow(missing_docs, unused_qualifications)] // The macros' code.
+
+use std::hint::black_box;
+
+use gungraun::{library_benchmark, library_benchmark_group, main};
+use hicp_benches::{Case, case};
+use hicp_sim::Household;
+use hybrid_icp::{
+    AllSamples, Correspondences, DataAssociation, DepthImage, ErrorMetric, Isometry3, Mask,
+    MeanVsd, NearestNeighbor, Observation, PinholeCamera, PointSelection, PointToPlane,
+    PointToPoint, Preset, Problem, Projective, Rasterizer, Refinement, Refiner, RenderedView,
+    Renderer, Score, Step, Surfel, VisibleSurface, Workspace,
+};
+
+/// A case whose render at the initial pose is in the cache, with the points selected and paired there.
+struct Ready {
+    case: Case,
+    workspace: Workspace,
+    source: Vec<Surfel>,
+    pairs: Correspondences,
+}
+
+fn ready_with(selection: &mut dyn PointSelection, association: &mut dyn DataAssociation) -> Ready {
+    let case = case(Household::Mug);
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let problem = Problem::new(&case.scene.model, &case.scene.observation);
+    let mut context = workspace.context(&problem);
+    let _ = context.view(&case.init);
+    let (mut source, mut pairs) = (Vec::new(), Correspondences::new());
+    selection.select(&mut context, &case.init, &mut source);
+    pairs.begin(&case.init, source.len());
+    association.associate(&mut context, &source, &case.init, &mut pairs);
+    Ready {
+        case,
+        workspace,
+        source,
+        pairs,
+    }
+}
+
+fn projective() -> Ready {
+    ready_with(&mut VisibleSurface::default(), &mut Projective)
+}
+
+fn nearest() -> Ready {
+    ready_with(&mut AllSamples, &mut NearestNeighbor::default())
+}
+
+fn raster() -> (Case, Rasterizer, RenderedView) {
+    let case = case(Household::Mug);
+    let (mut rasterizer, mut view) = (Rasterizer::default(), RenderedView::default());
+    draw(&case, &mut rasterizer, &mut view);
+    (case, rasterizer, view)
+}
+
+fn draw(case: &Case, rasterizer: &mut Rasterizer, view: &mut RenderedView) {
+    let camera = case.scene.observation.camera();
+    let mesh = case.scene.model.mesh();
+    rasterizer.render(mesh, camera, &case.init, &camera.region(), view);
+}
+
+#[library_benchmark]
+#[bench::mug(setup = raster)]
+fn render(state: (Case, Rasterizer, RenderedView)) -> (Case, Rasterizer, RenderedView) {
+    let (case, mut rasterizer, mut view) = state;
+    draw(&case, &mut rasterizer, &mut view);
+    black_box((case, rasterizer, view))
+}
+
+fn image() -> (DepthImage, Mask, PinholeCamera) {
+    let scene = case(Household::Mug).scene;
+    let observation = &scene.observation;
+    (
+        observation.depth().clone(),
+        observation.mask().clone(),
+        *observation.camera(),
+    )
+}
+
+#[library_benchmark]
+#[bench::mug(setup = image)]
+fn observe(image: (DepthImage, Mask, PinholeCamera)) -> Option<Observation> {
+    let (depth, mask, camera) = image;
+    black_box(Observation::new(depth, mask, camera).ok())
+}
+
+#[library_benchmark]
+#[bench::visible_surface_mug(setup = projective)]
+fn select(mut ready: Ready) -> Ready {
+    let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
+    ready.source.clear();
+    let mut context = ready.workspace.context(&problem);
+    VisibleSurface::default().select(&mut context, &ready.case.init, &mut ready.source);
+    black_box(ready)
+}
+
+fn pair(ready: &mut Ready, association: &mut dyn DataAssociation) {
+    let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
+    let (init, source) = (&ready.case.init, &ready.source);
+    ready.pairs.begin(init, source.len());
+    let mut context = ready.workspace.context(&problem);
+    association.associate(&mut context, source, init, &mut ready.pairs);
+}
+
+#[library_benchmark]
+#[bench::mug(setup = projective)]
+fn associate_projective(mut ready: Ready) -> Ready {
+    pair(&mut ready, &mut Projective);
+    black_box(ready)
+}
+
+#[library_benchmark]
+#[bench::mug(setup = nearest)]
+fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
+    pair(&mut ready, &mut NearestNeighbor::default());
+    black_box(ready)
+}
+
+#[library_benchmark]
+#[bench::mug(setup = projective)]
+fn metric_point_to_point(ready: Ready) -> (Ready, Option<Step>) {
+    let step = PointToPoint.minimize(&ready.pairs);
+    black_box((ready, step))
+}
+
+#[library_benchmark]
+#[bench::mug(setup = projective)]
+fn metric_point_to_plane(ready: Ready) -> (Ready, Option<Step>) {
+    let step = PointToPlane.minimize(&ready.pairs);
+    black_box((ready, step))
+}
+
+#[library_benchmark]
+#[bench::mve_mug(setup = projective)]
+fn score(mut ready: Ready) -> (Ready, f64) {
+    let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
+    let mut context = ready.workspace.context(&problem);
+    let mve = MeanVsd::default().score(&mut context, &ready.case.init);
+    black_box((ready, mve))
+}
+
+fn warm() -> (Case, Refiner) {
+    let case = case(Household::Mug);
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+    // Elsewhere, so that its renders are not those of the measured run.
+    let elsewhere = Isometry3::translation(0.001, 0.0, 0.0) * case.init;
+    refiner.refine(&case.scene.model, &case.scene.observation, &elsewhere);
+    (case, refiner)
+}
+
+#[library_benchmark]
+#[bench::hybrid_mug(setup = warm)]
+fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
+    let (case, mut refiner) = state;
+    let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);
+    black_box((case, refiner, refined))
+}
+
+library_benchmark_group!(
+    name = steps,
+    benchmarks = [
+        render,
+        observe,
+        select,
+        associate_projective,
+        associate_nearest_neighbor,
+        metric_point_to_point,
+        metric_point_to_plane,
+        score,
+        pipeline
+    ]
+);
+
+main!(library_benchmark_groups = steps);

@@ -1,0 +1,31 @@
+//! Single ICP stages: each association with each metric as the presets and the peers pair them, warm.
+//!
+//! `cargo bench -p hicp-benches --bench stage`
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use hicp_benches::{OBJECTS, case, stages};
+use hybrid_icp::{Problem, Rasterizer, Session, Workspace};
+
+fn stage(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("stage");
+    for object in OBJECTS {
+        let case = case(object);
+        let problem = Problem::new(&case.scene.model, &case.scene.observation);
+        for (name, mut stage) in stages::all() {
+            let mut workspace = Workspace::new(Rasterizer::default());
+            group.bench_function(BenchmarkId::new(name, case.name), |bencher| {
+                bencher.iter(|| {
+                    stage.run(
+                        &problem,
+                        &case.init,
+                        &mut Session::new(&mut workspace, &mut ()),
+                    )
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, stage);
+criterion_main!(benches);

@@ -1,0 +1,117 @@
+//! What every preset does on a fixed set of scenes, in counts that no clock changes, and no x86-64 processor: `cargo xtask counts`.
+//!
+//! Scenes: three objects, without noise and with 0.5 % of it, from a start that is nearly right and one that is far off.
+//! A line per preset. Columns:
+//!
+//! - `regimes`: switches that took the aligned branch / the other;
+//! - `stages`, `iterations` (evaluations of a pose, the rejected included), `selected` points, `pairs` that the metrics saw;
+//! - `queries`: points that asked for their nearest neighbour;
+//! - `renders` made, `pixels` of their views, those `filled`, `triangles` given to the renderer;
+//! - `cold`, `warm`: heap allocations of the first run (model and observation new, scratch memory empty) and of the next.
+
+use std::fmt::Write as _;
+
+use hicp_benches::allocations::{Counting, allocations};
+use hicp_benches::work::{CountingRenderer, StageWork};
+use hicp_sim::{Household, perturb, rng};
+use hybrid_icp::{Isometry3, Preset, Problem, Session, Workspace};
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
+const NOISE_PERCENT: [f64; 2] = [0.0, 0.5];
+/// Name, translation (metres) and rotation (degrees) error.
+const STARTS: [(&str, f64, f64); 2] = [("aligned", 0.003, 3.0), ("misaligned", 0.04, 30.0)];
+
+fn main() {
+    let mut table = vec![
+        "object noise start preset regimes stages iterations selected pairs queries renders pixels filled triangles cold warm"
+            .split(' ')
+            .map(str::to_owned)
+            .collect(),
+    ];
+    for object in OBJECTS {
+        for percent in NOISE_PERCENT {
+            for (start, meters, degrees) in STARTS {
+                for preset in Preset::ALL {
+                    table.push(line(object, percent, (start, meters, degrees), preset));
+                }
+            }
+        }
+    }
+    print!("{}", aligned(&table));
+}
+
+fn line(
+    object: Household,
+    percent: f64,
+    (start, meters, degrees): (&str, f64, f64),
+    preset: Preset,
+) -> Vec<String> {
+    // All of it anew for every line: what a cold run builds must not be there already.
+    let mut rng = rng(7);
+    let scene = hicp_tests::scene(object, percent, &mut rng);
+    let model = object.model().expect("the objects that ship are valid");
+    let init = perturb(&mut rng, &scene.truth, meters, degrees.to_radians());
+    let problem = Problem::new(&model, &scene.observation);
+
+    let renderer = CountingRenderer::default();
+    let mut workspace = Workspace::new(renderer.clone());
+    let mut stage = preset.build();
+    let mut run = |init: &Isometry3<f64>| {
+        let mut work = StageWork::default();
+        let before = allocations();
+        stage.run(&problem, init, &mut Session::new(&mut workspace, &mut work));
+        (work, allocations() - before)
+    };
+    let (work, cold) = run(&init);
+    let rendered = renderer.take();
+    let (_, warm) = run(&init);
+
+    let mut line = vec![
+        object.name().to_owned(),
+        format!("{percent}%"),
+        start.to_owned(),
+        preset.name().to_owned(),
+        format!("{}/{}", work.aligned, work.misaligned),
+    ];
+    let counts = [
+        work.stages,
+        work.iterations,
+        work.selected,
+        work.pairs,
+        work.queries,
+        rendered.renders,
+        rendered.pixels,
+        rendered.filled,
+        rendered.triangles,
+        cold,
+        warm,
+    ];
+    line.extend(counts.map(|count| count.to_string()));
+    line
+}
+
+/// The columns padded to one width each: words to the left, numbers to the right.
+fn aligned(table: &[Vec<String>]) -> String {
+    let mut widths = vec![0; table[0].len()];
+    for line in table {
+        for (width, cell) in widths.iter_mut().zip(line) {
+            *width = cell.len().max(*width);
+        }
+    }
+    let mut text = String::new();
+    for line in table {
+        for (column, (width, cell)) in widths.iter().zip(line).enumerate() {
+            let gap = if column == 0 { "" } else { " " };
+            let _ = if column < 4 {
+                write!(text, "{gap}{cell:<width$}")
+            } else {
+                write!(text, "{gap}{cell:>width$}")
+            };
+        }
+        text.push('\n');
+    }
+    text
+}

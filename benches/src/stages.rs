@@ -1,0 +1,60 @@
+//! The single stages that benches and the comparison with other libraries run.
+
+use hybrid_icp::{
+    BoxedStage, DataAssociation, ErrorMetric, Generalized, Icp, IterationLimit, MaxDistance,
+    Motion, NearestNeighbor, PointToPlane, PointToPoint, Projective, Stride, VisibleSurface,
+};
+
+/// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
+pub const GATE_METERS: f32 = 0.03;
+
+/// When a stage ends: the next increment is below 0.1 mm and 0.01°, or after 100 evaluations.
+pub const STOP: (Motion, IterationLimit) = (
+    Motion {
+        translation_meters: 1e-4,
+        rotation_degrees: 0.01,
+    },
+    IterationLimit(100),
+);
+
+/// A stage from visible points, at most [`GATE_METERS`] from theirs, to its natural end.
+pub fn visible<A, M>(stride: Stride, association: A, metric: M) -> BoxedStage
+where
+    A: DataAssociation + Send + 'static,
+    M: ErrorMetric + Send + 'static,
+{
+    Box::new(Icp {
+        selection: VisibleSurface { stride },
+        association,
+        filter: MaxDistance::meters(GATE_METERS),
+        metric,
+        stop: STOP,
+    })
+}
+
+/// Every stage with its name. `every-pixel` takes each visible pixel, the others about 2,000 of them.
+#[must_use]
+pub fn all() -> Vec<(&'static str, BoxedStage)> {
+    let some = Stride::AboutPoints(2000);
+    let nearest = NearestNeighbor::default();
+    vec![
+        (
+            "projective-point-to-plane-every-pixel",
+            visible(Stride::Pixels(1), Projective, PointToPlane),
+        ),
+        (
+            "projective-point-to-plane",
+            visible(some, Projective, PointToPlane),
+        ),
+        (
+            "projective-point-to-point",
+            visible(some, Projective, PointToPoint),
+        ),
+        ("nn-point-to-point", visible(some, nearest, PointToPoint)),
+        ("nn-point-to-plane", visible(some, nearest, PointToPlane)),
+        (
+            "nn-generalized",
+            visible(some, nearest, Generalized::default()),
+        ),
+    ]
+}
