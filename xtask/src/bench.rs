@@ -5,9 +5,6 @@ use std::time::SystemTime;
 
 use crate::{Findings, process};
 
-/// The benches, in the order of the data flow.
-const BENCHES: [&str; 4] = ["steps", "fused", "stage", "pipeline"];
-
 /// Medians that differ by less than this share are called the same, however narrow their intervals.
 const NOISE: f64 = 0.05;
 
@@ -24,10 +21,8 @@ pub(crate) fn run(root: &Path, arguments: &[&str]) -> Findings {
     let options = parse(arguments)?;
     let results = process::target(root).join("criterion");
     let start = SystemTime::now();
-    let mut command = process::cargo(root, &["bench", "--package", "hicp-benches"]);
-    for bench in BENCHES {
-        command.args(["--bench", bench]);
-    }
+    // All but the instruction counts, which want a feature.
+    let mut command = process::cargo(root, &["bench", "--package", "hicp-benches", "--benches"]);
     command.env("CRITERION_HOME", &results).arg("--");
     // Without a name of one's own, the results go where nobody compares: comparing is done here.
     command.args(["--save-baseline", options.save.as_deref().unwrap_or("last")]);
