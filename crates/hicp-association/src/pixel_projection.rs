@@ -31,6 +31,23 @@ impl PixelProjection {
         })
     }
 
+    /// Returns the image positions of many points, given as `[x, y, z]` of each; of no meaning where z is not positive and finite.
+    #[inline(always)]
+    pub(crate) fn project_all<const N: usize>(
+        &self,
+        points: &[[f32; N]; 3],
+    ) -> ([f32; N], [f32; N]) {
+        let (mut us, mut vs) = ([0.0; N], [0.0; N]);
+        let [x, y, z] = points;
+        for ((u, x), z) in us.iter_mut().zip(x).zip(z) {
+            *u = self.fx * x / z + self.cx;
+        }
+        for ((v, y), z) in vs.iter_mut().zip(y).zip(z) {
+            *v = self.fy * y / z + self.cy;
+        }
+        (us, vs)
+    }
+
     /// Returns the point seen at (u, v) at a depth of `z` metres.
     #[inline]
     pub(crate) fn unproject(&self, u: f32, v: f32, z: f32) -> Point3<f32> {

@@ -1,6 +1,9 @@
 //! Projective data association.
 
-use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Surfel};
+use hicp_core::{
+    Context, Correspondences, Isometry3, Mover, Observation, Pair, Point3, Surfel, UnitVector3,
+    Vector3, VectorLoop, vectorized,
+};
 
 use crate::association::DataAssociation;
 use crate::pixel_projection::PixelProjection;
@@ -22,25 +25,150 @@ impl DataAssociation for Projective {
         pairs: &mut Correspondences,
     ) {
         let observation = context.problem.observation;
-        let projection = PixelProjection::new(observation.camera());
-        let mover = Mover::new(camera_from_object);
         pairs.reserve(source.len());
-        for (source_index, surfel) in (0..).zip(source) {
-            let point = mover.point(&surfel.point);
-            let Some((u, v)) = projection.project(&point) else {
-                continue;
-            };
-            let Some(target_index) = observation.index_near(u, v) else {
-                continue;
-            };
-            if let Some(target) = observation.surfel(target_index) {
-                let source = mover.surfel(surfel);
-                pairs.push(Pair::new(source_index, source, target_index, *target));
-            }
-        }
+        vectorized(Project {
+            observation,
+            projection: PixelProjection::new(observation.camera()),
+            mover: Mover::new(camera_from_object),
+            source,
+            pairs,
+        });
     }
 
     fn name(&self) -> &'static str {
         "projective"
+    }
+}
+
+/// Points projected at a time.
+const LANES: usize = 16;
+
+struct Project<'a> {
+    observation: &'a Observation,
+    projection: PixelProjection,
+    mover: Mover,
+    source: &'a [Surfel],
+    pairs: &'a mut Correspondences,
+}
+
+impl VectorLoop for Project<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let grid = PixelGrid::new(self.observation);
+        for (block, first) in self.source.chunks(LANES).zip((0_u32..).step_by(LANES)) {
+            // Lanes beyond the last point lie in the camera plane, and have no pixel.
+            let (mut points, mut normals) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for (lane, surfel) in block.iter().enumerate() {
+                for axis in 0..3 {
+                    points[axis][lane] = surfel.point[axis];
+                    normals[axis][lane] = surfel.normal[axis];
+                }
+            }
+            let points = self.mover.points(&points);
+            let normals = self.mover.vectors(&normals);
+            let pixels = grid.pixels(&self.projection, &points);
+            for (lane, pixel) in pixels.into_iter().take(block.len()).enumerate() {
+                let Some(target) = self.observation.surfel(pixel) else {
+                    continue;
+                };
+                #[allow(clippy::cast_possible_truncation)] // Below LANES.
+                let source_index = first + lane as u32;
+                let source = Surfel {
+                    point: Point3::new(points[0][lane], points[1][lane], points[2][lane]),
+                    normal: UnitVector3::new_unchecked(Vector3::new(
+                        normals[0][lane],
+                        normals[1][lane],
+                        normals[2][lane],
+                    )),
+                };
+                self.pairs
+                    .push(Pair::new(source_index, source, pixel, *target));
+            }
+        }
+    }
+}
+
+/// The pixels of an observation's region, as [`Observation::index_near`] finds them.
+struct PixelGrid {
+    u_min: f32,
+    v_min: f32,
+    width: f32,
+    height: f32,
+    stride: u32,
+}
+
+impl PixelGrid {
+    fn new(observation: &Observation) -> Self {
+        let region = observation.region();
+        let (width, height) = (region.width(), region.height());
+        Self {
+            u_min: region.u_min as f32,
+            v_min: region.v_min as f32,
+            width: width as f32,
+            height: height as f32,
+            // The side of an accepted image fits.
+            stride: u32::try_from(width).unwrap_or(0),
+        }
+    }
+
+    /// The index of the pixel that each point is seen at, `u32::MAX` where there is none.
+    #[inline(always)]
+    fn pixels(&self, projection: &PixelProjection, points: &[[f32; LANES]; 3]) -> [u32; LANES] {
+        let (us, vs) = projection.project_all(points);
+        let mut pixels = [u32::MAX; LANES];
+        for lane in 0..LANES {
+            let column = us[lane] - self.u_min + 0.5;
+            let row = vs[lane] - self.v_min + 0.5;
+            let z = points[2][lane];
+            // False for NaN.
+            let inside = (z > 0.0)
+                & (z < f32::INFINITY)
+                & (column >= 0.0)
+                & (row >= 0.0)
+                & (column < self.width)
+                & (row < self.height);
+            // Where it is not inside, any number will do.
+            let pixel = whole(row)
+                .wrapping_mul(self.stride)
+                .wrapping_add(whole(column));
+            pixels[lane] = if inside { pixel } else { u32::MAX };
+        }
+        pixels
+    }
+}
+
+/// 2²³: from here on a float has no fraction, and the last bits of one below 2²⁴ are those of an integer.
+const WHOLE: f32 = 8_388_608.0;
+
+/// The whole part of a number from 0 to 2²²; anything for others. A cast would look for those, one lane at a time.
+#[inline(always)]
+fn whole(number: f32) -> u32 {
+    let rounded = (number + WHOLE) - WHOLE;
+    let floor = if rounded > number {
+        rounded - 1.0
+    } else {
+        rounded
+    };
+    (floor + WHOLE).to_bits() & 0x007f_ffff
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn the_whole_part_is_that_of_a_cast() {
+        for integer in [0_u16, 1, 2, 3, 255, 639, 640, 32_767, 65_535] {
+            let integer = f32::from(integer);
+            for fraction in [0.0, 1e-3, 0.25, 0.4999, 0.5, 0.500_01, 0.75, 0.999] {
+                let number = integer + fraction;
+                assert_eq!(whole(number), number as u32, "{number}");
+            }
+            let below = integer.next_down().max(0.0);
+            assert_eq!(whole(below), below as u32, "{below}");
+        }
     }
 }

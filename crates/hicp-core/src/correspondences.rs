@@ -174,6 +174,38 @@ impl Mover {
         Point3::from(self.rotation * point.coords + self.translation)
     }
 
+    /// Returns many moved points, given and returned as `[x, y, z]` of each; the bits of [`Mover::point`].
+    #[must_use]
+    #[inline(always)]
+    pub fn points<const N: usize>(&self, points: &[[f32; N]; 3]) -> [[f32; N]; 3] {
+        let mut moved = self.vectors(points);
+        for (moved, offset) in moved.iter_mut().zip(self.translation.iter()) {
+            for value in moved {
+                *value += offset;
+            }
+        }
+        moved
+    }
+
+    /// Returns many turned vectors, given and returned as `[x, y, z]` of each.
+    #[must_use]
+    #[inline(always)]
+    pub fn vectors<const N: usize>(&self, vectors: &[[f32; N]; 3]) -> [[f32; N]; 3] {
+        let [x, y, z] = vectors;
+        let mut turned = [[0.0; N]; 3];
+        for (axis, turned) in turned.iter_mut().enumerate() {
+            let (a, b, c) = (
+                self.rotation[(axis, 0)],
+                self.rotation[(axis, 1)],
+                self.rotation[(axis, 2)],
+            );
+            for ((turned, x), (y, z)) in turned.iter_mut().zip(x).zip(y.iter().zip(z)) {
+                *turned = a * x + b * y + c * z;
+            }
+        }
+        turned
+    }
+
     /// Returns the moved surfel.
     #[must_use]
     #[inline]

@@ -44,7 +44,7 @@
 //! [`NormalEquations::information`] and [`NormalEquations::covariance`].
 //!
 //! Modules in reading order: `metric` (trait); `point_to_point`, `point_to_plane`, `plane_to_point`, `symmetric`, `generalized`,
-//! `weighted_sum`; `normal_equations` over `row_sums`, and what they are asked: `degeneracy` (solving), `freedom` (held components),
+//! `weighted_sum`; `normal_equations` over `row_sums`, `row_blocks` and `moments`, and what they are asked: `degeneracy` (solving), `freedom` (held components),
 //! `observability`, `covariance`; the decorators `kernel` and `robust`, `pose_prior`, `conditioned`, `frozen`, `moved` with
 //! `gauss_newton` and `levenberg_marquardt`, `metric_schedule`.
 
@@ -59,6 +59,7 @@ mod kernel;
 mod levenberg_marquardt;
 mod metric;
 mod metric_schedule;
+mod moments;
 mod moved;
 mod normal_equations;
 mod observability;
@@ -67,6 +68,7 @@ mod point_to_plane;
 mod point_to_point;
 mod pose_prior;
 mod robust;
+mod row_blocks;
 mod row_sums;
 mod symmetric;
 mod weighted_sum;

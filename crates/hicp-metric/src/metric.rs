@@ -2,6 +2,7 @@
 
 use hicp_core::{Correspondences, Isometry3, Pair, VectorLoop, type_label, vectorized};
 
+use crate::moments::Moments;
 use crate::normal_equations::NormalEquations;
 
 /// What one minimisation found: the loss where it stands, and the way from there.
@@ -95,7 +96,8 @@ pub trait ErrorMetric {
     /// that are not finite. The provided method is one Gauss–Newton step: it solves [`ErrorMetric::system`].
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
         let system = self.system(pairs)?;
-        let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+        let sum = || pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+        let weight: f64 = system.weight().unwrap_or_else(sum);
         let mean_loss = system.loss() / weight;
         let increment = system.solve()?;
         mean_loss.is_finite().then_some(Step {
@@ -129,11 +131,15 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let mut system = NormalEquations::about_sources(self.pairs)?;
+        // One pass: about any point near by at first, and where the centroid and the radius turned out to be after.
+        let mut moments = Moments::about_first(self.pairs)?;
+        let mut system = NormalEquations::new(moments.origin(), 1.0);
         for pair in self.pairs {
+            moments.add(pair);
             self.metric.linearize(pair, &mut system);
         }
-        Some(system)
+        let (pivot, length) = moments.pivot_and_length()?;
+        Some(system.moved_to(pivot, length, moments.weight()))
     }
 }
 

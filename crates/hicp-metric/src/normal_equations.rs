@@ -4,6 +4,7 @@ use hicp_core::{Matrix3, Matrix6, Pair, Point3, Vector3, Vector6, so3::hat};
 
 use crate::degeneracy::Degeneracy;
 use crate::freedom::Freedom;
+use crate::moments::Moments;
 use crate::row_sums::RowSums;
 
 /// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
@@ -18,6 +19,8 @@ use crate::row_sums::RowSums;
 pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
     pub(crate) length: f64,
+    inverse_length: f64,
+    weight: Option<f64>,
     sums: RowSums,
     pub(crate) rows: usize,
     /// Trace of the rows alone, once a prior was added: its stiffness must not raise the damping.
@@ -34,6 +37,8 @@ impl NormalEquations {
         Self {
             pivot,
             length,
+            inverse_length: 1.0 / length,
+            weight: None,
             sums: RowSums::zeros(),
             rows: 0,
             row_trace: None,
@@ -49,34 +54,35 @@ impl NormalEquations {
     #[must_use]
     #[inline]
     pub fn about_sources(pairs: &[Pair]) -> Option<Self> {
-        // Relative to the first point that counts, so that an object far from the origin loses no digits.
-        let first = pairs.iter().find(|pair| pair.weight > 0.0)?;
-        let origin = first.source.point.cast::<f64>();
-        // x, y, z and the weight itself.
-        let [mut sums, mut squares] = [[0.0; 4]; 2];
+        let mut moments = Moments::about_first(pairs)?;
         for pair in pairs {
-            let offset = pair.source.point.cast::<f64>() - origin;
-            let (values, weight) = ([offset.x, offset.y, offset.z, 1.0], f64::from(pair.weight));
-            for lane in 0..4 {
-                let weighted = weight * values[lane];
-                sums[lane] += weighted;
-                squares[lane] += weighted * values[lane];
-            }
+            moments.add(pair);
         }
-        let [x, y, z, weight] = sums;
-        let squares = squares[0] + squares[1] + squares[2];
-        if !(weight > 0.0 && squares.is_finite()) {
-            return None;
+        let (pivot, length) = moments.pivot_and_length()?;
+        Some(Self::new(pivot, length))
+    }
+
+    /// Takes sums over `rows` rows about a pivot, with lengths in metres.
+    pub(crate) fn from_sums(pivot: Point3<f64>, sums: RowSums, rows: usize) -> Self {
+        Self {
+            sums,
+            rows,
+            ..Self::new(pivot, 1.0)
         }
-        let mean = Vector3::new(x, y, z) / weight;
-        let variance = squares / weight - mean.norm_squared();
-        // All points in one place: any length will do, the rotation is undetermined and stays damped.
-        let length = if variance > 1e-12 {
-            variance.sqrt()
-        } else {
-            1.0
-        };
-        Some(Self::new(origin + mean, length))
+    }
+
+    /// Returns this system about another pivot, with lengths scaled by another length.
+    #[must_use]
+    pub(crate) fn moved_to(&self, pivot: Point3<f64>, length: f64, weight: f64) -> Self {
+        let mut moved = Self::new(pivot, length);
+        moved.merge(self, 1.0);
+        moved.weight = Some(weight);
+        moved
+    }
+
+    /// Σ w over the pairs, if this is the sum over pairs that [`crate::ErrorMetric::system`] provides.
+    pub(crate) fn weight(&self) -> Option<f64> {
+        self.weight
     }
 
     /// Adds one scalar residual r of weight w whose change under the increment is `direction` · (displacement of `point`).
@@ -90,7 +96,7 @@ impl NormalEquations {
         residual: f64,
         weight: f64,
     ) {
-        let lever = (point - self.pivot).cross(direction) / self.length;
+        let lever = (point - self.pivot).cross(direction) * self.inverse_length;
         let jacobian = [
             direction.x,
             direction.y,
@@ -137,6 +143,7 @@ impl NormalEquations {
         jacobian: &Matrix6<f64>,
         information: &Matrix6<f64>,
     ) {
+        self.weight = None;
         self.row_trace.get_or_insert(self.sums.trace());
         let jacobian = jacobian * self.camera_from_scaled();
         let weighted = jacobian.transpose() * information;
@@ -156,6 +163,7 @@ impl NormalEquations {
         let shift = hat(&(other.pivot - self.pivot)) / -self.length;
         let scale = Matrix3::identity() * (other.length / self.length);
         let change = blocks(&Matrix3::identity(), &shift, &scale);
+        self.weight = None;
         let trace = self.damping_trace() + factor * other.damping_trace();
         if self.row_trace.is_some() || other.row_trace.is_some() {
             self.row_trace = Some(trace);
@@ -172,6 +180,7 @@ impl NormalEquations {
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.sums.scale(factor);
+        self.weight = None;
         self.row_trace = self.row_trace.map(|trace| trace * factor);
         self
     }

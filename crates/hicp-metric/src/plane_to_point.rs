@@ -1,9 +1,10 @@
 //! The plane-to-point error metric: point-to-plane in the model's tangent planes.
 
-use hicp_core::Pair;
+use hicp_core::{Correspondences, Pair};
 
 use crate::metric::ErrorMetric;
 use crate::normal_equations::NormalEquations;
+use crate::row_blocks::{Row, system_of_rows};
 
 /// E = (mᵀ (T o − c))², m the normal of the model, which turns with it; by Gauss–Newton.
 ///
@@ -13,20 +14,40 @@ use crate::normal_equations::NormalEquations;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PlaneToPoint;
 
+impl PlaneToPoint {
+    #[inline(always)]
+    fn row(pair: &Pair) -> Row {
+        // m·(ρ + φ × p) + (φ × m)·(p − c) = m·ρ + φ·(c × m): the lever of c, not of p, as m turns too.
+        let point = pair.target.point.cast::<f64>();
+        let direction = pair.source.normal.cast::<f64>().into_inner();
+        Row {
+            point,
+            direction,
+            residual: direction.dot(&(pair.source.point.cast::<f64>() - point)),
+        }
+    }
+}
+
 impl ErrorMetric for PlaneToPoint {
     #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        let observed = pair.target.point.cast::<f64>();
-        let normal = pair.source.normal.cast::<f64>().into_inner();
-        let residual = normal.dot(&(pair.source.point.cast::<f64>() - observed));
-        // m·(ρ + φ × p) + (φ × m)·(p − c) = m·ρ + φ·(c × m): the lever of c, not of p, as m turns too.
-        system.add_row(&observed, &normal, residual, f64::from(pair.weight));
+        let row = Self::row(pair);
+        system.add_row(
+            &row.point,
+            &row.direction,
+            row.residual,
+            f64::from(pair.weight),
+        );
     }
 
     #[inline]
     fn squared_error(&self, pair: &Pair) -> f64 {
         let offset = pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>();
         pair.source.normal.cast::<f64>().dot(&offset).powi(2)
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        system_of_rows(pairs.as_slice(), Self::row)
     }
 
     fn name(&self) -> &'static str {

@@ -1,9 +1,10 @@
 //! The point-to-plane error metric.
 
-use hicp_core::Pair;
+use hicp_core::{Correspondences, Pair};
 
 use crate::metric::ErrorMetric;
 use crate::normal_equations::NormalEquations;
+use crate::row_blocks::{Row, system_of_rows};
 
 /// E = (nᵀ (T o − c))² (§III-A.2; Chen & Medioni 1991), n the observed normal, by Gauss–Newton (Low 2004's rows).
 ///
@@ -12,19 +13,39 @@ use crate::normal_equations::NormalEquations;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PointToPlane;
 
+impl PointToPlane {
+    #[inline(always)]
+    fn row(pair: &Pair) -> Row {
+        let point = pair.source.point.cast::<f64>();
+        let direction = pair.target.normal.cast::<f64>().into_inner();
+        Row {
+            point,
+            direction,
+            residual: direction.dot(&(point - pair.target.point.cast::<f64>())),
+        }
+    }
+}
+
 impl ErrorMetric for PointToPlane {
     #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        let point = pair.source.point.cast::<f64>();
-        let normal = pair.target.normal.cast::<f64>().into_inner();
-        let residual = normal.dot(&(point - pair.target.point.cast::<f64>()));
-        system.add_row(&point, &normal, residual, f64::from(pair.weight));
+        let row = Self::row(pair);
+        system.add_row(
+            &row.point,
+            &row.direction,
+            row.residual,
+            f64::from(pair.weight),
+        );
     }
 
     #[inline]
     fn squared_error(&self, pair: &Pair) -> f64 {
         let offset = pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>();
         pair.target.normal.cast::<f64>().dot(&offset).powi(2)
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        system_of_rows(pairs.as_slice(), Self::row)
     }
 
     fn name(&self) -> &'static str {

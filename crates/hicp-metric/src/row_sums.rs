@@ -18,6 +18,18 @@ impl RowSums {
         Self([[0.0; LANES]; RESIDUAL + 1])
     }
 
+    /// Takes sums over the lower triangle of a aᵀ, column by column.
+    pub(crate) fn from_triangle(triangle: [f64; 28]) -> Self {
+        let mut sums = Self::zeros();
+        let mut triangle = triangle.into_iter();
+        for (column, sums) in sums.0.iter_mut().enumerate() {
+            for (sum, value) in sums[column..=RESIDUAL].iter_mut().zip(&mut triangle) {
+                *sum = value;
+            }
+        }
+        sums
+    }
+
     /// Adds a row.
     #[inline(always)]
     pub(crate) fn add_row(&mut self, jacobian: [f64; 6], residual: f64, weight: f64) {

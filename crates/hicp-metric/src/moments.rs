@@ -1,0 +1,75 @@
+//! Where the sources of some pairs are, and how far they spread.
+
+use hicp_core::{Pair, Point3, Vector3};
+
+/// Weighted sums of the source points and their squares.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moments {
+    /// The first point that counts, so that an object far from the origin loses no digits.
+    origin: Point3<f64>,
+    /// Σ w (x, y, z, 1).
+    sums: [f64; 4],
+    /// Σ w (x², y², z², 1).
+    squares: [f64; 4],
+}
+
+impl Moments {
+    /// `None` without a pair that has weight.
+    #[inline(always)]
+    pub(crate) fn about_first(pairs: &[Pair]) -> Option<Self> {
+        let first = pairs.iter().find(|pair| pair.weight > 0.0)?;
+        Some(Self {
+            origin: first.source.point.cast(),
+            sums: [0.0; 4],
+            squares: [0.0; 4],
+        })
+    }
+
+    /// Takes Σ w (x, y, z, 1) and Σ w (x², y², z²), of coordinates from the same origin.
+    pub(crate) fn with_sums(&self, sums: [f64; 4], squares: [f64; 3]) -> Self {
+        let [x, y, z] = squares;
+        Self {
+            sums,
+            squares: [x, y, z, sums[3]],
+            ..*self
+        }
+    }
+
+    pub(crate) fn origin(&self) -> Point3<f64> {
+        self.origin
+    }
+
+    pub(crate) fn weight(&self) -> f64 {
+        self.sums[3]
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, pair: &Pair) {
+        let offset = pair.source.point.cast::<f64>() - self.origin;
+        let weight = f64::from(pair.weight);
+        let values = [offset.x, offset.y, offset.z, 1.0];
+        for ((value, sum), square) in values.iter().zip(&mut self.sums).zip(&mut self.squares) {
+            let weighted = weight * value;
+            *sum += weighted;
+            *square += weighted * value;
+        }
+    }
+
+    /// Returns the centroid and the RMS radius; `None` without weight or with numbers that are not finite.
+    pub(crate) fn pivot_and_length(&self) -> Option<(Point3<f64>, f64)> {
+        let [x, y, z, weight] = self.sums;
+        let squares = self.squares[0] + self.squares[1] + self.squares[2];
+        if !(weight > 0.0 && squares.is_finite()) {
+            return None;
+        }
+        let mean = Vector3::new(x, y, z) / weight;
+        let variance = squares / weight - mean.norm_squared();
+        // All points in one place: any length will do, the rotation is undetermined and stays damped.
+        let length = if variance > 1e-12 {
+            variance.sqrt()
+        } else {
+            1.0
+        };
+        Some((self.origin + mean, length))
+    }
+}
