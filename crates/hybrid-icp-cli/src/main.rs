@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
 
-mod bop_refine;
+mod bop;
 mod choice;
 mod demo;
 mod doubts;
@@ -49,13 +49,8 @@ enum Command {
     Replay(replay::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
-    Bop(BopCommand),
+    Bop(bop::Command),
     Pipelines(pipelines::Arguments),
-}
-
-#[derive(Debug, Subcommand)]
-enum BopCommand {
-    Refine(bop_refine::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -63,7 +58,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
-        Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
+        Command::Bop(command) => bop::run(&command),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
     };
     match result {
