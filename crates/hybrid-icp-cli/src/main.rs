@@ -37,6 +37,7 @@ Examples:
   hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
+  hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp pipelines
 
 `hybrid-icp help refine` tells all about a command.

@@ -4,18 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use clap::Args;
 use hicp_io::bop::{Dataset, Detection, ResultRow};
 use hybrid_icp::{Isometry3, Refiner, Verdict};
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::frame::{Fate, Frame};
 use super::images::Scenes;
-use super::median;
 use super::models::Models;
 use super::problem::{self, Problem};
+use super::{median, progress_bar, thread_pool};
 use crate::choice::PipelineArguments;
 use crate::terminal::say;
 use crate::{outputs, report};
@@ -110,19 +109,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => None,
     };
     let frames = frames_of(&rows);
-    let threads = match arguments.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        // More threads than frames have nothing to do.
-        .num_threads(threads.min(frames.len().max(1)))
-        .build()
-        .context("cannot start the threads")?;
+    let pool = thread_pool(arguments.threads, frames.len())?;
 
     let start = Instant::now();
     let job = pool.install(|| Job::prepare(arguments, &dataset, detections, &rows))?;
-    let progress = progress_bar(rows.len());
+    let progress = progress_bar(rows.len(), "rows");
     let results: Vec<FrameResult> = pool.install(|| {
         frames
             .par_iter()
@@ -350,13 +341,4 @@ fn unrefined(index: usize, fate: Fate) -> Refined {
         pose: None,
         mve: None,
     }
-}
-
-/// A bar on a terminal; nothing where standard error is not one.
-fn progress_bar(rows: usize) -> ProgressBar {
-    let bar = ProgressBar::new(rows as u64);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} rows, {eta} left") {
-        bar.set_style(style);
-    }
-    bar
 }
