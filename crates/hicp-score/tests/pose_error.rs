@@ -112,3 +112,27 @@ fn points_in_one_place_and_values_that_are_not_finite() {
     assert_eq!(adi(&nowhere, &shifted, &one), f64::INFINITY);
     assert_eq!(adi(&shifted, &nowhere, &one), f64::INFINITY);
 }
+
+#[test]
+fn adi_is_its_definition_near_and_far_for_points_in_planes_and_in_one_place() {
+    let mut numbers = Numbers(314);
+    for (flat, size) in [(false, 0.01), (true, 0.01), (false, 3.0), (true, 3.0)] {
+        let mut points: Vec<Point3<f32>> = (0..400)
+            .map(|_| Point3::from((numbers.vector() * 0.05).cast()))
+            .collect();
+        if flat {
+            points.iter_mut().for_each(|p| p.z = 0.25);
+        }
+        let twice = points[..40].to_vec();
+        points.extend(twice);
+        let (a, b) = (numbers.pose(size), numbers.pose(size));
+        let distance = |p: &Point3<f32>| {
+            let to = b * p.cast::<f64>();
+            let all = points.iter().map(|q| (a * q.cast::<f64>() - to).norm());
+            all.fold(f64::INFINITY, f64::min)
+        };
+        let expected = points.iter().map(distance).sum::<f64>() / 440.0;
+        let found = adi(&a, &b, &points);
+        assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+    }
+}
