@@ -2,7 +2,7 @@
 
 use hybrid_icp::{
     BoxedStage, DataAssociation, ErrorMetric, Generalized, Icp, IterationLimit, MaxDistance,
-    Motion, NearestNeighbor, PointToPlane, PointToPoint, Projective, Stride, VisibleSurface,
+    Motion, PointToPlane, PointToPoint, Projective, Stride, VisibleSurface, WarmNearestNeighbor,
 };
 
 /// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
@@ -36,7 +36,7 @@ where
 #[must_use]
 pub fn all() -> Vec<(&'static str, BoxedStage)> {
     let some = Stride::AboutPoints(2000);
-    let nearest = NearestNeighbor::default();
+    let nearest = WarmNearestNeighbor::default;
     vec![
         (
             "projective-point-to-plane-every-pixel",
@@ -50,11 +50,11 @@ pub fn all() -> Vec<(&'static str, BoxedStage)> {
             "projective-point-to-point",
             visible(some, Projective, PointToPoint),
         ),
-        ("nn-point-to-point", visible(some, nearest, PointToPoint)),
-        ("nn-point-to-plane", visible(some, nearest, PointToPlane)),
+        ("nn-point-to-point", visible(some, nearest(), PointToPoint)),
+        ("nn-point-to-plane", visible(some, nearest(), PointToPlane)),
         (
             "nn-generalized",
-            visible(some, nearest, Generalized::default()),
+            visible(some, nearest(), Generalized::default()),
         ),
     ]
 }

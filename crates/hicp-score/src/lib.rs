@@ -1,5 +1,6 @@
 //! Scores of a pose: Visible Surface Discrepancy ([`vsd`], [`Vsd`]), the mean VSD estimate against the live image
-//! ([`MeanVsd`], the paper's MVE), and distances between model points ([`add`], [`adi`]).
+//! ([`MeanVsd`], the paper's MVE), and the pose errors and recalls of the BOP benchmark ([`bop_vsd`], [`mssd`], [`mspd`], [`add`],
+//! [`adi`], [`Recalls`]).
 //!
 //! **Should you use this crate?** To judge poses, with or without ground truth, whoever made them: yes. To refine them, use
 //! `hybrid-icp`, which reports the MVE of what it returns.
@@ -16,22 +17,32 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `score` (trait), `mean_vsd`, `vsd`, `tolerances`, `pose_error`, `error`.
+//! Modules in reading order: `score` (trait), `mean_vsd`, `vsd`, `tolerances`, `bop_vsd`, `pose_error`, `model_points`,
+//! `recall`, `error`.
 
 // Counts become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
 mod agreement;
+mod bop_vsd;
 mod error;
 mod mean_vsd;
+mod model_points;
+mod nearest;
 mod pose_error;
+mod recall;
 mod score;
 mod tolerances;
 mod vsd;
 
+pub use bop_vsd::{bop_vsd, spheres_overlap};
 pub use error::ScoreError;
 pub use mean_vsd::{MeanVsd, VISIBILITY_TOLERANCE_METERS};
-pub use pose_error::{add, adi};
+pub use model_points::ModelPoints;
+pub use pose_error::{add, adi, mspd, mssd};
+pub use recall::{
+    N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates,
+};
 pub use score::Score;
 pub use tolerances::{N_TOLERANCES, tolerances};
 pub use vsd::{Vsd, visibility_masks, vsd};

@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
 
-mod bop_refine;
+mod bop;
 mod choice;
 mod demo;
 mod doubts;
@@ -38,6 +38,7 @@ Examples:
   hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
+  hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp pipelines
   hybrid-icp objects --out objects
 
@@ -51,14 +52,9 @@ enum Command {
     Replay(replay::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
-    Bop(BopCommand),
+    Bop(bop::Command),
     Pipelines(pipelines::Arguments),
     Objects(objects::Arguments),
-}
-
-#[derive(Debug, Subcommand)]
-enum BopCommand {
-    Refine(bop_refine::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -66,7 +62,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
-        Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
+        Command::Bop(command) => bop::run(&command),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
         Command::Objects(arguments) => objects::run(&arguments),
     };

@@ -79,7 +79,9 @@ pub use hicp_metric::{
 };
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
-    MeanVsd, N_TOLERANCES, Score, ScoreError, Vsd, add, adi, tolerances, visibility_masks, vsd,
+    MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls, Score, ScoreError,
+    TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances,
+    most_visible, mspd, mssd, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
 };
 pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
 pub use pipeline::{PipelineError, PipelineFile};

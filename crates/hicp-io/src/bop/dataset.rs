@@ -58,7 +58,20 @@ impl Dataset {
     ///
     /// [`IoError::Missing`] when there is neither.
     pub fn models_dir(&self) -> Result<PathBuf, IoError> {
-        ["models", "models_eval"]
+        self.first_dir(["models", "models_eval"])
+    }
+
+    /// Returns the folder of the models that BOP's errors are stated over: `models_eval`, or `models` where there is no other.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError::Missing`] when there is neither.
+    pub fn eval_models_dir(&self) -> Result<PathBuf, IoError> {
+        self.first_dir(["models_eval", "models"])
+    }
+
+    fn first_dir(&self, names: [&str; 2]) -> Result<PathBuf, IoError> {
+        names
             .map(|name| self.root.join(name))
             .into_iter()
             .find(|dir| dir.is_dir())
@@ -71,7 +84,13 @@ impl Dataset {
     ///
     /// As [`Dataset::models_dir`].
     pub fn model_path(&self, obj_id: u32) -> Result<PathBuf, IoError> {
-        Ok(self.models_dir()?.join(format!("obj_{obj_id:06}.ply")))
+        Ok(Self::model_path_in(&self.models_dir()?, obj_id))
+    }
+
+    /// Returns the path of the mesh of an object in a folder of models, whether or not it exists.
+    #[must_use]
+    pub fn model_path_in(models: &Path, obj_id: u32) -> PathBuf {
+        models.join(format!("obj_{obj_id:06}.ply"))
     }
 
     /// Reads the mesh of an object; metres.
@@ -187,6 +206,10 @@ mod tests {
                 .unwrap()
                 .ends_with("models_eval/obj_000012.ply")
         );
+        assert_eq!(
+            dataset.eval_models_dir().unwrap(),
+            dataset.models_dir().unwrap()
+        );
         fs::create_dir(dir.path().join("models")).unwrap();
         assert!(
             dataset
@@ -194,6 +217,8 @@ mod tests {
                 .unwrap()
                 .ends_with("models/obj_000012.ply")
         );
+        let for_evaluation = dataset.eval_models_dir().unwrap();
+        assert!(for_evaluation.ends_with("models_eval"));
     }
 
     #[test]

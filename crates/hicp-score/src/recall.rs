@@ -1,0 +1,269 @@
+//! Which estimates are correct, and recalls by BOP's matching rules.
+
+use crate::tolerances::{N_TOLERANCES, tolerances};
+
+/// Number of thresholds of correctness per error function.
+pub const N_THRESHOLDS: usize = 10;
+
+/// The image width, pixels, in which BOP states its thresholds of MSPD.
+const MSPD_WIDTH: f64 = 640.0;
+
+/// Share of the diameter below which ADD or ADI is correct.
+const AD_THRESHOLD: f64 = 0.1;
+
+/// All errors of an estimate against one instance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseErrors {
+    /// e_VSD(τ), see [`crate::bop_vsd`].
+    pub vsd: [f64; N_TOLERANCES],
+    /// MSSD, metres.
+    pub mssd_m: f64,
+    /// MSPD, pixels of the test image.
+    pub mspd_px: f64,
+    /// ADD, metres.
+    pub add_m: f64,
+    /// ADI, metres.
+    pub adi_m: f64,
+    /// |t_est − t_gt|, metres. From the diameter on, BOP takes MSSD, ADD and ADI as infinite; see [`PoseErrors::is_apart`].
+    pub translation_m: f64,
+}
+
+impl PoseErrors {
+    /// Returns whether the object's origins lie a diameter or more apart, where MSSD, ADD and ADI count as infinite.
+    #[must_use]
+    pub fn is_apart(&self, diameter: f64) -> bool {
+        // A translation that is no number is apart from everything.
+        self.translation_m.is_nan() || self.translation_m >= diameter
+    }
+}
+
+/// The estimates of one object in one image against its instances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetErrors {
+    /// Diameter of the object, metres.
+    pub diameter_m: f64,
+    /// Width of the test image, pixels.
+    pub image_width: u32,
+    /// Whether AD is ADI for this object, else it is ADD.
+    pub symmetric: bool,
+    /// Instances to be found.
+    pub instances: usize,
+    /// One list per estimate, by descending score ([`top_estimates`]), of its errors against every instance.
+    pub estimates: Vec<Vec<PoseErrors>>,
+}
+
+impl TargetErrors {
+    /// Returns, for every instance, which estimate is matched to it when `error` is below `threshold`.
+    ///
+    /// See [`match_instances`].
+    #[must_use]
+    pub fn matches(
+        &self,
+        threshold: f64,
+        error: impl Fn(&PoseErrors) -> f64,
+    ) -> Vec<Option<usize>> {
+        let mut taken = vec![None; self.instances];
+        assign(
+            &mut taken,
+            self.estimates.len(),
+            threshold,
+            |estimate, instance| {
+                let errors = self.estimates[estimate].get(instance);
+                errors.map_or(f64::INFINITY, &error)
+            },
+        );
+        taken
+    }
+
+    /// Returns the ADI (metres) of the estimate that each instance is left with when every estimate, best score first,
+    /// takes the nearest instance by ADI; `None` for an instance without one.
+    #[must_use]
+    pub fn adi_of_instances(&self) -> Vec<Option<f64>> {
+        let matched = self.matches(f64::INFINITY, |e| e.adi_m);
+        let matched = matched.into_iter().enumerate();
+        matched
+            .map(|(instance, estimate)| Some(self.estimates[estimate?][instance].adi_m))
+            .collect()
+    }
+
+    fn found(&self, threshold: f64, error: impl Fn(&PoseErrors) -> f64) -> usize {
+        self.matches(threshold, error)
+            .iter()
+            .filter(|m| m.is_some())
+            .count()
+    }
+}
+
+/// Returns which estimate is matched to every instance: greedily by descending score, each estimate takes the free
+/// instance with the lowest error that is strictly below the threshold, the first of equals.
+///
+/// `errors[e][i]` is the error of estimate e, in descending order of score, against instance i. Cost: O(estimates × instances).
+///
+/// ```
+/// // The better estimate takes the instance that both are nearest to; the other one has to take the next.
+/// let errors = [vec![0.1, 0.4], vec![0.0, 0.3]];
+/// assert_eq!(hicp_score::match_instances(&errors, 2, 0.5), [Some(0), Some(1)]);
+/// assert_eq!(hicp_score::match_instances(&errors, 2, 0.3), [Some(0), None]);
+/// ```
+#[must_use]
+pub fn match_instances(
+    errors: &[Vec<f64>],
+    instances: usize,
+    threshold: f64,
+) -> Vec<Option<usize>> {
+    let mut taken = vec![None; instances];
+    assign(&mut taken, errors.len(), threshold, |estimate, instance| {
+        let error = errors[estimate].get(instance);
+        error.copied().unwrap_or(f64::INFINITY)
+    });
+    taken
+}
+
+fn assign(
+    taken: &mut [Option<usize>],
+    estimates: usize,
+    threshold: f64,
+    error: impl Fn(usize, usize) -> f64,
+) {
+    for estimate in 0..estimates {
+        let mut best = (threshold, None);
+        for (instance, by) in taken.iter().enumerate() {
+            let error = error(estimate, instance);
+            if by.is_none() && error < best.0 {
+                best = (error, Some(instance));
+            }
+        }
+        if let Some(instance) = best.1 {
+            taken[instance] = Some(estimate);
+        }
+    }
+}
+
+/// Returns the indices of the `count` estimates with the highest scores, highest first; of equals the first.
+#[must_use]
+pub fn top_estimates(scores: &[f64], count: usize) -> Vec<usize> {
+    descending(scores, count)
+}
+
+/// Returns the indices of the `count` instances with the largest visible fractions, largest first; of equals the first.
+///
+/// BOP asks for no more than `inst_count` instances of an object in an image, the most visible ones.
+#[must_use]
+pub fn most_visible(fractions: &[f64], count: usize) -> Vec<usize> {
+    descending(fractions, count)
+}
+
+fn descending(values: &[f64], count: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
+    order.truncate(count);
+    order
+}
+
+/// Recalls over any number of targets: of one object, of a scene, of a dataset.
+///
+/// A recall is the number of matched instances over the number of all instances, so one that nobody estimated counts as
+/// not found. Recalls of several parts are not averaged: [`Recalls::merge`] adds their instances up.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recalls {
+    instances: usize,
+    missing: usize,
+    vsd: [[usize; N_THRESHOLDS]; N_TOLERANCES],
+    mssd: [usize; N_THRESHOLDS],
+    mspd: [usize; N_THRESHOLDS],
+    ad: usize,
+}
+
+impl Recalls {
+    /// Counts a target.
+    ///
+    /// Thresholds θ: 0.05, 0.10, …, 0.50 for VSD at each of its tolerances, and times the diameter for MSSD; 5, 10, …, 50
+    /// pixels for MSPD in an image 640 pixels wide; a tenth of the diameter for AD. Correct is strictly below.
+    pub fn count(&mut self, target: &TargetErrors) {
+        self.instances += target.instances;
+        self.missing += target.instances.saturating_sub(target.estimates.len());
+        let diameter = target.diameter_m;
+        let unless_apart = |errors: &PoseErrors, error: f64| {
+            if errors.is_apart(diameter) {
+                f64::INFINITY
+            } else {
+                error
+            }
+        };
+        let mspd_scale = MSPD_WIDTH / f64::from(target.image_width);
+        for (index, threshold) in tolerances().into_iter().enumerate() {
+            for (tolerance, found) in self.vsd.iter_mut().enumerate() {
+                found[index] += target.found(threshold, |e| e.vsd[tolerance]);
+            }
+            self.mssd[index] += target.found(threshold, |e| unless_apart(e, e.mssd_m / diameter));
+            let pixels = 100.0 * threshold;
+            self.mspd[index] += target.found(pixels, |e| e.mspd_px * mspd_scale);
+        }
+        self.ad += target.found(AD_THRESHOLD, |e| {
+            let ad = if target.symmetric { e.adi_m } else { e.add_m };
+            unless_apart(e, ad / diameter)
+        });
+    }
+
+    /// Adds the instances of another part.
+    pub fn merge(&mut self, other: &Self) {
+        let sum = |a: &mut [usize], b: &[usize]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        self.instances += other.instances;
+        self.missing += other.missing;
+        self.ad += other.ad;
+        sum(self.vsd.as_flattened_mut(), other.vsd.as_flattened());
+        sum(&mut self.mssd, &other.mssd);
+        sum(&mut self.mspd, &other.mspd);
+    }
+
+    /// Instances to be found.
+    #[must_use]
+    pub fn instances(&self) -> usize {
+        self.instances
+    }
+
+    /// Instances beyond the number of estimates: whatever the thresholds, nobody can have found them.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.missing
+    }
+
+    /// AR_VSD: the mean recall over 10 tolerances and 10 thresholds. 0 without instances, as are all recalls.
+    #[must_use]
+    pub fn vsd(&self) -> f64 {
+        self.mean(self.vsd.as_flattened())
+    }
+
+    /// AR_MSSD: the mean recall over its thresholds.
+    #[must_use]
+    pub fn mssd(&self) -> f64 {
+        self.mean(&self.mssd)
+    }
+
+    /// AR_MSPD: the mean recall over its thresholds.
+    #[must_use]
+    pub fn mspd(&self) -> f64 {
+        self.mean(&self.mspd)
+    }
+
+    /// AR = (AR_VSD + AR_MSSD + AR_MSPD) / 3, BOP's score of a dataset.
+    #[must_use]
+    pub fn average(&self) -> f64 {
+        (self.vsd() + self.mssd() + self.mspd()) / 3.0
+    }
+
+    /// Recall of ADD(-S) below a tenth of the diameter.
+    #[must_use]
+    pub fn ad(&self) -> f64 {
+        self.mean(&[self.ad])
+    }
+
+    fn mean(&self, found: &[usize]) -> f64 {
+        let all = self.instances * found.len();
+        if all == 0 {
+            0.0
+        } else {
+            found.iter().sum::<usize>() as f64 / all as f64
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! `hybrid-icp bop eval`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail};
+use clap::Args;
+use hicp_io::bop::{Dataset, ResultRow};
+use hybrid_icp::ModelPoints;
+use rayon::prelude::*;
+
+use super::eval_report::{Report, Subject};
+use super::images::Scenes;
+use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
+use super::models::Models;
+use super::targets::{self, FrameKey, Targets};
+use super::{errors_csv, problem, progress_bar, thread_pool};
+use crate::outputs;
+use crate::terminal::{say, warn};
+
+/// Compare a result file with the ground truth, as the BOP benchmark does.
+///
+/// The table has, per object and in all, the average recalls of VSD, MSSD and MSPD, their mean AR, the recall of ADD below a
+/// tenth of the diameter (of ADI for symmetric objects), and the median ADI. Of every target the estimates with the best
+/// scores are matched greedily to the most visible instances; an instance without an estimate counts as not found.
+#[derive(Debug, Args)]
+#[command(override_usage = USAGE, after_help = EXAMPLE)]
+pub(crate) struct Arguments {
+    /// The dataset's folder, with models_eval/ (or models/) and the split's folder.
+    #[arg(long, value_name = "DIR")]
+    dataset: PathBuf,
+    /// The split's folder: test, test_primesense, train_pbr, …
+    #[arg(long, value_name = "NAME", default_value = "test")]
+    split: String,
+    /// The result file: CSV with scene_id, im_id, obj_id, score, R, t and time.
+    #[arg(long, value_name = "FILE.csv")]
+    results: PathBuf,
+    /// The targets; test_targets_bop19.json of the dataset if not given, every visible instance if there is none.
+    #[arg(long, value_name = "FILE.json")]
+    targets: Option<PathBuf>,
+    /// Objects whose AD is ADI; those with declared symmetries if not given.
+    #[arg(long, value_name = "ID,…", value_delimiter = ',')]
+    symmetric: Option<Vec<u32>>,
+    /// Visibility tolerance of VSD in millimetres; the benchmark takes 5 for ITODD.
+    #[arg(long, value_name = "MM", default_value_t = 15.0, value_parser = positive)]
+    delta: f64,
+    /// Also write the recalls as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+    /// Also write the errors of every estimate against every instance of its target as CSV.
+    #[arg(long, value_name = "FILE.csv")]
+    errors: Option<PathBuf>,
+    /// Threads; the number of cores if not given. Nothing but the time depends on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
+    threads: Option<u16>,
+}
+
+const USAGE: &str = "\
+hybrid-icp bop eval --dataset <DIR> [--split <NAME>]
+           --results <FILE.csv> [OPTIONS]";
+
+const EXAMPLE: &str = "\
+Example:
+  hybrid-icp bop eval --dataset bop/ycbv --split test \\
+      --results cosypose_ycbv-test.csv --errors errors.csv
+
+Exit codes: 0 done, with warnings of targets and rows that do not fit; 1 a file
+is damaged or nothing could be judged (what could be judged is still told);
+2 the command line is wrong.";
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: Option<f64> = text.parse().ok();
+    value
+        .filter(|x| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| "expected a finite number above 0".to_owned())
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let written: Vec<outputs::Named<'_>> = [
+        ("--json", arguments.json.as_deref()),
+        ("--errors", arguments.errors.as_deref()),
+    ]
+    .into_iter()
+    .filter_map(|(option, path)| Some((option, path?)))
+    .collect();
+    let mut read = vec![("--results", arguments.results.as_path())];
+    read.extend(arguments.targets.as_deref().map(|p| ("--targets", p)));
+    outputs::check(&written, &read, &[])?;
+
+    let rows = hicp_io::bop::read_results(&arguments.results)?;
+    let dataset = Dataset::open(&arguments.dataset)?;
+    dataset.scene_ids(&arguments.split)?;
+    let targets = targets::choose(&dataset, &arguments.split, arguments.targets.as_deref())?;
+    let scene_ids = targets.keys().map(|(scene_id, _)| *scene_id);
+    let scenes = Scenes::open(&dataset, &arguments.split, scene_ids);
+    let objects: BTreeSet<u32> = targets.values().flat_map(|t| t.keys().copied()).collect();
+    let pool = thread_pool(arguments.threads, targets.len())?;
+    let models_dir = dataset.eval_models_dir()?;
+    let models = pool.install(|| Models::read(&models_dir, &objects))?;
+
+    let judge = Judge {
+        objects: evaluated(arguments, &models),
+        scenes: &scenes,
+        rows: &rows,
+        rows_of: rows_of(&rows),
+        delta: 1e-3 * arguments.delta,
+    };
+    let frames: Vec<(&FrameKey, &BTreeMap<u32, u32>)> = targets.iter().collect();
+    let progress = progress_bar(frames.len(), "images");
+    let judged: Vec<JudgedFrame> = pool.install(|| {
+        let frames = frames.par_iter().with_max_len(1);
+        frames
+            .map_init(Renders::default, |renders, (frame, wanted)| {
+                let judged = judge.frame(renders, **frame, wanted);
+                progress.inc(1);
+                judged
+            })
+            .collect()
+    });
+    progress.finish_and_clear();
+    report(arguments, &rows, &targets, &models, &judged)
+}
+
+/// Prepares the objects for their errors.
+fn evaluated<'a>(arguments: &Arguments, models: &'a Models) -> BTreeMap<u32, EvaluatedObject<'a>> {
+    let of = |(id, model)| {
+        let points = ModelPoints::new(model);
+        let symmetric = match &arguments.symmetric {
+            Some(ids) => ids.contains(id),
+            None => points.is_symmetric(),
+        };
+        let object = EvaluatedObject {
+            model,
+            points,
+            symmetric,
+        };
+        (*id, object)
+    };
+    models.by_id.iter().map(of).collect()
+}
+
+fn rows_of(rows: &[ResultRow]) -> BTreeMap<FrameKey, Vec<usize>> {
+    let mut by_frame: BTreeMap<FrameKey, Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        let frame = (row.scene_id, row.im_id);
+        by_frame.entry(frame).or_default().push(index);
+    }
+    by_frame
+}
+
+/// Tells and writes what was found.
+fn report(
+    arguments: &Arguments,
+    rows: &[ResultRow],
+    wanted: &Targets,
+    models: &Models,
+    frames: &[JudgedFrame],
+) -> anyhow::Result<()> {
+    let warnings = misfits(arguments, rows, wanted, models, frames);
+    for text in &warnings {
+        warn(text);
+    }
+    let targets: Vec<&Judged> = frames.iter().flat_map(|frame| &frame.targets).collect();
+    let left_out = frames.iter().map(|frame| frame.left_out).sum();
+    let subject = Subject {
+        results: arguments.results.display().to_string(),
+        dataset: arguments.dataset.display().to_string(),
+        split: arguments.split.clone(),
+        delta_mm: arguments.delta,
+    };
+    let report = Report::new(subject, &targets, left_out, warnings);
+    if let Some(path) = &arguments.errors {
+        errors_csv::write(path, &targets, rows)?;
+    }
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_string_pretty(&report).context("cannot write JSON")?;
+        hicp_io::write_atomically(path, |file| writeln!(file, "{text}"))?;
+    }
+    if !report.is_empty() {
+        say(report.table())?;
+    }
+    let problems = frames.iter().flat_map(|frame| &frame.problems);
+    let damaged = problem::tell(problems, &models.broken);
+    if damaged > 0 {
+        bail!("{damaged} files could not be used; their targets are in no figure");
+    }
+    if report.is_empty() {
+        bail!(
+            "none of the {} targets could be judged, expected --dataset and --split to name images with ground truth, depth and models",
+            report.left_out()
+        );
+    }
+    Ok(())
+}
+
+/// Returns what does not fit between results, targets and dataset.
+fn misfits(
+    arguments: &Arguments,
+    rows: &[ResultRow],
+    wanted: &Targets,
+    models: &Models,
+    frames: &[JudgedFrame],
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let results = arguments.results.display();
+    let count = |row: &ResultRow| {
+        let of_frame = wanted.get(&(row.scene_id, row.im_id));
+        of_frame
+            .and_then(|objects| objects.get(&row.obj_id))
+            .copied()
+    };
+    let of_no_target: Vec<&ResultRow> = rows.iter().filter(|row| count(row).is_none()).collect();
+    if let Some(first) = of_no_target.first() {
+        warnings.push(format!(
+            "{results}: {} of {} rows are of no target and not looked at, the first of object {} in image {} of scene {}",
+            of_no_target.len(),
+            rows.len(),
+            first.obj_id,
+            first.im_id,
+            first.scene_id
+        ));
+    }
+    let mut estimates: BTreeMap<(FrameKey, u32), usize> = BTreeMap::new();
+    for row in rows {
+        let target = ((row.scene_id, row.im_id), row.obj_id);
+        *estimates.entry(target).or_default() += 1;
+    }
+    let beyond = |((frame, obj_id), n): (&(FrameKey, u32), &usize)| {
+        let count = wanted.get(frame).and_then(|objects| objects.get(obj_id));
+        count.map_or(0, |count| n.saturating_sub(*count as usize))
+    };
+    let beyond: usize = estimates.iter().map(beyond).sum();
+    if beyond > 0 {
+        warnings.push(format!(
+            "{results}: {beyond} rows beyond the number of instances of their target are not looked at, those with the lowest scores"
+        ));
+    }
+    if !models.missing.is_empty() {
+        let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
+        warnings.push(format!(
+            "the dataset has no model of object {}; its targets are left out",
+            ids.join(", ")
+        ));
+    }
+    let of_frames: Vec<&String> = frames.iter().flat_map(|frame| &frame.misfits).collect();
+    warnings.extend(
+        of_frames
+            .iter()
+            .take(MISFITS_SHOWN)
+            .map(|&text| text.clone()),
+    );
+    if of_frames.len() > MISFITS_SHOWN {
+        warnings.push(format!(
+            "{} more files that do not fit",
+            of_frames.len() - MISFITS_SHOWN
+        ));
+    }
+    warnings
+}
+
+/// Most misfits of frames that are told one by one.
+const MISFITS_SHOWN: usize = 10;

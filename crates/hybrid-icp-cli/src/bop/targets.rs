@@ -1,0 +1,81 @@
+//! What an evaluation asks for.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::bail;
+use hicp_io::IoError;
+use hicp_io::bop::{Dataset, Target, read_targets};
+
+use crate::terminal::warn;
+
+/// A scene and an image.
+pub(crate) type FrameKey = (u32, u32);
+
+/// How many instances of each object are asked for, by frame.
+pub(crate) type Targets = BTreeMap<FrameKey, BTreeMap<u32, u32>>;
+
+/// Name of the benchmark's own file.
+const TARGETS_FILE: &str = "test_targets_bop19.json";
+
+/// Visible fraction from which on the benchmark asks for an instance.
+const MIN_VISIBLE_FRACTION: f64 = 0.1;
+
+/// Reads the targets from the file given, else from the dataset's, else takes every instance that is visible enough.
+pub(crate) fn choose(
+    dataset: &Dataset,
+    split: &str,
+    given: Option<&Path>,
+) -> anyhow::Result<Targets> {
+    let of_dataset = dataset.root().join(TARGETS_FILE);
+    let path = match given {
+        Some(path) => path,
+        None if of_dataset.is_file() => &of_dataset,
+        None => {
+            warn(format_args!(
+                "{} does not exist: every instance of the split that is visible by {MIN_VISIBLE_FRACTION} or more is a target",
+                of_dataset.display()
+            ));
+            return Ok(of_ground_truth(dataset, split)?);
+        }
+    };
+    let mut targets = Targets::new();
+    for Target {
+        scene_id,
+        im_id,
+        obj_id,
+        inst_count,
+    } in read_targets(path)?
+    {
+        let of_frame = targets.entry((scene_id, im_id)).or_default();
+        if of_frame.insert(obj_id, inst_count).is_some() {
+            bail!(
+                "{}: object {obj_id} in image {im_id} of scene {scene_id} appears twice, expected once with its inst_count",
+                path.display()
+            );
+        }
+    }
+    if targets.is_empty() {
+        bail!("{} holds no target, expected at least one", path.display());
+    }
+    Ok(targets)
+}
+
+fn of_ground_truth(dataset: &Dataset, split: &str) -> Result<Targets, IoError> {
+    let mut targets = Targets::new();
+    for scene_id in dataset.scene_ids(split)? {
+        let scene = dataset.scene(split, scene_id)?;
+        for im_id in scene.image_ids() {
+            let infos = scene.ground_truth_info(im_id).unwrap_or_default();
+            let truths = scene.ground_truth(im_id).unwrap_or_default();
+            for (index, truth) in truths.iter().enumerate() {
+                let visible = infos.get(index).and_then(|info| info.visible_fraction);
+                if visible.is_none_or(|fraction| fraction >= MIN_VISIBLE_FRACTION) {
+                    let of_frame = targets.entry((scene_id, im_id)).or_default();
+                    *of_frame.entry(truth.obj_id).or_default() += 1;
+                }
+            }
+        }
+    }
+    Ok(targets)
+}
