@@ -6,6 +6,7 @@ mod bop_refine;
 mod choice;
 mod demo;
 mod doubts;
+mod experiment;
 mod objects;
 mod outputs;
 mod overlay;
@@ -40,6 +41,7 @@ Examples:
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp pipelines
   hybrid-icp objects --out objects
+  hybrid-icp experiment init-noise --poses 30
 
 `hybrid-icp help refine` tells all about a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
@@ -54,6 +56,8 @@ enum Command {
     Bop(BopCommand),
     Pipelines(pipelines::Arguments),
     Objects(objects::Arguments),
+    #[command(subcommand)]
+    Experiment(experiment::Command),
 }
 
 #[derive(Debug, Subcommand)]
@@ -69,6 +73,7 @@ fn main() -> ExitCode {
         Command::Bop(BopCommand::Refine(arguments)) => bop_refine::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
         Command::Objects(arguments) => objects::run(&arguments),
+        Command::Experiment(command) => experiment::run(&command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
