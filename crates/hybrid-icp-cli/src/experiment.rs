@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::Context as _;
 use clap::{Args, Subcommand};
-use hicp_experiments::{Config, Experiment, RunOptions, Study, Subject, Variant, run as run_study};
+use hicp_experiments::{
+    Config, Experiment, Report, RunOptions, Study, Subject, Variant, run as run_study,
+};
 use hybrid_icp::{Preset, UnknownPreset};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -169,12 +170,23 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
 }
 
 fn report(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
-    let studies: Vec<Study> = folders
-        .iter()
-        .map(|folder| Study::read(folder))
-        .collect::<Result<_, _>>()?;
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("cannot make the folder {}", out.display()))?;
-    let _ = studies;
-    say(format_args!("{}: report.html", out.display()))
+    let mut studies = Vec::new();
+    for folder in folders {
+        let name = folder.file_name().unwrap_or(folder.as_os_str());
+        studies.push((name.to_string_lossy().into_owned(), Study::read(folder)?));
+    }
+    let report = Report::of(studies);
+    report.write(out)?;
+    for (study, claim) in report.claims() {
+        say(format_args!(
+            "{study}: {}: {} ({})",
+            claim.verdict.name(),
+            claim.text,
+            claim.figures
+        ))?;
+    }
+    say(format_args!(
+        "{} holds it all",
+        out.join("report.html").display()
+    ))
 }
