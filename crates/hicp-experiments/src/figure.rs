@@ -33,6 +33,8 @@ pub struct Panel {
     pub x_title: String,
     /// Ends of the x axis.
     pub x: Range<f64>,
+    /// About how many numbers stand along it.
+    pub x_numbers: usize,
     /// The curves.
     pub curves: Vec<Curve>,
 }
@@ -167,9 +169,10 @@ fn row_of(analysis: &Analysis) -> Vec<Panel> {
         .chain(best(&projective))
         .collect();
     let panel = |title: &str, variants: &[usize]| Panel {
-        title: title.to_owned(),
+        title: format!("{}: {title}", analysis.experiment()),
         x_title: x_title.to_owned(),
         x: x.clone(),
+        x_numbers: if x.end > 1.0 { 6 } else { 11 },
         curves: variants
             .iter()
             .enumerate()
@@ -230,7 +233,7 @@ fn draw_panel<B: DrawingBackend>(
         .y_desc("mean post-ICP VSD")
         .axis_desc_style(("sans-serif", 12))
         .label_style(("sans-serif", 11))
-        .x_labels(11)
+        .x_labels(panel.x_numbers)
         .y_labels(7)
         .light_line_style(TRANSPARENT)
         .bold_line_style(RGBColor(225, 225, 225))
@@ -301,6 +304,7 @@ mod tests {
             title: "a".to_owned(),
             x_title: "b".to_owned(),
             x: 0.0..1.0,
+            x_numbers: 11,
             curves: vec![Curve {
                 label: "hybrid".to_owned(),
                 style: 0,
