@@ -2,6 +2,7 @@
 
 mod ci;
 mod deviations;
+mod repro;
 mod tidy;
 
 use std::path::{Path, PathBuf};
@@ -18,6 +19,8 @@ cargo xtask COMMAND
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
           crate documentation, nothing left open, docs/deviations.md up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
+  repro   fig6, table1 or alpha: reruns that part of the paper's single-image studies into target/study;
+          --quick takes minutes instead of the paper's number of poses
 ";
 
 fn main() -> ExitCode {
@@ -26,6 +29,8 @@ fn main() -> ExitCode {
         ["ci"] => ci::run(&root()),
         ["tidy"] => tidy::run(&root()),
         ["bless"] => deviations::bless(&root()),
+        ["repro", what] => repro::run(&root(), what, false),
+        ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())
