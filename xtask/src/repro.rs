@@ -25,28 +25,28 @@ const DEPTH_NOISE: Study = Study {
     name: "depth-noise",
     full: 100,
     quick: 10,
-    seconds_per_case: 0.5,
+    seconds_per_case: 0.4,
 };
 /// Robustness to model noise; the paper has 100 poses per object. The reconstructions are part of it.
 const MODEL_NOISE: Study = Study {
     name: "model-noise",
     full: 100,
     quick: 10,
-    seconds_per_case: 0.5,
+    seconds_per_case: 0.3,
 };
 /// Table I.
 const TIMING: Study = Study {
     name: "timing",
     full: 100,
     quick: 10,
-    seconds_per_case: 0.3,
+    seconds_per_case: 0.2,
 };
 /// The threshold, on the tuning objects.
 const ALPHA: Study = Study {
     name: "alpha",
     full: 1000,
     quick: 30,
-    seconds_per_case: 0.25,
+    seconds_per_case: 0.35,
 };
 /// Objects of each study.
 const OBJECTS: u32 = 10;
