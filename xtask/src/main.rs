@@ -7,6 +7,7 @@ mod deviations;
 mod instructions;
 mod peers;
 mod process;
+mod repro;
 mod tidy;
 
 use std::path::{Path, PathBuf};
@@ -34,6 +35,8 @@ cargo xtask COMMAND
   peers [--instances N]
           small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
           first time, a network
+  repro   fig6, table1 or alpha: reruns that part of the paper's single-image studies into target/study;
+          --quick takes minutes instead of the paper's number of poses
 ";
 
 fn main() -> ExitCode {
@@ -48,6 +51,8 @@ fn main() -> ExitCode {
         ["instructions"] => instructions::check(&root()),
         ["instructions", "--bless"] => instructions::bless(&root()),
         ["peers", ref options @ ..] => peers::run(&root(), options),
+        ["repro", what] => repro::run(&root(), what, false),
+        ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {
             print!("{HELP}");
             Ok(())

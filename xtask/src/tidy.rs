@@ -18,6 +18,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hybrid-icp", 4),
     ("hicp-sim", 4),
     ("hicp-testkit", 5),
+    ("hicp-experiments", 5),
     ("hybrid-icp-cli", 6),
 ];
 

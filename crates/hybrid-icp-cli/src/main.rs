@@ -6,6 +6,7 @@ mod bop;
 mod choice;
 mod demo;
 mod doubts;
+mod experiment;
 mod objects;
 mod outputs;
 mod overlay;
@@ -41,6 +42,7 @@ Examples:
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp pipelines
   hybrid-icp objects --out objects
+  hybrid-icp experiment init-noise --poses 30
 
 `hybrid-icp help refine` tells all about a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
@@ -55,6 +57,8 @@ enum Command {
     Bop(bop::Command),
     Pipelines(pipelines::Arguments),
     Objects(objects::Arguments),
+    #[command(subcommand)]
+    Experiment(experiment::Command),
 }
 
 fn main() -> ExitCode {
@@ -65,6 +69,7 @@ fn main() -> ExitCode {
         Command::Bop(command) => bop::run(&command),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
         Command::Objects(arguments) => objects::run(&arguments),
+        Command::Experiment(command) => experiment::run(&command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

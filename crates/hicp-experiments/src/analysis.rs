@@ -1,0 +1,434 @@
+//! Means of a study with intervals, and differences between its variants.
+
+use hicp_sim::stream;
+use rand::RngExt;
+
+use crate::experiment::Experiment;
+use crate::row::Measured;
+use crate::study::Study;
+
+/// A mean VSD above this is a failure.
+pub const FAILURE_VSD: f64 = 0.3;
+/// An ADD(-S) below this share of the diameter is a success, as in the literature on ADD.
+pub const ADD_SHARE: f64 = 0.1;
+/// Number of bootstrap samples.
+pub const REPLICATES: usize = 2000;
+/// The bins of the initial VSD, of ten, that count as low: below 0.3.
+const LOW_BINS: std::ops::Range<usize> = 0..3;
+/// The bins that count as high: 0.7 and above.
+const HIGH_BINS: std::ops::Range<usize> = 7..10;
+
+/// Which figure of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Mean VSD of the returned pose.
+    Vsd,
+    /// Whether it is above [`FAILURE_VSD`].
+    Failure,
+    /// Processor time, milliseconds.
+    CpuMs,
+}
+
+impl Metric {
+    const ALL: [Self; 3] = [Self::Vsd, Self::Failure, Self::CpuMs];
+
+    fn of(self, measured: &Measured) -> Option<f64> {
+        match self {
+            Self::Vsd => Some(measured.vsd_final),
+            Self::Failure => Some(f64::from(u8::from(measured.vsd_final > FAILURE_VSD))),
+            Self::CpuMs => measured.cpu_ms,
+        }
+    }
+}
+
+/// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The estimate from all rows.
+    pub estimate: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Rows that are averaged together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Name in tables.
+    pub label: String,
+    /// Indices of the levels.
+    pub levels: Vec<usize>,
+    /// The bins, where not all.
+    pub bins: Option<std::ops::Range<usize>>,
+    /// Whether it is one level or bin, a point of the figure, rather than a range of them.
+    pub single: bool,
+}
+
+/// Figures of a variant in a group, without intervals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Number of rows.
+    pub count: usize,
+    /// Mean VSD of the initial poses.
+    pub vsd_initial: f64,
+    /// Median ADD(-S), millimetres.
+    pub add_median_mm: f64,
+    /// Share of rows whose ADD(-S) is below [`ADD_SHARE`] of the diameter.
+    pub add_success: f64,
+    /// Mean number of iterations.
+    pub iterations: f64,
+    /// Standard deviation of the processor time, milliseconds; `None` without times.
+    pub cpu_deviation_ms: Option<f64>,
+}
+
+/// A case of an object, with what was measured at every level by every variant.
+struct Unit {
+    object: usize,
+    bin: usize,
+    /// By level, then by variant.
+    measured: Vec<Option<Measured>>,
+}
+
+/// The means of a study, per bin, level and overall, with bootstrap intervals over objects and poses.
+///
+/// A bootstrap sample draws objects with replacement, and for each the same number of cases in every bin with replacement. All
+/// variants and levels of a drawn case come along, so that differences are paired. The sample is the same for the same seed.
+///
+/// A case whose rows could not be made is left out. Cost: O([`REPLICATES`] · rows).
+pub struct Analysis {
+    experiment: Experiment,
+    variants: Vec<String>,
+    groups: Vec<Group>,
+    diameters_mm: Vec<f64>,
+    n_bins: usize,
+    units: Vec<Unit>,
+    /// Sums by metric, then as [`Sums`]; the first of each is of the rows as they are, the others are bootstrap samples.
+    replicates: Vec<Vec<f64>>,
+}
+
+impl std::fmt::Debug for Analysis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Analysis")
+            .field("experiment", &self.experiment)
+            .field("units", &self.units.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Analysis {
+    /// Analyses a study.
+    #[must_use]
+    pub fn of(study: &Study) -> Self {
+        let config = &study.config;
+        let variants: Vec<String> = config.variants.iter().map(|v| v.name.clone()).collect();
+        let n_bins = if config.experiment.is_binned() {
+            config.bins.max(1)
+        } else {
+            1
+        };
+        let units = units(study, n_bins);
+        let mut analysis = Self {
+            experiment: config.experiment,
+            groups: groups(config.experiment, &config.levels, n_bins),
+            diameters_mm: config.objects.iter().map(|o| o.diameter_mm).collect(),
+            variants,
+            n_bins,
+            units,
+            replicates: Vec::new(),
+        };
+        analysis.replicates = analysis.bootstrap(config.seed);
+        analysis
+    }
+
+    /// Which study.
+    #[must_use]
+    pub fn experiment(&self) -> Experiment {
+        self.experiment
+    }
+
+    /// Names of the variants.
+    #[must_use]
+    pub fn variants(&self) -> &[String] {
+        &self.variants
+    }
+
+    /// The groups: single bins or levels first, then ranges of them, all rows last.
+    #[must_use]
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// The index of the group of a label.
+    #[must_use]
+    pub fn group(&self, label: &str) -> Option<usize> {
+        self.groups.iter().position(|g| g.label == label)
+    }
+
+    /// The index of a variant.
+    #[must_use]
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.variants.iter().position(|v| v == name)
+    }
+
+    /// The group of all rows.
+    #[must_use]
+    pub fn overall(&self) -> usize {
+        self.groups.len() - 1
+    }
+
+    /// A mean with its interval; `None` where no row has the figure.
+    #[must_use]
+    pub fn mean(&self, metric: Metric, group: usize, variant: usize) -> Option<Interval> {
+        self.contrast(metric, &[(group, variant, 1.0)])
+    }
+
+    /// A sum of means times factors, with its interval: (A, 1), (B, −1) is the paired difference A − B.
+    #[must_use]
+    pub fn contrast(&self, metric: Metric, terms: &[(usize, usize, f64)]) -> Option<Interval> {
+        let value = |sums: &Vec<f64>| -> f64 {
+            terms
+                .iter()
+                .map(|(g, v, factor)| factor * self.mean_of(metric, sums, *g, *v))
+                .sum()
+        };
+        let (all, samples) = self.replicates.split_first()?;
+        let estimate = value(all);
+        if !estimate.is_finite() {
+            return None;
+        }
+        let mut drawn: Vec<f64> = samples
+            .iter()
+            .map(value)
+            .filter(|x| x.is_finite())
+            .collect();
+        drawn.sort_by(f64::total_cmp);
+        Some(Interval {
+            estimate,
+            low: quantile(&drawn, 0.025).unwrap_or(estimate),
+            high: quantile(&drawn, 0.975).unwrap_or(estimate),
+        })
+    }
+
+    /// Figures of a variant in a group; `None` where there is no row.
+    #[must_use]
+    pub fn cell(&self, group: usize, variant: usize) -> Option<Cell> {
+        let group = &self.groups[group];
+        let rows: Vec<(&Unit, &Measured)> = self
+            .units
+            .iter()
+            .filter(|unit| {
+                group
+                    .bins
+                    .as_ref()
+                    .is_none_or(|bins| bins.contains(&unit.bin))
+            })
+            .flat_map(|unit| group.levels.iter().map(move |level| (unit, *level)))
+            .filter_map(|(unit, level)| {
+                let measured = unit.measured[level * self.variants.len() + variant].as_ref()?;
+                Some((unit, measured))
+            })
+            .collect();
+        if rows.is_empty() {
+            return None;
+        }
+        let count = rows.len() as f64;
+        let mean = |value: &dyn Fn(&(&Unit, &Measured)) -> f64| {
+            rows.iter().map(value).sum::<f64>() / count
+        };
+        let mut errors: Vec<f64> = rows.iter().map(|(_, m)| m.add_final_mm).collect();
+        errors.sort_by(f64::total_cmp);
+        let times: Option<Vec<f64>> = rows.iter().map(|(_, m)| m.cpu_ms).collect();
+        Some(Cell {
+            count: rows.len(),
+            vsd_initial: mean(&|(_, m)| m.vsd_initial),
+            add_median_mm: quantile(&errors, 0.5).unwrap_or(0.0),
+            add_success: mean(&|(unit, m)| {
+                f64::from(u8::from(
+                    m.add_final_mm < ADD_SHARE * self.diameters_mm[unit.object],
+                ))
+            }),
+            iterations: mean(&|(_, m)| m.iterations as f64),
+            cpu_deviation_ms: times.map(|times| {
+                let mean = times.iter().sum::<f64>() / count;
+                let squares: f64 = times.iter().map(|t| (t - mean).powi(2)).sum();
+                (squares / (count - 1.0).max(1.0)).sqrt()
+            }),
+        })
+    }
+
+    /// Where the sum of a metric is among the sums of a sample; its weight comes right after.
+    fn slot(&self, metric: Metric, level: usize, variant: usize, bin: usize) -> usize {
+        2 * (((metric as usize * self.levels() + level) * self.variants.len() + variant)
+            * self.n_bins
+            + bin)
+    }
+
+    fn levels(&self) -> usize {
+        self.units
+            .first()
+            .map_or(0, |u| u.measured.len() / self.variants.len())
+    }
+
+    fn mean_of(&self, metric: Metric, sums: &[f64], group: usize, variant: usize) -> f64 {
+        let group = &self.groups[group];
+        let bins = group.bins.clone().unwrap_or(0..self.n_bins);
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for level in &group.levels {
+            for bin in bins.clone() {
+                let slot = self.slot(metric, *level, variant, bin);
+                sum += sums[slot];
+                weight += sums[slot + 1];
+            }
+        }
+        sum / weight
+    }
+
+    /// Returns the sums of a weighting of the units.
+    fn sums(&self, weights: &[f64]) -> Vec<f64> {
+        let mut sums =
+            vec![
+                0.0;
+                self.slot(Metric::Vsd, 0, 0, 0)
+                    + 2 * Metric::ALL.len() * self.levels() * self.variants.len() * self.n_bins
+            ];
+        for (unit, weight) in self.units.iter().zip(weights) {
+            if *weight == 0.0 {
+                continue;
+            }
+            for (index, measured) in unit.measured.iter().enumerate() {
+                let Some(measured) = measured else { continue };
+                let (level, variant) = (index / self.variants.len(), index % self.variants.len());
+                for metric in Metric::ALL {
+                    if let Some(value) = metric.of(measured) {
+                        let slot = self.slot(metric, level, variant, unit.bin);
+                        sums[slot] += weight * value;
+                        sums[slot + 1] += weight;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    fn bootstrap(&self, seed: u64) -> Vec<Vec<f64>> {
+        // By object, then by bin, the units.
+        let mut strata: Vec<Vec<Vec<usize>>> =
+            vec![vec![Vec::new(); self.n_bins]; self.diameters_mm.len()];
+        for (index, unit) in self.units.iter().enumerate() {
+            strata[unit.object][unit.bin].push(index);
+        }
+        strata.retain(|bins| bins.iter().any(|units| !units.is_empty()));
+        let mut replicates = vec![self.sums(&vec![1.0; self.units.len()])];
+        if strata.is_empty() {
+            return replicates;
+        }
+        let mut weights = vec![0.0; self.units.len()];
+        for sample in 0..REPLICATES {
+            let mut rng = stream(seed, &["bootstrap"], sample as u64);
+            weights.fill(0.0);
+            for _ in 0..strata.len() {
+                for units in &strata[rng.random_range(0..strata.len())] {
+                    for _ in 0..units.len() {
+                        weights[units[rng.random_range(0..units.len())]] += 1.0;
+                    }
+                }
+            }
+            replicates.push(self.sums(&weights));
+        }
+        replicates
+    }
+}
+
+/// Puts the rows of each case together.
+fn units(study: &Study, n_bins: usize) -> Vec<Unit> {
+    let config = &study.config;
+    let (variants, width) = (&config.variants, config.rows_per_case());
+    let mut places = std::collections::BTreeMap::new();
+    let mut units: Vec<Unit> = Vec::new();
+    for row in &study.rows {
+        let find = (
+            config.objects.iter().position(|o| o.name == row.object),
+            config.levels.iter().position(|l| *l == row.level),
+            variants.iter().position(|v| v.name == row.variant),
+        );
+        let (Some(object), Some(level), Some(variant)) = find else {
+            continue;
+        };
+        let Some(measured) = &row.measured else {
+            continue;
+        };
+        let place = *places.entry((object, row.case)).or_insert_with(|| {
+            units.push(Unit {
+                object,
+                bin: if n_bins > 1 {
+                    row.bin.unwrap_or(0).min(n_bins - 1)
+                } else {
+                    0
+                },
+                measured: vec![None; width],
+            });
+            units.len() - 1
+        });
+        units[place].measured[level * variants.len() + variant] = Some(measured.clone());
+    }
+    units
+}
+
+/// The groups of a study.
+fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group> {
+    let all: Vec<usize> = (0..levels.len()).collect();
+    let mut groups = Vec::new();
+    let range = |label: &str, levels: Vec<usize>, bins| Group {
+        label: label.to_owned(),
+        levels,
+        bins,
+        single: false,
+    };
+    if experiment == Experiment::InitNoise {
+        for bin in 0..n_bins {
+            let edge = |bin: usize| bin as f64 / n_bins as f64;
+            groups.push(Group {
+                label: format!("{:.1}-{:.1}", edge(bin), edge(bin + 1)),
+                levels: all.clone(),
+                bins: Some(bin..bin + 1),
+                single: true,
+            });
+        }
+        groups.push(range(LOW, all.clone(), Some(LOW_BINS)));
+        groups.push(range(HIGH, all.clone(), Some(HIGH_BINS)));
+    } else {
+        groups.extend(all.iter().map(|level| Group {
+            label: levels[*level].clone(),
+            levels: vec![*level],
+            bins: None,
+            single: true,
+        }));
+    }
+    if matches!(experiment, Experiment::DepthNoise | Experiment::ModelNoise) {
+        groups.push(range(NOISY, all[1..].to_vec(), None));
+    }
+    groups.push(range(ALL, all, None));
+    groups
+}
+
+/// Label of the group of low initial VSD.
+pub const LOW: &str = "low (< 0.3)";
+/// Label of the group of high initial VSD.
+pub const HIGH: &str = "high (≥ 0.7)";
+/// Label of the group of every level with noise.
+pub const NOISY: &str = "with noise";
+/// Label of the group of all rows.
+pub const ALL: &str = "all";
+
+/// Returns a quantile of sorted values, between neighbours in proportion; `None` without any.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let place = share * last as f64;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // Between 0 and the last index.
+    let below = place.floor() as usize;
+    let above = (below + 1).min(last);
+    let part = place - below as f64;
+    Some(sorted[below] * (1.0 - part) + sorted[above] * part)
+}

@@ -1,0 +1,66 @@
+//! The single-image studies of the Hybrid ICP paper (§VI-A, §VI-B, Table I and the tuning of α), as code.
+//!
+//! **Should you use this crate?** To check the paper's claims, or to judge a pipeline of your own against its nine variants on
+//! many objects, yes; `hybrid-icp experiment` is its command line. To refine poses, no: that is `hybrid-icp`.
+//!
+//! A study looks at cases (an object, an image, an initial pose) under one or more levels of noise and gives each to every variant:
+//! differences between variants are paired by construction. It writes a row per case, level and variant as it goes, can be killed
+//! and resumed, and comes out the same on any number of threads, but for the times.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//! use hicp_experiments::{Config, Experiment, Metric, Report, RunOptions, Study, Subject, Variant, run};
+//! use hicp_sim::Household;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let folder = tempfile::tempdir()?;
+//! let subjects = Subject::household(&[Household::Mug])?;
+//! let config = Config::new(Experiment::DepthNoise, &subjects, &Variant::paper(), 1, 7)?;
+//! let options = RunOptions { threads: 1, resume: false };
+//! run(&config, &subjects, folder.path(), options, &mut |_| ControlFlow::Continue(()))?;
+//!
+//! let study = Study::read(folder.path())?;
+//! assert_eq!(study.rows.len(), 6 * 9); // six levels of noise, nine variants
+//! let report = Report::of(vec![("mug".to_owned(), study)]);
+//! let (_, analysis) = &report.analyses()[0];
+//! let hybrid = analysis.mean(Metric::Vsd, analysis.overall(), 0).ok_or("no row")?;
+//! assert!(hybrid.low <= hybrid.estimate && hybrid.estimate <= hybrid.high);
+//! report.write(folder.path())?; // report.html, figure.svg, summary.csv, …
+//! # Ok(()) }
+//! ```
+//!
+//! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
+//! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
+//! differences), `claims` (the paper's, tested), `figure`, `tables`, `report`, and `clock`, `error`.
+
+// Counts and indices of rows become floating point numbers.
+#![allow(clippy::cast_precision_loss)]
+
+mod analysis;
+mod claims;
+mod clock;
+mod config;
+mod error;
+mod experiment;
+mod figure;
+mod report;
+mod row;
+mod runner;
+mod study;
+mod subject;
+mod tables;
+mod variant;
+
+pub use analysis::{
+    ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, Group, HIGH, Interval, LOW, Metric, NOISY,
+    REPLICATES,
+};
+pub use claims::{Claim, TABLE_I, Verdict, claims};
+pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};
+pub use error::ExperimentError;
+pub use experiment::{Condition, Experiment};
+pub use figure::{Curve, Figure, Panel};
+pub use report::Report;
+pub use row::{COLUMNS, Measured, Row};
+pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
+pub use subject::Subject;
+pub use variant::Variant;

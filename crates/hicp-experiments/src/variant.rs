@@ -1,0 +1,78 @@
+//! The pipelines of a study.
+
+use std::path::Path;
+
+use hybrid_icp::{BoxedStage, PipelineFile, Preset};
+
+use crate::error::ExperimentError;
+
+/// Where the threshold α is in the pipeline of [`Preset::Hybrid`] and in those made like it.
+const ALPHA_FIELD: &str = "stage.switcher.alpha";
+
+/// A pipeline under a name: a preset, or a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// Name in tables.
+    pub name: String,
+    /// The pipeline as a file's text.
+    pub toml: String,
+}
+
+impl Variant {
+    /// The nine variants of the paper, Hybrid ICP first.
+    #[must_use]
+    pub fn paper() -> Vec<Self> {
+        Preset::ALL.into_iter().map(Self::preset).collect()
+    }
+
+    /// Makes the variant of a preset.
+    #[must_use]
+    pub fn preset(preset: Preset) -> Self {
+        Self {
+            name: preset.name().to_owned(),
+            toml: preset.toml().to_owned(),
+        }
+    }
+
+    /// Reads a variant from a pipeline file; its name is the file's without the ending.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Pipeline`] when the file cannot be read or is no pipeline.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let stem = path.file_stem().unwrap_or_default();
+        let variant = Self {
+            name: stem.to_string_lossy().into_owned(),
+            toml: PipelineFile::read_text(path)?,
+        };
+        variant.build(None)?;
+        Ok(variant)
+    }
+
+    /// Builds the pipeline, with another threshold α if one is given.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Pipeline`] when the text is no pipeline, or α is given and the pipeline does not switch.
+    pub fn build(&self, alpha: Option<f64>) -> Result<BoxedStage, ExperimentError> {
+        let mut file = PipelineFile::parse(&self.toml, &self.name)?;
+        if let Some(alpha) = alpha {
+            file.set(&format!("{ALPHA_FIELD}={alpha:?}"))?;
+        }
+        Ok(file.build()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alpha_can_be_set_where_there_is_a_switch_only() {
+        let hybrid = Variant::preset(Preset::Hybrid);
+        assert!(hybrid.build(Some(0.25)).is_ok() && hybrid.build(Some(1.0)).is_ok());
+        let fixed = Variant::preset(Preset::NnPointToPoint);
+        assert!(fixed.build(None).is_ok());
+        assert!(fixed.build(Some(0.25)).is_err());
+    }
+}

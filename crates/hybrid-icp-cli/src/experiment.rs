@@ -1,0 +1,192 @@
+//! `hybrid-icp experiment`.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::{Args, Subcommand};
+use hicp_experiments::{
+    Config, Experiment, Report, RunOptions, Study, Subject, Variant, run as run_study,
+};
+use hybrid_icp::{Preset, UnknownPreset};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::terminal::say;
+
+/// Rerun the paper's single-image studies, on its kind of objects or on any meshes.
+///
+/// A study writes into its folder: `config.json` (exactly what was run), `cases.csv` (one row per case, level and variant, as it
+/// goes), and from these a summary: `report.html`, `figure.svg`, `figure.png`, `summary.csv`, `differences.csv`, `claims.csv`. All
+/// variants see the same images and initial poses.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Robustness to the initial pose: ten equal bins of the initial VSD (§VI-B.1).
+    InitNoise(Arguments),
+    /// Robustness to depth noise of 0 to 5 % (§VI-B.2).
+    DepthNoise(Arguments),
+    /// Robustness to reconstructed models, levels 0 to 4 (§VI-B.3).
+    ModelNoise(Arguments),
+    /// Time per refinement under the conditions of those three studies (Table I).
+    Timing(Arguments),
+    /// The threshold of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
+    Alpha(Arguments),
+    Report(ReportArguments),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A folder of meshes in metres (OBJ, PLY, STL) instead of the ten household objects.
+    #[arg(long, value_name = "DIR")]
+    objects: Option<PathBuf>,
+    /// Cases per object, spread evenly over the bins where there are bins.
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    poses: u64,
+    /// Which pipelines: names (`hybrid-icp pipelines` lists them) and TOML files, separated by commas, or all; alpha takes those
+    /// that switch, hybrid unless told otherwise.
+    #[arg(long, value_name = "LIST|all", value_delimiter = ',')]
+    variants: Vec<Choice>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Number of threads; the results are the same for any. Timing takes one unless told otherwise, the others all processors.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// The folder to write to; made when it is not there. Unless given, study/NAME.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on with a study that was interrupted.
+    #[arg(long)]
+    resume: bool,
+    /// Leave the column of times empty: two runs then give the same bytes.
+    #[arg(long)]
+    no_times: bool,
+}
+
+/// Put finished studies into one report, with a figure like the paper's Figure 6.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArguments {
+    /// The folders of the studies.
+    #[arg(required = true, value_name = "DIR")]
+    studies: Vec<PathBuf>,
+    /// The folder to write to; made when it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// What `--variants` names.
+#[derive(Clone, Debug)]
+enum Choice {
+    All,
+    Preset(Preset),
+    File(PathBuf),
+}
+
+impl FromStr for Choice {
+    type Err = UnknownPreset;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPreset> {
+        match text {
+            "all" => Ok(Self::All),
+            file if file.ends_with(".toml") => Ok(Self::File(file.into())),
+            name => name.parse().map(Self::Preset),
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::InitNoise(arguments) => study(Experiment::InitNoise, arguments),
+        Command::DepthNoise(arguments) => study(Experiment::DepthNoise, arguments),
+        Command::ModelNoise(arguments) => study(Experiment::ModelNoise, arguments),
+        Command::Timing(arguments) => study(Experiment::Timing, arguments),
+        Command::Alpha(arguments) => study(Experiment::Alpha, arguments),
+        Command::Report(arguments) => report(&arguments.studies, &arguments.out),
+    }
+}
+
+fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
+    let subjects = match &arguments.objects {
+        Some(folder) => Subject::read_folder(folder)?,
+        None => Subject::household(&experiment.household())?,
+    };
+    let variants = variants(experiment, &arguments.variants)?;
+    let mut config = Config::new(
+        experiment,
+        &subjects,
+        &variants,
+        arguments.poses,
+        arguments.seed,
+    )?;
+    config.times = !arguments.no_times;
+    let out = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("study").join(experiment.name()));
+    let threads = arguments.threads.unwrap_or_else(|| match experiment {
+        Experiment::Timing => 1,
+        _ => std::thread::available_parallelism().map_or(1, usize::from),
+    });
+    let options = RunOptions {
+        threads,
+        resume: arguments.resume,
+    };
+    let bar = ProgressBar::new(config.n_cases() as u64);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} cases, {eta} left")
+    {
+        bar.set_style(style);
+    }
+    bar.set_message(experiment.name());
+    let mut begun = false;
+    let ran = run_study(&config, &subjects, &out, options, &mut |done| {
+        bar.set_position(done as u64);
+        if !begun {
+            bar.reset_eta();
+            begun = true;
+        }
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    ran?;
+    report(std::slice::from_ref(&out), &out)
+}
+
+fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Variant>> {
+    if choices.is_empty() {
+        return Ok(match experiment {
+            Experiment::Alpha => vec![Variant::preset(Preset::Hybrid)],
+            _ => Variant::paper(),
+        });
+    }
+    let mut variants = Vec::new();
+    for choice in choices {
+        match choice {
+            Choice::All => variants.extend(Variant::paper()),
+            Choice::Preset(preset) => variants.push(Variant::preset(*preset)),
+            Choice::File(path) => variants.push(Variant::read(path)?),
+        }
+    }
+    Ok(variants)
+}
+
+fn report(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
+    let mut studies = Vec::new();
+    for folder in folders {
+        let name = folder.file_name().unwrap_or(folder.as_os_str());
+        studies.push((name.to_string_lossy().into_owned(), Study::read(folder)?));
+    }
+    let report = Report::of(studies);
+    report.write(out)?;
+    for (study, claim) in report.claims() {
+        say(format_args!(
+            "{study}: {}: {} ({})",
+            claim.verdict.name(),
+            claim.text,
+            claim.figures
+        ))?;
+    }
+    say(format_args!(
+        "{} holds it all",
+        out.join("report.html").display()
+    ))
+}
