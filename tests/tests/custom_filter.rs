@@ -44,10 +44,10 @@ impl OutlierFilter for Graduated {
 
 fn graduated() -> Graduated {
     Graduated {
-        sigma_meters: 0.004,
-        start: 100.0,
-        rate: 1.6,
-        mu: 100.0,
+        sigma_meters: 0.002,
+        start: 30.0,
+        rate: 1.4,
+        mu: 30.0,
     }
 }
 

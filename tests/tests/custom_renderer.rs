@@ -108,7 +108,7 @@ fn without_limit_it_is_the_rasterizer() {
 fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
     let mut mine = Workspace::new(grazing());
     let mut plain = Workspace::new(Rasterizer::default());
-    let mut ratios = Vec::new();
+    let (mut ratios, mut with_grazing) = (Vec::new(), 0);
     for (seed, object) in (0..).zip(Household::ALL) {
         let (scene, init) = sensed(object, seed);
         let problem = Problem::new(&scene.model, &scene.observation);
@@ -118,7 +118,9 @@ fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
             depth.iter().filter(|z| **z > 0.0).count()
         };
         let (few, all) = (shown(&mut mine), shown(&mut plain));
-        assert!(few < all, "{few} of {all} pixels of the {}", object.name());
+        // A lid seen face on has no grazing surface, but most objects do.
+        assert!(few <= all, "{few} of {all} pixels of the {}", object.name());
+        with_grazing += usize::from(few < all);
         assert_eq!(few, scene.observation.n_measured(), "{}", object.name());
 
         let mut stage = Preset::Hybrid.build();
@@ -126,6 +128,7 @@ fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
         let mut score = |pose| MeanVsd::default().score(&mut mine.context(&problem), pose);
         ratios.push(score(&outcome.camera_from_object) / score(&init));
     }
+    assert!(2 * with_grazing > ratios.len(), "{with_grazing}");
     let ratio = median(&mut ratios);
     assert!(ratio < 0.5, "{ratios:?}");
 }
