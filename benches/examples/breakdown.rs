@@ -7,7 +7,7 @@
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
-use hicp_benches::{Case, OBJECTS, case};
+use hicp_benches::{Case, OBJECTS, case, forget_renders};
 use hybrid_icp::presets::paper_stop;
 use hybrid_icp::{
     AllSamples, Cascade, Context, Correspondences, DataAssociation, ErrorMetric, Icp, Isometry3,
@@ -182,6 +182,11 @@ fn timed_preset(preset: Preset) -> Box<dyn Stage> {
 fn run(case: &Case, stage: &mut dyn Stage, workspace: &mut Workspace) -> [Duration; 7] {
     let seen = &case.scene.observation;
     let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
+    forget_renders(
+        workspace,
+        &Problem::new(&case.scene.model, seen),
+        &case.init,
+    );
     CLOCK.with_borrow_mut(|clock| clock.spent = [Duration::ZERO; 7]);
     timed(REST, || {
         let made = timed(OBSERVE, || Observation::new(depth, mask, *seen.camera()));

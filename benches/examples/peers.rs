@@ -8,15 +8,17 @@ use std::io::{BufRead as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use hicp_benches::forget_renders;
 use hicp_benches::fused::Fused;
 use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
 use hicp_benches::stages::{GATE_METERS, STOP};
 use hybrid_icp::{
     Context, DataAssociation, DepthImage, ErrorMetric, Generalized, Icp, Isometry3, Mask, Matrix3,
-    MaxDistance, MeanVsd, Model, ModelConfig, NearestNeighbor, Observation, Outcome, OutlierFilter,
-    PinholeCamera, Point3, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective,
-    Rasterizer, RenderedView, Renderer, Score, Session, Stage, Stride, Surfel, Translation3,
-    TriMesh, UnitVector3, Vector3, VisibleSurface, Workspace, rotation_from_matrix, se3,
+    MaxDistance, MeanVsd, Model, ModelConfig, Observation, Outcome, OutlierFilter, PinholeCamera,
+    Point3, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective, Rasterizer,
+    RenderedView, Renderer, Score, Session, Stage, Stride, Surfel, Translation3, TriMesh,
+    UnitVector3, Vector3, VisibleSurface, WarmNearestNeighbor, Workspace, rotation_from_matrix,
+    se3,
 };
 use serde_json::{Value, json};
 
@@ -243,10 +245,8 @@ struct Bench {
 impl Bench {
     /// Does what a row names, once.
     fn run(&mut self, row: &str, loaded: &Loaded) -> Result<Value, Failure> {
-        let nearest = NearestNeighbor::default();
-        let all = NearestNeighbor {
-            targets: Stride::Pixels(1),
-        };
+        let nearest = WarmNearestNeighbor::default();
+        let all = WarmNearestNeighbor::new(Stride::Pixels(1));
         let gate = MaxDistance::meters(GATE_METERS);
         match row {
             "observe" => observe(&loaded.depth, &loaded.mask, loaded.camera),
@@ -356,10 +356,7 @@ impl Bench {
         let mut stage = preset.build();
         // The renders of the run before would be found in the cache.
         let problem = Problem::new(&loaded.model, &loaded.observation);
-        for step in 1..=8 {
-            let elsewhere = Isometry3::translation(0.001 * f64::from(step), 0.0, 0.0) * loaded.init;
-            let _ = self.workspace.context(&problem).view(&elsewhere);
-        }
+        forget_renders(&mut self.workspace, &problem, &loaded.init);
         let (depth, mask) = (loaded.depth.clone(), loaded.mask.clone());
         let start = Instant::now();
         let observation = Observation::new(depth, mask, loaded.camera)?;

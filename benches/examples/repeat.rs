@@ -5,8 +5,8 @@
 
 use std::time::Instant;
 
-use hicp_benches::{OBJECTS, case};
-use hybrid_icp::{Observation, Preset, Refiner, Trace};
+use hicp_benches::{OBJECTS, case, forget_renders};
+use hybrid_icp::{Observation, Preset, Problem, Refiner, Trace};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -22,6 +22,8 @@ fn main() {
         let mut trace = Trace::new();
         for _ in 0..repeats {
             let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
+            let problem = Problem::new(&case.scene.model, seen);
+            forget_renders(refiner.workspace_mut(), &problem, &case.init);
             let start = Instant::now();
             let observation = Observation::new(depth, mask, *seen.camera()).unwrap();
             let made = Instant::now();

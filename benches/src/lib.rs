@@ -10,7 +10,7 @@ use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
 };
 use hicp_tests::Scene;
-use hybrid_icp::Isometry3;
+use hybrid_icp::{Isometry3, Problem, Workspace};
 
 /// A scene and a start at the paper's mean initialisation error.
 #[derive(Debug)]
@@ -43,3 +43,11 @@ pub fn case(object: Household) -> Case {
 
 /// The objects that the benches measure: a body with a handle, a thin one, and a flat box.
 pub const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
+
+/// Fills a workspace's render cache with poses that no run asks for, so that none finds what the run before it rendered.
+pub fn forget_renders(workspace: &mut Workspace, problem: &Problem<'_>, init: &Isometry3<f64>) {
+    for step in 1..=8 {
+        let elsewhere = Isometry3::translation(0.001 * f64::from(step), 0.0, 0.0) * init;
+        let _ = workspace.context(problem).view(&elsewhere);
+    }
+}
