@@ -45,6 +45,8 @@ mod figure;
 mod report;
 mod row;
 mod runner;
+mod sequential;
+mod streaming;
 mod study;
 mod subject;
 mod tables;
@@ -61,6 +63,10 @@ pub use experiment::{Condition, Experiment};
 pub use figure::{Curve, Figure, Panel};
 pub use report::Report;
 pub use row::{COLUMNS, Measured, Row};
+pub use sequential::{
+    FusionRule, TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryConfig, TrajectoryReport,
+    TrajectoryRow, TrajectoryStudy, UnderlyingRecord, run_trajectories,
+};
 pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
 pub use subject::Subject;
 pub use variant::Variant;
