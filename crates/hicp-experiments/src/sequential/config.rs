@@ -170,8 +170,10 @@ impl TrajectoryConfig {
     #[must_use]
     pub fn n_images(&self, underlying: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // Not negative, and small.
-        let steps = (self.path_m / self.step_m(underlying)).max(0.0).floor() as usize;
+        // Not negative, and small; a path of whole steps ends with an image in spite of rounding.
+        let steps = (self.path_m / self.step_m(underlying) + 1e-9)
+            .max(0.0)
+            .floor() as usize;
         steps.min(100_000) + 1
     }
 
