@@ -35,7 +35,7 @@ cargo xtask COMMAND
   peers [--instances N]
           small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
           first time, a network
-  repro   fig6, table1 or alpha: reruns that part of the paper's single-image studies into target/study;
+  repro   fig6, fig7, table1 or alpha: reruns that part of the paper's studies into target/study;
           --quick takes minutes instead of the paper's number of poses
 ";
 

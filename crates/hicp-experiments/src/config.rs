@@ -230,31 +230,10 @@ impl Config {
             source,
         })
     }
-
-    /// Says what differs first from another configuration; `None` when nothing does.
-    pub(crate) fn difference(&self, other: &Self) -> Option<String> {
-        let (ours, theirs) = (self.to_json(), other.to_json());
-        let (mut ours, mut theirs) = (ours.lines(), theirs.lines());
-        loop {
-            match (ours.next(), theirs.next()) {
-                (None, None) => return None,
-                (a, b) if a == b => {}
-                (a, b) => {
-                    let text = |line: Option<&str>| {
-                        line.unwrap_or("nothing")
-                            .trim()
-                            .trim_end_matches(',')
-                            .to_owned()
-                    };
-                    return Some(format!("{} there, {} now", text(b), text(a)));
-                }
-            }
-        }
-    }
 }
 
 impl ObjectRecord {
-    fn of(subject: &Subject) -> Self {
+    pub(crate) fn of(subject: &Subject) -> Self {
         let symmetries = subject.model.symmetries();
         Self {
             name: subject.name.clone(),
@@ -268,7 +247,7 @@ impl ObjectRecord {
 }
 
 /// Checks that there is a name and that no name comes twice.
-fn distinct<'a>(
+pub(crate) fn distinct<'a>(
     what: &'static str,
     names: impl Iterator<Item = &'a str>,
 ) -> Result<(), ExperimentError> {

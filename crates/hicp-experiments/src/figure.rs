@@ -31,6 +31,8 @@ pub struct Panel {
     pub title: String,
     /// What is along x.
     pub x_title: String,
+    /// What is along y.
+    pub y_title: String,
     /// Ends of the x axis.
     pub x: Range<f64>,
     /// About how many numbers stand along it.
@@ -171,6 +173,7 @@ fn row_of(analysis: &Analysis) -> Vec<Panel> {
     let panel = |title: &str, variants: &[usize]| Panel {
         title: format!("{}: {title}", analysis.experiment()),
         x_title: x_title.to_owned(),
+        y_title: "mean post-ICP VSD".to_owned(),
         x: x.clone(),
         x_numbers: if x.end > 1.0 { 6 } else { 11 },
         curves: variants
@@ -193,7 +196,8 @@ fn row_of(analysis: &Analysis) -> Vec<Panel> {
     .collect()
 }
 
-fn curve(analysis: &Analysis, variant: usize, style: usize) -> Curve {
+/// The means of a variant over the single groups.
+pub(crate) fn curve(analysis: &Analysis, variant: usize, style: usize) -> Curve {
     let singles = analysis
         .groups()
         .iter()
@@ -230,7 +234,7 @@ fn draw_panel<B: DrawingBackend>(
     chart
         .configure_mesh()
         .x_desc(&panel.x_title)
-        .y_desc("mean post-ICP VSD")
+        .y_desc(&panel.y_title)
         .axis_desc_style(("sans-serif", 12))
         .label_style(("sans-serif", 11))
         .x_labels(panel.x_numbers)
@@ -303,6 +307,7 @@ mod tests {
         let panel = Panel {
             title: "a".to_owned(),
             x_title: "b".to_owned(),
+            y_title: "mean post-ICP VSD".to_owned(),
             x: 0.0..1.0,
             x_numbers: 11,
             curves: vec![Curve {

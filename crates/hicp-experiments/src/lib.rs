@@ -1,4 +1,4 @@
-//! The single-image studies of the Hybrid ICP paper (§VI-A, §VI-B, Table I and the tuning of α), as code.
+//! The studies of the Hybrid ICP paper, as code: single images (§VI-A, §VI-B, Table I and the tuning of α) and trajectories (§VI-C).
 //!
 //! **Should you use this crate?** To check the paper's claims, or to judge a pipeline of your own against its nine variants on
 //! many objects, yes; `hybrid-icp experiment` is its command line. To refine poses, no: that is `hybrid-icp`.
@@ -30,7 +30,8 @@
 //!
 //! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
 //! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
-//! differences), `claims` (the paper's, tested), `figure`, `tables`, `report`, and `clock`, `error`.
+//! differences), `claims` (the paper's, tested), `figure`, `tables`, `report`; `sequential` (the study of trajectories:
+//! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), and `clock`, `error`.
 
 // Counts and indices of rows become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
@@ -45,6 +46,8 @@ mod figure;
 mod report;
 mod row;
 mod runner;
+mod sequential;
+mod streaming;
 mod study;
 mod subject;
 mod tables;
@@ -61,6 +64,10 @@ pub use experiment::{Condition, Experiment};
 pub use figure::{Curve, Figure, Panel};
 pub use report::Report;
 pub use row::{COLUMNS, Measured, Row};
+pub use sequential::{
+    FusionRule, TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryConfig, TrajectoryReport,
+    TrajectoryRow, TrajectoryStudy, UnderlyingRecord, run_trajectories,
+};
 pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
 pub use subject::Subject;
 pub use variant::Variant;

@@ -93,7 +93,7 @@ impl Report {
     }
 
     fn html(&self, figures: &[(bool, String)]) -> String {
-        let mut text = String::from(HEAD);
+        let mut text = HEAD.replace("TITLE", "The single-image studies of Hybrid ICP, rerun");
         text.push_str(
             "<h1>The single-image studies of Hybrid ICP, rerun</h1>\n<h2>What was run</h2>\n",
         );
@@ -209,11 +209,12 @@ fn by(experiment: Experiment) -> &'static str {
     }
 }
 
-const HEAD: &str = "<!DOCTYPE html>
+/// The head of a page; TITLE stands for its title.
+pub(crate) const HEAD: &str = "<!DOCTYPE html>
 <html lang=\"en\">
 <head>
 <meta charset=\"utf-8\">
-<title>The single-image studies of Hybrid ICP, rerun</title>
+<title>TITLE</title>
 <style>
 body { font: 15px/1.45 sans-serif; margin: 2em auto; max-width: 1440px; padding: 0 1em; color: #222 }
 table { border-collapse: collapse; margin: 1em 0; font-size: 13px; font-variant-numeric: tabular-nums }

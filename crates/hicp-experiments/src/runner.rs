@@ -224,7 +224,7 @@ fn corruption(condition: &Condition) -> Corruption {
 }
 
 /// ADD over the model's samples, or ADI where symmetries are declared, metres.
-fn add_or_adi(model: &Model, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+pub(crate) fn add_or_adi(model: &Model, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
     let points: Vec<Point3<f32>> = model.samples().iter().map(|s| s.point).collect();
     let symmetries = model.symmetries();
     if symmetries.discrete.is_empty() && symmetries.continuous.is_empty() {

@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::terminal::say;
 
-/// Rerun the paper's single-image studies, on its kind of objects or on any meshes.
+/// Rerun the paper's studies, on its kind of objects or on any meshes.
 ///
 /// A study writes into its folder: `config.json` (exactly what was run), `cases.csv` (one row per case, level and variant, as it
 /// goes), and from these a summary: `report.html`, `figure.svg`, `figure.png`, `summary.csv`, `differences.csv`, `claims.csv`. All
@@ -30,6 +30,7 @@ pub(crate) enum Command {
     Timing(Arguments),
     /// The threshold of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
     Alpha(Arguments),
+    Sequential(crate::sequential::Arguments),
     Report(ReportArguments),
 }
 
@@ -101,6 +102,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::ModelNoise(arguments) => study(Experiment::ModelNoise, arguments),
         Command::Timing(arguments) => study(Experiment::Timing, arguments),
         Command::Alpha(arguments) => study(Experiment::Alpha, arguments),
+        Command::Sequential(arguments) => crate::sequential::run(arguments),
         Command::Report(arguments) => report(&arguments.studies, &arguments.out),
     }
 }

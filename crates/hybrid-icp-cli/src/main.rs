@@ -14,6 +14,7 @@ mod pipelines;
 mod refine;
 mod replay;
 mod report;
+mod sequential;
 mod terminal;
 mod trace_lines;
 

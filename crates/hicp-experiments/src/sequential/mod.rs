@@ -1,0 +1,19 @@
+//! The sequential study (§VI-C): trajectories toward an object, along which estimates are fused.
+//!
+//! Modules in reading order: `rule` (how estimates are fused), `config`, `trajectory` (the camera's path and the start), `runner` (the
+//! rows of one trajectory), `row`, `study` (running, resuming, reading), `claims`, `report`.
+
+mod claims;
+mod config;
+mod report;
+mod row;
+mod rule;
+mod runner;
+mod study;
+mod trajectory;
+
+pub use config::{TrajectoryConfig, UnderlyingRecord};
+pub use report::TrajectoryReport;
+pub use row::{TRAJECTORY_COLUMNS, TrajectoryRow};
+pub use rule::FusionRule;
+pub use study::{TRAJECTORIES_FILE, TrajectoryStudy, run_trajectories};

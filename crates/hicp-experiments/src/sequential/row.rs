@@ -1,0 +1,179 @@
+//! The rows of a sequential study: one per trajectory, underlying pipeline and method.
+
+use std::path::Path;
+
+use crate::error::ExperimentError;
+
+/// The columns of `trajectories.csv`, in order.
+pub const TRAJECTORY_COLUMNS: [&str; 10] = [
+    "object",
+    "trajectory",
+    "bin",
+    "underlying",
+    "method",
+    "vsd_initial",
+    "vsd_final",
+    "add_final_mm",
+    "n_estimates",
+    "note",
+];
+
+/// What a method made of one trajectory with an underlying pipeline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryRow {
+    /// Name of the object.
+    pub object: String,
+    /// Index of the trajectory among those of its object.
+    pub trajectory: u64,
+    /// Bin of the initial VSD, from 0; `None` when there is no trajectory.
+    pub bin: Option<usize>,
+    /// Name of the underlying pipeline.
+    pub underlying: String,
+    /// Name of the method; see [`crate::FusionRule::name`].
+    pub method: String,
+    /// What was measured; `None` when the trajectory could not be made.
+    pub(crate) measured: Option<Travelled>,
+    /// Why not; empty otherwise.
+    pub note: String,
+}
+
+/// The figures of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Travelled {
+    /// Mean VSD of the start against the truth in the first camera frame, with the original model.
+    pub(crate) vsd_initial: f64,
+    /// Mean VSD of the fused pose where the path ends.
+    pub(crate) vsd_final: f64,
+    /// Its ADD, or ADI where symmetries are declared, millimetres.
+    pub(crate) add_final_mm: f64,
+    /// Number of estimates along the way.
+    pub(crate) n_estimates: usize,
+}
+
+impl TrajectoryRow {
+    /// Mean VSD of the start and of the fused pose at the end; `None` when the trajectory could not be made.
+    #[must_use]
+    pub fn vsd(&self) -> Option<(f64, f64)> {
+        let measured = self.measured.as_ref()?;
+        Some((measured.vsd_initial, measured.vsd_final))
+    }
+
+    /// Number of estimates along the way; 0 when the trajectory could not be made.
+    #[must_use]
+    pub fn n_estimates(&self) -> usize {
+        self.measured.as_ref().map_or(0, |m| m.n_estimates)
+    }
+
+    /// The fields in the order of [`TRAJECTORY_COLUMNS`], numbers with a fixed number of digits.
+    pub(crate) fn fields(&self) -> [String; 10] {
+        let m = self.measured.as_ref();
+        let number = |digits: usize, value: Option<f64>| {
+            value.map_or_else(String::new, |x| format!("{x:.digits$}"))
+        };
+        [
+            self.object.clone(),
+            self.trajectory.to_string(),
+            self.bin.map_or_else(String::new, |b| b.to_string()),
+            self.underlying.clone(),
+            self.method.clone(),
+            number(6, m.map(|m| m.vsd_initial)),
+            number(6, m.map(|m| m.vsd_final)),
+            number(4, m.map(|m| m.add_final_mm)),
+            m.map_or_else(String::new, |m| m.n_estimates.to_string()),
+            self.note.clone(),
+        ]
+    }
+
+    /// Reads a row back; the error says which field is wrong.
+    fn parse(record: &csv::StringRecord) -> Result<Self, String> {
+        fn number<T: std::str::FromStr>(
+            record: &csv::StringRecord,
+            column: usize,
+        ) -> Result<T, String> {
+            record[column].parse().map_err(|_| {
+                format!(
+                    "{} is {:?}, expected a number",
+                    TRAJECTORY_COLUMNS[column], &record[column]
+                )
+            })
+        }
+        let finite = |column: usize| {
+            let value: f64 = number(record, column)?;
+            if value.is_finite() && value >= 0.0 {
+                Ok(value)
+            } else {
+                Err(format!(
+                    "{} is {value}, expected a number of at least 0",
+                    TRAJECTORY_COLUMNS[column]
+                ))
+            }
+        };
+        if record.len() != TRAJECTORY_COLUMNS.len() {
+            return Err(format!(
+                "{} fields, expected {}",
+                record.len(),
+                TRAJECTORY_COLUMNS.len()
+            ));
+        }
+        let measured = if record[8].is_empty() {
+            None
+        } else {
+            Some(Travelled {
+                vsd_initial: finite(5)?,
+                vsd_final: finite(6)?,
+                add_final_mm: finite(7)?,
+                n_estimates: number(record, 8)?,
+            })
+        };
+        Ok(Self {
+            object: record[0].to_owned(),
+            trajectory: number(record, 1)?,
+            bin: if record[2].is_empty() {
+                None
+            } else {
+                Some(number(record, 2)?)
+            },
+            underlying: record[3].to_owned(),
+            method: record[4].to_owned(),
+            measured,
+            note: record[9].to_owned(),
+        })
+    }
+}
+
+/// Returns rows as CSV, without a header.
+pub(crate) fn to_csv(rows: impl IntoIterator<Item = [String; 10]>) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        // A vector takes everything.
+        let _ = writer.write_record(&row);
+    }
+    writer.into_inner().unwrap_or_default()
+}
+
+/// Returns the header line.
+pub(crate) fn header() -> Vec<u8> {
+    to_csv([TRAJECTORY_COLUMNS.map(str::to_owned)])
+}
+
+/// Reads the rows of a file.
+pub(crate) fn read(path: &Path) -> Result<Vec<TrajectoryRow>, ExperimentError> {
+    let bytes = std::fs::read(path).map_err(ExperimentError::file(path))?;
+    let wrong = |line: usize, what: String| ExperimentError::Row {
+        path: path.to_owned(),
+        line,
+        what,
+    };
+    if !bytes.starts_with(&header()) {
+        let what = format!("expected the columns {}", TRAJECTORY_COLUMNS.join(","));
+        return Err(wrong(1, what));
+    }
+    let mut reader = csv::Reader::from_reader(&bytes[..]);
+    let records = reader.records().zip(2..);
+    records
+        .map(|(record, line)| {
+            let record = record.map_err(|e| wrong(line, e.to_string()))?;
+            TrajectoryRow::parse(&record).map_err(|what| wrong(line, what))
+        })
+        .collect()
+}

@@ -1,0 +1,80 @@
+//! The camera's path, and the pose to start from (§VI-C.1).
+
+use hicp_core::{Isometry3, Model, Translation3, Vector3};
+use hicp_sim::{CaseMaker, VsdBins, object_pose, perturb, rotation_of, stream, unit_vector};
+use rand::RngExt;
+
+use super::config::TrajectoryConfig;
+
+/// A straight path toward a point near the object, without turning, and a start in a bin of the initial VSD.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Trajectory {
+    /// The true pose in the first camera frame.
+    pub(crate) camera_from_object: Isometry3<f64>,
+    /// Where the camera moves, a unit vector in its frame.
+    pub(crate) direction: Vector3<f64>,
+    /// The pose to start from, in the first camera frame.
+    pub(crate) init: Isometry3<f64>,
+    /// Mean VSD of `init` against the truth in the first camera frame, with the original model.
+    pub(crate) vsd_initial: f64,
+    /// Its bin, from 0.
+    pub(crate) bin: usize,
+}
+
+impl Trajectory {
+    /// Draws the trajectory of an index; its bin is the index modulo their number.
+    ///
+    /// A start is looked for around one path for a number of tries before another path is drawn, as in the single-image studies.
+    pub(crate) fn draw(
+        config: &TrajectoryConfig,
+        scorer: &mut CaseMaker,
+        model: &Model,
+        object: &str,
+        index: u64,
+    ) -> Result<Self, String> {
+        let bins = VsdBins {
+            count: config.bins,
+            max_translation_meters: config.max_translation_m,
+            ..VsdBins::default()
+        };
+        #[allow(clippy::cast_possible_truncation)] // Below the number of bins.
+        let bin = (index % bins.count as u64) as usize;
+        let mut paths = stream(config.seed, &[object, "trajectory"], index);
+        let mut inits = stream(config.seed, &[object, "trajectory init"], index);
+        for _ in 0..bins.max_poses {
+            let distance = config.start_distance_m;
+            let truth = object_pose(
+                &mut paths,
+                &model.center(),
+                distance..distance,
+                config.axis_offset_m,
+            );
+            let aside = unit_vector(&mut paths) * (config.target_offset_m * paths.random::<f64>());
+            let direction = ((truth * model.center()).coords + aside).normalize();
+            for _ in 0..bins.tries_per_pose {
+                let translation = bins.max_translation_meters * inits.random::<f64>();
+                let init = perturb(&mut inits, &truth, translation, rotation_of(translation));
+                let vsd_initial = scorer.vsd(model, &truth, &init);
+                if bins.bin_of(vsd_initial) == bin {
+                    return Ok(Self {
+                        camera_from_object: truth,
+                        direction,
+                        init,
+                        vsd_initial,
+                        bin,
+                    });
+                }
+            }
+        }
+        Err(format!(
+            "no start of {object} in bin {bin} of {}, expected one within {} tries around each of {} poses",
+            bins.count, bins.tries_per_pose, bins.max_poses
+        ))
+    }
+
+    /// The motion of the camera when it travels so far: the next camera frame from the one before.
+    pub(crate) fn motion(&self, meters: f64) -> Isometry3<f64> {
+        let moved = Translation3::from(-self.direction * meters);
+        Isometry3::from_parts(moved, hicp_core::UnitQuaternion::identity())
+    }
+}

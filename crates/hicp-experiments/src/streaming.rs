@@ -1,0 +1,188 @@
+//! Rows of cases on their way into a file: in order from any number of threads, and on from where a run ended.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use hicp_io::write_atomically;
+
+use crate::error::ExperimentError;
+use crate::study::{CONFIG_FILE, RunOptions};
+
+/// A file of rows and the configuration beside it.
+pub(crate) struct Sheet<'a> {
+    /// The folder of both.
+    pub(crate) folder: &'a Path,
+    /// Name of the file of rows.
+    pub(crate) name: &'static str,
+    /// Its first line.
+    pub(crate) header: Vec<u8>,
+    /// Number of rows of a case.
+    pub(crate) rows_per_case: usize,
+    /// Number of cases.
+    pub(crate) cases: usize,
+    /// The configuration as text.
+    pub(crate) config: String,
+    /// Reads the text of a stored configuration, as this version would write it.
+    pub(crate) stored: fn(&Path) -> Result<String, ExperimentError>,
+}
+
+impl Sheet<'_> {
+    fn path(&self) -> PathBuf {
+        self.folder.join(self.name)
+    }
+
+    /// Fills the file: `worker` is made once per thread, and `rows` gives the text of a case.
+    pub(crate) fn fill<W>(
+        &self,
+        options: RunOptions,
+        worker: &(dyn Fn() -> Result<W, ExperimentError> + Sync),
+        rows: &(dyn Fn(&mut W, usize) -> Vec<u8> + Sync),
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(), ExperimentError> {
+        std::fs::create_dir_all(self.folder).map_err(ExperimentError::file(self.folder))?;
+        let (mut file, first) = self.open(options.resume)?;
+        if progress(first).is_break() {
+            return Err(ExperimentError::Stopped { cases: first });
+        }
+        let next = AtomicUsize::new(first);
+        let stop = AtomicBool::new(false);
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            for _ in 0..options.threads.max(1) {
+                let sender = sender.clone();
+                let (next, stop) = (&next, &stop);
+                scope.spawn(move || {
+                    let mut worker = match worker() {
+                        Ok(worker) => worker,
+                        Err(error) => {
+                            let _ = sender.send(Err(error));
+                            return;
+                        }
+                    };
+                    loop {
+                        let case = next.fetch_add(1, Ordering::Relaxed);
+                        if case >= self.cases || stop.load(Ordering::Relaxed) {
+                            return;
+                        }
+                        if sender.send(Ok((case, rows(&mut worker, case)))).is_err() {
+                            return;
+                        }
+                    }
+                });
+            }
+            drop(sender);
+            let written = self.write_in_order(&receiver, &mut file, first, progress);
+            stop.store(true, Ordering::Relaxed);
+            written
+        })
+    }
+
+    /// Writes the rows of cases as they come, in the order of the cases.
+    fn write_in_order(
+        &self,
+        receiver: &mpsc::Receiver<Result<(usize, Vec<u8>), ExperimentError>>,
+        file: &mut File,
+        first: usize,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(), ExperimentError> {
+        let mut early: BTreeMap<usize, Vec<u8>> = BTreeMap::new();
+        let mut next = first;
+        for message in receiver {
+            let (case, text) = message?;
+            early.insert(case, text);
+            while let Some(text) = early.remove(&next) {
+                file.write_all(&text)
+                    .map_err(ExperimentError::file(self.path()))?;
+                next += 1;
+                if progress(next).is_break() {
+                    return Err(ExperimentError::Stopped { cases: next });
+                }
+            }
+        }
+        file.sync_all().map_err(ExperimentError::file(self.path()))
+    }
+
+    /// Opens the file of rows at its end; returns the first case that is not in it.
+    fn open(&self, resume: bool) -> Result<(File, usize), ExperimentError> {
+        let (path, stored) = (self.path(), self.folder.join(CONFIG_FILE));
+        if !path.exists() {
+            write_atomically(&stored, |w| w.write_all(self.config.as_bytes()))?;
+            let mut file = File::create(&path).map_err(ExperimentError::file(&path))?;
+            file.write_all(&self.header)
+                .map_err(ExperimentError::file(&path))?;
+            return Ok((file, 0));
+        }
+        if !resume {
+            return Err(ExperimentError::AlreadyThere { path });
+        }
+        if let Some(difference) = difference(&self.config, &(self.stored)(&stored)?) {
+            return Err(ExperimentError::OtherConfiguration {
+                path: stored,
+                difference,
+            });
+        }
+        let bytes = std::fs::read(&path).map_err(ExperimentError::file(&path))?;
+        let (whole, cases) = self.whole_cases(&bytes);
+        let mut file = OpenOptions::new()
+            .write(true)
+            .open(&path)
+            .map_err(ExperimentError::file(&path))?;
+        file.set_len(whole as u64)
+            .map_err(ExperimentError::file(&path))?;
+        if whole == 0 {
+            file.write_all(&self.header)
+                .map_err(ExperimentError::file(&path))?;
+        }
+        file.seek(SeekFrom::End(0))
+            .map_err(ExperimentError::file(&path))?;
+        Ok((file, cases))
+    }
+
+    /// Returns where the last whole case ends, and how many cases are whole; 0 bytes when not even the header is.
+    fn whole_cases(&self, bytes: &[u8]) -> (usize, usize) {
+        if !bytes.starts_with(&self.header) {
+            return (0, 0);
+        }
+        let mut end = self.header.len();
+        let (mut cases, mut rows) = (0, 0);
+        let mut quoted = false;
+        for (position, byte) in bytes.iter().enumerate().skip(self.header.len()) {
+            match byte {
+                b'"' => quoted = !quoted,
+                b'\n' if !quoted => {
+                    rows += 1;
+                    if rows % self.rows_per_case == 0 {
+                        (end, cases) = (position + 1, cases + 1);
+                    }
+                }
+                _ => {}
+            }
+        }
+        (end, cases)
+    }
+}
+
+/// Says what differs first between two configurations as text; `None` when nothing does.
+fn difference(ours: &str, theirs: &str) -> Option<String> {
+    let (mut ours, mut theirs) = (ours.lines(), theirs.lines());
+    loop {
+        match (ours.next(), theirs.next()) {
+            (None, None) => return None,
+            (a, b) if a == b => {}
+            (a, b) => {
+                let text = |line: Option<&str>| {
+                    line.unwrap_or("nothing")
+                        .trim()
+                        .trim_end_matches(',')
+                        .to_owned()
+                };
+                return Some(format!("{} there, {} now", text(b), text(a)));
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The sequential study end to end: streamed, resumed, paired, and the same on any number of threads.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use hicp_experiments::{
+    ExperimentError, FusionRule, Metric, RunOptions, Subject, TRAJECTORIES_FILE, TrajectoryConfig,
+    TrajectoryReport, TrajectoryStudy, run_trajectories,
+};
+use hicp_sim::Household;
+use hybrid_icp::Preset;
+
+const BOTH: [Preset; 2] = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
+
+fn subjects() -> Vec<Subject> {
+    Subject::household(&[Household::Mug]).unwrap()
+}
+
+/// One trajectory per bin, a short one, seen by a small camera; a coarse reconstruction from few images.
+fn config() -> TrajectoryConfig {
+    let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3).unwrap();
+    let camera = &mut config.camera;
+    (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
+    (camera.width, camera.height) = (160, 120);
+    config.start_distance_m = 0.6;
+    config.path_m = 0.12;
+    config.underlying[1].seconds_per_estimate = 0.4;
+    config.reconstruction_images = 20;
+    config.reconstruction_voxel_m = 0.004;
+    config
+}
+
+fn go(
+    config: &TrajectoryConfig,
+    folder: &Path,
+    threads: usize,
+    resume: bool,
+) -> Result<(), ExperimentError> {
+    let options = RunOptions { threads, resume };
+    run_trajectories(config, &subjects(), folder, options, &mut |_| {
+        ControlFlow::Continue(())
+    })
+}
+
+fn bytes(folder: &Path) -> Vec<u8> {
+    std::fs::read(folder.join(TRAJECTORIES_FILE)).unwrap()
+}
+
+#[test]
+fn a_small_study_runs_to_its_report() {
+    let (config, folder) = (config(), tempfile::tempdir().unwrap());
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    assert_eq!(study.rows.len(), 10 * 2 * FusionRule::ALL.len());
+    for row in &study.rows {
+        let (vsd_initial, vsd_final) = row.vsd().unwrap();
+        // The bin is that of the start, and all rows of a trajectory have the same start.
+        let bin = usize::try_from(row.trajectory).unwrap();
+        assert_eq!(row.bin, Some(bin));
+        assert!((vsd_initial * 10.0 - bin as f64 - 0.5).abs() <= 0.5 + 1e-4);
+        assert!((0.0..=1.0).contains(&vsd_final), "{row:?}");
+        // 12 cm at 0.1 m/s and 0.542 s: images after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
+        let images = if row.underlying == "hybrid" { 3 } else { 4 };
+        assert_eq!(config.n_images(usize::from(images == 4)), images);
+        assert!(row.n_estimates() <= images, "{row:?}");
+    }
+    // Methods do differ, and from good starts the object is found all the same.
+    let differ = study.rows.chunks(FusionRule::ALL.len());
+    let differ = differ.filter(|rows| rows.iter().any(|r| r.vsd() != rows[0].vsd()));
+    assert!(differ.count() > 0);
+    let report = TrajectoryReport::of(study);
+    let analysis = report.analysis();
+    let average = analysis.variant("hybrid/average").unwrap();
+    let first = analysis.mean(Metric::Vsd, 0, average).unwrap();
+    assert!(first.estimate < 0.3, "{first:?}");
+    assert_eq!(report.claims().len(), 2 * 5 + 2);
+    report.write(folder.path()).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for part in [
+        "<svg",
+        "post-trajectory VSD",
+        "gated-weighted-average",
+        "average is at least as good",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    for file in [
+        "figure.svg",
+        "figure.png",
+        "summary.csv",
+        "differences.csv",
+        "claims.csv",
+    ] {
+        assert!(folder.path().join(file).metadata().unwrap().len() > 100);
+    }
+}
+
+#[test]
+fn threads_and_interruptions_do_not_show() {
+    let (config, one) = (config(), tempfile::tempdir().unwrap());
+    go(&config, one.path(), 1, false).unwrap();
+    let whole = bytes(one.path());
+    let two = tempfile::tempdir().unwrap();
+    go(&config, two.path(), 2, false).unwrap();
+    assert_eq!(bytes(two.path()), whole);
+    // Cut in the header, between trajectories, and within one.
+    let file = two.path().join(TRAJECTORIES_FILE);
+    for cut in [5, whole.len() / 2, whole.len() - 7] {
+        std::fs::write(&file, &whole[..cut]).unwrap();
+        go(&config, two.path(), 2, true).unwrap();
+        assert_eq!(bytes(two.path()), whole, "cut at {cut}");
+    }
+    // What is there is not overwritten, and another study does not go on from it.
+    let again = go(&config, two.path(), 1, false);
+    assert!(matches!(again, Err(ExperimentError::AlreadyThere { .. })));
+    let mut other = config.clone();
+    other.underlying[0].seconds_per_estimate = 0.3;
+    let other = go(&other, two.path(), 1, true);
+    assert!(matches!(
+        other,
+        Err(ExperimentError::OtherConfiguration { .. })
+    ));
+}
+
+#[test]
+fn pipelines_of_one_study_share_paths_and_starts() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let both = config();
+    go(&both, folders[0].path(), 2, false).unwrap();
+    let mut alone = both.clone();
+    alone.underlying.remove(0);
+    go(&alone, folders[1].path(), 2, false).unwrap();
+    let [both, alone] = folders.map(|f| TrajectoryStudy::read(f.path()).unwrap().rows);
+    let expected: Vec<_> = both
+        .into_iter()
+        .filter(|row| row.underlying == BOTH[1].name())
+        .collect();
+    assert_eq!(alone, expected);
+}
+
+#[test]
+fn what_cannot_be_run_is_refused() {
+    let refused = |subjects: &[Subject], n, presets: &[Preset]| {
+        TrajectoryConfig::new(subjects, presets, n, 1)
+    };
+    assert!(refused(&subjects(), 0, &BOTH).is_err());
+    assert!(refused(&subjects(), 1, &[]).is_err());
+    assert!(refused(&subjects(), 1, &[BOTH[0], BOTH[0]]).is_err());
+    assert!(refused(&[], 1, &BOTH).is_err());
+}
