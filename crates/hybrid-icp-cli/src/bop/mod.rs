@@ -5,10 +5,12 @@ mod eval;
 mod eval_report;
 mod frame;
 mod images;
+mod journal;
 mod judge;
 mod models;
 mod problem;
 mod refine;
+mod shard;
 mod targets;
 
 use anyhow::Context as _;
