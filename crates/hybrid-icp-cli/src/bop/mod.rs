@@ -4,10 +4,12 @@ mod errors_csv;
 mod eval;
 mod eval_report;
 mod frame;
+mod generate;
 mod images;
 mod journal;
 mod judge;
 mod models;
+mod objects;
 mod problem;
 mod refine;
 mod shard;
@@ -22,6 +24,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 pub(crate) enum Command {
     Refine(refine::Arguments),
     Eval(eval::Arguments),
+    Generate(generate::Arguments),
 }
 
 /// Runs the command.
@@ -29,6 +32,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Refine(arguments) => refine::run(arguments),
         Command::Eval(arguments) => eval::run(arguments),
+        Command::Generate(arguments) => generate::run(arguments),
     }
 }
 
