@@ -1,5 +1,6 @@
 //! `hybrid-icp bop`: work on whole datasets.
 
+mod compare;
 mod errors_csv;
 mod eval;
 mod eval_report;
@@ -25,6 +26,7 @@ pub(crate) enum Command {
     Refine(refine::Arguments),
     Eval(eval::Arguments),
     Generate(generate::Arguments),
+    Compare(compare::Arguments),
 }
 
 /// Runs the command.
@@ -33,6 +35,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Refine(arguments) => refine::run(arguments),
         Command::Eval(arguments) => eval::run(arguments),
         Command::Generate(arguments) => generate::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
     }
 }
 

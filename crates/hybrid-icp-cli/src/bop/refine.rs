@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::{self, Write as _};
 use std::hash::{DefaultHasher, Hasher};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::bail;
@@ -119,6 +119,11 @@ type FrameRows = ((u32, u32), Vec<usize>);
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    refine(arguments).map(|_| ())
+}
+
+/// Runs the command; returns the mean seconds per pose that was refined or kept by the pipeline, `None` without any.
+pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let mut inputs = vec![("--results", arguments.results.as_path())];
     inputs.extend(
         arguments
@@ -195,10 +200,37 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     summary.push_str(&summarize(&results, &job.models.missing));
     say(summary)?;
-    report_problems(arguments, &job.models.broken, &results)
+    report_problems(arguments, &job.models.broken, &results)?;
+    let spent: f64 = results.iter().filter_map(|result| result.seconds).sum();
+    let rows = results.iter().flat_map(|result| &result.rows);
+    let poses = rows.filter(|row| row.mve.is_some()).count();
+    Ok((poses > 0).then(|| spent / poses as f64))
 }
 
 impl Arguments {
+    /// The command without options, but that it goes on with a run that was killed.
+    pub(super) fn plain(
+        (dataset, split): (&Path, &str),
+        pipeline: PipelineArguments,
+        (results, output): (&Path, PathBuf),
+        threads: Option<u16>,
+    ) -> Self {
+        Self {
+            dataset: dataset.to_owned(),
+            split: split.to_owned(),
+            results: results.to_owned(),
+            output,
+            detections: None,
+            pipeline,
+            threads,
+            no_time: false,
+            shard: None,
+            limit: None,
+            rescore: None,
+            resume: true,
+        }
+    }
+
     /// Reads the rows that are to be refined and written.
     fn rows(&self) -> anyhow::Result<Vec<ResultRow>> {
         let mut rows = hicp_io::bop::read_results(&self.results)?;
