@@ -17,13 +17,14 @@
 //!
 //! Modules in reading order: `household` (objects), `shapes`, `solid` and
 //! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `case`
-//! (one image and a start), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `tsdf`, `meshing`, `components`,
+//! (one image and a start), `clutter` (many objects on a table), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `tsdf`, `meshing`, `components`,
 //! `reconstruction` (noisy models), `error`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
 mod case;
+mod clutter;
 mod components;
 mod corruption;
 mod error;
@@ -41,6 +42,7 @@ mod stream;
 mod tsdf;
 
 pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
+pub use clutter::{Clutter, ClutterView, PlacedObject, SeenObject};
 pub use components::{Component, components, join};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
 pub use error::SimError;

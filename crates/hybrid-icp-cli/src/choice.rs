@@ -19,7 +19,7 @@ pub(crate) struct PipelineArguments {
 
 /// What `--pipeline` names.
 #[derive(Clone, Debug)]
-enum Source {
+pub(crate) enum Source {
     Preset(Preset),
     File(PathBuf),
 }
@@ -51,7 +51,29 @@ enum MadeOf {
     File(PipelineFile),
 }
 
+impl Source {
+    /// A name for files: the preset's, or the file's without folder and ending.
+    pub(crate) fn short_name(&self) -> String {
+        match self {
+            Self::Preset(preset) => preset.name().to_owned(),
+            Self::File(path) => path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+        }
+    }
+}
+
 impl PipelineArguments {
+    /// A pipeline without overrides.
+    pub(crate) fn plain(pipeline: Source) -> Self {
+        Self {
+            pipeline,
+            overrides: Vec::new(),
+        }
+    }
+
     /// The pipeline file, so that no output overwrites it.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
         match &self.pipeline {

@@ -1,7 +1,7 @@
 //! `hybrid-icp bop eval`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
@@ -9,7 +9,7 @@ use hicp_io::bop::{Dataset, ResultRow};
 use hybrid_icp::ModelPoints;
 use rayon::prelude::*;
 
-use super::eval_report::{Report, Subject};
+use super::eval_report::{Report, Subject, Summary};
 use super::images::Scenes;
 use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
 use super::models::Models;
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "ID,…", value_delimiter = ',')]
     symmetric: Option<Vec<u32>>,
     /// Visibility tolerance of VSD in millimetres; the benchmark takes 5 for ITODD.
-    #[arg(long, value_name = "MM", default_value_t = 15.0, value_parser = positive)]
+    #[arg(long, value_name = "MM", default_value_t = DELTA_MM, value_parser = positive)]
     delta: f64,
     /// Also write the recalls as JSON.
     #[arg(long, value_name = "FILE.json")]
@@ -68,6 +68,9 @@ Exit codes: 0 done, with warnings of targets and rows that do not fit; 1 a file
 is damaged or nothing could be judged (what could be judged is still told);
 2 the command line is wrong.";
 
+/// The benchmark's visibility tolerance.
+const DELTA_MM: f64 = 15.0;
+
 fn positive(text: &str) -> Result<f64, String> {
     let value: Option<f64> = text.parse().ok();
     value
@@ -77,6 +80,40 @@ fn positive(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    evaluate(arguments).map(|_| ())
+}
+
+/// What an evaluation found.
+pub(super) struct Evaluation {
+    pub(super) all: Summary,
+    /// ADI of the estimates that were looked at to the nearest instance of their target, metres, by their row.
+    pub(super) adi_m: BTreeMap<usize, f64>,
+}
+
+impl Arguments {
+    /// The command without options, with its report as JSON.
+    pub(super) fn plain(
+        (dataset, split): (&Path, &str),
+        results: &Path,
+        json: PathBuf,
+        threads: Option<u16>,
+    ) -> Self {
+        Self {
+            dataset: dataset.to_owned(),
+            split: split.to_owned(),
+            results: results.to_owned(),
+            targets: None,
+            symmetric: None,
+            delta: DELTA_MM,
+            json: Some(json),
+            errors: None,
+            threads,
+        }
+    }
+}
+
+/// Runs the command.
+pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let written: Vec<outputs::Named<'_>> = [
         ("--json", arguments.json.as_deref()),
         ("--errors", arguments.errors.as_deref()),
@@ -156,7 +193,7 @@ fn report(
     wanted: &Targets,
     models: &Models,
     frames: &[JudgedFrame],
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Evaluation> {
     let warnings = misfits(arguments, rows, wanted, models, frames);
     for text in &warnings {
         warn(text);
@@ -191,7 +228,17 @@ fn report(
             report.left_out()
         );
     }
-    Ok(())
+    let mut adi_m = BTreeMap::new();
+    for target in targets {
+        for (row, against) in target.rows.iter().zip(&target.errors.estimates) {
+            let adi = against.iter().map(|errors| errors.adi_m);
+            adi_m.insert(*row, adi.fold(f64::INFINITY, f64::min));
+        }
+    }
+    Ok(Evaluation {
+        all: report.all,
+        adi_m,
+    })
 }
 
 /// Returns what does not fit between results, targets and dataset.

@@ -13,17 +13,17 @@ use super::median;
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
     /// Instances asked for and judged.
-    targets: usize,
+    pub(super) targets: usize,
     /// Those of them beyond the number of estimates.
     missing: usize,
-    ar: f64,
-    ar_vsd: f64,
-    ar_mssd: f64,
-    ar_mspd: f64,
+    pub(super) ar: f64,
+    pub(super) ar_vsd: f64,
+    pub(super) ar_mssd: f64,
+    pub(super) ar_mspd: f64,
     /// Recall of ADD, of ADI for symmetric objects, below a tenth of the diameter.
     ad_recall: f64,
     /// Median ADI of the estimates that are matched to an instance, millimetres; `null` without any.
-    median_adi_mm: Option<f64>,
+    pub(super) median_adi_mm: Option<f64>,
 }
 
 impl Summary {
@@ -58,7 +58,7 @@ pub(crate) struct Report {
     /// Instances asked for that could not be judged: no image, no model, no ground truth.
     left_out: usize,
     #[serde(flatten)]
-    all: Summary,
+    pub(super) all: Summary,
     objects: BTreeMap<u32, Summary>,
     warnings: Vec<String>,
 }

@@ -1,14 +1,19 @@
 //! `hybrid-icp bop`: work on whole datasets.
 
+mod compare;
 mod errors_csv;
 mod eval;
 mod eval_report;
 mod frame;
+mod generate;
 mod images;
+mod journal;
 mod judge;
 mod models;
+mod objects;
 mod problem;
 mod refine;
+mod shard;
 mod targets;
 
 use anyhow::Context as _;
@@ -20,6 +25,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 pub(crate) enum Command {
     Refine(refine::Arguments),
     Eval(eval::Arguments),
+    Generate(generate::Arguments),
+    Compare(compare::Arguments),
 }
 
 /// Runs the command.
@@ -27,6 +34,8 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Refine(arguments) => refine::run(arguments),
         Command::Eval(arguments) => eval::run(arguments),
+        Command::Generate(arguments) => generate::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
     }
 }
 

@@ -1,22 +1,26 @@
 //! `hybrid-icp bop refine`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::fmt::{self, Write as _};
+use std::hash::{DefaultHasher, Hasher};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::bail;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use hicp_io::bop::{Dataset, Detection, ResultRow};
 use hybrid_icp::{Isometry3, Refiner, Verdict};
 use rayon::prelude::*;
 
 use super::frame::{Fate, Frame};
 use super::images::Scenes;
+use super::journal::Journal;
 use super::models::Models;
 use super::problem::{self, Problem};
+use super::shard::Shard;
 use super::{median, progress_bar, thread_pool};
-use crate::choice::PipelineArguments;
-use crate::terminal::say;
+use crate::choice::{Pipeline, PipelineArguments};
+use crate::terminal::{say, warn};
 use crate::{outputs, report};
 
 /// Refine every row of a result file.
@@ -25,6 +29,9 @@ use crate::{outputs, report};
 /// that the silhouette at the row's pose overlaps most, or one of a detections file. Rows that cannot be refined keep their
 /// numbers and are counted by reason at the end. The time column holds the seconds spent on all rows of the image, added to
 /// the time that the input states.
+///
+/// While it runs, a journal beside the output (OUT.csv.journal) keeps every image that is done; --resume goes on from there
+/// after a run was killed. The output itself is written at the end, whole or not at all.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -51,6 +58,26 @@ pub(crate) struct Arguments {
     /// Write -1 into the time column, so that the same input gives the same bytes.
     #[arg(long)]
     no_time: bool,
+    /// Refine and write only part I of N, counted from 1. Images are never split; where the rows of each stand together,
+    /// the outputs of all parts one after the other (each but the first without its header line) are that of one run.
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    shard: Option<Shard>,
+    /// Read only the first N rows of the result file; --shard divides these.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    limit: Option<u32>,
+    /// Write another score than that of the input, so that poses can be ranked without ground truth.
+    #[arg(long, value_enum, value_name = "BY")]
+    rescore: Option<Rescore>,
+    /// Go on with a run of the same options that was killed; begin anew where it left no journal.
+    #[arg(long)]
+    resume: bool,
+}
+
+/// What becomes the score.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Rescore {
+    /// 1 - MVE of the row's pose in the output; 0 for a row without an MVE, because it met no mask, image or model.
+    Mve,
 }
 
 const USAGE: &str = "\
@@ -67,19 +94,24 @@ is damaged or no frame was found (the output is still written where that came up
 while refining); 2 the command line is wrong.";
 
 /// A row's result.
-struct Refined {
-    index: usize,
-    fate: Fate,
-    pose: Option<Isometry3<f64>>,
-    mve: Option<(f64, f64)>,
+#[derive(Debug)]
+pub(super) struct Refined {
+    /// Its place among the rows of the run.
+    pub(super) index: usize,
+    pub(super) fate: Fate,
+    /// The pose, where it is another than the row's.
+    pub(super) pose: Option<Isometry3<f64>>,
+    /// MVE of the row's pose and of the result's.
+    pub(super) mve: Option<(f64, f64)>,
 }
 
 /// All rows of a frame.
-struct FrameResult {
-    rows: Vec<Refined>,
+#[derive(Debug)]
+pub(super) struct FrameResult {
+    pub(super) rows: Vec<Refined>,
     /// Spent on its rows; `None` if none got as far as the pipeline.
-    seconds: Option<f64>,
-    problems: Vec<Problem>,
+    pub(super) seconds: Option<f64>,
+    pub(super) problems: Vec<Problem>,
 }
 
 /// Rows of a frame: scene, image and where the rows stand in the file.
@@ -87,6 +119,11 @@ type FrameRows = ((u32, u32), Vec<usize>);
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    refine(arguments).map(|_| ())
+}
+
+/// Runs the command; returns the mean seconds per pose that was refined or kept by the pipeline, `None` without any.
+pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let mut inputs = vec![("--results", arguments.results.as_path())];
     inputs.extend(
         arguments
@@ -101,7 +138,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &[("--output", "--results")],
     )?;
     let pipeline = arguments.pipeline.choose()?;
-    let mut rows = hicp_io::bop::read_results(&arguments.results)?;
+    let mut rows = arguments.rows()?;
     let dataset = Dataset::open(&arguments.dataset)?;
     dataset.scene_ids(&arguments.split)?;
     let detections = match &arguments.detections {
@@ -112,29 +149,43 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let pool = thread_pool(arguments.threads, frames.len())?;
 
     let start = Instant::now();
+    let settings = arguments.settings(&pipeline, &rows, detections.as_deref());
     let job = pool.install(|| Job::prepare(arguments, &dataset, detections, &rows))?;
+    let (journal, mut results) = arguments.journal(&settings, &frames)?;
+    let resumed = results.iter().flatten().count();
     let progress = progress_bar(rows.len(), "rows");
-    let results: Vec<FrameResult> = pool.install(|| {
-        frames
-            .par_iter()
+    pool.install(|| {
+        results
+            .par_iter_mut()
+            .zip(&frames)
             // One frame at a time per thread: frames differ in cost by their number of rows.
             .with_max_len(1)
-            .map_init(
+            .enumerate()
+            .try_for_each_init(
                 || pipeline.refiner(),
-                |refiner, ((scene_id, im_id), indices)| {
-                    let result = job.frame(refiner, *scene_id, *im_id, indices, &rows);
+                |refiner, (place, (result, ((scene_id, im_id), indices)))| {
+                    if result.is_none() {
+                        let done = job.frame(refiner, *scene_id, *im_id, indices, &rows);
+                        if let Some(journal) = &journal {
+                            journal.append(place, &done)?;
+                        }
+                        *result = Some(done);
+                    }
                     progress.inc(indices.len() as u64);
-                    result
+                    Ok::<(), anyhow::Error>(())
                 },
             )
-            .collect()
-    });
+    })?;
     progress.finish_and_clear();
+    let results: Vec<FrameResult> = results.into_iter().flatten().collect();
 
     for (result, (_, indices)) in results.iter().zip(&frames) {
-        enter(result, indices, &mut rows, arguments.no_time);
+        enter(result, indices, &mut rows, arguments);
     }
     hicp_io::bop::write_results(&arguments.output, &rows)?;
+    if let Some(journal) = journal {
+        journal.remove()?;
+    }
 
     let mut summary = format!(
         "{}: {} rows of {} frames in {:.1} s on {} threads",
@@ -144,9 +195,127 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         start.elapsed().as_secs_f64(),
         pool.current_num_threads(),
     );
+    if resumed > 0 {
+        let _ = write!(summary, ", {resumed} frames from the journal");
+    }
     summary.push_str(&summarize(&results, &job.models.missing));
     say(summary)?;
-    report_problems(arguments, &job.models.broken, &results)
+    report_problems(arguments, &job.models.broken, &results)?;
+    let spent: f64 = results.iter().filter_map(|result| result.seconds).sum();
+    let rows = results.iter().flat_map(|result| &result.rows);
+    let poses = rows.filter(|row| row.mve.is_some()).count();
+    Ok((poses > 0).then(|| spent / poses as f64))
+}
+
+impl Arguments {
+    /// The command without options, but that it goes on with a run that was killed.
+    pub(super) fn plain(
+        (dataset, split): (&Path, &str),
+        pipeline: PipelineArguments,
+        (results, output): (&Path, PathBuf),
+        threads: Option<u16>,
+    ) -> Self {
+        Self {
+            dataset: dataset.to_owned(),
+            split: split.to_owned(),
+            results: results.to_owned(),
+            output,
+            detections: None,
+            pipeline,
+            threads,
+            no_time: false,
+            shard: None,
+            limit: None,
+            rescore: None,
+            resume: true,
+        }
+    }
+
+    /// Reads the rows that are to be refined and written.
+    fn rows(&self) -> anyhow::Result<Vec<ResultRow>> {
+        let mut rows = hicp_io::bop::read_results(&self.results)?;
+        if let Some(limit) = self.limit {
+            rows.truncate(limit as usize);
+        }
+        let Some(shard) = self.shard else {
+            return Ok(rows);
+        };
+        let part = shard.take(rows);
+        if !part.contiguous {
+            warn(format_args!(
+                "{}: the rows of an image do not stand together, so that the outputs of all shards one after the other have another order than one run",
+                self.results.display()
+            ));
+        }
+        Ok(part.rows)
+    }
+
+    /// What the results depend on: a run goes on only with the work of one that has the same.
+    fn settings(
+        &self,
+        pipeline: &Pipeline,
+        rows: &[ResultRow],
+        detections: Option<&[Detection]>,
+    ) -> Vec<(&'static str, String)> {
+        let stated = |value: Option<String>| value.unwrap_or_else(|| "not given".to_owned());
+        let dataset = self.dataset.canonicalize();
+        let dataset = dataset.unwrap_or_else(|_| self.dataset.clone());
+        vec![
+            ("hybrid-icp", env!("CARGO_PKG_VERSION").to_owned()),
+            ("--dataset", dataset.display().to_string()),
+            ("--split", self.split.clone()),
+            ("--limit", stated(self.limit.map(|limit| limit.to_string()))),
+            ("--shard", stated(self.shard.map(|shard| shard.to_string()))),
+            ("--results with the digest", digest(&rows)),
+            (
+                "--detections with the digest",
+                stated(detections.map(|list| digest(&list))),
+            ),
+            ("--pipeline", pipeline.name().to_owned()),
+            (
+                "--pipeline with the digest",
+                digest(&(pipeline.toml(), pipeline.overrides())),
+            ),
+        ]
+    }
+
+    /// Opens the journal, and returns it with what it holds of the frames. There is none for what is not a file.
+    fn journal(
+        &self,
+        settings: &[(&str, String)],
+        frames: &[FrameRows],
+    ) -> anyhow::Result<(Option<Journal>, Vec<Option<FrameResult>>)> {
+        let mut results: Vec<Option<FrameResult>> = frames.iter().map(|_| None).collect();
+        if self.output.exists() && !self.output.is_file() {
+            return Ok((None, results));
+        }
+        let path = Journal::path_of(&self.output);
+        let (journal, done) = Journal::open(path, settings, self.resume)?;
+        for (place, result) in done {
+            let indices = frames.get(place).map_or(&[][..], |(_, indices)| indices);
+            let found = result.rows.iter().map(|row| row.index);
+            // Anything else was not written by this program.
+            if found.eq(indices.iter().copied()) && !indices.is_empty() {
+                results[place] = Some(result);
+            }
+        }
+        Ok((Some(journal), results))
+    }
+}
+
+/// A digest of all that the debug form of a value shows.
+fn digest(value: &impl fmt::Debug) -> String {
+    struct Digest(DefaultHasher);
+    impl fmt::Write for Digest {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            self.0.write(text.as_bytes());
+            Ok(())
+        }
+    }
+    let mut digest = Digest(DefaultHasher::new());
+    // Nothing above fails.
+    let _ = write!(digest, "{value:?}");
+    format!("{:016x}", digest.0.finish())
 }
 
 /// Groups the rows by frame, in the order of scene and image.
@@ -159,12 +328,12 @@ fn frames_of(rows: &[ResultRow]) -> Vec<FrameRows> {
     frames.into_iter().collect()
 }
 
-/// Enters a frame's poses and its time, the same for all of its rows, into the file's rows.
-fn enter(result: &FrameResult, indices: &[usize], rows: &mut [ResultRow], no_time: bool) {
+/// Enters a frame's poses, scores and its time, the same for all of its rows, into the file's rows.
+fn enter(result: &FrameResult, indices: &[usize], rows: &mut [ResultRow], arguments: &Arguments) {
     let stated = indices.iter().filter_map(|index| rows[*index].time_s);
     let stated = stated.reduce(f64::max);
     let time_s = match result.seconds {
-        _ if no_time => None,
+        _ if arguments.no_time => None,
         Some(seconds) => Some(stated.unwrap_or(0.0) + seconds),
         None => stated,
     };
@@ -173,6 +342,9 @@ fn enter(result: &FrameResult, indices: &[usize], rows: &mut [ResultRow], no_tim
         row.time_s = time_s;
         if let Some(pose) = refined.pose {
             row.set_camera_from_object(pose);
+        }
+        if arguments.rescore == Some(Rescore::Mve) {
+            row.score = refined.mve.map_or(0.0, |(_, mve)| 1.0 - mve);
         }
     }
 }

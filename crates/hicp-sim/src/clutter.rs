@@ -1,0 +1,324 @@
+//! Cluttered scenes: several objects on a table, seen from around it by a depth sensor.
+
+use hicp_core::{
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, TriMesh, UnitQuaternion, Vector3,
+};
+use hicp_raster::render_depth_image;
+use rand::{Rng, RngExt};
+
+use crate::error::{SimError, check_range};
+use crate::sensor::DepthSensor;
+
+/// Half the side of the square table, metres.
+const TABLE_HALF_METERS: f64 = 0.8;
+/// How far beyond the last try's disc an object may lie, metres: more tries, more room.
+const DISC_GROWTH_METERS: f64 = 0.005;
+/// Height of the camera above the table as seen from its middle, degrees: low enough that objects hide each other.
+const ELEVATION_DEGREES: std::ops::Range<f64> = 25.0..60.0;
+/// Distance of the camera against the one at which everything just fits.
+const DISTANCE_FACTOR: std::ops::Range<f64> = 0.85..1.05;
+
+/// An object of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedObject {
+    /// Index into the models that the scene was drawn from.
+    pub model: usize,
+    /// Where it stands: world z is up, the table's surface is z = 0, metres.
+    pub world_from_object: Isometry3<f64>,
+}
+
+/// Objects on a table that do not touch each other.
+///
+/// Each stands on one of six sides of its axes' box, turned at random about the vertical. An object may be there several times.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clutter {
+    /// The objects, in the order in which they were placed, from the middle outwards.
+    pub objects: Vec<PlacedObject>,
+    extent: f64,
+}
+
+/// What a camera sees of a [`Clutter`].
+#[derive(Clone, Debug)]
+pub struct ClutterView {
+    /// Pose of the world in the camera frame, metres.
+    pub camera_from_world: Isometry3<f64>,
+    /// What the sensor measured.
+    pub depth: DepthImage,
+    /// The objects in the scene's order.
+    pub instances: Vec<SeenObject>,
+}
+
+/// An object in a [`ClutterView`].
+#[derive(Clone, Debug)]
+pub struct SeenObject {
+    /// Index into the models.
+    pub model: usize,
+    /// Its pose, metres.
+    pub camera_from_object: Isometry3<f64>,
+    /// Pixels that it would cover if it were alone.
+    pub silhouette: Mask,
+    /// Pixels at which it is the nearest surface.
+    pub visible: Mask,
+}
+
+impl Clutter {
+    /// Draws a scene of `count` objects from some models, with replacement.
+    ///
+    /// Cost: O(vertices + count² tries).
+    ///
+    /// # Errors
+    ///
+    /// [`SimError::Parameter`] when there is no model, or `count` is not in 1 to 100.
+    pub fn draw<R: Rng + ?Sized>(
+        rng: &mut R,
+        models: &[Model],
+        count: usize,
+    ) -> Result<Self, SimError> {
+        check_range(
+            "number of models",
+            models.len() as f64,
+            1.0..=1e6,
+            "at least 1",
+        )?;
+        check_range("number of objects", count as f64, 1.0..=100.0, "1 to 100")?;
+        let mut objects = Vec::with_capacity(count);
+        let mut discs: Vec<(f64, f64, f64)> = Vec::with_capacity(count);
+        for _ in 0..count {
+            let model = rng.random_range(0..models.len());
+            let rotation = resting(rng);
+            let (center, radius, lowest) = footprint(models[model].mesh(), &rotation);
+            let mut reach = 0.0;
+            let (x, y) = loop {
+                let angle = std::f64::consts::TAU * rng.random::<f64>();
+                let distance = reach * rng.random::<f64>().sqrt();
+                let (x, y) = (distance * angle.cos(), distance * angle.sin());
+                // Ends, since the disc outgrows the others.
+                if discs
+                    .iter()
+                    .all(|(a, b, r)| (x - a).hypot(y - b) >= r + radius)
+                {
+                    break (x, y);
+                }
+                reach += DISC_GROWTH_METERS;
+            };
+            discs.push((x, y, radius));
+            let shift = Vector3::new(x - center.0, y - center.1, -lowest);
+            objects.push(PlacedObject {
+                model,
+                world_from_object: Isometry3::from_parts(shift.into(), rotation),
+            });
+        }
+        let reaches = discs.iter().map(|(x, y, r)| x.hypot(*y) + r);
+        let extent = reaches.fold(0.0, f64::max);
+        Ok(Self { objects, extent })
+    }
+
+    /// Looks at the scene's middle from a random side, near enough that the objects fill the image.
+    ///
+    /// `models` are those that the scene was drawn from. Cost: a render per object, and what the sensor costs.
+    ///
+    /// # Errors
+    ///
+    /// As [`DepthSensor::measure`].
+    pub fn view<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        models: &[Model],
+        camera: &PinholeCamera,
+        sensor: &DepthSensor,
+    ) -> Result<ClutterView, SimError> {
+        let camera_from_world = self.look(rng, camera);
+        let table = render_depth_image(&table()?, camera, &camera_from_world);
+        let mut nearest = table.pixels().to_vec();
+        let mut owner = vec![usize::MAX; nearest.len()];
+        let mut seen = Vec::with_capacity(self.objects.len());
+        for (index, object) in self.objects.iter().enumerate() {
+            let camera_from_object = camera_from_world * object.world_from_object;
+            let mesh = models[object.model].mesh();
+            let alone = render_depth_image(mesh, camera, &camera_from_object);
+            for ((z, near), owner) in alone.pixels().iter().zip(&mut nearest).zip(&mut owner) {
+                if *z > 0.0 && (*near <= 0.0 || z < near) {
+                    (*near, *owner) = (*z, index);
+                }
+            }
+            let silhouette = alone.pixels().iter().map(|z| *z > 0.0).collect();
+            seen.push((object.model, camera_from_object, silhouette));
+        }
+        let (width, height) = (camera.width(), camera.height());
+        let instances = seen
+            .into_iter()
+            .enumerate()
+            .map(|(index, (model, camera_from_object, silhouette))| {
+                let visible = owner.iter().map(|owner| *owner == index).collect();
+                Ok(SeenObject {
+                    model,
+                    camera_from_object,
+                    silhouette: Mask::new(width, height, silhouette)?,
+                    visible: Mask::new(width, height, visible)?,
+                })
+            })
+            .collect::<Result<_, SimError>>()?;
+        let perfect = DepthImage::from_meters(width, height, nearest)?;
+        Ok(ClutterView {
+            camera_from_world,
+            depth: sensor.measure(rng, &perfect, camera)?,
+            instances,
+        })
+    }
+
+    fn look<R: Rng + ?Sized>(&self, rng: &mut R, camera: &PinholeCamera) -> Isometry3<f64> {
+        let mut within = |range: &std::ops::Range<f64>| {
+            range.start + (range.end - range.start) * rng.random::<f64>()
+        };
+        let elevation = within(&ELEVATION_DEGREES).to_radians();
+        let azimuth = within(&(0.0..std::f64::consts::TAU));
+        // Half the width of the image at a distance of one.
+        let half_width = 0.5 * f64::from(camera.width()) / camera.fx();
+        let distance = self.extent * (1.0 + 1.0 / half_width) * within(&DISTANCE_FACTOR);
+        let toward = Vector3::new(
+            elevation.cos() * azimuth.cos(),
+            elevation.cos() * azimuth.sin(),
+            elevation.sin(),
+        );
+        let eye = Point3::from(toward * distance);
+        // From a frame that looks along -z with y up to one that looks along z with y down.
+        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        half_turn * Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z())
+    }
+}
+
+/// A rotation that puts one of six sides down and then turns about the vertical.
+fn resting<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
+    let (axis, angle) = match rng.random_range(0..6) {
+        0 => (Vector3::x_axis(), 0.0),
+        1 => (Vector3::x_axis(), PI),
+        2 => (Vector3::x_axis(), FRAC_PI_2),
+        3 => (Vector3::x_axis(), -FRAC_PI_2),
+        4 => (Vector3::y_axis(), FRAC_PI_2),
+        _ => (Vector3::y_axis(), -FRAC_PI_2),
+    };
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TAU * rng.random::<f64>());
+    turn * UnitQuaternion::from_axis_angle(&axis, angle)
+}
+
+/// Middle and radius of the disc over which a turned mesh stands, and its lowest height.
+fn footprint(mesh: &TriMesh, rotation: &UnitQuaternion<f64>) -> ((f64, f64), f64, f64) {
+    let turned = || mesh.vertices().iter().map(|v| rotation * v.cast::<f64>());
+    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let mut high = -low;
+    for point in turned() {
+        low = low.inf(&point);
+        high = high.sup(&point);
+    }
+    let center = (0.5 * (low.x + high.x), 0.5 * (low.y + high.y));
+    let distances = turned().map(|p| (p.x - center.0).hypot(p.y - center.1));
+    (center, distances.fold(0.0, f64::max), low.z)
+}
+
+fn table() -> Result<TriMesh, SimError> {
+    #[allow(clippy::cast_possible_truncation)]
+    let half = TABLE_HALF_METERS as f32;
+    let corner = |x: f32, y: f32| Point3::new(x * half, y * half, 0.0);
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let vertices = corners.map(|(x, y)| corner(x, y)).to_vec();
+    Ok(TriMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]])?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Household, stream};
+
+    fn models() -> Vec<Model> {
+        [Household::Mug, Household::Hammer, Household::Carton]
+            .map(|object| object.model().unwrap())
+            .to_vec()
+    }
+
+    #[test]
+    fn objects_stand_on_the_table_apart_from_each_other() {
+        let models = models();
+        for scene in 0..5 {
+            let clutter = Clutter::draw(&mut stream(3, &["scene"], scene), &models, 7).unwrap();
+            assert_eq!(clutter.objects.len(), 7);
+            let points: Vec<Vec<Point3<f64>>> = clutter
+                .objects
+                .iter()
+                .map(|object| {
+                    let vertices = models[object.model].mesh().vertices().iter();
+                    vertices
+                        .map(|v| object.world_from_object * v.cast::<f64>())
+                        .collect()
+                })
+                .collect();
+            for (index, object) in points.iter().enumerate() {
+                let lowest = object.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+                assert!(lowest.abs() < 1e-9, "{lowest}");
+                for other in &points[..index] {
+                    let disc = |points: &[Point3<f64>]| {
+                        let mut sorted: [Vec<f64>; 2] = [
+                            points.iter().map(|p| p.x).collect(),
+                            points.iter().map(|p| p.y).collect(),
+                        ];
+                        sorted.iter_mut().for_each(|c| c.sort_by(f64::total_cmp));
+                        let [x, y] = sorted.map(|c| 0.5 * (c[0] + c[c.len() - 1]));
+                        let reach = points.iter().map(|p| (p.x - x).hypot(p.y - y));
+                        (x, y, reach.fold(0.0, f64::max))
+                    };
+                    let ((a, b, r), (c, d, s)) = (disc(object), disc(other));
+                    assert!((a - c).hypot(b - d) > r + s - 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn views_hide_objects_behind_each_other_and_show_the_table() {
+        let models = models();
+        let camera = PinholeCamera::new(300.0, 300.0, 159.5, 119.5, 320, 240).unwrap();
+        let mut hidden = 0;
+        for scene in 0..4 {
+            let clutter = Clutter::draw(&mut stream(5, &["scene"], scene), &models, 6).unwrap();
+            let look = || {
+                let mut rng = stream(5, &["view"], scene);
+                clutter.view(&mut rng, &models, &camera, &DepthSensor::default())
+            };
+            let view = look().unwrap();
+            assert_eq!(view.depth, look().unwrap().depth);
+            let table = camera.width() * camera.height() / 10;
+            let mut of_table = 0;
+            for v in 0..camera.height() {
+                for u in 0..camera.width() {
+                    let z = f64::from(view.depth.pixels()[(v * camera.width() + u) as usize]);
+                    let owners = view.instances.iter();
+                    let owners = owners.filter(|i| i.visible.get(u, v) == Some(true)).count();
+                    assert!(owners <= 1);
+                    let point = camera.unproject(f64::from(u), f64::from(v), z);
+                    let world = view.camera_from_world.inverse() * point;
+                    if owners == 0 && z > 0.0 {
+                        assert!(world.z.abs() < 1e-4, "{world}");
+                        of_table += 1;
+                    } else if owners == 1 {
+                        assert!(world.z > -1e-4, "{world}");
+                    }
+                }
+            }
+            assert!(of_table > table);
+            for instance in &view.instances {
+                let count = |mask: &Mask| mask.pixels().iter().filter(|set| **set).count();
+                let (all, seen) = (count(&instance.silhouette), count(&instance.visible));
+                assert!(all > 50 && seen <= all, "{seen} of {all}");
+                hidden += usize::from(seen < all);
+            }
+        }
+        assert!(hidden > 4, "{hidden}");
+    }
+
+    #[test]
+    fn nothing_to_place_is_refused() {
+        let mut rng = stream(1, &[], 0);
+        assert!(Clutter::draw(&mut rng, &[], 3).is_err());
+        assert!(Clutter::draw(&mut rng, &models(), 0).is_err());
+    }
+}

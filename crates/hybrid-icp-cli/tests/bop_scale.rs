@@ -1,0 +1,244 @@
+//! `hybrid-icp bop refine` on files too large for one sitting: shards, limits, killed runs, scores.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+
+mod common;
+#[path = "common/world.rs"]
+mod world;
+
+use std::time::{Duration, Instant};
+
+use common::*;
+use hicp_io::bop::{ResultRow, read_results, write_results};
+use hybrid_icp::{Isometry3, Vector3};
+use world::*;
+
+/// Rows whose images stand together, several per instance.
+fn grouped(world: &World, per_instance: u64) -> Vec<ResultRow> {
+    let mut rows = Vec::new();
+    for ((scene, image), truths) in world.truths.iter().rev() {
+        for (id, pose) in truths {
+            for seed in 0..per_instance {
+                rows.push(ResultRow::new(*scene, *image, *id, nearby(pose, seed)));
+            }
+        }
+    }
+    rows
+}
+
+fn output(world: &World) -> Vec<u8> {
+    std::fs::read(world.path("out.csv")).unwrap()
+}
+
+fn journal(world: &World) -> std::path::PathBuf {
+    world.path("out.csv.journal")
+}
+
+/// Kills a run on one thread when it has done an image of four; returns what its journal held.
+fn killed(world: &World) -> Vec<u8> {
+    let words = "bop refine --dataset . --results in.csv --output out.csv --no-time --threads 1";
+    let mut child = program(world.folder.path())
+        .args(words.split(' '))
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    let lines = || {
+        let text = std::fs::read(journal(world)).unwrap_or_default();
+        text.iter().filter(|byte| **byte == b'\n').count()
+    };
+    while lines() < 2 {
+        assert!(child.try_wait().unwrap().is_none(), "done too early");
+        assert!(start.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // SIGKILL where there are signals.
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success(), "done too early");
+    assert!(lines() < 5);
+    std::fs::read(journal(world)).unwrap()
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_same_bytes() {
+    let world = World::new();
+    let rows = grouped(&world, 12);
+    let (whole, _) = world.refine(&rows, &["--no-time"]);
+    whole.exits(0);
+    let expected = output(&world);
+    assert!(!journal(&world).exists());
+    std::fs::write(world.path("out.csv"), "the user's").unwrap();
+
+    let held = killed(&world);
+    // Nobody sees half an output.
+    assert_eq!(output(&world), b"the user's");
+    world.run(&["--no-time"]).exits(1).complains(&[
+        "out.csv.journal",
+        "did not finish",
+        "--resume",
+    ]);
+    for (options, parts) in [
+        (&["--limit", "7"][..], &["--limit not given, expected 7"]),
+        (&["--shard", "1/2"], &["--shard not given, expected 1/2"]),
+        (
+            &["--pipeline", "nn-point-to-point"],
+            &["--pipeline hybrid, expected nn-point-to-point"],
+        ),
+        (
+            &["--set", "times=1"],
+            &["--pipeline hybrid, expected hybrid times=1"],
+        ),
+    ] {
+        let options = [options, &["--resume"]].concat();
+        world.run(&options).exits(1).complains(parts);
+    }
+    let other: Vec<_> = rows.iter().rev().cloned().collect();
+    write_results(world.path("in.csv"), &other).unwrap();
+    world
+        .run(&["--resume"])
+        .exits(1)
+        .complains(&["--results with the digest"]);
+    write_results(world.path("in.csv"), &rows).unwrap();
+    assert_eq!(std::fs::read(journal(&world)).unwrap(), held);
+
+    let run = world.run(&["--no-time", "--resume"]).exits(0);
+    assert!(run.out.contains("frames from the journal"), "{}", run.out);
+    assert_eq!(run.err, "");
+    assert_eq!(output(&world), expected);
+    assert!(!journal(&world).exists());
+
+    // Lines that the end of a run cut off are done again.
+    for length in [3, held.len() / 2, held.len() - 1] {
+        std::fs::write(journal(&world), &held[..length]).unwrap();
+        world
+            .run(&["--no-time", "--resume", "--threads", "2"])
+            .exits(0);
+        assert_eq!(output(&world), expected);
+    }
+    // What the journal holds is not done again: it is written as it stands there.
+    let text = String::from_utf8(held).unwrap();
+    let kept = text.replacen("\"refined\"", "\"kept: no mask of the object\"", 1);
+    std::fs::write(journal(&world), kept).unwrap();
+    let run = world.run(&["--no-time", "--resume"]).exits(0);
+    assert!(
+        run.out.contains("1  kept: no mask of the object"),
+        "{}",
+        run.out
+    );
+    // Without a journal there is nothing to go on with.
+    let run = world.run(&["--no-time", "--resume"]).exits(0);
+    assert!(!run.out.contains("journal"));
+    assert_eq!(output(&world), expected);
+}
+
+#[test]
+fn shards_one_after_the_other_are_one_run() {
+    let world = World::new();
+    write_results(world.path("in.csv"), &grouped(&world, 2)).unwrap();
+    world.run(&["--no-time", "--rescore", "mve"]).exits(0);
+    let whole = String::from_utf8(output(&world)).unwrap();
+    for count in [2, 3, 9] {
+        let mut joined = String::new();
+        for index in 1..=count {
+            let shard = format!("{index}/{count}");
+            let options = ["--no-time", "--rescore", "mve", "--shard", &shard];
+            let run = world.run(&options).exits(0);
+            assert_eq!(run.err, "");
+            let text = String::from_utf8(output(&world)).unwrap();
+            let (header, rows) = text.split_once('\n').unwrap();
+            if index == 1 {
+                joined = format!("{header}\n");
+            }
+            joined.push_str(rows);
+        }
+        assert_eq!(joined, whole, "{count}");
+    }
+
+    // Scattered rows: the same lines in another order, and that is told.
+    let rows = world.rows();
+    let (run, _) = world.refine(&rows, &["--no-time"]);
+    run.exits(0);
+    let sorted = |texts: &[Vec<u8>]| {
+        let mut lines: Vec<String> = texts
+            .iter()
+            .flat_map(|text| {
+                String::from_utf8_lossy(text)
+                    .lines()
+                    .skip(1)
+                    .map(str::to_owned)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        lines.sort();
+        lines
+    };
+    let whole = output(&world);
+    let parts = ["1/2", "2/2"].map(|shard| {
+        world
+            .run(&["--no-time", "--shard", shard])
+            .exits(0)
+            .complains(&["warning: in.csv: the rows of an image do not stand together"]);
+        output(&world)
+    });
+    assert!(parts.iter().all(|part| part.len() > 200));
+    assert_eq!(sorted(&parts), sorted(&[whole]));
+}
+
+#[test]
+fn limits_and_scores() {
+    let world = World::new();
+    let mut rows = grouped(&world, 1);
+    let pose = rows[0].camera_from_object();
+    rows.insert(1, ResultRow::new(12, 40, ABSENT, pose));
+    rows.insert(
+        2,
+        ResultRow::new(12, 40, CAR, Isometry3::translation(0.0, 3.0, 0.0) * pose),
+    );
+    let upside_down = pose * Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
+    rows.insert(3, ResultRow::new(12, 40, CAR, upside_down));
+    write_results(world.path("in.csv"), &rows).unwrap();
+    world.run(&["--no-time"]).exits(0);
+    let all = read_results(world.path("out.csv")).unwrap();
+    world.run(&["--no-time", "--limit", "5"]).exits(0);
+    assert_eq!(read_results(world.path("out.csv")).unwrap(), all[..5]);
+    world.run(&["--no-time", "--limit", "99999"]).exits(0);
+    assert_eq!(read_results(world.path("out.csv")).unwrap(), all);
+
+    let run = world.run(&["--no-time", "--rescore", "mve"]).exits(0);
+    let scored = read_results(world.path("out.csv")).unwrap();
+    for (index, (before, after)) in all.iter().zip(&scored).enumerate() {
+        assert!(same_pose(before, after));
+        assert_eq!(before.score, 1.0);
+        match index {
+            1 | 2 => assert_eq!(after.score, 0.0),
+            _ => assert!(after.score > 0.0 && after.score <= 1.0),
+        }
+    }
+    // Upside down: what ICP finds from there explains the image worse than every other pose does.
+    let others = scored[4..].iter().chain(&scored[..1]);
+    let lowest = others.map(|row| row.score).fold(1.0, f64::min);
+    let score = scored[3].score;
+    assert!(score < lowest && lowest > 0.8, "{score} {lowest}");
+    let mut known: Vec<f64> = scored.iter().map(|row| row.score).collect();
+    known.retain(|score| *score > 0.0);
+    known.sort_by(f64::total_cmp);
+    let n = known.len();
+    let median = 1.0 - 0.5 * (known[(n - 1) / 2] + known[n / 2]);
+    assert!(run.out.contains(&format!("-> {median:.3}")), "{}", run.out);
+
+    for (options, parts) in [
+        (
+            ["--shard", "0/2"],
+            ["--shard", "'0/2'", "I/N with 1 <= I <= N"],
+        ),
+        (
+            ["--shard", "3/2"],
+            ["--shard", "'3/2'", "I/N with 1 <= I <= N"],
+        ),
+        (["--shard", "-1/2"], ["--shard", "'-1/2'", "I/N"]),
+        (["--limit", "0"], ["--limit", "'0'", "1.."]),
+        (["--limit", "-3"], ["--limit", "'-3'", "1.."]),
+        (["--rescore", "vsd"], ["--rescore", "'vsd'", "mve"]),
+    ] {
+        world.run(&options).exits(2).complains(&parts);
+    }
+}
