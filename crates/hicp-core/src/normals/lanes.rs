@@ -2,24 +2,21 @@
 
 use std::ops::{Add, Mul, Sub};
 
-/// Numbers side by side.
-pub(super) const LANES: usize = 8;
-
 /// Several numbers; every operation is one on each of them, which compilers recognise.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lanes(pub(super) [f64; LANES]);
+pub(super) struct Lanes<const N: usize>(pub(super) [f64; N]);
 
-impl Lanes {
+impl<const N: usize> Lanes<N> {
     #[inline(always)]
     pub(super) fn all(number: f64) -> Self {
-        Self([number; LANES])
+        Self([number; N])
     }
 
     /// The numbers from an index on.
     #[inline(always)]
     pub(super) fn of(numbers: &[f64], from: usize) -> Self {
-        let mut lanes = [0.0; LANES];
-        lanes.copy_from_slice(&numbers[from..from + LANES]);
+        let mut lanes = [0.0; N];
+        lanes.copy_from_slice(&numbers[from..from + N]);
         Self(lanes)
     }
 
@@ -34,8 +31,8 @@ impl Lanes {
     /// In single precision.
     #[inline(always)]
     #[allow(clippy::cast_possible_truncation)]
-    pub(super) fn single(self) -> [f32; LANES] {
-        let mut lanes = [0.0; LANES];
+    pub(super) fn single(self) -> [f32; N] {
+        let mut lanes = [0.0; N];
         for (lane, number) in lanes.iter_mut().zip(self.0) {
             *lane = number as f32;
         }
@@ -51,7 +48,7 @@ impl Lanes {
     }
 }
 
-impl Add for Lanes {
+impl<const N: usize> Add for Lanes<N> {
     type Output = Self;
 
     #[inline(always)]
@@ -60,7 +57,7 @@ impl Add for Lanes {
     }
 }
 
-impl Sub for Lanes {
+impl<const N: usize> Sub for Lanes<N> {
     type Output = Self;
 
     #[inline(always)]
@@ -69,7 +66,7 @@ impl Sub for Lanes {
     }
 }
 
-impl Mul for Lanes {
+impl<const N: usize> Mul for Lanes<N> {
     type Output = Self;
 
     #[inline(always)]

@@ -7,12 +7,14 @@ use std::ops::Range;
 
 use nalgebra::{UnitVector3, Vector3};
 
-use super::lanes::{LANES, Lanes};
+use super::lanes::Lanes;
 use super::{DepthPatch, MIN_DEPTH_METERS, used};
 use crate::vectorized::{VectorLoop, vectorized};
 
 /// Fewest pixels that a plane is fitted to.
 const MIN_SUPPORT: f64 = 6.0;
+/// Pixels fitted at a time.
+const LANES: usize = 8;
 
 /// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
 ///
@@ -295,7 +297,14 @@ impl VectorLoop for Fit<'_> {
 ///
 /// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
 #[inline(always)]
-fn plane_fit(sums: [Lanes; 9], rays: &Rays, u0: Lanes, v0: f64, x: Lanes, y: f64) -> [Lanes; 3] {
+fn plane_fit<const N: usize>(
+    sums: [Lanes<N>; 9],
+    rays: &Rays,
+    u0: Lanes<N>,
+    v0: f64,
+    x: Lanes<N>,
+    y: f64,
+) -> [Lanes<N>; 3] {
     let [n, u, v, uu, uv, vv, w, uw, vw] = sums;
     let [v0, y, fx, fy] = [v0, y, rays.fx, rays.fy].map(Lanes::all);
     // Central moments times n: integers but for those with w, and no division.
@@ -316,7 +325,7 @@ fn plane_fit(sums: [Lanes; 9], rays: &Rays, u0: Lanes, v0: f64, x: Lanes, y: f64
     let determined = determinant - Lanes::all(1e-3) * n * (suu + svv);
     let scale = norm.map(|norm| -1.0 / norm);
     let mut normal = [nx * scale, ny * scale, nz * scale];
-    for lane in 0..LANES {
+    for lane in 0..N {
         let fitted = (n.0[lane] >= MIN_SUPPORT)
             & (determined.0[lane] > 0.0)
             & (w0.0[lane] > 0.0)
@@ -342,15 +351,9 @@ impl WindowSums {
 
     /// Returns the normal at pixel (u, v), facing the camera.
     pub(super) fn normal(self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
-        let (x, y) = (Lanes::all(rays.x[u]), rays.y[v]);
-        let fit = plane_fit(
-            self.0.map(Lanes::all),
-            rays,
-            Lanes::all(u as f64),
-            v as f64,
-            x,
-            y,
-        );
+        let (x, y) = (Lanes([rays.x[u]]), rays.y[v]);
+        let sums = self.0.map(|sum| Lanes([sum]));
+        let fit = plane_fit(sums, rays, Lanes([u as f64]), v as f64, x, y);
         let normal = fit.map(|component| component.single()[0]);
         (normal != [0.0; 3]).then(|| UnitVector3::new_unchecked(Vector3::from(normal)))
     }
