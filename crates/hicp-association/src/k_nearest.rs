@@ -5,6 +5,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Surfel};
 use crate::association::DataAssociation;
 use crate::box_tree::Found;
 use crate::observed_points::ObservedPoints;
+use crate::point_tree::PointTree;
 use crate::scratch::Scratch;
 use crate::stride::Stride;
 
@@ -50,16 +51,16 @@ impl DataAssociation for KNearest {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets);
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
         let mover = Mover::new(camera_from_object);
         let found = &mut self.found.0;
         pairs.reserve(source.len().saturating_mul(self.k.max(1).min(index.len())));
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.nearest_n(&source.point, self.k, found);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
             let weight = 1.0 / found.len() as f32;
             for neighbor in &*found {
-                let (target_index, target) = index.get(neighbor);
+                let (target_index, target) = index.get(neighbor.element);
                 pairs.push(Pair {
                     weight,
                     ..Pair::new(source_index, source, target_index, target)

@@ -1,11 +1,10 @@
 //! Nearest-neighbour data association.
 
-use std::sync::Arc;
-
-use hicp_core::{Context, Correspondences, Isometry3, Mover, Observation, Pair, Surfel};
+use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Point3, Surfel};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use crate::association::DataAssociation;
+use crate::observed_points::ObservedPoints;
 use crate::stride::Stride;
 
 /// Pairs every model point with the closest observed point (§III-A.1; Besl & McKay 1992), through a k-d tree.
@@ -36,12 +35,13 @@ impl DataAssociation for NearestNeighbor {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = TargetIndex::of(context.problem.observation, self.targets);
+        let index = ObservedPoints::of(context.problem.observation, self.targets, KdTree::new);
         let mover = Mover::new(camera_from_object);
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            if let Some((target_index, target)) = index.nearest(&source) {
+            if let Some(element) = index.tree().nearest(&source.point) {
+                let (target_index, target) = index.get(element);
                 pairs.push(Pair::new(source_index, source, target_index, target));
             }
         }
@@ -52,46 +52,30 @@ impl DataAssociation for NearestNeighbor {
     }
 }
 
-/// The observed surfels of one stride with their indices, and the tree over their positions.
-struct TargetIndex {
-    surfels: Vec<(u32, Surfel)>,
-    /// `None` when there is nothing to find: the tree would answer with item 0 at an infinite distance.
-    tree: Option<ImmutableKdTree<f32, 3>>,
-}
+/// `None` when there is nothing to find: the tree would answer with item 0 at an infinite distance.
+struct KdTree(Option<ImmutableKdTree<f32, 3>>);
 
-impl TargetIndex {
-    fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
-        let stride = targets.pixels(observation.n_surfels());
-        observation
-            .derived()
-            .get_or_build(u64::from(stride), || Self::build(observation, stride))
+impl KdTree {
+    #[allow(clippy::needless_pass_by_value)] // As every tree over observed points is built.
+    fn new(points: Vec<Point3<f32>>) -> Self {
+        let points: Vec<[f32; 3]> = points.iter().map(|point| (*point).into()).collect();
+        let filled = !points.is_empty();
+        Self(
+            filled
+                .then(|| ImmutableKdTree::new_from_slice(&points).ok())
+                .flatten(),
+        )
     }
 
-    fn build(observation: &Observation, stride: u32) -> Self {
-        // An observation's surfels are finite by construction, so no NaN reaches the tree.
-        let surfels: Vec<(u32, Surfel)> =
-            observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
-        let points: Vec<[f32; 3]> = surfels.iter().map(|(_, s)| s.point.into()).collect();
-        let tree = if points.is_empty() {
-            None
-        } else {
-            ImmutableKdTree::new_from_slice(&points).ok()
-        };
-        Self { surfels, tree }
-    }
-
-    fn nearest(&self, source: &Surfel) -> Option<(u32, Surfel)> {
+    fn nearest(&self, query: &Point3<f32>) -> Option<u32> {
+        let query: [f32; 3] = (*query).into();
         let found = self
-            .tree
+            .0
             .as_ref()?
-            .query(&source.point.into())
+            .query(&query)
             .nearest_one::<SquaredEuclidean<f32>>()
             .execute();
         // A query that is not finite "finds" item 0 at an infinite distance.
-        found
-            .distance
-            .is_finite()
-            .then(|| self.surfels.get(found.item as usize).copied())
-            .flatten()
+        found.distance.is_finite().then_some(found.item)
     }
 }

@@ -6,6 +6,7 @@ use crate::association::DataAssociation;
 use crate::box_tree::Found;
 use crate::max_normal_angle::min_cosine;
 use crate::observed_points::ObservedPoints;
+use crate::point_tree::PointTree;
 use crate::scratch::Scratch;
 use crate::stride::Stride;
 
@@ -53,17 +54,17 @@ impl DataAssociation for NormalCompatible {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets);
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
         let mover = Mover::new(camera_from_object);
         let min_cosine = min_cosine(self.max_angle_degrees);
         let found = &mut self.found.0;
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.nearest_n(&source.point, self.k, found);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
             let compatible = found
                 .iter()
-                .map(|neighbor| index.get(neighbor))
+                .map(|neighbor| index.get(neighbor.element))
                 .find(|(_, target)| source.normal.dot(&target.normal) >= min_cosine);
             if let Some((target_index, target)) = compatible {
                 pairs.push(Pair::new(source_index, source, target_index, target));

@@ -6,6 +6,7 @@ use crate::association::DataAssociation;
 use crate::box_tree::Found;
 use crate::length::Length;
 use crate::observed_points::ObservedPoints;
+use crate::point_tree::PointTree;
 use crate::scratch::Scratch;
 use crate::stride::Stride;
 
@@ -57,7 +58,7 @@ impl DataAssociation for NormalShooting {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets);
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
         let mover = Mover::new(camera_from_object);
         let limit = self
             .max_offset
@@ -66,10 +67,10 @@ impl DataAssociation for NormalShooting {
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.nearest_n(&source.point, self.k, found);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
             let mut best: Option<(f32, u32, Surfel)> = None;
             for neighbor in &*found {
-                let (target_index, target) = index.get(neighbor);
+                let (target_index, target) = index.get(neighbor.element);
                 let offset = distance_to_line(&source, &target);
                 if best.is_none_or(|(smallest, _, _)| offset < smallest) {
                     best = Some((offset, target_index, target));

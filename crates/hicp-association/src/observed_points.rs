@@ -4,24 +4,28 @@ use std::sync::Arc;
 
 use hicp_core::{Observation, Point3, Surfel};
 
-use crate::box_tree::Found;
-use crate::point_tree::PointTree;
 use crate::stride::Stride;
 
-/// Built once per observation and stride, shared by all threads and hypotheses.
-pub(crate) struct ObservedPoints {
+/// The observed surfels of one stride with their indices, and a tree over their positions.
+pub(crate) struct ObservedPoints<T> {
     surfels: Vec<(u32, Surfel)>,
-    tree: PointTree,
+    tree: T,
 }
 
-impl ObservedPoints {
-    pub(crate) fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
+impl<T: Send + Sync + 'static> ObservedPoints<T> {
+    /// Built once per observation, stride and kind of tree, shared by all threads and hypotheses.
+    ///
+    /// `plant` makes the tree over the positions; an observation's surfels are finite by construction.
+    pub(crate) fn of(
+        observation: &Observation,
+        targets: Stride,
+        plant: impl Fn(Vec<Point3<f32>>) -> T,
+    ) -> Arc<Self> {
         let stride = targets.pixels(observation.n_surfels());
         observation.derived().get_or_build(u64::from(stride), || {
             let surfels: Vec<(u32, Surfel)> =
                 observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
-            let mut tree = PointTree::default();
-            tree.rebuild(surfels.len(), |i| surfels[i].1.point);
+            let tree = plant(surfels.iter().map(|(_, s)| s.point).collect());
             Self { surfels, tree }
         })
     }
@@ -31,13 +35,15 @@ impl ObservedPoints {
         self.surfels.len()
     }
 
-    /// Replaces the content of `found` by the `count` nearest surfels (at least one), nearest first.
-    pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Found>) {
-        self.tree.nearest_n(query, count.max(1), found);
+    /// The tree, which counts the surfels from 0 in the order of the image.
+    #[inline]
+    pub(crate) fn tree(&self) -> &T {
+        &self.tree
     }
 
-    /// Returns what a query found: the index in the observation, and the surfel.
-    pub(crate) fn get(&self, found: &Found) -> (u32, Surfel) {
-        self.surfels[found.element as usize]
+    /// Returns the index in the observation and the surfel of one that the tree found.
+    #[inline]
+    pub(crate) fn get(&self, element: u32) -> (u32, Surfel) {
+        self.surfels[element as usize]
     }
 }

@@ -12,6 +12,14 @@ pub(crate) struct PointTree {
 }
 
 impl PointTree {
+    /// Builds a tree over points, which must be finite.
+    #[allow(clippy::needless_pass_by_value)] // As every tree over observed points is built.
+    pub(crate) fn new(points: Vec<Point3<f32>>) -> Self {
+        let mut tree = Self::default();
+        tree.rebuild(points.len(), |i| points[i]);
+        tree
+    }
+
     /// Builds the tree anew, reusing its memory. Points must be finite; `point(i)` is the i-th of `count`.
     pub(crate) fn rebuild(&mut self, count: usize, point: impl Fn(usize) -> Point3<f32>) {
         self.tree.rebuild(count, |element| {

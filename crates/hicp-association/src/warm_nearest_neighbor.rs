@@ -1,22 +1,19 @@
 //! Nearest neighbours that are searched from those of the last iteration.
 
-use std::sync::Arc;
-
-use hicp_core::{
-    Context, Correspondences, Isometry3, Mover, Observation, Pair, Surfel, VectorLoop, vectorized,
-};
+use hicp_core::{Context, Correspondences, Isometry3, Mover, Pair, Surfel, VectorLoop, vectorized};
 
 use crate::association::DataAssociation;
+use crate::observed_points::ObservedPoints;
 use crate::scratch::Scratch;
 use crate::stride::Stride;
 use crate::wide_tree::WideTree;
 
-/// Pairs every model point with the closest observed point, as `NearestNeighbor` does (§III-A.1; Besl & McKay 1992), several
-/// times faster along a registration.
+/// Pairs every model point with the closest observed point, as `NearestNeighbor` does (§III-A.1; Besl & McKay 1992), and
+/// faster along a registration.
 ///
 /// From one iteration to the next a point moves little, so its last match is near: the search begins with it, and looks only
 /// into the boxes that something nearer could be in (Greenspan & Godin 2001 start from the last match likewise). The boxes are
-/// eight to a node and the points eight to a leaf, a few vector operations each. The pairs are exact and do not depend on where
+/// eight to a node and the points sixteen to a leaf, a few vector operations each. The pairs are exact and do not depend on where
 /// a search began: of equally near points the first in the image is taken, where a k-d tree takes any of them.
 ///
 /// The tree over the observed surfels is built once per observation and stride and shared by all threads and hypotheses.
@@ -56,7 +53,7 @@ impl DataAssociation for WarmNearestNeighbor {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = TargetIndex::of(context.problem.observation, self.targets);
+        let index = ObservedPoints::of(context.problem.observation, self.targets, WideTree::new);
         let last = &mut self.last.0;
         // Any element is a valid start, so what another run left behind costs time at worst.
         last.resize(source.len(), 0);
@@ -77,7 +74,7 @@ impl DataAssociation for WarmNearestNeighbor {
 }
 
 struct Search<'a> {
-    index: &'a TargetIndex,
+    index: &'a ObservedPoints<WideTree>,
     source: &'a [Surfel],
     mover: Mover,
     last: &'a mut [u32],
@@ -91,30 +88,12 @@ impl VectorLoop for Search<'_> {
     fn run(self) {
         for ((source_index, surfel), last) in (0..).zip(self.source).zip(self.last) {
             let source = self.mover.surfel(surfel);
-            let found = self.index.tree.nearest(&source.point, Some(*last));
+            let found = self.index.tree().nearest(&source.point, *last);
             let Some(found) = found else { continue };
             *last = found.element;
-            let (target_index, target) = self.index.surfels[found.element as usize];
+            let (target_index, target) = self.index.get(found.element);
             self.pairs
                 .push(Pair::new(source_index, source, target_index, target));
         }
-    }
-}
-
-/// The observed surfels of one stride with their indices, and the tree over their positions.
-struct TargetIndex {
-    surfels: Vec<(u32, Surfel)>,
-    tree: WideTree,
-}
-
-impl TargetIndex {
-    fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
-        let stride = targets.pixels(observation.n_surfels());
-        observation.derived().get_or_build(u64::from(stride), || {
-            let surfels: Vec<(u32, Surfel)> =
-                observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
-            let tree = WideTree::new(surfels.iter().map(|(_, s)| s.point).collect());
-            Self { surfels, tree }
-        })
     }
 }

@@ -153,21 +153,19 @@ impl WideTree {
         index
     }
 
-    /// Returns the nearest point, `hint` being any point, the nearer the better; `None` without points and for a query that is
+    /// Returns the nearest point, `hint` being one of them, the nearer the better, or out of range; `None` without points and for a query that is
     /// not finite.
     #[inline(always)]
-    pub(crate) fn nearest(&self, query: &Point3<f32>, hint: Option<u32>) -> Option<Nearest> {
+    pub(crate) fn nearest(&self, query: &Point3<f32>, hint: u32) -> Option<Nearest> {
         if self.nodes.is_empty() || !query.iter().all(|x| x.is_finite()) {
             return None;
         }
         let query = [query.x, query.y, query.z];
         let mut best = Nearest::NONE;
-        if let Some((element, point)) =
-            hint.and_then(|element| Some((element, self.points.get(element as usize)?)))
-        {
+        if let Some(point) = self.points.get(hint as usize) {
             best = Nearest {
                 distance_squared: distance_squared(&query, [point.x, point.y, point.z]),
-                element,
+                element: hint,
             };
         }
         let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH * WIDTH];
@@ -309,14 +307,8 @@ mod tests {
                             a
                         }
                     });
-                    for hint in [
-                        None,
-                        Some(0),
-                        Some(count - 1),
-                        Some(count / 2),
-                        Some(u32::MAX),
-                    ] {
-                        assert_eq!(tree.nearest(query, hint), expected, "{count} {hint:?}");
+                    for hint in [0, count - 1, count / 2, u32::MAX] {
+                        assert_eq!(tree.nearest(query, hint), expected, "{count} {hint}");
                     }
                 }
             }
@@ -326,16 +318,12 @@ mod tests {
     #[test]
     fn nothing_is_found_without_points_or_for_a_query_that_is_not_finite() {
         assert_eq!(
-            WideTree::new(Vec::new()).nearest(&Point3::origin(), None),
+            WideTree::new(Vec::new()).nearest(&Point3::origin(), 0),
             None
         );
         let tree = WideTree::new(vec![Point3::origin()]);
         for x in [f32::NAN, f32::INFINITY, f32::MAX] {
-            assert_eq!(
-                tree.nearest(&Point3::new(x, 0.0, 0.0), Some(0)),
-                None,
-                "{x}"
-            );
+            assert_eq!(tree.nearest(&Point3::new(x, 0.0, 0.0), 0), None, "{x}");
         }
     }
 }
