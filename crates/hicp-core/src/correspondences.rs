@@ -216,3 +216,32 @@ impl Mover {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_move_as_one_does() {
+        let mover = Mover::new(&Isometry3::new(
+            Vector3::new(0.1, -0.2, 0.7),
+            Vector3::new(1.3, -0.4, 0.9),
+        ));
+        let numbers: [[f32; 7]; 3] = std::array::from_fn(|axis| {
+            std::array::from_fn(|i| (1.7 * i as f32 + axis as f32).sin())
+        });
+        let points = mover.points(&numbers);
+        let vectors = mover.vectors(&numbers);
+        for i in 0..7 {
+            let point = Point3::new(numbers[0][i], numbers[1][i], numbers[2][i]);
+            let moved = mover.surfel(&Surfel {
+                point,
+                normal: UnitVector3::new_unchecked(point.coords),
+            });
+            for axis in 0..3 {
+                assert_eq!(points[axis][i], moved.point[axis]);
+                assert_eq!(vectors[axis][i], moved.normal[axis]);
+            }
+        }
+    }
+}

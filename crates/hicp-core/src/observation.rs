@@ -21,7 +21,7 @@ use crate::surfel::Surfel;
 ///
 /// An empty mask or a depth image of zeros makes an observation without surfels; refining against it ends with "no pairs".
 ///
-/// Building one costs O(image) for the mask's box and about 25 ns for every pixel inside it. Share it between threads and
+/// Building one costs O(image) for the mask's box and 15 to 30 ns for every pixel inside it, the more the more depth edges there are. Share it between threads and
 /// hypotheses: search trees and the like are built once per observation, see [`Observation::derived`].
 ///
 /// ```

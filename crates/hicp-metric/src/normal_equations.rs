@@ -1,10 +1,9 @@
 //! The 6×6 normal equations of a rigid increment.
 
-use hicp_core::{Matrix3, Matrix6, Pair, Point3, Vector3, Vector6, so3::hat};
+use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, so3::hat};
 
 use crate::degeneracy::Degeneracy;
 use crate::freedom::Freedom;
-use crate::moments::Moments;
 use crate::row_sums::RowSums;
 
 /// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
@@ -46,20 +45,6 @@ impl NormalEquations {
             policy: Degeneracy::default(),
             threshold: Degeneracy::THRESHOLD,
         }
-    }
-
-    /// Makes an empty system about the weighted centroid of the pairs' source points, scaled by their RMS radius.
-    ///
-    /// `None` without weight or with numbers that are not finite.
-    #[must_use]
-    #[inline]
-    pub fn about_sources(pairs: &[Pair]) -> Option<Self> {
-        let mut moments = Moments::about_first(pairs)?;
-        for pair in pairs {
-            moments.add(pair);
-        }
-        let (pivot, length) = moments.pivot_and_length()?;
-        Some(Self::new(pivot, length))
     }
 
     /// Takes sums over `rows` rows about a pivot, with lengths in metres.
