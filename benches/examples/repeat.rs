@@ -1,4 +1,5 @@
 //! Runs one pipeline over and over, for a profiler: `cargo run --release -p hicp-benches --example repeat -- hybrid 200`.
+//! Further arguments override fields: `repeat -- nn-point-to-point 50 association=nearest-neighbor` searches with the k-d tree.
 //!
 //! Cold runs: each makes its observation anew. Prints the 5th percentile of the time per object, which other work on the machine hardly moves.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -6,7 +7,7 @@
 use std::time::Instant;
 
 use hicp_benches::{OBJECTS, case, forget_renders};
-use hybrid_icp::{Observation, Preset, Problem, Refiner, Trace};
+use hybrid_icp::{Observation, PipelineFile, Preset, Problem, Refiner, Trace};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -14,10 +15,14 @@ fn main() {
         .next()
         .map_or(Preset::Hybrid, |name| name.parse().unwrap());
     let repeats: usize = arguments.next().map_or(100, |count| count.parse().unwrap());
+    let mut pipeline = PipelineFile::parse(preset.toml(), preset.name()).unwrap();
+    for assignment in arguments {
+        pipeline.set(&assignment).unwrap();
+    }
     for object in OBJECTS {
         let case = case(object);
         let seen = &case.scene.observation;
-        let mut refiner = Refiner::preset(preset);
+        let mut refiner = Refiner::boxed(pipeline.build().unwrap());
         let (mut observe, mut refine) = (Vec::new(), Vec::new());
         let mut trace = Trace::new();
         for _ in 0..repeats {

@@ -87,11 +87,8 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
         .map(|value| value.as_str().map(str::to_owned))
         .collect::<Option<Vec<_>>>()
         .ok_or_else(|| header.refuse("set", "a list of texts"))?;
-    let origin = header
-        .text("pipeline")?
-        .trim_end_matches(&overrides.join(" "))
-        .trim_end();
-    let pipeline = Pipeline::parse(origin, header.text("toml")?.to_owned(), &overrides)?;
+    let origin = format!("the pipeline of {}", header.path.display());
+    let pipeline = Pipeline::parse(&origin, header.text("toml")?.to_owned(), &overrides)?;
     let inputs = Inputs {
         model: header.text("model")?.into(),
         model_unit: header
