@@ -11,9 +11,9 @@
 
 use std::fmt::Write as _;
 
-use hicp_benches::allocations::{Counting, allocations};
 use hicp_benches::work::{CountingRenderer, StageWork};
 use hicp_sim::{Household, perturb, rng};
+use hicp_tests::allocations::{Counting, allocations};
 use hybrid_icp::{Isometry3, Preset, Problem, Session, Workspace};
 
 #[global_allocator]

@@ -1,6 +1,5 @@
 //! The scenes that the benches measure: fixed seeds, so that every run measures the same work.
 
-pub mod allocations;
 pub mod fused;
 pub mod instances;
 pub mod stages;

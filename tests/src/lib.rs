@@ -1,5 +1,6 @@
-//! Scenes that the cross-crate tests share.
+//! What the cross-crate tests and the benches share: scenes, starts, data, an allocator that counts.
 
+pub mod allocations;
 pub mod nees;
 pub mod room;
 pub mod starts;

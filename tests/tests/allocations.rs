@@ -1,38 +1,11 @@
 //! A warm run makes no heap allocation, whatever the preset.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
 use hicp_sim::{Household, perturb, rng};
+use hicp_tests::allocations::{Counting, allocations};
 use hicp_tests::scene;
 use hybrid_icp::fusion::{CameraMotion, FusionMethod};
 use hybrid_icp::pipeline::{PARTS, Part, PartKind};
 use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator};
-
-/// Counts the allocations of the thread that asks.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system's allocator unchanged; counting touches only a thread-local integer,
-// which needs no allocation itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        unsafe { System.realloc(pointer, layout, new_size) }
-    }
-}
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -52,10 +25,10 @@ fn a_warm_run_allocates_nothing() {
             refiner.refine(&scene.model, &scene.observation, init);
         }
         for init in &starts {
-            let before = ALLOCATIONS.get();
+            let before = allocations();
             let refined = refiner.refine(&scene.model, &scene.observation, init);
-            let allocations = ALLOCATIONS.get() - before;
-            assert_eq!(allocations, 0, "{preset}: {refined:?}");
+            let count = allocations() - before;
+            assert_eq!(count, 0, "{preset}: {refined:?}");
         }
     }
     counter_works();
@@ -116,9 +89,9 @@ fn every_component_of_the_catalogue_is_silent_when_warm() {
         for _ in 0..2 {
             refiner.refine(&scene.model, &scene.observation, &init);
         }
-        let before = ALLOCATIONS.get();
+        let before = allocations();
         refiner.refine(&scene.model, &scene.observation, &init);
-        assert_eq!(ALLOCATIONS.get() - before, 0, "{}", part.name);
+        assert_eq!(allocations() - before, 0, "{}", part.name);
         tried += 1;
     }
     assert!(tried > 50, "{tried}");
@@ -144,15 +117,15 @@ fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
             }
         };
         steps(&init);
-        let before = ALLOCATIONS.get();
+        let before = allocations();
         steps(&init);
-        assert_eq!(ALLOCATIONS.get() - before, 0, "{method}");
+        assert_eq!(allocations() - before, 0, "{method}");
     }
     counter_works();
 }
 
 fn counter_works() {
-    let before = ALLOCATIONS.get();
+    let before = allocations();
     std::hint::black_box(vec![1_u8]);
-    assert_eq!(ALLOCATIONS.get() - before, 1);
+    assert_eq!(allocations() - before, 1);
 }
