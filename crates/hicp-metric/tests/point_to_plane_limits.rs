@@ -10,53 +10,8 @@ mod pairs;
 
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3, so3};
 use hicp_metric::{ErrorMetric, PointToPlane};
-use pairs::pair;
 use pairs::support::{Numbers, median};
-
-/// Pairs on an ellipsoid of 10 cm, the source off by a motion about its centre.
-fn ellipsoid(
-    numbers: &mut Numbers,
-    count: usize,
-    off: &Isometry3<f64>,
-    center: &Vector3<f64>,
-) -> Correspondences {
-    let axes = Vector3::new(0.05, 0.04, 0.025);
-    (0..count)
-        .map(|_| {
-            let direction = numbers.direction();
-            let point = direction.component_mul(&axes);
-            let normal = direction.component_div(&axes).normalize();
-            pair(
-                Point3::from(off * Point3::from(point) + center),
-                Point3::from(point + center),
-                normal,
-                1.0,
-            )
-        })
-        .collect()
-}
-
-fn small_motion(numbers: &mut Numbers, degrees: f64, shift: f64) -> Isometry3<f64> {
-    let axis = numbers.direction() * degrees.to_radians();
-    Isometry3::new(numbers.direction() * shift, axis)
-}
-
-fn moved(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
-    pairs
-        .as_slice()
-        .iter()
-        .map(|p| {
-            let normal = motion.rotation * p.target.normal.cast::<f64>().into_inner();
-            let point = |q: Point3<f32>| motion * q.cast::<f64>();
-            pair(
-                point(p.source.point),
-                point(p.target.point),
-                normal,
-                p.weight,
-            )
-        })
-        .collect()
-}
+use pairs::{ellipsoid, moved, pair, small_motion};
 
 #[test]
 fn pitfall_13_metres_and_millimetres_take_the_same_step() {

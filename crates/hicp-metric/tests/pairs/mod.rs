@@ -58,3 +58,48 @@ pub fn rounding(pairs: &Correspondences) -> f64 {
 pub fn determinant(motion: &Isometry3<f64>) -> f64 {
     motion.rotation.to_rotation_matrix().matrix().determinant()
 }
+
+/// Pairs on an ellipsoid of 10 cm, the source off by a motion about its centre.
+pub fn ellipsoid(
+    numbers: &mut support::Numbers,
+    count: usize,
+    off: &Isometry3<f64>,
+    center: &Vector3<f64>,
+) -> Correspondences {
+    let axes = Vector3::new(0.05, 0.04, 0.025);
+    (0..count)
+        .map(|_| {
+            let direction = numbers.direction();
+            let point = direction.component_mul(&axes);
+            let normal = direction.component_div(&axes).normalize();
+            pair(
+                Point3::from(off * Point3::from(point) + center),
+                Point3::from(point + center),
+                normal,
+                1.0,
+            )
+        })
+        .collect()
+}
+
+pub fn small_motion(numbers: &mut support::Numbers, degrees: f64, shift: f64) -> Isometry3<f64> {
+    let axis = numbers.direction() * degrees.to_radians();
+    Isometry3::new(numbers.direction() * shift, axis)
+}
+
+pub fn moved(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
+    pairs
+        .as_slice()
+        .iter()
+        .map(|p| {
+            let normal = motion.rotation * p.target.normal.cast::<f64>().into_inner();
+            let point = |q: Point3<f32>| motion * q.cast::<f64>();
+            pair(
+                point(p.source.point),
+                point(p.target.point),
+                normal,
+                p.weight,
+            )
+        })
+        .collect()
+}
