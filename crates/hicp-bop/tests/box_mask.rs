@@ -2,7 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use hicp_bop::BoxMask;
-use hybrid_icp::{DepthImage, Isometry3, Mask, Model, PixelRegion, Point3, RenderedView, TriMesh};
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, TriMesh,
+    Vector3,
+};
 
 /// A plate of 0.3 m × 0.4 m, 0.5 m in diameter, about the origin.
 fn plate() -> Model {
