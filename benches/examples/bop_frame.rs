@@ -78,6 +78,7 @@ fn main() -> Result<(), Failure> {
             frame,
             SceneCamera {
                 matrix,
+                image_size: None,
                 depth_scale: Some(DEPTH_SCALE),
                 camera_from_world: None,
             },

@@ -8,6 +8,7 @@ mod instructions;
 mod peers;
 mod process;
 mod repro;
+mod scale;
 mod tidy;
 
 use std::path::{Path, PathBuf};
@@ -35,6 +36,9 @@ cargo xtask COMMAND
   peers [--instances N]
           small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
           first time, a network
+  scale [--rows N] [--threads N]
+          20,000 rows over generated images through `bop refine`: throughput, peak memory, kill and resume, shards;
+          fails where the bytes differ
   repro   fig6, fig7, table1 or alpha: reruns that part of the paper's studies into target/study;
           --quick takes minutes instead of the paper's number of poses
 ";
@@ -51,6 +55,7 @@ fn main() -> ExitCode {
         ["instructions"] => instructions::check(&root()),
         ["instructions", "--bless"] => instructions::bless(&root()),
         ["peers", ref options @ ..] => peers::run(&root(), options),
+        ["scale", ref options @ ..] => scale::run(&root(), options),
         ["repro", what] => repro::run(&root(), what, false),
         ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {

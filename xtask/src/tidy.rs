@@ -19,6 +19,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-sim", 4),
     ("hicp-testkit", 5),
     ("hicp-experiments", 5),
+    ("hicp-bop", 5),
     ("hybrid-icp-cli", 6),
 ];
 

@@ -63,6 +63,20 @@ impl Termination {
             Self::ScoreNotImproved => "score_not_improved",
         }
     }
+
+    /// What it means for the pose that is returned, in words.
+    #[must_use]
+    pub fn explain(self) -> &'static str {
+        match self {
+            Self::Converged => "the loss stopped changing",
+            Self::IterationLimit => "the limit of iterations was reached",
+            Self::NoPairs => "no pairs of model and measured points were found",
+            Self::PairsLost => "the next step lost too many pairs",
+            Self::LossIncreased => "the next step raised the loss",
+            Self::Degenerate => "the pairs did not determine a step",
+            other => other.name(),
+        }
+    }
 }
 
 impl std::fmt::Display for Termination {

@@ -1,6 +1,9 @@
 //! What a run borrows: scratch memory and an observer.
 
-use hicp_core::{Context, Correspondences, Problem, RenderCache, Renderer, Surfel};
+use hicp_core::{
+    Context, Correspondences, Isometry3, Model, PinholeCamera, Problem, RenderCache, RenderedView,
+    Renderer, Surfel,
+};
 
 use crate::observer::Observer;
 
@@ -25,6 +28,16 @@ impl Workspace {
     /// Returns a problem as components see it, with this workspace's render cache.
     pub fn context<'a>(&'a mut self, problem: &Problem<'a>) -> Context<'a> {
         Context::new(*problem, &mut self.renders)
+    }
+
+    /// Returns a model rendered at a pose where there is no observation yet, by the cache that runs take their renders from.
+    pub fn view(
+        &mut self,
+        model: &Model,
+        camera: &PinholeCamera,
+        camera_from_object: &Isometry3<f64>,
+    ) -> &RenderedView {
+        self.renders.view(model, camera, camera_from_object)
     }
 
     /// Number of renders made so far.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hicp_core::{CameraError, Matrix3, PinholeCamera};
 
+use crate::camera_model::{CameraModel, camera_model};
 use crate::error::IoError;
 use crate::json::{Document, Node};
 
@@ -18,10 +19,12 @@ pub struct CameraFile {
 
 /// Reads a camera from a JSON file, for images of `image_size` (width, height).
 ///
-/// Three forms are understood; further keys are ignored:
+/// Four forms are understood; further keys are ignored:
 /// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's, which states no size (one that is there must match);
+/// - `{"cam_model": {"projection_model_type": "PinholePlane", "projection_params": [fx, fy, cx, cy]}, "depth_scale": ...}`, BOP's
+///   newer one; models with distortion are refused;
 /// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, of BOP's `camera.json`, whose size must match;
-/// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in either form.
+/// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in any of these forms.
 ///
 /// `depth_scale` is optional everywhere.
 ///
@@ -36,7 +39,7 @@ pub fn read_camera_json(
     let document = Document::read(path.as_ref())?;
     let root = document.root();
     let is_camera = |node: &Node<'_>| {
-        ["cam_K", "fx"]
+        ["cam_K", "cam_model", "fx"]
             .iter()
             .any(|key| node.optional(key).is_some())
     };
@@ -54,12 +57,14 @@ pub fn read_camera_json(
         _ => root,
     };
     if !is_camera(&node) {
-        return Err(
-            node.refuse("an object with the key `cam_K`, or with `fx`, `fy`, `cx` and `cy`")
-        );
+        return Err(node.refuse(
+            "an object with the key `cam_K` or `cam_model`, or with `fx`, `fy`, `cx` and `cy`",
+        ));
     }
     let (width, height) = image_size;
-    let matrix = node.optional("cam_K");
+    let matrix = node
+        .optional("cam_K")
+        .or_else(|| node.optional("cam_model"));
     let states_size = ["width", "height"]
         .iter()
         .all(|key| node.optional(key).is_some());
@@ -67,8 +72,14 @@ pub fn read_camera_json(
         check_size(&node, image_size)?;
     }
     let camera = match matrix {
-        Some(place) => PinholeCamera::from_matrix(&camera_matrix(&node)?, width, height)
-            .map_err(|source| camera_error(&place, source))?,
+        Some(place) => {
+            let stated = calibration(&node)?;
+            if let Some(found) = stated.image_size {
+                same_size(&place, found, image_size)?;
+            }
+            PinholeCamera::from_matrix(&stated.matrix, width, height)
+                .map_err(|source| camera_error(&place, source))?
+        }
         None => {
             let value = |key: &str| node.get(key)?.number();
             let (fx, fy, cx, cy) = (value("fx")?, value("fy")?, value("cx")?, value("cy")?);
@@ -83,11 +94,16 @@ pub fn read_camera_json(
 }
 
 /// Checks the size that a camera states.
-fn check_size(node: &Node<'_>, (width, height): (u32, u32)) -> Result<(), IoError> {
-    let (found_width, found_height) = (
-        node.get("width")?.unsigned()?,
-        node.get("height")?.unsigned()?,
-    );
+fn check_size(node: &Node<'_>, image_size: (u32, u32)) -> Result<(), IoError> {
+    let side = |key: &str| node.get(key)?.unsigned();
+    same_size(node, (side("width")?, side("height")?), image_size)
+}
+
+fn same_size(
+    node: &Node<'_>,
+    (found_width, found_height): (u32, u32),
+    (width, height): (u32, u32),
+) -> Result<(), IoError> {
     if (found_width, found_height) == (width, height) {
         return Ok(());
     }
@@ -100,15 +116,23 @@ fn check_size(node: &Node<'_>, (width, height): (u32, u32)) -> Result<(), IoErro
     })
 }
 
-/// Reads the calibration matrix `cam_K`.
-pub(crate) fn camera_matrix(node: &Node<'_>) -> Result<Matrix3<f64>, IoError> {
-    if node.optional("cam_K").is_none() && node.optional("cam_model").is_some() {
-        return Err(
-            node.refuse("a pinhole camera `cam_K`; camera models (`cam_model`) are not supported")
-        );
+/// Reads the calibration matrix of a camera, from `cam_K` or from a `cam_model` without distortion, and the size of its images
+/// where the latter states one.
+pub(crate) fn calibration(node: &Node<'_>) -> Result<CameraModel, IoError> {
+    match (node.optional("cam_K"), node.optional("cam_model")) {
+        (None, Some(model)) => camera_model(&model),
+        (Some(_), Some(model)) => {
+            let found = "`cam_K` and `cam_model`".to_owned();
+            Err(model.refuse_found(found, "one of them"))
+        }
+        _ => {
+            let numbers: [f64; 9] = node.get("cam_K")?.numbers()?;
+            Ok(CameraModel {
+                matrix: Matrix3::from_row_slice(&numbers),
+                image_size: None,
+            })
+        }
     }
-    let numbers: [f64; 9] = node.get("cam_K")?.numbers()?;
-    Ok(Matrix3::from_row_slice(&numbers))
 }
 
 /// Reads `depth_scale`, millimetres per unit, where it is there.
@@ -168,6 +192,55 @@ mod tests {
         }
     }
 
+    const MODEL: &str = r#"{"cam_model": {"projection_model_type": "PinholePlane", "label": "x",
+        "projection_params": [600, 610, 320.5, 240.25], "image_width": 640, "image_height": 480}}"#;
+
+    #[test]
+    fn camera_models_without_distortion_are_pinholes() {
+        let camera = |text: &str| read(text).map(|file| file.camera);
+        let expected = camera(FLAT).unwrap();
+        let linear = MODEL.replace("PinholePlane", "CameraModelType.LINEAR");
+        let unsized_ = MODEL.replace(r#""image_width": 640, "image_height": 480"#, r#""x": 1"#);
+        for text in [MODEL, &linear, &unsized_, &format!(r#"{{"7": {MODEL}}}"#)] {
+            assert_eq!(camera(text).unwrap(), expected, "{text}");
+        }
+        let single = MODEL.replace("600, 610,", "600,");
+        assert_eq!(camera(&single).unwrap().fy(), 600.0);
+
+        let refused = |text: &str| match read(text) {
+            Err(IoError::JsonValue {
+                key,
+                found,
+                expected,
+                ..
+            }) => (key, found, expected),
+            other => panic!("{other:?}"),
+        };
+        let fisheye = MODEL.replace("PinholePlane", "CameraModelType.FISHEYE624");
+        let (key, found, expected) = refused(&fisheye);
+        assert_eq!(key, "$.cam_model.projection_model_type");
+        assert!(found.contains("FISHEYE624") && expected.contains("undistorted"));
+        let (key, found, _) = refused(&MODEL.replace("[600,", "[0, 600,"));
+        assert_eq!(
+            (key.as_str(), found.as_str()),
+            ("$.cam_model.projection_params", "5 numbers")
+        );
+        let (key, ..) = refused(&MODEL.replace("\"PinholePlane\"", "7"));
+        assert_eq!(key, "$.cam_model.projection_model_type");
+        let (key, _, expected) = refused(&MODEL.replacen('{', &format!("{{{K}, "), 1));
+        assert_eq!(
+            (key.as_str(), expected.as_str()),
+            ("$.cam_model", "one of them")
+        );
+        assert!(matches!(
+            read(&MODEL.replace("640", "1408")),
+            Err(IoError::CameraSize {
+                found_width: 1408,
+                ..
+            })
+        ));
+    }
+
     #[test]
     fn every_fault_is_named() {
         let key = |text: &str| match read(text) {
@@ -177,7 +250,7 @@ mod tests {
         assert_eq!(key(&format!(r#"{{"1": {{{K}}}, "2": {{{K}}}}}"#)), "$");
         assert_eq!(key("{}"), "$");
         assert_eq!(key("[1]"), "$");
-        assert_eq!(key(r#"{"1": {"cam_model": {}}}"#), "$.1");
+        assert_eq!(key(r#"{"1": {"cam_model": {}}}"#), "$.1.cam_model");
         assert_eq!(key(r#"{"cam_K": [1, 2]}"#), "$.cam_K");
         assert_eq!(
             key(&format!(r#"{{{K}, "depth_scale": 0}}"#)),

@@ -59,6 +59,7 @@ mod pose;
 pub use pose::{PoseFile, pose_from_bop, pose_to_bop, read_pose_json, write_pose_json};
 
 mod camera;
+mod camera_model;
 pub use camera::{CameraFile, read_camera_json};
 
 pub mod bop;

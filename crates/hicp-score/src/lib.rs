@@ -18,13 +18,14 @@
 //! ```
 //!
 //! Modules in reading order: `score` (trait), `mean_vsd`, `vsd`, `tolerances`, `bop_vsd`, `pose_error`, `model_points`,
-//! `recall`, `error`.
+//! `recall`, `calibration`, `error`.
 
 // Counts become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
 mod agreement;
 mod bop_vsd;
+mod calibration;
 mod error;
 mod mean_vsd;
 mod model_points;
@@ -36,6 +37,7 @@ mod tolerances;
 mod vsd;
 
 pub use bop_vsd::{bop_vsd, spheres_overlap};
+pub use calibration::{Judgement, ReliabilityBin, reliability, roc_area};
 pub use error::ScoreError;
 pub use mean_vsd::{MeanVsd, VISIBILITY_TOLERANCE_METERS};
 pub use model_points::ModelPoints;

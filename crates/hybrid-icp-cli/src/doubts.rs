@@ -6,8 +6,6 @@ use std::path::Display;
 use hicp_io::LengthUnit;
 use hybrid_icp::{Isometry3, Model, Observation, Refinement, Verdict};
 
-use crate::report;
-
 /// Diameters beyond which an object is taken for one in another unit: a coin in metres, a car in millimetres.
 const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 
@@ -27,7 +25,7 @@ pub(crate) fn reason(
     observation: &Observation,
     init: &Isometry3<f64>,
 ) -> String {
-    let ended = report::explain(refined.outcome.termination);
+    let ended = refined.outcome.termination.explain();
     if refined.outcome.verdict == Verdict::Refined {
         return ended.to_owned();
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use hicp_io::PoseFile;
-use hybrid_icp::{Refinement, StageRecord, Termination, Verdict};
+use hybrid_icp::{Refinement, StageRecord, Verdict};
 use serde::Serialize;
 
 use crate::terminal::warn;
@@ -105,19 +105,6 @@ fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Refined => "refined",
         Verdict::KeptInitial(_) => "kept_initial",
-    }
-}
-
-/// What a way to end means for the pose that is returned.
-pub(crate) fn explain(termination: Termination) -> &'static str {
-    match termination {
-        Termination::Converged => "the loss stopped changing",
-        Termination::IterationLimit => "the limit of iterations was reached",
-        Termination::NoPairs => "no pairs of model and measured points were found",
-        Termination::PairsLost => "the next step lost too many pairs",
-        Termination::LossIncreased => "the next step raised the loss",
-        Termination::Degenerate => "the pairs did not determine a step",
-        other => other.name(),
     }
 }
 

@@ -488,3 +488,65 @@ fn bad_results_and_targets_name_their_place() {
             .complains(&["above 0"]);
     }
 }
+
+#[test]
+fn scores_are_held_against_correctness() {
+    let world = dataset();
+    // Ten right rows, and ten that are half a metre off; one of each has the score of the other kind.
+    let mut rows = truth_as_results(&world);
+    let mut wrong = rows.clone();
+    for row in &mut rows {
+        row.score = 0.95;
+    }
+    for row in &mut wrong {
+        row.score = 0.25;
+        row.set_camera_from_object(
+            Isometry3::translation(0.0, 0.0, 0.5) * row.camera_from_object(),
+        );
+    }
+    (rows[3].score, wrong[7].score) = (0.25, 0.95);
+    // Rows of no image or object are left out.
+    let pose = rows[0].camera_from_object();
+    let strangers = [
+        ResultRow::new(3, 77, CAR, pose),
+        ResultRow::new(3, 0, HAMMER, pose),
+    ];
+    write_results(
+        world.path("in.csv"),
+        &[&rows[..], &wrong, &strangers].concat(),
+    )
+    .unwrap();
+    let run = eval(&world, &["--calibration"]).exits(0);
+    let found = read_json(&world)["calibration"].clone();
+    // Of 100 pairs 81 are in order, 18 are ties and one is in reverse.
+    assert_eq!(found["roc_area"], json!(0.9));
+    assert_eq!(
+        (&found["estimates"], &found["correct"]),
+        (&json!(20), &json!(10))
+    );
+    let line = |lower: f64, share: f64| {
+        let table = found["reliability"].as_array().unwrap();
+        let line = table.iter().find(|line| line["lower"] == json!(lower));
+        let line = line.unwrap();
+        assert_eq!(
+            (&line["estimates"], &line["share_correct"]),
+            (&json!(10), &json!(share))
+        );
+    };
+    line(0.2, 0.1);
+    line(0.9, 0.9);
+    for part in [
+        "20 estimates, 10 correct, ROC area 0.900",
+        "0.9-1.0        10",
+    ] {
+        assert!(run.out.contains(part), "no {part:?} in {}", run.out);
+    }
+
+    // All alike: there is nothing to rank.
+    write_results(world.path("in.csv"), &rows).unwrap();
+    let run = eval(&world, &["--calibration"]).exits(0);
+    assert!(read_json(&world)["calibration"]["roc_area"].is_null());
+    assert!(run.out.contains("not defined"), "{}", run.out);
+    eval(&world, &[]).exits(0);
+    assert!(read_json(&world).get("calibration").is_none());
+}

@@ -79,9 +79,10 @@ pub use hicp_metric::{
 };
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
-    MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls, Score, ScoreError,
-    TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances,
-    most_visible, mspd, mssd, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
+    Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
+    ReliabilityBin, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd, add, adi,
+    bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area, spheres_overlap,
+    tolerances, top_estimates, visibility_masks, vsd,
 };
 pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
 pub use pipeline::{PipelineError, PipelineFile};

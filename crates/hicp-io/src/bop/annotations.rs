@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hicp_core::{CameraError, Isometry3, Matrix3, PinholeCamera};
 
-use crate::camera::{camera_matrix, depth_scale};
+use crate::camera::{calibration, depth_scale};
 use crate::error::IoError;
 use crate::json::{Document, Node};
 use crate::pose::pose_of;
@@ -15,6 +15,8 @@ use crate::pose::pose_of;
 pub struct SceneCamera {
     /// Calibration matrix K, pixels; pixel centres at integers.
     pub matrix: Matrix3<f64>,
+    /// Width and height of its images, where stated: a `cam_model` may, a `cam_K` does not.
+    pub image_size: Option<(u32, u32)>,
     /// Millimetres per unit of the depth image, where stated.
     pub depth_scale: Option<f64>,
     /// Pose of the world in the camera frame, metres, where stated.
@@ -44,7 +46,7 @@ pub struct GroundTruthInfo {
 }
 
 impl SceneCamera {
-    /// Returns the camera for images of a size; the files do not state it.
+    /// Returns the camera for images of a size; the files rarely state it ([`SceneCamera::image_size`]).
     ///
     /// # Errors
     ///
@@ -99,8 +101,10 @@ fn scene_camera(node: &Node<'_>) -> Result<SceneCamera, IoError> {
     let has_pose = ["cam_R_w2c", "cam_t_w2c"]
         .iter()
         .all(|key| node.optional(key).is_some());
+    let calibration = calibration(node)?;
     Ok(SceneCamera {
-        matrix: camera_matrix(node)?,
+        matrix: calibration.matrix,
+        image_size: calibration.image_size,
         depth_scale: depth_scale(node)?,
         camera_from_world: has_pose
             .then(|| pose_of(node, "cam_R_w2c", "cam_t_w2c"))

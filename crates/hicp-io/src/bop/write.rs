@@ -167,6 +167,7 @@ mod tests {
         let matrix = Matrix3::new(600.1, 0.0, 320.25, 0.0, 601.3, 239.75, 0.0, 0.0, 1.0);
         let camera = |camera_from_world| SceneCamera {
             matrix,
+            image_size: None,
             depth_scale: Some(0.1),
             camera_from_world,
         };

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
+use hicp_bop::{FrameKey, Models, Scenes, Targets};
 use hicp_io::bop::{Dataset, ResultRow};
 use hybrid_icp::ModelPoints;
 use rayon::prelude::*;
 
+use super::calibration::Calibration;
 use super::eval_report::{Report, Subject, Summary};
-use super::images::Scenes;
 use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
-use super::models::Models;
-use super::targets::{self, FrameKey, Targets};
-use super::{errors_csv, problem, progress_bar, thread_pool};
+use super::{errors_csv, models, problem, progress_bar, targets, thread_pool};
 use crate::outputs;
 use crate::terminal::{say, warn};
 
@@ -42,7 +41,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "ID,…", value_delimiter = ',')]
     symmetric: Option<Vec<u32>>,
     /// Visibility tolerance of VSD in millimetres; the benchmark takes 5 for ITODD.
-    #[arg(long, value_name = "MM", default_value_t = DELTA_MM, value_parser = positive)]
+    #[arg(long, value_name = "MM", default_value_t = DELTA_MM, value_parser = super::positive)]
     delta: f64,
     /// Also write the recalls as JSON.
     #[arg(long, value_name = "FILE.json")]
@@ -50,6 +49,10 @@ pub(crate) struct Arguments {
     /// Also write the errors of every estimate against every instance of its target as CSV.
     #[arg(long, value_name = "FILE.csv")]
     errors: Option<PathBuf>,
+    /// Also tell whether the scores of all rows, from 0 to 1, rank the correct ones (ADI below a tenth of the diameter) first:
+    /// the area under the ROC curve, and the share that is correct by range of the score.
+    #[arg(long)]
+    calibration: bool,
     /// Threads; the number of cores if not given. Nothing but the time depends on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     threads: Option<u16>,
@@ -70,13 +73,6 @@ is damaged or nothing could be judged (what could be judged is still told);
 
 /// The benchmark's visibility tolerance.
 const DELTA_MM: f64 = 15.0;
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value: Option<f64> = text.parse().ok();
-    value
-        .filter(|x| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| "expected a finite number above 0".to_owned())
-}
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -107,6 +103,7 @@ impl Arguments {
             delta: DELTA_MM,
             json: Some(json),
             errors: None,
+            calibration: false,
             threads,
         }
     }
@@ -129,12 +126,11 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let dataset = Dataset::open(&arguments.dataset)?;
     dataset.scene_ids(&arguments.split)?;
     let targets = targets::choose(&dataset, &arguments.split, arguments.targets.as_deref())?;
-    let scene_ids = targets.keys().map(|(scene_id, _)| *scene_id);
-    let scenes = Scenes::open(&dataset, &arguments.split, scene_ids);
     let objects: BTreeSet<u32> = targets.values().flat_map(|t| t.keys().copied()).collect();
     let pool = thread_pool(arguments.threads, targets.len())?;
+    let scenes = Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1);
     let models_dir = dataset.eval_models_dir()?;
-    let models = pool.install(|| Models::read(&models_dir, &objects))?;
+    let models = pool.install(|| models::read(&models_dir, &objects))?;
 
     let judge = Judge {
         objects: evaluated(arguments, &models),
@@ -156,7 +152,10 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
             .collect()
     });
     progress.finish_and_clear();
-    report(arguments, &rows, &targets, &models, &judged)
+    let calibration = arguments
+        .calibration
+        .then(|| pool.install(|| Calibration::of(&rows, &scenes, &judge.objects)));
+    report(arguments, &rows, (&targets, &models), &judged, calibration)
 }
 
 /// Prepares the objects for their errors.
@@ -190,9 +189,9 @@ fn rows_of(rows: &[ResultRow]) -> BTreeMap<FrameKey, Vec<usize>> {
 fn report(
     arguments: &Arguments,
     rows: &[ResultRow],
-    wanted: &Targets,
-    models: &Models,
+    (wanted, models): (&Targets, &Models),
     frames: &[JudgedFrame],
+    calibration: Option<Calibration>,
 ) -> anyhow::Result<Evaluation> {
     let warnings = misfits(arguments, rows, wanted, models, frames);
     for text in &warnings {
@@ -206,7 +205,8 @@ fn report(
         split: arguments.split.clone(),
         delta_mm: arguments.delta,
     };
-    let report = Report::new(subject, &targets, left_out, warnings);
+    let mut report = Report::new(subject, &targets, left_out, warnings);
+    report.calibration = calibration;
     if let Some(path) = &arguments.errors {
         errors_csv::write(path, &targets, rows)?;
     }
@@ -217,8 +217,8 @@ fn report(
     if !report.is_empty() {
         say(report.table())?;
     }
-    let problems = frames.iter().flat_map(|frame| &frame.problems);
-    let damaged = problem::tell(problems, &models.broken);
+    let faults = frames.iter().flat_map(|frame| &frame.faults);
+    let damaged = problem::tell(faults, models.broken.values());
     if damaged > 0 {
         bail!("{damaged} files could not be used; their targets are in no figure");
     }

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use hybrid_icp::Recalls;
 use serde::Serialize;
 
+use super::calibration::Calibration;
 use super::judge::Judged;
 use super::median;
 
@@ -61,6 +62,9 @@ pub(crate) struct Report {
     pub(super) all: Summary,
     objects: BTreeMap<u32, Summary>,
     warnings: Vec<String>,
+    /// Whether the scores tell right from wrong, where asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) calibration: Option<Calibration>,
 }
 
 /// What was evaluated.
@@ -95,6 +99,7 @@ impl Report {
                 .map(|(id, targets)| (id, Summary::of(targets.into_iter())))
                 .collect(),
             warnings,
+            calibration: None,
         }
     }
 
@@ -145,6 +150,9 @@ impl Report {
                 "\n{} targets could not be judged and are in no figure",
                 self.left_out
             );
+        }
+        if let Some(calibration) = &self.calibration {
+            let _ = write!(text, "\n{}", calibration.table());
         }
         text
     }

@@ -6,13 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, bail};
-use hybrid_icp::{Isometry3, Termination, UnitQuaternion, Vector3};
+use hicp_bop::{Fate, Fault, FrameResult, RowResult};
+use hybrid_icp::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-
-use super::frame::Fate;
-use super::problem::Problem;
-use super::refine::{FrameResult, Refined};
-use crate::report;
 
 /// A file beside the output: a line that says which run it is of, then a line for every image that is done.
 ///
@@ -161,9 +157,9 @@ fn read_entry(line: &[u8]) -> Option<(usize, FrameResult)> {
     let line = line.strip_suffix(b"\n")?;
     let entry: Entry = serde_json::from_slice(line).ok()?;
     let rows = entry.rows.iter().map(|row| {
-        Some(Refined {
+        Some(RowResult {
             index: row.index,
-            fate: fate_of(&row.fate)?,
+            fate: Fate::parse(&row.fate)?,
             pose: row.pose.map(pose_of),
             mve: row.mve.map(|[a, b]| (f64::from_bits(a), f64::from_bits(b))),
         })
@@ -172,8 +168,8 @@ fn read_entry(line: &[u8]) -> Option<(usize, FrameResult)> {
     let result = FrameResult {
         rows: rows.collect::<Option<_>>()?,
         seconds: entry.seconds.map(f64::from_bits),
-        problems: problems
-            .map(|(missing, text)| Problem { missing, text })
+        faults: problems
+            .map(|(missing, text)| Fault { missing, text })
             .collect(),
     };
     Some((entry.frame, result))
@@ -181,13 +177,13 @@ fn read_entry(line: &[u8]) -> Option<(usize, FrameResult)> {
 
 impl Entry {
     fn of(frame: usize, result: &FrameResult) -> Self {
-        let row = |row: &Refined| Row {
+        let row = |row: &RowResult| Row {
             index: row.index,
-            fate: row.fate.describe(),
+            fate: row.fate.to_string(),
             pose: row.pose.map(|pose| bits_of(&pose)),
             mve: row.mve.map(|(a, b)| [a.to_bits(), b.to_bits()]),
         };
-        let problems = result.problems.iter();
+        let problems = result.faults.iter();
         Self {
             frame,
             seconds: result.seconds.map(f64::to_bits),
@@ -208,34 +204,6 @@ fn pose_of(bits: [u64; 7]) -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)
 }
 
-/// The fate that is described so.
-fn fate_of(text: &str) -> Option<Fate> {
-    let kept = [
-        Termination::Converged,
-        Termination::IterationLimit,
-        Termination::NoPairs,
-        Termination::PairsLost,
-        Termination::LossIncreased,
-        Termination::Degenerate,
-        Termination::Oscillating,
-        Termination::OutOfBounds,
-        Termination::Deadline,
-        Termination::Stopped,
-        Termination::ScoreNotImproved,
-    ];
-    let kept = kept.map(|reason| Fate::Kept(report::explain(reason)));
-    let fates = [
-        Fate::Refined,
-        Fate::MissingModel,
-        Fate::MissingFrame,
-        Fate::NoMask,
-        Fate::NoOverlap,
-        Fate::Damaged,
-    ];
-    let mut all = fates.into_iter().chain(kept);
-    all.find(|fate| fate.describe() == text)
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
@@ -243,7 +211,7 @@ mod tests {
 
     fn result() -> FrameResult {
         let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.7), Vector3::new(0.3, 2.0, -1.0));
-        let row = |index, fate, pose, mve| Refined {
+        let row = |index, fate, pose, mve| RowResult {
             index,
             fate,
             pose,
@@ -255,7 +223,7 @@ mod tests {
                 row(9, Fate::NoMask, None, None),
             ],
             seconds: Some(0.7 / 3.0),
-            problems: vec![Problem::damaged("a\n\"b\"".to_owned())],
+            faults: vec![Fault::damaged("a\n\"b\"".to_owned())],
         }
     }
 

@@ -2,15 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use hicp_bop::{Fault, FrameKey, Image, Scenes};
 use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::{
     Isometry3, Model, ModelPoints, N_TOLERANCES, PoseErrors, Rasterizer, RenderedView, Renderer,
     TargetErrors, bop_vsd, most_visible, spheres_overlap, top_estimates,
 };
-
-use super::images::{Image, Scenes};
-use super::problem::Problem;
-use super::targets::FrameKey;
 
 /// An object as the errors need it.
 pub(crate) struct EvaluatedObject<'a> {
@@ -37,7 +34,7 @@ pub(crate) struct JudgedFrame {
     pub(crate) targets: Vec<Judged>,
     /// Instances that the targets ask for and that could not be judged.
     pub(crate) left_out: usize,
-    pub(crate) problems: Vec<Problem>,
+    pub(crate) faults: Vec<Fault>,
     /// What does not fit, without harm to the errors.
     pub(crate) misfits: Vec<String>,
 }
@@ -70,11 +67,11 @@ impl Judge<'_> {
         wanted: &BTreeMap<u32, u32>,
     ) -> JudgedFrame {
         let mut judged = JudgedFrame::default();
-        let image = match self.scenes.read(frame.0, frame.1) {
+        let image = match self.scenes.read(frame) {
             Ok(image) => image,
-            Err(problem) => {
+            Err(fault) => {
                 judged.left_out = wanted.values().map(|count| *count as usize).sum();
-                judged.problems.push(problem);
+                judged.faults.push(fault);
                 return judged;
             }
         };
@@ -85,7 +82,7 @@ impl Judge<'_> {
                 judged.left_out += count;
                 continue;
             };
-            let truths = instances(image.scene, image.im_id, *obj_id, count);
+            let truths = instances(&image.scene, image.im_id, *obj_id, count);
             if truths.len() < count {
                 judged.misfits.push(format!(
                     "{}, $.{}: {} instances of object {obj_id}, but the targets ask for {count}; the others are left out",
@@ -103,7 +100,7 @@ impl Judge<'_> {
                 Ok(target) => judged.targets.push(target),
                 Err(text) => {
                     judged.left_out += n_truths;
-                    judged.problems.push(Problem::damaged(text));
+                    judged.faults.push(Fault::damaged(text));
                 }
             }
         }
@@ -113,7 +110,7 @@ impl Judge<'_> {
     fn target(
         &self,
         renders: &mut Renders,
-        image: &Image<'_>,
+        image: &Image,
         frame: FrameKey,
         (obj_id, object): (u32, &EvaluatedObject<'_>),
         (truths, count): (Vec<usize>, usize),
@@ -210,7 +207,7 @@ fn instances(scene: &Scene, im_id: u32, obj_id: u32, count: usize) -> Vec<usize>
 }
 
 /// Compares the size of the depth image with those of the colour image and the masks, by their headers.
-fn check_size(image: &Image<'_>, judged: &mut JudgedFrame) {
+fn check_size(image: &Image, judged: &mut JudgedFrame) {
     let expected = (image.depth.width(), image.depth.height());
     let n_instances = image.scene.ground_truth(image.im_id).map_or(0, <[_]>::len);
     let masks = (0..n_instances).map(|i| image.scene.visible_mask_path(image.im_id, i));
@@ -227,7 +224,7 @@ fn check_size(image: &Image<'_>, judged: &mut JudgedFrame) {
                 expected.1
             )),
             Ok(_) => {}
-            Err(error) => judged.misfits.push(super::problem::chain(&error)),
+            Err(error) => judged.misfits.push(hicp_bop::chain(&error)),
         }
     }
 }

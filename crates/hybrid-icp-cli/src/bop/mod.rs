@@ -1,19 +1,19 @@
 //! `hybrid-icp bop`: work on whole datasets.
 
+mod calibration;
 mod compare;
 mod errors_csv;
 mod eval;
 mod eval_report;
-mod frame;
 mod generate;
-mod images;
 mod journal;
 mod judge;
 mod models;
 mod objects;
 mod problem;
 mod refine;
-mod shard;
+mod refine_settings;
+mod refine_summary;
 mod targets;
 
 use anyhow::Context as _;
@@ -49,6 +49,14 @@ fn thread_pool(threads: Option<u16>, frames: usize) -> anyhow::Result<rayon::Thr
         .num_threads(threads.min(frames.max(1)))
         .build()
         .context("cannot start the threads")
+}
+
+/// Reads a number of an option.
+fn positive(text: &str) -> Result<f64, String> {
+    let value: Option<f64> = text.parse().ok();
+    value
+        .filter(|x| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| "expected a finite number above 0".to_owned())
 }
 
 /// A bar on a terminal; nothing where standard error is not one.

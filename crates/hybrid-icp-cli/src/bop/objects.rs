@@ -8,7 +8,7 @@ use hicp_io::{LengthUnit, read_mesh};
 use hicp_sim::Household;
 use hybrid_icp::Model;
 
-use super::models::Models;
+use super::models;
 
 /// Models with their ids, ascending.
 #[derive(Debug)]
@@ -34,8 +34,8 @@ impl Objects {
         let info = dir.join("models_info.json");
         let models = if info.is_file() {
             let ids: BTreeSet<u32> = hicp_io::bop::read_models_info(&info)?.into_keys().collect();
-            let read = Models::read(dir, &ids)?;
-            if let Some(broken) = read.broken.first() {
+            let read = models::read(dir, &ids)?;
+            if let Some(broken) = read.broken.values().next() {
                 bail!("{broken}");
             }
             read.by_id.into_iter().collect()

@@ -1,19 +1,13 @@
 //! What an evaluation asks for.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::bail;
+use hicp_bop::Targets;
 use hicp_io::IoError;
 use hicp_io::bop::{Dataset, Target, read_targets};
 
 use crate::terminal::warn;
-
-/// A scene and an image.
-pub(crate) type FrameKey = (u32, u32);
-
-/// How many instances of each object are asked for, by frame.
-pub(crate) type Targets = BTreeMap<FrameKey, BTreeMap<u32, u32>>;
 
 /// Name of the benchmark's own file.
 const TARGETS_FILE: &str = "test_targets_bop19.json";
@@ -39,6 +33,11 @@ pub(crate) fn choose(
             return Ok(of_ground_truth(dataset, split)?);
         }
     };
+    read(path)
+}
+
+/// Reads a file of targets.
+pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
     let mut targets = Targets::new();
     for Target {
         scene_id,

@@ -7,8 +7,15 @@ use std::str::FromStr;
 use hicp_io::bop::ResultRow;
 
 /// Part `index` of `count`, from 1: written `index/count`.
+///
+/// ```
+/// let shard: hicp_bop::Shard = "2/8".parse()?;
+/// assert_eq!(shard.to_string(), "2/8");
+/// assert!("0/8".parse::<hicp_bop::Shard>().is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shard {
+pub struct Shard {
     index: u32,
     count: u32,
 }
@@ -34,11 +41,11 @@ impl fmt::Display for Shard {
 
 /// What [`Shard::take`] leaves.
 #[derive(Debug)]
-pub(crate) struct Part {
+pub struct Part {
     /// The shard's rows, in the order of the file.
-    pub(crate) rows: Vec<ResultRow>,
+    pub rows: Vec<ResultRow>,
     /// Whether the rows of every image stand together in the whole file, so that the shards' rows one after the other have its order.
-    pub(crate) contiguous: bool,
+    pub contiguous: bool,
 }
 
 impl Shard {
@@ -47,7 +54,8 @@ impl Shard {
     /// Images are taken in the order of their first rows and never split. An image belongs to the shard into whose equal
     /// share of the rows its first row falls when the images are laid end to end. Every row is so in exactly one shard,
     /// whatever the order of the rows; a shard may be empty. Cost: O(rows).
-    pub(crate) fn take(self, rows: Vec<ResultRow>) -> Part {
+    #[must_use]
+    pub fn take(self, rows: Vec<ResultRow>) -> Part {
         let image = |row: &ResultRow| (row.scene_id, row.im_id);
         let mut ranks: HashMap<(u32, u32), usize> = HashMap::new();
         let mut counts: Vec<u64> = Vec::new();

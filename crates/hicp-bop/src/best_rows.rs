@@ -1,0 +1,103 @@
+//! The best rows of every image and object.
+
+use std::collections::BTreeMap;
+
+use hicp_io::bop::ResultRow;
+use hybrid_icp::top_estimates;
+
+use crate::frames::Targets;
+
+/// Keeps, of every object in every image, the rows with the best scores, in the order of the file.
+///
+/// Counts as the benchmark's toolkit does: with `targets`, rows of no target are dropped and `inst_count` rows of every
+/// target kept, so what is left is what an evaluation looks at; with `top`, no more than that many. Of equal scores the first
+/// is kept. With neither, all rows are. Cost: O(n log n).
+///
+/// ```
+/// use hicp_io::bop::ResultRow;
+/// use hybrid_icp::Isometry3;
+/// let row = |object, score| {
+///     let mut row = ResultRow::new(1, 2, object, Isometry3::identity());
+///     row.score = score;
+///     row
+/// };
+/// let rows = vec![row(5, 0.2), row(5, 0.9), row(7, 0.1), row(5, 0.9)];
+/// let kept = hicp_bop::best_rows(rows, Some(1), None);
+/// assert_eq!(kept, [row(5, 0.9), row(7, 0.1)]);
+/// ```
+#[must_use]
+pub fn best_rows(
+    rows: Vec<ResultRow>,
+    top: Option<usize>,
+    targets: Option<&Targets>,
+) -> Vec<ResultRow> {
+    if top.is_none() && targets.is_none() {
+        return rows;
+    }
+    let mut groups: BTreeMap<(u32, u32, u32), Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        let group = (row.scene_id, row.im_id, row.obj_id);
+        groups.entry(group).or_default().push(index);
+    }
+    let mut kept = vec![false; rows.len()];
+    for ((scene_id, im_id, obj_id), indices) in groups {
+        let wanted = targets.map_or(usize::MAX, |targets| {
+            let of_frame = targets.get(&(scene_id, im_id));
+            let count = of_frame.and_then(|objects| objects.get(&obj_id));
+            count.map_or(0, |count| *count as usize)
+        });
+        let scores: Vec<f64> = indices.iter().map(|index| rows[*index].score).collect();
+        for best in top_estimates(&scores, wanted.min(top.unwrap_or(usize::MAX))) {
+            kept[indices[best]] = true;
+        }
+    }
+    let rows = rows.into_iter().zip(kept);
+    rows.filter_map(|(row, kept)| kept.then_some(row)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hybrid_icp::Isometry3;
+
+    fn rows() -> Vec<ResultRow> {
+        let row = |(im_id, obj_id, score)| {
+            let mut row = ResultRow::new(1, im_id, obj_id, Isometry3::identity());
+            row.score = score;
+            row
+        };
+        [
+            (1, 5, 0.3),
+            (2, 5, 0.1),
+            (1, 5, 0.7),
+            (1, 6, 0.2),
+            (1, 5, 0.3),
+        ]
+        .map(row)
+        .to_vec()
+    }
+
+    fn kept(top: Option<usize>, targets: Option<&Targets>) -> Vec<(u32, u32, f64)> {
+        let kept = best_rows(rows(), top, targets);
+        let key = |row: &ResultRow| (row.im_id, row.obj_id, row.score);
+        kept.iter().map(key).collect()
+    }
+
+    #[test]
+    fn the_best_of_every_object_in_every_image_stay_in_order() {
+        assert_eq!(best_rows(rows(), None, None), rows());
+        assert_eq!(kept(Some(1), None), [(2, 5, 0.1), (1, 5, 0.7), (1, 6, 0.2)]);
+        // Of equals the first.
+        let best = best_rows(rows(), Some(2), None);
+        assert_eq!(best, [0, 1, 2, 3].map(|index| rows()[index].clone()));
+        assert_eq!(best_rows(rows(), Some(9), None), rows());
+    }
+
+    #[test]
+    fn targets_say_how_many_and_of_what() {
+        let targets = Targets::from([((1, 1), BTreeMap::from([(5, 2), (7, 1)]))]);
+        assert_eq!(kept(None, Some(&targets)), [(1, 5, 0.3), (1, 5, 0.7)]);
+        assert_eq!(kept(Some(1), Some(&targets)), [(1, 5, 0.7)]);
+        assert!(kept(None, Some(&Targets::new())).is_empty());
+    }
+}

@@ -1,0 +1,153 @@
+//! The refinement of an image's rows.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use hicp_io::bop::ResultRow;
+use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict};
+
+use crate::fate::Fate;
+use crate::frame::Frame;
+use crate::frames::FrameKey;
+use crate::mask_source::MaskSource;
+use crate::models::Models;
+use crate::result::{FrameResult, RowResult};
+use crate::scenes::Scenes;
+
+/// What all images of a dataset share: its models, its scenes, and where masks come from. Threads may share it, each with a
+/// [`Refiner`] of its own.
+#[derive(Debug)]
+pub struct DatasetRefiner {
+    /// The models of the objects that rows name.
+    pub models: Models,
+    /// The scenes.
+    pub scenes: Scenes,
+    /// Where masks come from.
+    pub masks: MaskSource,
+}
+
+impl DatasetRefiner {
+    /// Refines the rows of one image: `indices` are their places in `rows`, ascending ([`crate::frames_of`]).
+    ///
+    /// The rows of an object compete for its masks ([`crate::assign_masks`]); without segmentation each has its own
+    /// ([`crate::BoxMask`]). Never fails: a row that cannot be refined has a [`Fate`] that says why, and what is missing or
+    /// damaged is in the faults. But for the time, the result depends on the arguments alone. Memory: the image, the masks of
+    /// the objects that its rows name, and an observation per mask that is used.
+    pub fn frame(
+        &self,
+        refiner: &mut Refiner,
+        key: FrameKey,
+        rows: &[ResultRow],
+        indices: &[usize],
+    ) -> FrameResult {
+        let image = match self.scenes.read(key) {
+            Ok(image) => image,
+            Err(fault) => {
+                let fate = Fate::from(&fault);
+                let unrefined = indices.iter().map(|i| RowResult::unrefined(*i, fate));
+                return FrameResult {
+                    rows: unrefined.collect(),
+                    seconds: None,
+                    faults: vec![fault],
+                };
+            }
+        };
+        let mut work = Work {
+            frame: self.masks.frame(key, image),
+            refiner,
+            result: FrameResult::default(),
+        };
+        let mut by_object: BTreeMap<u32, Vec<(usize, Isometry3<f64>)>> = BTreeMap::new();
+        for index in indices {
+            let row = &rows[*index];
+            let of_object = by_object.entry(row.obj_id).or_default();
+            of_object.push((*index, row.camera_from_object()));
+        }
+        for (obj_id, of_object) in by_object {
+            match (self.models.by_id.get(&obj_id), &self.masks) {
+                (None, _) if self.models.broken.contains_key(&obj_id) => {
+                    work.leave(&of_object, Fate::Damaged);
+                }
+                (None, _) => work.leave(&of_object, Fate::MissingModel),
+                (Some(model), MaskSource::Box(by)) => {
+                    for (index, init) in of_object {
+                        let start = Instant::now();
+                        let observed = work.frame.observe_box(work.refiner, model, &init, by);
+                        match observed {
+                            Ok(observed) => {
+                                let row = refine(work.refiner, model, &observed, (index, &init));
+                                work.done(start, row);
+                            }
+                            Err(fate) => work.leave(&[(index, init)], fate),
+                        }
+                    }
+                }
+                (Some(model), _) => work.in_masks(model, obj_id, &of_object),
+            }
+        }
+        let mut result = work.result;
+        result.rows.sort_by_key(|row| row.index);
+        result.faults = work.frame.into_faults();
+        result
+    }
+}
+
+/// An image at work.
+struct Work<'a, 'r> {
+    frame: Frame<'a>,
+    refiner: &'r mut Refiner,
+    result: FrameResult,
+}
+
+impl Work<'_, '_> {
+    /// Refines the rows of an object, each in the mask that it is assigned.
+    fn in_masks(&mut self, model: &Model, obj_id: u32, rows: &[(usize, Isometry3<f64>)]) {
+        let poses: Vec<Isometry3<f64>> = rows.iter().map(|(_, init)| *init).collect();
+        let mut start = Instant::now();
+        let chosen = self.frame.choose(self.refiner, model, obj_id, &poses);
+        for ((index, init), mask) in rows.iter().zip(chosen) {
+            match mask.and_then(|mask| self.frame.observation(mask)) {
+                Ok(observation) => {
+                    let row = refine(self.refiner, model, observation, (*index, init));
+                    self.done(start, row);
+                    // The choice is counted once, with the first row that it is for.
+                    start = Instant::now();
+                }
+                Err(fate) => self.leave(&[(*index, *init)], fate),
+            }
+        }
+    }
+
+    fn done(&mut self, start: Instant, row: RowResult) {
+        *self.result.seconds.get_or_insert(0.0) += start.elapsed().as_secs_f64();
+        self.result.rows.push(row);
+    }
+
+    fn leave(&mut self, rows: &[(usize, Isometry3<f64>)], fate: Fate) {
+        let left = rows
+            .iter()
+            .map(|(index, _)| RowResult::unrefined(*index, fate));
+        self.result.rows.extend(left);
+    }
+}
+
+/// Refines a row in an observation.
+fn refine(
+    refiner: &mut Refiner,
+    model: &Model,
+    observation: &Observation,
+    (index, init): (usize, &Isometry3<f64>),
+) -> RowResult {
+    let refinement = refiner.refine(model, observation, init);
+    let outcome = &refinement.outcome;
+    let (fate, pose) = match outcome.verdict {
+        Verdict::Refined => (Fate::Refined, Some(outcome.camera_from_object)),
+        Verdict::KeptInitial(reason) => (Fate::Kept(reason), None),
+    };
+    RowResult {
+        index,
+        fate,
+        pose,
+        mve: Some((refinement.mve_initial, refinement.mve)),
+    }
+}

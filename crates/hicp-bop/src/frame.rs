@@ -1,0 +1,257 @@
+//! The masks of an image, and what each cuts out of it.
+
+use hicp_io::bop::{Detection, Rle};
+use hybrid_icp::{Isometry3, Mask, Model, Observation, Refiner};
+
+use crate::assignment::assign_masks;
+use crate::box_mask::BoxMask;
+use crate::fate::Fate;
+use crate::fault::Fault;
+use crate::scenes::Image;
+
+/// An image while its rows are refined: its depth read once, a mask read when a row of its object asks for it, an observation
+/// made when a row is refined in it.
+#[derive(Debug)]
+pub struct Frame<'a> {
+    image: Image,
+    masks: Vec<Candidate<'a>>,
+    faults: Vec<Fault>,
+}
+
+/// A mask that rows of an object may be refined in.
+#[derive(Debug)]
+struct Candidate<'a> {
+    obj_id: u32,
+    source: Source<'a>,
+    seen: Seen,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Source<'a> {
+    /// The visible mask of an instance, by its index in the ground truth.
+    Instance(usize),
+    /// A detection's run-length code.
+    Code(&'a Rle),
+}
+
+/// What is known of a mask.
+#[derive(Debug)]
+enum Seen {
+    /// Nobody asked for it yet.
+    Unread,
+    /// It is not there or cannot be used.
+    Unusable(Fate),
+    Read(Mask),
+    Observed(Box<Observation>),
+}
+
+impl<'a> Frame<'a> {
+    /// An image whose masks are the visible masks of its ground truth; without ground truth it has none.
+    #[must_use]
+    pub fn with_visible_masks(image: Image) -> Self {
+        let truths = image.scene.ground_truth(image.im_id).unwrap_or_default();
+        let masks = truths.iter().enumerate();
+        let masks = masks.map(|(instance, truth)| (truth.obj_id, Source::Instance(instance)));
+        let masks = candidates(masks);
+        Self::new(image, masks)
+    }
+
+    /// An image whose masks are the segmentations of detections; those without one are of no use and no harm.
+    #[must_use]
+    pub fn with_detections(image: Image, detections: &'a [Detection]) -> Self {
+        let coded = detections.iter();
+        let coded = coded.filter_map(|d| Some((d.category_id, d.segmentation.as_ref()?)));
+        let masks = candidates(coded.map(|(obj_id, code)| (obj_id, Source::Code(code))));
+        Self::new(image, masks)
+    }
+
+    /// An image without masks, for [`Frame::observe_box`].
+    #[must_use]
+    pub fn without_masks(image: Image) -> Self {
+        Self::new(image, Vec::new())
+    }
+
+    fn new(image: Image, masks: Vec<Candidate<'a>>) -> Self {
+        Self {
+            image,
+            masks,
+            faults: Vec::new(),
+        }
+    }
+
+    /// The image.
+    #[must_use]
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// Masks that could not be used, as far as rows asked for them.
+    #[must_use]
+    pub fn into_faults(self) -> Vec<Fault> {
+        self.faults
+    }
+
+    /// Chooses a mask for every pose of an object, as [`assign_masks`] does; or says why a pose has none.
+    ///
+    /// The masks returned are for [`Frame::observation`]. Cost: a render per pose and O(silhouette) per mask. The renderer's cache
+    /// keeps the last few, so that the refinement of a single pose begins with the render that chose its mask.
+    pub fn choose(
+        &mut self,
+        refiner: &mut Refiner,
+        model: &Model,
+        obj_id: u32,
+        poses: &[Isometry3<f64>],
+    ) -> Vec<Result<usize, Fate>> {
+        let mut usable = Vec::new();
+        let mut fate = Fate::NoMask;
+        for index in 0..self.masks.len() {
+            if self.masks[index].obj_id == obj_id {
+                match self.read(index) {
+                    Ok(()) => {
+                        usable.push(index);
+                        fate = fate.max(Fate::NoOverlap);
+                    }
+                    Err(unusable) => fate = fate.max(unusable),
+                }
+            }
+        }
+        let overlaps: Vec<Vec<u64>> = poses
+            .iter()
+            .map(|pose| self.overlaps(refiner, model, pose, &usable))
+            .collect();
+        let chosen = assign_masks(&overlaps).into_iter();
+        chosen
+            .map(|place| place.map(|place| usable[place]).ok_or(fate))
+            .collect()
+    }
+
+    /// Returns what a mask cuts out of the image, made when it is first asked for.
+    ///
+    /// # Errors
+    ///
+    /// The fate of rows in a mask that cannot be used; [`Frame::choose`] returns no such mask.
+    pub fn observation(&mut self, mask: usize) -> Result<&Observation, Fate> {
+        self.read(mask)?;
+        let seen = &mut self.masks[mask].seen;
+        if matches!(seen, Seen::Read(_))
+            && let Seen::Read(read) = std::mem::replace(seen, Seen::Unusable(Fate::Damaged))
+        {
+            match Observation::new(self.image.depth.clone(), read, self.image.camera) {
+                Ok(observation) => *seen = Seen::Observed(Box::new(observation)),
+                Err(error) => self.faults.push(Fault::damaged(error.to_string())),
+            }
+        }
+        match &self.masks[mask].seen {
+            Seen::Observed(observation) => Ok(observation),
+            Seen::Unusable(fate) => Err(*fate),
+            Seen::Unread | Seen::Read(_) => Err(Fate::NoMask),
+        }
+    }
+
+    /// Makes the observation of an estimate that has no mask but the box about it.
+    ///
+    /// # Errors
+    ///
+    /// [`Fate::NothingMeasured`] where the mask is empty.
+    pub fn observe_box(
+        &self,
+        refiner: &mut Refiner,
+        model: &Model,
+        pose: &Isometry3<f64>,
+        by: &BoxMask,
+    ) -> Result<Observation, Fate> {
+        let Image { depth, camera, .. } = &self.image;
+        let view = refiner.workspace_mut().view(model, camera, pose);
+        let mask = by.mask(view, (depth, camera), model, pose);
+        let mask = mask.ok_or(Fate::NothingMeasured)?;
+        // The mask has the size of the depth image, and so has the camera.
+        Observation::new(depth.clone(), mask, *camera).map_err(|_| Fate::Damaged)
+    }
+
+    /// Makes sure that a mask is read.
+    fn read(&mut self, index: usize) -> Result<(), Fate> {
+        if matches!(self.masks[index].seen, Seen::Unread) {
+            let seen = match self.mask_of(self.masks[index].source) {
+                Ok(mask) => Seen::Read(mask),
+                // An instance whose mask is not there is one without a mask.
+                Err(fault) if fault.missing => Seen::Unusable(Fate::NoMask),
+                Err(fault) => {
+                    self.faults.push(fault);
+                    Seen::Unusable(Fate::Damaged)
+                }
+            };
+            self.masks[index].seen = seen;
+        }
+        match &self.masks[index].seen {
+            Seen::Unusable(fate) => Err(*fate),
+            _ => Ok(()),
+        }
+    }
+
+    fn mask_of(&self, source: Source<'_>) -> Result<Mask, Fault> {
+        let Image { scene, im_id, .. } = &self.image;
+        let (mask, name) = match source {
+            Source::Instance(instance) => {
+                let mask = scene.read_visible_mask(*im_id, instance);
+                let path = scene.visible_mask_path(*im_id, instance);
+                (mask.map_err(|e| Fault::of(&e))?, path.display().to_string())
+            }
+            Source::Code(code) => (
+                code.to_mask(),
+                format!("a segmentation of image {im_id} in --detections"),
+            ),
+        };
+        let depth = &self.image.depth;
+        if (mask.width(), mask.height()) == (depth.width(), depth.height()) {
+            return Ok(mask);
+        }
+        let path = scene.depth_path(*im_id);
+        let path = path.map_or_else(|e| e.to_string(), |path| path.display().to_string());
+        Err(Fault::damaged(format!(
+            "{name} is {}x{} pixels but {path} is {}x{}, expected the same size",
+            mask.width(),
+            mask.height(),
+            depth.width(),
+            depth.height(),
+        )))
+    }
+
+    /// Returns how many pixels of each mask the model covers at a pose.
+    fn overlaps(
+        &self,
+        refiner: &mut Refiner,
+        model: &Model,
+        pose: &Isometry3<f64>,
+        masks: &[usize],
+    ) -> Vec<u64> {
+        let camera = &self.image.camera;
+        let view = refiner.workspace_mut().view(model, camera, pose);
+        let region = view.region();
+        let masks = masks.iter().map(|index| match &self.masks[*index].seen {
+            Seen::Read(mask) => Some(mask),
+            Seen::Observed(observation) => Some(observation.mask()),
+            Seen::Unread | Seen::Unusable(_) => None,
+        });
+        masks
+            .map(|mask| {
+                let Some(mask) = mask else { return 0 };
+                let pixels = (region.v_min..region.v_max)
+                    .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)));
+                let covered = pixels.zip(view.depth());
+                let both =
+                    covered.filter(|((u, v), z)| **z > 0.0 && mask.get(*u, *v) == Some(true));
+                both.count() as u64
+            })
+            .collect()
+    }
+}
+
+fn candidates<'a>(masks: impl Iterator<Item = (u32, Source<'a>)>) -> Vec<Candidate<'a>> {
+    masks
+        .map(|(obj_id, source)| Candidate {
+            obj_id,
+            source,
+            seen: Seen::Unread,
+        })
+        .collect()
+}

@@ -1,0 +1,67 @@
+//! Refining the rows of BOP result files, image by image: what `hybrid-icp bop refine` does, without its threads, its journal
+//! and its terminal.
+//!
+//! **Should you use this crate?** To refine whole result files from a program of your own, a queue or a cluster: yes; it reads
+//! rows, groups them by image, gives each row a mask, refines, and enters the results into the rows. From a shell,
+//! `hybrid-icp bop refine` is the same and keeps a journal. For single poses, use `hybrid-icp`; to read datasets only, `hicp-io`.
+//!
+//! ```no_run
+//! use hicp_bop::{DatasetRefiner, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of};
+//! use hicp_io::bop::{Dataset, read_results, write_results};
+//! use hybrid_icp::{Preset, Refiner};
+//! # fn main() -> Result<(), hicp_io::IoError> {
+//! let mut rows = read_results("estimates_ycbv-test.csv")?;
+//! let dataset = Dataset::open("bop/ycbv")?;
+//! let objects = rows.iter().map(|row| row.obj_id).collect();
+//! let shared = DatasetRefiner {
+//!     models: Models::read(&ModelFolder::open(dataset.models_dir()?)?, &objects),
+//!     scenes: Scenes::new(&dataset, "test", 2),
+//!     masks: MaskSource::Visible,
+//! };
+//! // One refiner per thread; images may be refined in any order.
+//! let mut refiner = Refiner::preset(Preset::Hybrid);
+//! for (frame, indices) in frames_of(&rows) {
+//!     let result = shared.frame(&mut refiner, frame, &rows, &indices);
+//!     result.enter(&mut rows, Rescore::Mve, true);
+//! }
+//! write_results("refined_ycbv-test.csv", &rows)?;
+//! # Ok(()) }
+//! ```
+//!
+//! Nothing here starts threads, prints or writes. What is missing or damaged costs the rows that need it and is told in the
+//! result ([`Fate`], [`Fault`]).
+//!
+//! Modules in reading order, by file: `dataset_refiner` (the refinement of an image's rows), `result`, `fate`, `fault` (what
+//! comes of them), `frames`, `best_rows`, `shard` (which rows), `models`, `scenes` (what is read), `mask_source`, `frame`,
+//! `assignment`, `box_mask` (in which mask).
+
+// Counts of pixels become floating point numbers; all are far below 2⁵³.
+#![allow(clippy::cast_precision_loss)]
+
+mod assignment;
+mod best_rows;
+mod box_mask;
+mod dataset_refiner;
+mod fate;
+mod fault;
+mod frame;
+mod frames;
+mod mask_source;
+mod models;
+mod result;
+mod scenes;
+mod shard;
+
+pub use assignment::assign_masks;
+pub use best_rows::best_rows;
+pub use box_mask::BoxMask;
+pub use dataset_refiner::DatasetRefiner;
+pub use fate::Fate;
+pub use fault::{Fault, chain};
+pub use frame::Frame;
+pub use frames::{FrameKey, FrameRows, Targets, detections_by_frame, frames_of};
+pub use mask_source::MaskSource;
+pub use models::{ModelFolder, Models};
+pub use result::{FrameResult, Rescore, RowResult};
+pub use scenes::{Image, Scenes};
+pub use shard::{Part, Shard};

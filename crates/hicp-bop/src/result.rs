@@ -1,0 +1,85 @@
+//! What a refinement of rows returns, and how it is entered into the file's rows.
+
+use hicp_io::bop::ResultRow;
+use hybrid_icp::Isometry3;
+
+use crate::fate::Fate;
+use crate::fault::Fault;
+
+/// What became of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowResult {
+    /// Its place among the rows that were given.
+    pub index: usize,
+    /// What became of it.
+    pub fate: Fate,
+    /// `camera_from_object`, metres, where it is another than the row's.
+    pub pose: Option<Isometry3<f64>>,
+    /// MVE of the row's pose and of the result's; `None` if it did not get as far as the pipeline.
+    pub mve: Option<(f64, f64)>,
+}
+
+impl RowResult {
+    /// A row that did not get as far as the pipeline.
+    #[must_use]
+    pub fn unrefined(index: usize, fate: Fate) -> Self {
+        Self {
+            index,
+            fate,
+            pose: None,
+            mve: None,
+        }
+    }
+}
+
+/// All rows of an image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameResult {
+    /// One per row, in the order of the rows.
+    pub rows: Vec<RowResult>,
+    /// Spent on its rows, seconds; `None` if none got as far as the pipeline.
+    pub seconds: Option<f64>,
+    /// Files that were missing or damaged.
+    pub faults: Vec<Fault>,
+}
+
+/// What becomes the score of a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rescore {
+    /// The row's own score.
+    #[default]
+    Keep,
+    /// 1 − MVE of the row's pose in the output; 0 for a row without an MVE.
+    Mve,
+}
+
+impl FrameResult {
+    /// Enters the poses, scores and the time of an image, the same for all of its rows, into the rows that were given.
+    ///
+    /// The time is added to the largest that these rows state; `timed` false writes it as unknown, so that the same input
+    /// gives the same bytes. Places beyond `rows` are ignored.
+    pub fn enter(&self, rows: &mut [ResultRow], rescore: Rescore, timed: bool) {
+        let own = self
+            .rows
+            .iter()
+            .filter_map(|refined| rows.get(refined.index));
+        let stated = own.filter_map(|row| row.time_s).reduce(f64::max);
+        let time_s = match self.seconds {
+            _ if !timed => None,
+            Some(seconds) => Some(stated.unwrap_or(0.0) + seconds),
+            None => stated,
+        };
+        for refined in &self.rows {
+            let Some(row) = rows.get_mut(refined.index) else {
+                continue;
+            };
+            row.time_s = time_s;
+            if let Some(pose) = refined.pose {
+                row.set_camera_from_object(pose);
+            }
+            if rescore == Rescore::Mve {
+                row.score = refined.mve.map_or(0.0, |(_, mve)| 1.0 - mve);
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! What a `bop refine` tells at its end.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::bail;
+use hicp_bop::{Fate, FrameResult, Models};
+
+use super::{median, problem};
+
+/// What the summary says of the run.
+pub(super) struct Told<'a> {
+    pub(super) output: &'a Path,
+    pub(super) seconds: f64,
+    pub(super) threads: usize,
+    /// Images whose results were in the journal.
+    pub(super) resumed: usize,
+}
+
+impl Told<'_> {
+    /// Counts the rows by what became of them.
+    pub(super) fn summary(&self, results: &[FrameResult], models: &Models) -> String {
+        let rows = || results.iter().flat_map(|result| &result.rows);
+        let mut text = format!(
+            "{}: {} rows of {} frames in {:.1} s on {} threads",
+            self.output.display(),
+            rows().count(),
+            results.len(),
+            self.seconds,
+            self.threads,
+        );
+        // Writing to a string does not fail.
+        if self.resumed > 0 {
+            let _ = write!(text, ", {} frames from the journal", self.resumed);
+        }
+        let mut counts: BTreeMap<Fate, usize> = BTreeMap::new();
+        for row in rows() {
+            *counts.entry(row.fate).or_default() += 1;
+        }
+        for (fate, count) in &counts {
+            let _ = write!(text, "\n  {count:>7}  {fate}");
+            if *fate == Fate::MissingModel {
+                let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
+                let _ = write!(text, " (object {})", ids.join(", "));
+            }
+        }
+        let (mut before, mut after): (Vec<f64>, Vec<f64>) =
+            rows().filter_map(|row| row.mve).unzip();
+        if let (Some(before), Some(after)) = (median(&mut before), median(&mut after)) {
+            let _ = write!(text, "\n  median MVE {before:.3} -> {after:.3}");
+        }
+        text
+    }
+}
+
+/// Mean seconds per pose that got as far as the pipeline, `None` without any.
+pub(super) fn mean_seconds(results: &[FrameResult]) -> Option<f64> {
+    let spent: f64 = results.iter().filter_map(|result| result.seconds).sum();
+    let rows = results.iter().flat_map(|result| &result.rows);
+    let poses = rows.filter(|row| row.mve.is_some()).count();
+    (poses > 0).then(|| spent / poses as f64)
+}
+
+/// Warns of what is missing, and fails where something is damaged or nothing is there.
+///
+/// `files` are the input, the output, and the folder of the images.
+pub(super) fn report_faults(
+    (input, output, images): (&Path, &Path, &Path),
+    models: &Models,
+    results: &[FrameResult],
+) -> anyhow::Result<()> {
+    let faults = results.iter().flat_map(|result| &result.faults);
+    let damaged = problem::tell(faults, models.broken.values());
+    if damaged > 0 {
+        bail!(
+            "{damaged} files could not be used; their rows are in {} unchanged",
+            output.display()
+        );
+    }
+    let mut rows = results.iter().flat_map(|result| &result.rows);
+    if !results.is_empty() && rows.all(|row| row.fate == Fate::MissingFrame) {
+        bail!(
+            "{}: none of its frames is in {}, expected --dataset and --split to name the images that it was made for",
+            input.display(),
+            images.display()
+        );
+    }
+    Ok(())
+}
