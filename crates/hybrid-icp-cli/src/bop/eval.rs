@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::bop::{Dataset, ResultRow};
-use hybrid_icp::ModelPoints;
 use rayon::prelude::*;
 
 use super::eval_report::{Report, Subject, Summary};
 use super::images::Scenes;
-use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
+use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders, rows_of_frames};
 use super::models::Models;
 use super::targets::{self, FrameKey, Targets};
 use super::{errors_csv, problem, progress_bar, thread_pool};
@@ -69,9 +68,9 @@ is damaged or nothing could be judged (what could be judged is still told);
 2 the command line is wrong.";
 
 /// The benchmark's visibility tolerance.
-const DELTA_MM: f64 = 15.0;
+pub(super) const DELTA_MM: f64 = 15.0;
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     let value: Option<f64> = text.parse().ok();
     value
         .filter(|x| x.is_finite() && *x > 0.0)
@@ -86,6 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// What an evaluation found.
 pub(super) struct Evaluation {
     pub(super) all: Summary,
+    pub(super) objects: BTreeMap<u32, Summary>,
     /// ADI of the estimates that were looked at to the nearest instance of their target, metres, by their row.
     pub(super) adi_m: BTreeMap<usize, f64>,
 }
@@ -137,10 +137,10 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let models = pool.install(|| Models::read(&models_dir, &objects))?;
 
     let judge = Judge {
-        objects: evaluated(arguments, &models),
+        objects: EvaluatedObject::of_models(&models, arguments.symmetric.as_deref()),
         scenes: &scenes,
         rows: &rows,
-        rows_of: rows_of(&rows),
+        rows_of: rows_of_frames(&rows),
         delta: 1e-3 * arguments.delta,
     };
     let frames: Vec<(&FrameKey, &BTreeMap<u32, u32>)> = targets.iter().collect();
@@ -157,33 +157,6 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     });
     progress.finish_and_clear();
     report(arguments, &rows, &targets, &models, &judged)
-}
-
-/// Prepares the objects for their errors.
-fn evaluated<'a>(arguments: &Arguments, models: &'a Models) -> BTreeMap<u32, EvaluatedObject<'a>> {
-    let of = |(id, model)| {
-        let points = ModelPoints::new(model);
-        let symmetric = match &arguments.symmetric {
-            Some(ids) => ids.contains(id),
-            None => points.is_symmetric(),
-        };
-        let object = EvaluatedObject {
-            model,
-            points,
-            symmetric,
-        };
-        (*id, object)
-    };
-    models.by_id.iter().map(of).collect()
-}
-
-fn rows_of(rows: &[ResultRow]) -> BTreeMap<FrameKey, Vec<usize>> {
-    let mut by_frame: BTreeMap<FrameKey, Vec<usize>> = BTreeMap::new();
-    for (index, row) in rows.iter().enumerate() {
-        let frame = (row.scene_id, row.im_id);
-        by_frame.entry(frame).or_default().push(index);
-    }
-    by_frame
 }
 
 /// Tells and writes what was found.
@@ -237,6 +210,7 @@ fn report(
     }
     Ok(Evaluation {
         all: report.all,
+        objects: report.objects,
         adi_m,
     })
 }
@@ -283,12 +257,8 @@ fn misfits(
             "{results}: {beyond} rows beyond the number of instances of their target are not looked at, those with the lowest scores"
         ));
     }
-    if !models.missing.is_empty() {
-        let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
-        warnings.push(format!(
-            "the dataset has no model of object {}; its targets are left out",
-            ids.join(", ")
-        ));
+    if let Some(text) = models.tell_missing() {
+        warnings.push(format!("{text}; its targets are left out"));
     }
     let of_frames: Vec<&String> = frames.iter().flat_map(|frame| &frame.misfits).collect();
     warnings.extend(

@@ -59,7 +59,7 @@ pub(crate) struct Report {
     left_out: usize,
     #[serde(flatten)]
     pub(super) all: Summary,
-    objects: BTreeMap<u32, Summary>,
+    pub(super) objects: BTreeMap<u32, Summary>,
     warnings: Vec<String>,
 }
 

@@ -12,7 +12,7 @@ use super::problem::Problem;
 pub(crate) struct Scenes(BTreeMap<u32, Result<Scene, Problem>>);
 
 /// An image with what the files say of it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Image<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) im_id: u32,

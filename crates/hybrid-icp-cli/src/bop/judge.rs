@@ -9,6 +9,7 @@ use hybrid_icp::{
 };
 
 use super::images::{Image, Scenes};
+use super::models::Models;
 use super::problem::Problem;
 use super::targets::FrameKey;
 
@@ -18,6 +19,36 @@ pub(crate) struct EvaluatedObject<'a> {
     pub(crate) points: ModelPoints,
     /// Whether AD is ADI.
     pub(crate) symmetric: bool,
+}
+
+impl<'a> EvaluatedObject<'a> {
+    /// Prepares models for their errors; AD is ADI for the objects named, if not given for those with declared symmetries.
+    pub(crate) fn of_models(models: &'a Models, symmetric: Option<&[u32]>) -> BTreeMap<u32, Self> {
+        let of = |(id, model)| {
+            let points = ModelPoints::new(model);
+            let symmetric = match symmetric {
+                Some(ids) => ids.contains(id),
+                None => points.is_symmetric(),
+            };
+            let object = Self {
+                model,
+                points,
+                symmetric,
+            };
+            (*id, object)
+        };
+        models.by_id.iter().map(of).collect()
+    }
+}
+
+/// Returns where the rows of each frame stand in a result file.
+pub(crate) fn rows_of_frames(rows: &[ResultRow]) -> BTreeMap<FrameKey, Vec<usize>> {
+    let mut by_frame: BTreeMap<FrameKey, Vec<usize>> = BTreeMap::new();
+    for (index, row) in rows.iter().enumerate() {
+        let frame = (row.scene_id, row.im_id);
+        by_frame.entry(frame).or_default().push(index);
+    }
+    by_frame
 }
 
 /// A target with its errors, and which row and which instance each of them is of.
@@ -110,7 +141,9 @@ impl Judge<'_> {
         judged
     }
 
-    fn target(
+    /// Judges the `count` estimates of an object with the best scores against instances, given as indices into the image's
+    /// ground truth.
+    pub(crate) fn target(
         &self,
         renders: &mut Renders,
         image: &Image<'_>,

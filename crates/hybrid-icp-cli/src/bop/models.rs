@@ -1,7 +1,7 @@
 //! The models of a dataset's objects.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hicp_io::bop::{Dataset, ModelInfo, read_models_info};
 use hicp_io::{IoError, LengthUnit, read_mesh};
@@ -15,6 +15,8 @@ use super::problem::chain;
 pub(crate) struct Models {
     /// Those that can be used.
     pub(crate) by_id: BTreeMap<u32, Model>,
+    /// The folder that they were read from.
+    dir: PathBuf,
     /// Objects that the dataset has no model of.
     pub(crate) missing: Vec<u32>,
     /// What is wrong with the others.
@@ -37,6 +39,7 @@ impl Models {
             .collect();
         let mut models = Self {
             by_id: BTreeMap::new(),
+            dir: dir.to_owned(),
             missing: Vec::new(),
             broken: Vec::new(),
         };
@@ -50,6 +53,17 @@ impl Models {
             }
         }
         Ok(models)
+    }
+
+    /// Tells which objects there is no model of, and where the first was looked for.
+    pub(crate) fn tell_missing(&self) -> Option<String> {
+        let first = Dataset::model_path_in(&self.dir, *self.missing.first()?);
+        let ids: Vec<String> = self.missing.iter().map(u32::to_string).collect();
+        Some(format!(
+            "the dataset has no model of object {}, expected {}",
+            ids.join(", "),
+            first.display()
+        ))
     }
 }
 
