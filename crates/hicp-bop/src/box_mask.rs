@@ -70,7 +70,8 @@ impl BoxMask {
             .iter()
             .zip(model.mesh().used_vertices());
         let offsets = vertices
-            .filter_map(|(vertex, used)| used.then(|| (vertex.cast::<f64>() - center).abs()));
+            .filter(|(_, used)| *used)
+            .map(|(vertex, _)| (vertex.cast::<f64>() - center).abs());
         let half = offsets.fold(Vector3::zeros(), |half: Vector3<f64>, offset| {
             half.sup(&offset)
         });

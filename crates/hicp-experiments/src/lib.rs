@@ -30,7 +30,7 @@
 //!
 //! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
 //! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
-//! differences), `claims` (the paper's, tested), `figure`, `tables`, `report`; `sequential` (the study of trajectories:
+//! differences), `claims` (the paper's, tested), `figure`, `html`, `tables`, `report`; `sequential` (the study of trajectories:
 //! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), and `clock`, `error`.
 
 // Counts and indices of rows become floating point numbers.
@@ -43,6 +43,7 @@ mod config;
 mod error;
 mod experiment;
 mod figure;
+mod html;
 mod report;
 mod row;
 mod runner;
@@ -62,6 +63,7 @@ pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};
 pub use error::ExperimentError;
 pub use experiment::{Condition, Experiment};
 pub use figure::{Curve, Figure, Panel};
+pub use html::{Table, escaped as html_escaped, page as html_page};
 pub use report::Report;
 pub use row::{COLUMNS, Measured, Row};
 pub use sequential::{

@@ -10,8 +10,9 @@ use crate::claims::{Claim, claims};
 use crate::error::ExperimentError;
 use crate::experiment::Experiment;
 use crate::figure::Figure;
+use crate::html::{Table, escaped, page};
 use crate::study::Study;
-use crate::tables::{self, Table, escaped};
+use crate::tables;
 
 /// What a report says, before it is written.
 #[derive(Debug)]
@@ -93,10 +94,7 @@ impl Report {
     }
 
     fn html(&self, figures: &[(bool, String)]) -> String {
-        let mut text = HEAD.replace("TITLE", "The single-image studies of Hybrid ICP, rerun");
-        text.push_str(
-            "<h1>The single-image studies of Hybrid ICP, rerun</h1>\n<h2>What was run</h2>\n",
-        );
+        let mut text = String::from("<h2>What was run</h2>\n");
         text.push_str(&self.what_was_run().html());
         let _ = writeln!(
             text,
@@ -130,8 +128,8 @@ impl Report {
         }
         text.push_str("<h2>Differences of the mean VSD, by group</h2>\n<details><summary>All paired differences</summary>\n");
         text.push_str(&tables::differences(&self.analyses).html());
-        text.push_str("</details>\n</body>\n</html>\n");
-        text
+        text.push_str("</details>\n");
+        page("The single-image studies of Hybrid ICP, rerun", &text)
     }
 
     fn what_was_run(&self) -> Table {
@@ -208,20 +206,3 @@ fn by(experiment: Experiment) -> &'static str {
         _ => experiment.level_title(),
     }
 }
-
-/// The head of a page; TITLE stands for its title.
-pub(crate) const HEAD: &str = "<!DOCTYPE html>
-<html lang=\"en\">
-<head>
-<meta charset=\"utf-8\">
-<title>TITLE</title>
-<style>
-body { font: 15px/1.45 sans-serif; margin: 2em auto; max-width: 1440px; padding: 0 1em; color: #222 }
-table { border-collapse: collapse; margin: 1em 0; font-size: 13px; font-variant-numeric: tabular-nums }
-th, td { border: 1px solid #ccc; padding: 3px 7px; text-align: left; vertical-align: top }
-th { background: #f2f2f2 }
-figure { margin: 0; overflow-x: auto }
-</style>
-</head>
-<body>
-";

@@ -1,58 +1,8 @@
-//! The tables of a report, as CSV and as HTML.
-
-use std::fmt::Write as _;
+//! The tables of a report.
 
 use crate::analysis::{Analysis, Interval, Metric};
 use crate::claims::{Claim, TABLE_I};
-
-/// A table: a heading, and rows of as many fields.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Table {
-    pub(crate) head: Vec<String>,
-    pub(crate) rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    fn new(head: &[&str]) -> Self {
-        Self {
-            head: head.iter().map(|h| (*h).to_owned()).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    pub(crate) fn csv(&self) -> Vec<u8> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        for row in std::iter::once(&self.head).chain(&self.rows) {
-            // A vector takes everything, and all rows are of one length.
-            let _ = writer.write_record(row);
-        }
-        writer.into_inner().unwrap_or_default()
-    }
-
-    pub(crate) fn html(&self) -> String {
-        let mut text = String::from("<table>\n<tr>");
-        for head in &self.head {
-            let _ = write!(text, "<th>{}</th>", escaped(head));
-        }
-        text.push_str("</tr>\n");
-        for row in &self.rows {
-            text.push_str("<tr>");
-            for field in row {
-                let _ = write!(text, "<td>{}</td>", escaped(field));
-            }
-            text.push_str("</tr>\n");
-        }
-        text.push_str("</table>\n");
-        text
-    }
-}
-
-/// Text as it is written in HTML.
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-}
+use crate::html::Table;
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value

@@ -4,6 +4,7 @@
 
 mod bop;
 mod choice;
+mod contour;
 mod demo;
 mod doubts;
 mod experiment;
@@ -16,6 +17,7 @@ mod replay;
 mod report;
 mod sequential;
 mod terminal;
+mod text;
 mod trace_lines;
 
 use std::process::ExitCode;
@@ -41,6 +43,8 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
+  hybrid-icp bop show --dataset bop/ycbv --scene 50 --image 1 \\
+      --results out.csv --against in.csv --out 50-1.png
   hybrid-icp pipelines
   hybrid-icp objects --out objects
   hybrid-icp experiment init-noise --poses 30

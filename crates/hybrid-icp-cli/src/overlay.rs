@@ -1,6 +1,10 @@
-//! A depth image with the outlines of a model drawn on it.
+//! A picture of an image, with the outlines of models drawn on it.
 
-use hybrid_icp::{DepthImage, Isometry3, Model, Observation, Problem, Refiner};
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Refiner, RenderedView,
+};
+
+use crate::contour::contours;
 
 /// A colour, 8 bits per channel.
 pub(crate) type Rgb = [u8; 3];
@@ -9,6 +13,37 @@ pub(crate) type Rgb = [u8; 3];
 pub(crate) const BEFORE: Rgb = [230, 159, 0];
 /// Sky blue: the pose after.
 pub(crate) const AFTER: Rgb = [86, 180, 233];
+
+/// Sides of pixels that a dash is long, and that lie between two.
+const DASH: (usize, usize) = (7, 5);
+/// How much of a line is seen where something hides the model.
+const FAINT: f32 = 0.4;
+/// How much darker the pixels beside a line become, so that it stands out from any colour.
+const SHADE: f32 = 0.55;
+
+/// How much darker a surface is that is seen from the side.
+const TURNED: f32 = 0.6;
+
+/// How an outline is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) color: Rgb,
+    pub(crate) dashed: bool,
+}
+
+impl Line {
+    pub(crate) fn solid(color: Rgb) -> Self {
+        Self {
+            color,
+            dashed: false,
+        }
+    }
+
+    /// Whether it is drawn at a place along it, pixels.
+    pub(crate) fn draws(&self, place: usize) -> bool {
+        !self.dashed || place % (DASH.0 + DASH.1) < DASH.0
+    }
+}
 
 /// An RGB picture.
 pub(crate) struct Picture {
@@ -51,6 +86,25 @@ impl Picture {
         }
     }
 
+    /// Shows depth as [`Picture::of_depth`] does, darker where the surface turns away from the camera.
+    pub(crate) fn shaded(
+        depth: &DepthImage,
+        camera: &PinholeCamera,
+    ) -> Result<Self, hybrid_icp::ImageError> {
+        let mask = Mask::full(depth.width(), depth.height());
+        let observation = Observation::new(depth.clone(), mask, *camera)?;
+        let mut picture = Self::of_depth(depth);
+        for (index, surfel) in observation.surfels(1) {
+            let (u, v) = observation.pixel(index);
+            let facing = surfel.normal.dot(&surfel.point.coords.normalize()).abs();
+            if let Some(index) = picture.index(u.into(), v.into()) {
+                let pixel = &mut picture.rgb[3 * index..3 * index + 3];
+                blend(pixel, [0; 3], TURNED * (1.0 - facing));
+            }
+        }
+        Ok(picture)
+    }
+
     /// Draws the silhouette's outline of a model at a pose, two pixels wide.
     pub(crate) fn outline(
         &mut self,
@@ -63,25 +117,115 @@ impl Picture {
         let problem = Problem::new(model, observation);
         let mut context = refiner.workspace_mut().context(&problem);
         let view = context.view(camera_from_object);
-        let region = view.region();
-        let shown = |u: i64, v: i64| match (u32::try_from(u), u32::try_from(v)) {
-            (Ok(u), Ok(v)) => view.depth_at(u, v) > 0.0,
-            _ => false,
-        };
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let (x, y) = (i64::from(u), i64::from(v));
-                let border = shown(x, y) && (-2..=2).any(|d| !shown(x + d, y) || !shown(x, y + d));
-                if border {
-                    let index = 3 * (v as usize * self.width as usize + u as usize);
-                    self.rgb[index..index + 3].copy_from_slice(&color);
+        let mut ink = Ink::of(self);
+        ink.outline(view, Line::solid(color), |_, _, _| false);
+        self.draw(&ink);
+    }
+
+    /// Draws lines: first the shade beside all of them, then the lines in their order.
+    pub(crate) fn draw(&mut self, ink: &Ink) {
+        let mut shade = vec![0.0_f32; self.rgb.len() / 3];
+        for dot in &ink.dots {
+            let around = (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (du, dv)));
+            for (du, dv) in around {
+                if let Some(index) = self.index(dot.u + du, dot.v + dv) {
+                    shade[index] = shade[index].max(SHADE * dot.opacity);
                 }
             }
         }
+        for (pixel, shade) in self.rgb.chunks_exact_mut(3).zip(shade) {
+            blend(pixel, [0; 3], shade);
+        }
+        for dot in &ink.dots {
+            if let Some(index) = self.index(dot.u, dot.v) {
+                let pixel = &mut self.rgb[3 * index..3 * index + 3];
+                blend(pixel, dot.color, dot.opacity);
+            }
+        }
+    }
+
+    /// Returns the index of a pixel, `None` outside the picture.
+    fn index(&self, u: i64, v: i64) -> Option<usize> {
+        let u = u32::try_from(u).ok().filter(|u| *u < self.width)?;
+        let v = u32::try_from(v).ok().filter(|v| *v < self.height)?;
+        Some(v as usize * self.width as usize + u as usize)
     }
 
     /// Writes the picture as PNG.
     pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
         hicp_io::write_rgb_png(path, self.width, self.height, &self.rgb)
+    }
+}
+
+fn blend(pixel: &mut [u8], color: Rgb, opacity: f32) {
+    for (channel, color) in pixel.iter_mut().zip(color) {
+        let mixed = f32::from(*channel) * (1.0 - opacity) + f32::from(color) * opacity;
+        // In the range of a byte, as both are.
+        *channel = mixed.round() as u8;
+    }
+}
+
+/// Lines that are still to be drawn: all of a picture's together, so that none shades another.
+#[derive(Debug)]
+pub(crate) struct Ink {
+    width: i64,
+    height: i64,
+    dots: Vec<Dot>,
+}
+
+#[derive(Debug)]
+struct Dot {
+    u: i64,
+    v: i64,
+    color: Rgb,
+    opacity: f32,
+}
+
+impl Ink {
+    /// Makes ink for a picture.
+    pub(crate) fn of(picture: &Picture) -> Self {
+        Self {
+            width: picture.width.into(),
+            height: picture.height.into(),
+            dots: Vec::new(),
+        }
+    }
+
+    /// Adds the outline of what a view shows, two pixels wide, faint where `hidden(u, v, depth of the model)` says so.
+    ///
+    /// Where the image cuts the silhouette there is no outline.
+    pub(crate) fn outline(
+        &mut self,
+        view: &RenderedView,
+        line: Line,
+        hidden: impl Fn(u32, u32, f32) -> bool,
+    ) {
+        let (columns, rows) = (0..self.width, 0..self.height);
+        let cut = |(u, v): (i64, i64)| !columns.contains(&u) || !rows.contains(&v);
+        let mut dots = std::collections::BTreeMap::new();
+        for path in contours(view) {
+            for (place, side) in path.iter().enumerate() {
+                if !line.draws(place) || cut(side.outside) {
+                    continue;
+                }
+                let (u, v) = side.inside;
+                let opacity = match hidden(u, v, view.depth_at(u, v)) {
+                    true => FAINT,
+                    false => 1.0,
+                };
+                for (u, v) in [(i64::from(u), i64::from(v)), side.outside] {
+                    let most: &mut f32 = dots.entry((v, u)).or_default();
+                    *most = most.max(opacity);
+                }
+            }
+        }
+        let color = line.color;
+        let dots = dots.into_iter();
+        self.dots.extend(dots.map(|((v, u), opacity)| Dot {
+            u,
+            v,
+            color,
+            opacity,
+        }));
     }
 }

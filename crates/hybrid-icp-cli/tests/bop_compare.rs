@@ -11,10 +11,13 @@ use serde_json::Value;
 const COMPARE: &str =
     "bop compare --dataset set --init set/initial_synthetic-test.csv --out compared";
 
-/// The cells of the table's lines below its head.
+/// The cells of the first table's lines below its head.
 fn cells(folder: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
-    let lines = text.lines().skip(2);
+    let lines = text
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
     let cells = |line: &str| {
         line.trim_matches('|')
             .split('|')
@@ -36,6 +39,8 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
     assert_eq!(
         names(&folder.join("compared")),
         [
+            "compare.html",
+            "compare.json",
             "compare.md",
             "hybrid.csv",
             "hybrid.json",
@@ -58,13 +63,41 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
         assert_eq!(format!("{adi:.2}"), line[5]);
         assert!(told.out.contains(&line.join(" | ")), "{}", told.out);
     }
-    assert_eq!(cells[0][6..], ["-", "-", "-"]);
+    assert_eq!(cells[0][6..], ["-"; 4]);
     let number = |line: usize, cell: usize| cells[line][cell].parse::<f64>().unwrap();
     // Most poses are better after Hybrid ICP than before, and no share is above the whole.
     assert!(number(1, 1) > number(0, 1) && number(1, 6) > 80.0);
     for line in [1, 2] {
         assert!(number(line, 6) + number(line, 7) <= 100.05);
         assert!(number(line, 8) > 0.0);
+        let ratio = number(line, 8) / number(1, 8);
+        assert!((number(line, 9) - ratio).abs() < 0.01 + 0.01 * ratio);
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.join("compared").join(name)).unwrap();
+    let document: Value = serde_json::from_str(&read("compare.json")).unwrap();
+    for (entry, line) in document["entries"].as_array().unwrap().iter().zip(&cells) {
+        let report: Value = serde_json::from_str(&read(&format!("{}.json", line[0]))).unwrap();
+        assert_eq!(entry["name"].as_str().unwrap(), line[0]);
+        for key in ["ar", "ar_vsd", "median_adi_mm", "targets", "objects"] {
+            assert_eq!(entry[key], report[key], "{key}");
+        }
+    }
+    // The page has the same figures, holds everything and has a row per object.
+    let page = read("compare.html");
+    for line in &cells {
+        let row: String = line.iter().map(|cell| format!("<td>{cell}</td>")).collect();
+        assert!(page.contains(&format!("<tr>{row}</tr>")), "{row}");
+    }
+    for loaded in ["src=", "href=", "url(", "<script"] {
+        assert!(!page.contains(loaded), "{loaded}");
+    }
+    let objects = document["entries"][0]["objects"].as_object().unwrap();
+    for id in objects.keys() {
+        assert_eq!(page.matches(&format!("<tr><td>{id}</td>")).count(), 2);
+        assert_eq!(
+            read("compare.md").matches(&format!("\n| {id} |")).count(),
+            2
+        );
     }
 
     // What refine alone writes.
@@ -90,6 +123,7 @@ fn wrong_pipelines_are_told_before_anything_is_computed() {
             &["--pipelines", "hybird", "did you mean \"hybrid\""][..],
         ),
         ("hybrid,hybrid", 1, &["--pipelines gives hybrid twice"]),
+        ("compare.toml", 1, &["--pipelines gives compare", "differ"]),
         ("hybrid,hybrid.toml", 1, &["--pipelines gives hybrid twice"]),
         ("hybrid.toml", 1, &["hybrid.toml"]),
         ("hybrid,gone.toml", 1, &["gone.toml"]),

@@ -101,6 +101,50 @@ fn generated_refined_evaluated() {
 }
 
 #[test]
+fn symmetric_equivalents_of_the_truth_score_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    generate(folder, "--out set");
+    let infos = Dataset::open(folder.join("set")).unwrap();
+    let infos = infos.read_models_info().unwrap();
+    let mut rows = read_results(folder.join("set/truth_synthetic-test.csv")).unwrap();
+    let (mut turned, mut flipped) = (0, 0);
+    for row in &mut rows {
+        let symmetries = &infos[&row.obj_id].symmetries;
+        let mut pose = row.camera_from_object();
+        if let Some(axis) = symmetries.continuous.first() {
+            // No multiple of the steps that BOP takes about an axis.
+            pose *= axis.rotation(2.345);
+            turned += 1;
+        }
+        if let Some(other) = symmetries.discrete.last() {
+            pose *= other;
+            flipped += 1;
+        }
+        row.set_camera_from_object(pose);
+    }
+    assert!(turned > 0 && flipped > 0, "{turned} {flipped}");
+    hicp_io::bop::write_results(folder.join("turned.csv"), &rows).unwrap();
+    let report = eval(folder, "turned.csv");
+    assert_eq!(report["ar_mssd"], 1.0);
+    assert_eq!(report["ar_mspd"], 1.0);
+    assert_eq!(report["ad_recall"], 1.0);
+    // Meshes are not as round as their symmetries say: the silhouettes' pixels need not all agree.
+    assert!(report["ar_vsd"].as_f64().unwrap() >= 0.989);
+
+    // Where nothing is declared, the same poses are wrong.
+    let path = folder.join("set/models/models_info.json");
+    let mut declared: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    for info in declared.as_object_mut().unwrap().values_mut() {
+        let info = info.as_object_mut().unwrap();
+        info.retain(|key, _| !key.starts_with("symmetries"));
+    }
+    std::fs::write(&path, declared.to_string()).unwrap();
+    let report = eval(folder, "turned.csv");
+    assert!(report["ar_mssd"].as_f64().unwrap() < 1.0);
+}
+
+#[test]
 fn the_layout_is_that_of_the_benchmark() {
     let folder = tempfile::tempdir().unwrap();
     generate(folder.path(), "--out set");

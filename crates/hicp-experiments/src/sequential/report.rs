@@ -11,8 +11,8 @@ use crate::analysis::{Analysis, Metric, REPLICATES};
 use crate::claims::Claim;
 use crate::error::ExperimentError;
 use crate::figure::{Curve, Figure, Panel, curve};
-use crate::report::HEAD;
-use crate::tables::{self, Table};
+use crate::html::{Table, page};
+use crate::tables;
 
 /// Number of the paper's methods, the first of all.
 const PAPER_METHODS: usize = 6;
@@ -306,8 +306,7 @@ impl TrajectoryReport {
     }
 
     fn html(&self, svg: &str) -> String {
-        let mut text = HEAD.replace("TITLE", TITLE);
-        let _ = writeln!(text, "<h1>{TITLE}</h1>\n<h2>What was run</h2>");
+        let mut text = String::from("<h2>What was run</h2>\n");
         text.push_str(&self.what_was_run().html());
         let _ = writeln!(
             text,
@@ -333,7 +332,7 @@ impl TrajectoryReport {
         }
         text.push_str("<h2>Differences from average, by group</h2>\n<details><summary>All paired differences</summary>\n");
         text.push_str(&self.differences().html());
-        text.push_str("</details>\n</body>\n</html>\n");
-        text
+        text.push_str("</details>\n");
+        page(TITLE, &text)
     }
 }

@@ -1,21 +1,22 @@
 //! `hybrid-icp bop compare`.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
 
-use super::eval::{self, Evaluation};
+use super::compare_report::{Comparison, Entry};
+use super::eval;
 use super::refine;
 use crate::choice::{PipelineArguments, Source};
 use crate::terminal::say;
 
 /// Refine a result file with several pipelines, and compare them by their evaluations.
 ///
-/// Writes, for every pipeline, its result file and its evaluation as JSON, and compare.md: average recalls, the median ADI,
-/// the shares of the poses whose ADI fell and rose by more than 0.1 mm, and the time per pose on one thread of those given.
+/// Writes, for every pipeline, its result file and its evaluation as JSON, and the comparison as compare.md, compare.html and
+/// compare.json: average recalls, the median ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, the time
+/// per pose on one thread of those given and its ratio to that of the first pipeline; AR and median ADI by object.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -46,17 +47,17 @@ Example:
 
 /// What the initial poses are called.
 const INITIAL: &str = "initial";
-/// Change of the ADI from which a pose counts as improved or worsened, metres.
-const CHANGE: f64 = 1e-4;
+/// What the files of the comparison are called.
+const COMPARISON: &str = "compare";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mut names = BTreeSet::from([INITIAL.to_owned()]);
+    let mut names = BTreeSet::from([INITIAL, COMPARISON].map(str::to_owned));
     for pipeline in &arguments.pipelines {
         let name = pipeline.short_name();
         if !names.insert(name.clone()) {
             bail!(
-                "--pipelines gives {name} twice, expected names that differ from each other and from {INITIAL}"
+                "--pipelines gives {name} twice, expected names that differ from each other, from {INITIAL} and from {COMPARISON}"
             );
         }
         // A file that cannot be built is told before anything is computed.
@@ -66,18 +67,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
     let dataset = (arguments.dataset.as_path(), arguments.split.as_str());
-    let evaluate = |name: &str, results: &std::path::Path| {
+    let evaluate = |name: &str, results: &Path, seconds: Option<f64>| {
         say(format_args!("\n{name}:"))?;
         let json = out.join(format!("{name}.json"));
         let words = eval::Arguments::plain(dataset, results, json, arguments.threads);
-        eval::evaluate(&words)
+        Ok::<Entry, anyhow::Error>(Entry {
+            name: name.to_owned(),
+            evaluation: eval::evaluate(&words)?,
+            seconds,
+        })
     };
-    let initial = evaluate(INITIAL, &arguments.init)?;
-    let mut table = String::from(
-        "| pipeline | AR | VSD | MSSD | MSPD | median ADI mm | improved % | worsened % | ms per pose |\n\
-         |---|---:|---:|---:|---:|---:|---:|---:|---:|\n",
-    );
-    table.push_str(&line(INITIAL, &initial, None, None));
+    let initial = evaluate(INITIAL, &arguments.init, None)?;
+    let mut pipelines = Vec::new();
     for pipeline in &arguments.pipelines {
         let name = pipeline.short_name();
         let output = out.join(format!("{name}.csv"));
@@ -87,73 +88,29 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (&arguments.init, output.clone()),
             arguments.threads,
         ))?;
-        let refined = evaluate(&name, &output)?;
-        table.push_str(&line(&name, &refined, Some(&initial), seconds));
+        pipelines.push(evaluate(&name, &output, seconds)?);
     }
-    let path = out.join("compare.md");
-    hicp_io::write_atomically(&path, |writer| writer.write_all(table.as_bytes()))?;
-    say(format_args!("\n{table}\n{}", path.display()))
-}
-
-/// A line of the table.
-fn line(
-    name: &str,
-    found: &Evaluation,
-    before: Option<&Evaluation>,
-    seconds: Option<f64>,
-) -> String {
-    let all = &found.all;
-    let dash = || "-".to_owned();
-    let (improved, worsened) = before.map_or_else(
-        || (dash(), dash()),
-        |before| {
-            let (improved, worsened) = changes(&before.adi_m, &found.adi_m);
-            (
-                format!("{:.1}", 100.0 * improved),
-                format!("{:.1}", 100.0 * worsened),
-            )
-        },
-    );
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let _ = writeln!(
-        text,
-        "| {name} | {:.3} | {:.3} | {:.3} | {:.3} | {} | {improved} | {worsened} | {} |",
-        all.ar,
-        all.ar_vsd,
-        all.ar_mssd,
-        all.ar_mspd,
-        all.median_adi_mm.map_or_else(dash, |mm| format!("{mm:.2}")),
-        seconds.map_or_else(dash, |s| format!("{:.2}", 1e3 * s)),
-    );
-    text
-}
-
-/// Shares of the estimates in both evaluations whose ADI fell and rose.
-fn changes(before: &BTreeMap<usize, f64>, after: &BTreeMap<usize, f64>) -> (f64, f64) {
-    let both = before
-        .iter()
-        .filter_map(|(row, a)| Some((*a, *after.get(row)?)));
-    let changes: Vec<f64> = both.map(|(a, b)| b - a).collect();
-    let share = |changed: &dyn Fn(f64) -> bool| {
-        let count = changes.iter().filter(|change| changed(**change)).count();
-        count as f64 / changes.len().max(1) as f64
+    let comparison = Comparison {
+        dataset: arguments.dataset.display().to_string(),
+        split: arguments.split.clone(),
+        init: arguments.init.display().to_string(),
+        initial,
+        pipelines,
     };
-    (
-        share(&|change| change < -CHANGE),
-        share(&|change| change > CHANGE),
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shares_count_rows_of_both() {
-        let before = BTreeMap::from([(0, 0.004), (1, 0.004), (2, 0.004), (3, 0.004), (9, 1.0)]);
-        let after = BTreeMap::from([(0, 0.001), (1, 0.004_05), (2, 0.005), (3, 0.0), (7, 0.0)]);
-        assert_eq!(changes(&before, &after), (0.5, 0.25));
-        assert_eq!(changes(&before, &BTreeMap::new()), (0.0, 0.0));
+    let markdown = comparison.markdown();
+    let json = comparison.json()?;
+    for (ending, text) in [
+        ("md", &markdown),
+        ("html", &comparison.html()),
+        ("json", &json),
+    ] {
+        let path = out.join(format!("{COMPARISON}.{ending}"));
+        hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
     }
+    let page = out.join(format!("{COMPARISON}.html"));
+    say(format_args!(
+        "\n{}\n{}",
+        comparison.overall().markdown(),
+        page.display()
+    ))
 }

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_bop::{FrameKey, Models, Scenes, Targets};
+use hicp_bop::{FrameKey, Models, Scenes, Targets, frames_of};
 use hicp_io::bop::{Dataset, ResultRow};
-use hybrid_icp::ModelPoints;
 use rayon::prelude::*;
 
 use super::calibration::Calibration;
@@ -72,7 +71,7 @@ is damaged or nothing could be judged (what could be judged is still told);
 2 the command line is wrong.";
 
 /// The benchmark's visibility tolerance.
-const DELTA_MM: f64 = 15.0;
+pub(super) const DELTA_MM: f64 = 15.0;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -82,6 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// What an evaluation found.
 pub(super) struct Evaluation {
     pub(super) all: Summary,
+    pub(super) objects: BTreeMap<u32, Summary>,
     /// ADI of the estimates that were looked at to the nearest instance of their target, metres, by their row.
     pub(super) adi_m: BTreeMap<usize, f64>,
 }
@@ -133,10 +133,10 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let models = pool.install(|| models::read(&models_dir, &objects))?;
 
     let judge = Judge {
-        objects: evaluated(arguments, &models),
+        objects: EvaluatedObject::of_models(&models, arguments.symmetric.as_deref()),
         scenes: &scenes,
         rows: &rows,
-        rows_of: rows_of(&rows),
+        rows_of: frames_of(&rows).into_iter().collect(),
         delta: 1e-3 * arguments.delta,
     };
     let frames: Vec<(&FrameKey, &BTreeMap<u32, u32>)> = targets.iter().collect();
@@ -155,45 +155,24 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let calibration = arguments
         .calibration
         .then(|| pool.install(|| Calibration::of(&rows, &scenes, &judge.objects)));
-    report(arguments, &rows, (&targets, &models), &judged, calibration)
-}
-
-/// Prepares the objects for their errors.
-fn evaluated<'a>(arguments: &Arguments, models: &'a Models) -> BTreeMap<u32, EvaluatedObject<'a>> {
-    let of = |(id, model)| {
-        let points = ModelPoints::new(model);
-        let symmetric = match &arguments.symmetric {
-            Some(ids) => ids.contains(id),
-            None => points.is_symmetric(),
-        };
-        let object = EvaluatedObject {
-            model,
-            points,
-            symmetric,
-        };
-        (*id, object)
-    };
-    models.by_id.iter().map(of).collect()
-}
-
-fn rows_of(rows: &[ResultRow]) -> BTreeMap<FrameKey, Vec<usize>> {
-    let mut by_frame: BTreeMap<FrameKey, Vec<usize>> = BTreeMap::new();
-    for (index, row) in rows.iter().enumerate() {
-        let frame = (row.scene_id, row.im_id);
-        by_frame.entry(frame).or_default().push(index);
-    }
-    by_frame
+    report(
+        arguments,
+        &rows,
+        (&targets, &models, &models_dir),
+        &judged,
+        calibration,
+    )
 }
 
 /// Tells and writes what was found.
 fn report(
     arguments: &Arguments,
     rows: &[ResultRow],
-    (wanted, models): (&Targets, &Models),
+    (wanted, models, models_dir): (&Targets, &Models, &Path),
     frames: &[JudgedFrame],
     calibration: Option<Calibration>,
 ) -> anyhow::Result<Evaluation> {
-    let warnings = misfits(arguments, rows, wanted, models, frames);
+    let warnings = misfits(arguments, rows, wanted, (models, models_dir), frames);
     for text in &warnings {
         warn(text);
     }
@@ -237,6 +216,7 @@ fn report(
     }
     Ok(Evaluation {
         all: report.all,
+        objects: report.objects,
         adi_m,
     })
 }
@@ -246,7 +226,7 @@ fn misfits(
     arguments: &Arguments,
     rows: &[ResultRow],
     wanted: &Targets,
-    models: &Models,
+    (models, models_dir): (&Models, &Path),
     frames: &[JudgedFrame],
 ) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -283,12 +263,8 @@ fn misfits(
             "{results}: {beyond} rows beyond the number of instances of their target are not looked at, those with the lowest scores"
         ));
     }
-    if !models.missing.is_empty() {
-        let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
-        warnings.push(format!(
-            "the dataset has no model of object {}; its targets are left out",
-            ids.join(", ")
-        ));
+    if let Some(text) = models::tell_missing(models, models_dir) {
+        warnings.push(format!("{text}; its targets are left out"));
     }
     let of_frames: Vec<&String> = frames.iter().flat_map(|frame| &frame.misfits).collect();
     warnings.extend(

@@ -60,7 +60,7 @@ pub(crate) struct Report {
     left_out: usize,
     #[serde(flatten)]
     pub(super) all: Summary,
-    objects: BTreeMap<u32, Summary>,
+    pub(super) objects: BTreeMap<u32, Summary>,
     warnings: Vec<String>,
     /// Whether the scores tell right from wrong, where asked for.
     #[serde(skip_serializing_if = "Option::is_none")]

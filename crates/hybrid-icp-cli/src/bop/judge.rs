@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hicp_bop::{Fault, FrameKey, Image, Scenes};
+use hicp_bop::{Fault, FrameKey, Image, Models, Scenes};
 use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::{
     Isometry3, Model, ModelPoints, N_TOLERANCES, PoseErrors, Rasterizer, RenderedView, Renderer,
@@ -15,6 +15,26 @@ pub(crate) struct EvaluatedObject<'a> {
     pub(crate) points: ModelPoints,
     /// Whether AD is ADI.
     pub(crate) symmetric: bool,
+}
+
+impl<'a> EvaluatedObject<'a> {
+    /// Prepares models for their errors; AD is ADI for the objects named, if not given for those with declared symmetries.
+    pub(crate) fn of_models(models: &'a Models, symmetric: Option<&[u32]>) -> BTreeMap<u32, Self> {
+        let of = |(id, model)| {
+            let points = ModelPoints::new(model);
+            let symmetric = match symmetric {
+                Some(ids) => ids.contains(id),
+                None => points.is_symmetric(),
+            };
+            let object = Self {
+                model,
+                points,
+                symmetric,
+            };
+            (*id, object)
+        };
+        models.by_id.iter().map(of).collect()
+    }
 }
 
 /// A target with its errors, and which row and which instance each of them is of.
@@ -107,7 +127,9 @@ impl Judge<'_> {
         judged
     }
 
-    fn target(
+    /// Judges the `count` estimates of an object with the best scores against instances, given as indices into the image's
+    /// ground truth.
+    pub(crate) fn target(
         &self,
         renders: &mut Renders,
         image: &Image,

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod compare;
+mod compare_report;
 mod errors_csv;
 mod eval;
 mod eval_report;
@@ -14,6 +15,10 @@ mod problem;
 mod refine;
 mod refine_settings;
 mod refine_summary;
+mod show;
+mod show_estimates;
+mod show_lines;
+mod show_picture;
 mod targets;
 
 use anyhow::Context as _;
@@ -27,6 +32,7 @@ pub(crate) enum Command {
     Eval(eval::Arguments),
     Generate(generate::Arguments),
     Compare(compare::Arguments),
+    Show(show::Arguments),
 }
 
 /// Runs the command.
@@ -36,6 +42,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Eval(arguments) => eval::run(arguments),
         Command::Generate(arguments) => generate::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
+        Command::Show(arguments) => show::run(arguments),
     }
 }
 

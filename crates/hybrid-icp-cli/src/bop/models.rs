@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hicp_bop::{ModelFolder, Models};
 use hicp_io::IoError;
+use hicp_io::bop::Dataset;
 use rayon::prelude::*;
 
 /// Reads the models of some objects from a folder, on all threads.
@@ -16,4 +17,15 @@ pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoErro
         .map(|id| (*id, folder.read(*id)))
         .collect();
     Ok(read.into_iter().collect())
+}
+
+/// Tells which objects a folder has no model of, and where the first was looked for.
+pub(crate) fn tell_missing(models: &Models, dir: &Path) -> Option<String> {
+    let first = Dataset::model_path_in(dir, *models.missing.first()?);
+    let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
+    Some(format!(
+        "the dataset has no model of object {}, expected {}",
+        ids.join(", "),
+        first.display()
+    ))
 }

@@ -135,7 +135,8 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let start = Instant::now();
     let settings = refine_settings::of(arguments, &pipeline, &rows, &masks);
     let objects = rows.iter().map(|row| row.obj_id).collect();
-    let models = pool.install(|| models::read(&dataset.models_dir()?, &objects))?;
+    let models_dir = dataset.models_dir()?;
+    let models = pool.install(|| models::read(&models_dir, &objects))?;
     let shared = DatasetRefiner {
         models,
         scenes: Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1),
@@ -175,7 +176,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
         arguments.output.as_path(),
         images.as_path(),
     );
-    report_faults(files, &shared.models, &results)?;
+    report_faults(files, (&shared.models, &models_dir), &results)?;
     Ok(mean_seconds(&results))
 }
 

@@ -7,7 +7,8 @@ use std::path::Path;
 use anyhow::bail;
 use hicp_bop::{Fate, FrameResult, Models};
 
-use super::{median, problem};
+use super::{median, models, problem};
+use crate::terminal::warn;
 
 /// What the summary says of the run.
 pub(super) struct Told<'a> {
@@ -64,13 +65,16 @@ pub(super) fn mean_seconds(results: &[FrameResult]) -> Option<f64> {
 
 /// Warns of what is missing, and fails where something is damaged or nothing is there.
 ///
-/// `files` are the input, the output, and the folder of the images.
+/// `files` are the input, the output, and the folder of the images; with the models comes the folder that they are in.
 pub(super) fn report_faults(
     (input, output, images): (&Path, &Path, &Path),
-    models: &Models,
+    (models, models_dir): (&Models, &Path),
     results: &[FrameResult],
 ) -> anyhow::Result<()> {
     let faults = results.iter().flat_map(|result| &result.faults);
+    if let Some(text) = models::tell_missing(models, models_dir) {
+        warn(format_args!("{text}; its rows are unchanged"));
+    }
     let damaged = problem::tell(faults, models.broken.values());
     if damaged > 0 {
         bail!(
