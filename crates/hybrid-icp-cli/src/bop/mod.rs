@@ -13,6 +13,7 @@ mod models;
 mod objects;
 mod problem;
 mod refine;
+mod sequence;
 mod shard;
 mod targets;
 
@@ -27,6 +28,7 @@ pub(crate) enum Command {
     Eval(eval::Arguments),
     Generate(generate::Arguments),
     Compare(compare::Arguments),
+    Sequence(sequence::Arguments),
 }
 
 /// Runs the command.
@@ -36,6 +38,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Eval(arguments) => eval::run(arguments),
         Command::Generate(arguments) => generate::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
+        Command::Sequence(arguments) => sequence::run(arguments),
     }
 }
 
