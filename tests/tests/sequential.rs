@@ -9,8 +9,8 @@ use hybrid_icp::fusion::{
     InflatedCovariance, UnitCovariance, Update,
 };
 use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, Outcome, Preset, Problem, SequentialConfig,
-    SequentialEstimator, SequentialEvent, Session, Stage, Vector6, presets, se3,
+    Calibration, DepthImage, Isometry3, Mask, Model, Observation, Outcome, Preset, Problem,
+    SequentialConfig, SequentialEstimator, SequentialEvent, Session, Stage, Vector6, presets, se3,
 };
 
 /// What a camera sees that moves toward an object: images, true poses, and the motion before each.
@@ -242,6 +242,48 @@ fn the_covariance_of_the_registration_reaches_the_fuser() {
     let (observation, _, motion) = &path.frames[1];
     let second = estimator.step(model, observation, motion).covariance;
     assert!(second.expect("an estimate").determinant() < 0.5 * found.determinant());
+}
+
+#[test]
+fn a_calibrated_estimator_states_what_no_number_of_images_averages_away() {
+    let path = path(Household::Mug, 6, 0.5, 5);
+    let (model, (_, truth, _)) = (&path.model, &path.frames[0]);
+    let calibration = Calibration::HYBRID;
+    let init = perturb(&mut rng(6), truth, 0.006, 0.16);
+    let mut estimator = SequentialEstimator::calibrated(
+        presets::hybrid(),
+        FusionMethod::WeightedAverage,
+        &calibration,
+        model,
+        &init,
+    )
+    .expect("valid");
+    let unit = UnitCovariance::about_object(model.center(), model.radius()).expect("valid");
+    let mut volumes = Vec::new();
+    for (observation, truth, motion) in &path.frames {
+        let step = estimator.step(model, observation, motion);
+        assert!(
+            matches!(step.event, SequentialEvent::Estimated(Update::Accepted(_))),
+            "{:?}",
+            step.event
+        );
+        let covariance = step.covariance.expect("an estimate");
+        let shared = unit.at(&step.camera_from_object) * calibration.shared.powi(2);
+        // What is beyond the shared error is a covariance too, and what is stated holds the error.
+        assert!((covariance - shared).cholesky().is_some());
+        let error = se3::log(&(truth * step.camera_from_object.inverse()));
+        let solved = covariance.cholesky().expect("positive").solve(&error);
+        assert!(calibration.probability_within(error.dot(&solved)) < 0.99);
+        volumes.push((covariance - shared).determinant());
+    }
+    assert!(volumes[5] < 0.1 * volumes[0], "{volumes:?}");
+    let broken = Calibration {
+        shared: -1.0,
+        ..calibration
+    };
+    let method = FusionMethod::Average;
+    let made = SequentialEstimator::calibrated(presets::hybrid(), method, &broken, model, &init);
+    assert!(matches!(made, Err(FusionError::Parameter { .. })));
 }
 
 #[test]

@@ -67,8 +67,9 @@ pub use html::{Table, escaped as html_escaped, page as html_page};
 pub use report::Report;
 pub use row::{COLUMNS, Measured, Row};
 pub use sequential::{
-    FusionRule, TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryConfig, TrajectoryReport,
-    TrajectoryRow, TrajectoryStudy, UnderlyingRecord, run_trajectories,
+    FusionRule, TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryClock, TrajectoryConfig,
+    TrajectoryReport, TrajectoryRow, TrajectoryStep, TrajectoryStudy, UnderlyingRecord,
+    run_trajectories, watch_trajectories,
 };
 pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
 pub use subject::Subject;

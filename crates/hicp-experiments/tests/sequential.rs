@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use hicp_experiments::{
-    ExperimentError, FusionRule, Metric, RunOptions, Subject, TRAJECTORIES_FILE, TrajectoryConfig,
-    TrajectoryReport, TrajectoryStudy, run_trajectories,
+    ExperimentError, FusionRule, Metric, RunOptions, Subject, TRAJECTORIES_FILE, TrajectoryClock,
+    TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run_trajectories,
 };
 use hicp_sim::Household;
 use hybrid_icp::Preset;
@@ -64,6 +64,10 @@ fn a_small_study_runs_to_its_report() {
         let images = if row.underlying == "hybrid" { 3 } else { 4 };
         assert_eq!(config.n_images(usize::from(images == 4)), images);
         assert!(row.n_estimates() <= images, "{row:?}");
+        // Whoever has an estimate states a covariance.
+        let distance = row.mahalanobis_squared();
+        assert_eq!(distance.is_some(), row.n_estimates() > 0, "{row:?}");
+        assert!(distance.is_none_or(|squared| squared >= 0.0));
     }
     // Methods do differ, and from good starts the object is found all the same.
     let differ = study.rows.chunks(FusionRule::ALL.len());
@@ -74,13 +78,14 @@ fn a_small_study_runs_to_its_report() {
     let average = analysis.variant("hybrid/average").unwrap();
     let first = analysis.mean(Metric::Vsd, 0, average).unwrap();
     assert!(first.estimate < 0.3, "{first:?}");
-    assert_eq!(report.claims().len(), 2 * 5 + 2);
+    assert_eq!(report.claims().len(), 2 * 6 + 2);
     report.write(folder.path()).unwrap();
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for part in [
         "<svg",
         "post-trajectory VSD",
         "gated-weighted-average",
+        "calibrated-weighted-average",
         "average is at least as good",
     ] {
         assert!(html.contains(part), "{part}");
@@ -91,6 +96,7 @@ fn a_small_study_runs_to_its_report() {
         "summary.csv",
         "differences.csv",
         "claims.csv",
+        "calibration.csv",
     ] {
         assert!(folder.path().join(file).metadata().unwrap().len() > 100);
     }
@@ -137,6 +143,31 @@ fn pipelines_of_one_study_share_paths_and_starts() {
         .filter(|row| row.underlying == BOTH[1].name())
         .collect();
     assert_eq!(alone, expected);
+}
+
+#[test]
+fn by_a_real_clock_every_method_has_images_of_its_own() {
+    let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
+    config.clock = TrajectoryClock::Real;
+    config.methods = vec!["last-estimate".to_owned(), "average".to_owned()];
+    // So fast that a path ends after some images, whatever the machine.
+    config.speed_m_s = 20.0;
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    assert_eq!(study.config.clock, TrajectoryClock::Real);
+    assert_eq!(study.rows.len(), 10 * 2 * 2);
+    for row in &study.rows {
+        // At least the first image, from the start that both have.
+        assert!(
+            row.vsd()
+                .is_some_and(|(_, last)| (0.0..=1.0).contains(&last)),
+            "{row:?}"
+        );
+    }
+    assert!(study.rows.iter().any(|row| row.n_estimates() > 0));
+    TrajectoryReport::of(study).write(folder.path()).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(html.contains("no run repeats this one"));
 }
 
 #[test]

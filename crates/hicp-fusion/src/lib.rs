@@ -1,5 +1,5 @@
 //! Fusing pose estimates on SE(3) while the camera moves: the trait [`Fuser`], Barfoot & Furgale's fusion ([`Fusion`], [`fuse`]), the
-//! paper's six methods ([`FusionMethod`], §V-A), and fusers that look at what they are given ([`Gated`], [`SymmetryAware`]).
+//! paper's six methods ([`FusionMethod`], §V-A), and fusers that look at what they are given ([`Gated`], [`SymmetryAware`], [`SharedError`]).
 //!
 //! **Should you use this crate?** To fuse poses with covariances, whoever made them, yes: it depends on `hicp-core` alone. To
 //! estimate a pose from images along a trajectory, use `hybrid_icp::SequentialEstimator`, which drives a fuser.
@@ -30,8 +30,8 @@
 //! perturbations T = exp(ξ^) T̄, in the camera frame.
 //!
 //! Modules in reading order, by file: `estimate` (a pose with its covariance), `motion` (of the camera), `fusion` (the algorithm),
-//! `fuser` (trait), `config`, `single`, `batch`, `recursive` (the six methods), `method` (by name), `gate`, `symmetry_aware`,
-//! `unit` and `covariance` (where covariances come from), `error`.
+//! `fuser` (trait), `config`, `single`, `batch`, `recursive` (the six methods), `method` (by name), `gate`, `symmetry_aware`, `shared_error`,
+//! `unit` and `covariance` (where covariances come from), `tails` (what they say of errors), `error`.
 
 mod batch;
 mod config;
@@ -44,8 +44,10 @@ mod gate;
 mod method;
 mod motion;
 mod recursive;
+mod shared_error;
 mod single;
 mod symmetry_aware;
+mod tails;
 mod unit;
 
 pub use batch::BatchFuser;
@@ -59,6 +61,8 @@ pub use gate::{CHI_SQUARED_6_999, Gate, Gated};
 pub use method::{BoxedFuser, FusionMethod, UnknownMethod};
 pub use motion::{CameraMotion, Transport};
 pub use recursive::RecursiveFuser;
+pub use shared_error::SharedError;
 pub use single::{LastEstimate, MostConfident};
 pub use symmetry_aware::SymmetryAware;
+pub use tails::probability_within;
 pub use unit::UnitCovariance;

@@ -13,8 +13,9 @@ use hicp_core::{
     se3,
 };
 use hicp_fusion::{
-    BatchFuser, CHI_SQUARED_6_999, Failure, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
-    Gated, PoseEstimate, RecursiveFuser, SymmetryAware, Update,
+    BatchFuser, CHI_SQUARED_6_999, CameraMotion, Failure, Fuser, FuserConfig, FusionError,
+    FusionMethod, Gate, Gated, PoseEstimate, RecursiveFuser, SharedError, SymmetryAware,
+    UnitCovariance, Update,
 };
 
 fn at(x: f64, mve: f64) -> PoseEstimate {
@@ -343,4 +344,35 @@ fn the_representative_keeps_its_covariance_and_moves_with_the_camera() {
     };
     let inner = RecursiveFuser::filtering(FuserConfig::default());
     assert!(SymmetryAware::new(inner, symmetries, Point3::origin(), 0.1).is_err());
+}
+
+#[test]
+fn a_shared_error_is_stated_but_moves_nothing() {
+    let unit = UnitCovariance::about_object(Point3::new(0.01, 0.0, 0.02), 0.08).unwrap();
+    let mut random = Random(36);
+    let make = || BatchFuser::weighted_average(FuserConfig::default());
+    let (mut bare, mut shared) = (make(), SharedError::new(make(), unit, 0.02).unwrap());
+    let motion = CameraMotion::new(Isometry3::new(
+        Vector3::new(0.1, -0.2, 0.05),
+        Vector3::new(0.3, 0.1, -0.2),
+    ))
+    .unwrap();
+    let pose = Isometry3::translation(0.0, 0.1, 0.6);
+    for x in [0.0, 0.002, -0.001] {
+        let seen = Isometry3::translation(x, 0.0, 0.0) * pose;
+        let seen = estimate(seen, random.covariance(1e-3));
+        assert_eq!(bare.update(&seen), shared.update(&seen));
+    }
+    bare.propagate(&motion);
+    shared.propagate(&motion);
+    let (bare_one, one) = (bare.estimate().unwrap(), shared.estimate().unwrap());
+    assert_eq!(one.camera_from_object(), bare_one.camera_from_object());
+    let added = one.covariance() - bare_one.covariance();
+    let expected = unit.at(one.camera_from_object()) * 4e-4;
+    assert!(relative(&added, &expected) < 1e-12);
+    for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(SharedError::new(make(), unit, wrong).is_err());
+    }
+    shared.reset();
+    assert_eq!(shared.estimate(), None);
 }

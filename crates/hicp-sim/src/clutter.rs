@@ -17,6 +17,10 @@ const DISC_GROWTH_METERS: f64 = 0.005;
 const ELEVATION_DEGREES: std::ops::Range<f64> = 25.0..60.0;
 /// Distance of the camera against the one at which everything just fits.
 const DISTANCE_FACTOR: std::ops::Range<f64> = 0.85..1.05;
+/// The same at the beginning and at the end of a path.
+const PATH_FACTOR: [f64; 2] = [1.5, 0.9];
+/// How far a path goes round the scene, degrees.
+const PATH_TURN_DEGREES: f64 = 40.0;
 
 /// An object of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,6 +132,43 @@ impl Clutter {
         sensor: &DepthSensor,
     ) -> Result<ClutterView, SimError> {
         let camera_from_world = self.look(rng, camera);
+        self.view_from(rng, camera_from_world, models, camera, sensor)
+    }
+
+    /// Returns camera poses along a path, the world in the camera frame: from a random side and 1.5 times as far as everything
+    /// needs to fit the camera comes nearer and goes round the scene by 40°, in equal steps, looking at its middle.
+    pub fn path<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        camera: &PinholeCamera,
+        images: usize,
+    ) -> Vec<Isometry3<f64>> {
+        let elevation = within(rng, &ELEVATION_DEGREES).to_radians();
+        let azimuth = within(rng, &(0.0..std::f64::consts::TAU));
+        let steps = images.saturating_sub(1).max(1) as f64;
+        let along = |image: usize| {
+            let done = image as f64 / steps;
+            let [far, near] = PATH_FACTOR;
+            let factor = far + done * (near - far);
+            let turned = azimuth + done * PATH_TURN_DEGREES.to_radians();
+            self.look_from(elevation, turned, factor, camera)
+        };
+        (0..images).map(along).collect()
+    }
+
+    /// Looks at the scene from a pose of the world in the camera frame; otherwise as [`Clutter::view`].
+    ///
+    /// # Errors
+    ///
+    /// As [`DepthSensor::measure`].
+    pub fn view_from<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        camera_from_world: Isometry3<f64>,
+        models: &[Model],
+        camera: &PinholeCamera,
+        sensor: &DepthSensor,
+    ) -> Result<ClutterView, SimError> {
         let table = render_depth_image(&table()?, camera, &camera_from_world);
         let mut nearest = table.pixels().to_vec();
         let mut owner = vec![usize::MAX; nearest.len()];
@@ -167,14 +208,23 @@ impl Clutter {
     }
 
     fn look<R: Rng + ?Sized>(&self, rng: &mut R, camera: &PinholeCamera) -> Isometry3<f64> {
-        let mut within = |range: &std::ops::Range<f64>| {
-            range.start + (range.end - range.start) * rng.random::<f64>()
-        };
-        let elevation = within(&ELEVATION_DEGREES).to_radians();
-        let azimuth = within(&(0.0..std::f64::consts::TAU));
+        let elevation = within(rng, &ELEVATION_DEGREES).to_radians();
+        let azimuth = within(rng, &(0.0..std::f64::consts::TAU));
+        let factor = within(rng, &DISTANCE_FACTOR);
+        self.look_from(elevation, azimuth, factor, camera)
+    }
+
+    /// Looks at the scene's middle; `factor` is the distance against the one at which everything just fits.
+    fn look_from(
+        &self,
+        elevation: f64,
+        azimuth: f64,
+        factor: f64,
+        camera: &PinholeCamera,
+    ) -> Isometry3<f64> {
         // Half the width of the image at a distance of one.
         let half_width = 0.5 * f64::from(camera.width()) / camera.fx();
-        let distance = self.extent * (1.0 + 1.0 / half_width) * within(&DISTANCE_FACTOR);
+        let distance = self.extent * (1.0 + 1.0 / half_width) * factor;
         let toward = Vector3::new(
             elevation.cos() * azimuth.cos(),
             elevation.cos() * azimuth.sin(),
@@ -185,6 +235,10 @@ impl Clutter {
         let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         half_turn * Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z())
     }
+}
+
+fn within<R: Rng + ?Sized>(rng: &mut R, range: &std::ops::Range<f64>) -> f64 {
+    range.start + (range.end - range.start) * rng.random::<f64>()
 }
 
 /// A rotation that puts one of six sides down and then turns about the vertical.
@@ -313,6 +367,41 @@ mod tests {
             }
         }
         assert!(hidden > 4, "{hidden}");
+    }
+
+    #[test]
+    fn a_path_comes_nearer_in_equal_steps() {
+        let models = models();
+        let camera = PinholeCamera::new(300.0, 300.0, 159.5, 119.5, 320, 240).unwrap();
+        let clutter = Clutter::draw(&mut stream(5, &["scene"], 1), &models, 4).unwrap();
+        let path = clutter.path(&mut stream(5, &["path"], 1), &camera, 9);
+        assert_eq!(path.len(), 9);
+        // The middle is in front of every camera, ever nearer.
+        let ranges: Vec<f64> = path.iter().map(|pose| pose.translation.z).collect();
+        assert!(ranges.is_sorted_by(|a, b| a > b), "{ranges:?}");
+        assert!((ranges[8] / ranges[0] - 0.6).abs() < 1e-9, "{ranges:?}");
+        for pose in &path {
+            let aside = pose.translation.x.hypot(pose.translation.y);
+            assert!(aside < 1e-9, "{aside}");
+        }
+        let turns: Vec<f64> = path
+            .windows(2)
+            .map(|two| (two[1] * two[0].inverse()).rotation.angle())
+            .collect();
+        assert!(
+            turns
+                .iter()
+                .all(|turn| (turn - turns[0]).abs() < 1e-9 && *turn > 0.02)
+        );
+        assert!(
+            clutter
+                .path(&mut stream(5, &["path"], 1), &camera, 0)
+                .is_empty()
+        );
+        assert_eq!(
+            clutter.path(&mut stream(5, &["path"], 1), &camera, 1).len(),
+            1
+        );
     }
 
     #[test]

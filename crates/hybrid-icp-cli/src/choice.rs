@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use hybrid_icp::{PipelineFile, Preset, Refiner, UnknownPreset};
+use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
 
 /// The options that choose a pipeline.
 #[derive(Clone, Debug, Args)]
@@ -128,6 +128,14 @@ impl Pipeline {
         &self.toml
     }
 
+    /// The preset, where it is one as it is.
+    pub(crate) fn preset(&self) -> Option<Preset> {
+        match self.made_of {
+            MadeOf::Preset(preset) => Some(preset),
+            MadeOf::File(_) => None,
+        }
+    }
+
     /// The overrides, in order.
     pub(crate) fn overrides(&self) -> &[String] {
         &self.overrides
@@ -142,8 +150,16 @@ impl Pipeline {
     pub(crate) fn refiner(&self) -> Refiner {
         match &self.made_of {
             MadeOf::Preset(preset) => Refiner::preset(*preset),
+            MadeOf::File(_) => Refiner::boxed(self.stage()),
+        }
+    }
+
+    /// Makes the stage alone.
+    pub(crate) fn stage(&self) -> BoxedStage {
+        match &self.made_of {
+            MadeOf::Preset(preset) => preset.build(),
             MadeOf::File(file) => match file.build() {
-                Ok(stage) => Refiner::boxed(stage),
+                Ok(stage) => stage,
                 // It was built once, and building is pure.
                 Err(error) => unreachable!("{error}"),
             },

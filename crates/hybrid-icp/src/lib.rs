@@ -37,8 +37,9 @@
 //! right and y down; pixel centres are at integers.
 //!
 //! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), [`pipeline`] (from a file),
-//! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `trace` (what ran).
+//! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `calibration` (its uncertainty), `trace` (what ran).
 
+mod calibration;
 pub mod pipeline;
 mod preset;
 pub mod presets;
@@ -47,6 +48,7 @@ mod sequential;
 mod suggest;
 mod trace;
 
+pub use calibration::Calibration;
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,

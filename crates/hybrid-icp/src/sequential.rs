@@ -3,12 +3,13 @@
 use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
 use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
-    Gated, MveCovariance, PoseEstimate, SymmetryAware, UnitCovariance, Update,
+    Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance, Update,
 };
 use hicp_icp::{Observer, Outcome, Quality, Session, Stage, Termination, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
+use crate::calibration::Calibration;
 use crate::preset::BoxedStage;
 
 /// How a [`SequentialEstimator`] judges each estimate.
@@ -138,30 +139,53 @@ impl SequentialEstimator {
         init: &Isometry3<f64>,
     ) -> Result<Self, FusionError> {
         let unit = UnitCovariance::about_object(model.center(), model.radius())?;
-        let config = FuserConfig {
-            unit,
-            ..FuserConfig::default()
-        };
         // Without calibrated covariances a Mahalanobis distance means nothing.
         let gate = Gate {
             max_mahalanobis_squared: None,
             ..Gate::default()
         };
-        let fuser = SymmetryAware::new(
-            Gated::new(method.build(config), gate)?,
-            model.symmetries().clone(),
-            model.center(),
-            model.radius(),
-        )?;
+        let gated = gated(method, unit, gate)?;
         let mve = MveCovariance {
             unit,
             ..MveCovariance::default()
         };
-        let judge = SequentialConfig {
-            covariance: CovarianceModel::Mve(mve),
+        Self::of_object(stage, gated, CovarianceModel::Mve(mve), model, init)
+    }
+
+    /// Makes an estimator for an object whose uncertainty is the registration's own 6×6 covariance, calibrated: with it go the error
+    /// that all estimates share, and a gate on the Mahalanobis distance. Otherwise as [`SequentialEstimator::for_object`].
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError`] as for [`SequentialEstimator::for_object`], or when a factor of the calibration is out of range.
+    pub fn calibrated(
+        stage: impl Stage + Send + 'static,
+        method: FusionMethod,
+        calibration: &Calibration,
+        model: &Model,
+        init: &Isometry3<f64>,
+    ) -> Result<Self, FusionError> {
+        let unit = UnitCovariance::about_object(model.center(), model.radius())?;
+        let gated = gated(method, unit, calibration.gate)?;
+        let fuser = SharedError::new(gated, unit, calibration.shared)?;
+        let covariance = CovarianceModel::Inflated(calibration.covariance(unit));
+        Self::of_object(stage, fuser, covariance, model, init)
+    }
+
+    fn of_object(
+        stage: impl Stage + Send + 'static,
+        fuser: impl Fuser + Send + 'static,
+        covariance: CovarianceModel,
+        model: &Model,
+        init: &Isometry3<f64>,
+    ) -> Result<Self, FusionError> {
+        let symmetries = model.symmetries().clone();
+        let fuser = SymmetryAware::new(fuser, symmetries, model.center(), model.radius())?;
+        let config = SequentialConfig {
+            covariance,
             ..SequentialConfig::default()
         };
-        Self::new(stage, fuser, judge, init)
+        Self::new(stage, fuser, config, init)
     }
 
     /// Makes the estimator of §V to the letter: covariances e_MVE·I₆, kept as they are when the camera moves, no gate; the MVE
@@ -287,6 +311,19 @@ impl SequentialEstimator {
         };
         (mve, event)
     }
+}
+
+/// A method behind the gate of an object.
+fn gated(
+    method: FusionMethod,
+    unit: UnitCovariance,
+    gate: Gate,
+) -> Result<Gated<BoxedFuser>, FusionError> {
+    let config = FuserConfig {
+        unit,
+        ..FuserConfig::default()
+    };
+    Gated::new(method.build(config), gate)
 }
 
 impl std::fmt::Debug for SequentialEstimator {

@@ -1,6 +1,7 @@
 //! What the paper finds about fusing (§VI-C), held against a study.
 
 use super::config::TrajectoryConfig;
+use super::rule::FusionRule;
 use super::study::variant;
 use crate::analysis::{Analysis, HIGH, Interval, LOW, Metric};
 use crate::claims::{Claim, Verdict};
@@ -11,7 +12,11 @@ const WEIGHTED: [(&str, &str); 2] = [
     ("filtering", "filtering-constant"),
 ];
 const AVERAGE: &str = "average";
-const GATED: [&str; 2] = ["gated-average", "gated-weighted-average"];
+const BEYOND: [&str; 3] = [
+    "gated-average",
+    "gated-weighted-average",
+    "calibrated-weighted-average",
+];
 const HYBRID: &str = "hybrid";
 const CASCADE: &str = "projective-cascade-point-plane";
 const SECTION: &str = "§VI-C";
@@ -27,13 +32,13 @@ pub(crate) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Clai
                 .methods
                 .iter()
                 .map(String::as_str)
-                .filter(|m| !m.starts_with("gated-"))
+                .filter(|m| is_of_paper(m))
                 .collect(),
         };
         found.extend(tester.no_clear_best());
         found.extend(tester.average_as_good());
         found.extend(tester.weighting_no_better());
-        found.extend(tester.gated_better());
+        found.extend(tester.better_than_average());
     }
     found.extend(pipelines(config, analysis, LOW, CASCADE, HYBRID));
     found.extend(pipelines(config, analysis, HIGH, HYBRID, CASCADE));
@@ -137,13 +142,13 @@ impl Tester<'_> {
         ))
     }
 
-    fn gated_better(&self) -> Vec<Claim> {
-        let tested = GATED.into_iter().filter_map(|gated| {
-            let difference = self.difference(gated, AVERAGE)?;
+    fn better_than_average(&self) -> Vec<Claim> {
+        let tested = BEYOND.into_iter().filter_map(|method| {
+            let difference = self.difference(method, AVERAGE)?;
             Some(Claim {
                 section: "beyond §V",
                 ..self.claim(
-                    &format!("{gated} is better than average"),
+                    &format!("{method} is better than average"),
                     below(&[difference]),
                     vec![told(difference)],
                 )
@@ -151,6 +156,10 @@ impl Tester<'_> {
         });
         tested.collect()
     }
+}
+
+pub(super) fn is_of_paper(method: &str) -> bool {
+    FusionRule::from_name(method).is_some_and(FusionRule::is_of_paper)
 }
 
 /// Whether one pipeline is better than another in a range of bins, over the paper's methods together and with each.
@@ -162,7 +171,7 @@ fn pipelines(
     worse: &str,
 ) -> Option<Claim> {
     let group = analysis.group(label)?;
-    let methods = config.methods.iter().filter(|m| !m.starts_with("gated-"));
+    let methods = config.methods.iter().filter(|m| is_of_paper(m));
     let pairs: Vec<(&str, usize, usize)> = methods
         .filter_map(|m| {
             Some((

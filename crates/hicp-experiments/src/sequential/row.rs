@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::ExperimentError;
 
 /// The columns of `trajectories.csv`, in order.
-pub const TRAJECTORY_COLUMNS: [&str; 10] = [
+pub const TRAJECTORY_COLUMNS: [&str; 11] = [
     "object",
     "trajectory",
     "bin",
@@ -15,6 +15,7 @@ pub const TRAJECTORY_COLUMNS: [&str; 10] = [
     "vsd_final",
     "add_final_mm",
     "n_estimates",
+    "mahalanobis_squared",
     "note",
 ];
 
@@ -48,6 +49,9 @@ pub(crate) struct Travelled {
     pub(crate) add_final_mm: f64,
     /// Number of estimates along the way.
     pub(crate) n_estimates: usize,
+    /// ξᵀΣ⁻¹ξ of the fused pose's error by the covariance that the method states; `None` without an estimate, and for an object
+    /// that looks the same however it is turned about an axis.
+    pub(crate) mahalanobis_squared: Option<f64>,
 }
 
 impl TrajectoryRow {
@@ -64,8 +68,15 @@ impl TrajectoryRow {
         self.measured.as_ref().map_or(0, |m| m.n_estimates)
     }
 
+    /// Squared Mahalanobis distance of the final pose from the truth by the stated covariance, distributed like χ²₆ where that is
+    /// right; `None` without an estimate, and for an object that looks the same however it is turned about an axis.
+    #[must_use]
+    pub fn mahalanobis_squared(&self) -> Option<f64> {
+        self.measured.as_ref()?.mahalanobis_squared
+    }
+
     /// The fields in the order of [`TRAJECTORY_COLUMNS`], numbers with a fixed number of digits.
-    pub(crate) fn fields(&self) -> [String; 10] {
+    pub(crate) fn fields(&self) -> [String; 11] {
         let m = self.measured.as_ref();
         let number = |digits: usize, value: Option<f64>| {
             value.map_or_else(String::new, |x| format!("{x:.digits$}"))
@@ -80,6 +91,7 @@ impl TrajectoryRow {
             number(6, m.map(|m| m.vsd_final)),
             number(4, m.map(|m| m.add_final_mm)),
             m.map_or_else(String::new, |m| m.n_estimates.to_string()),
+            number(4, m.and_then(|m| m.mahalanobis_squared)),
             self.note.clone(),
         ]
     }
@@ -123,6 +135,11 @@ impl TrajectoryRow {
                 vsd_final: finite(6)?,
                 add_final_mm: finite(7)?,
                 n_estimates: number(record, 8)?,
+                mahalanobis_squared: if record[9].is_empty() {
+                    None
+                } else {
+                    Some(finite(9)?)
+                },
             })
         };
         Ok(Self {
@@ -136,13 +153,13 @@ impl TrajectoryRow {
             underlying: record[3].to_owned(),
             method: record[4].to_owned(),
             measured,
-            note: record[9].to_owned(),
+            note: record[10].to_owned(),
         })
     }
 }
 
 /// Returns rows as CSV, without a header.
-pub(crate) fn to_csv(rows: impl IntoIterator<Item = [String; 10]>) -> Vec<u8> {
+pub(crate) fn to_csv(rows: impl IntoIterator<Item = [String; 11]>) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
         // A vector takes everything.

@@ -3,8 +3,9 @@
 use hicp_core::{Isometry3, Model};
 use hybrid_icp::fusion::{
     CovarianceModel, FuserConfig, FusionError, FusionMethod, MveCovariance, UnitCovariance,
+    probability_within,
 };
-use hybrid_icp::{BoxedStage, MeanVsd, SequentialConfig, SequentialEstimator};
+use hybrid_icp::{BoxedStage, Calibration, MeanVsd, Preset, SequentialConfig, SequentialEstimator};
 
 /// A method of §V-A as the study runs it, or one behind this project's gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,11 +17,13 @@ pub enum FusionRule {
     /// The same, but estimates with an MVE above 0.4 are left out and symmetric poses are brought together:
     /// [`SequentialEstimator::for_object`].
     Gated(FusionMethod),
+    /// As `Gated`, with the covariance of the registration, calibrated to the pipeline: [`SequentialEstimator::calibrated`].
+    Calibrated(FusionMethod),
 }
 
 impl FusionRule {
     /// The paper's six methods in its order, then what goes beyond it.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Plain(FusionMethod::LastEstimate),
         Self::Plain(FusionMethod::Average),
         Self::Plain(FusionMethod::WeightedAverage),
@@ -29,33 +32,61 @@ impl FusionRule {
         Self::Plain(FusionMethod::MostConfident),
         Self::Gated(FusionMethod::Average),
         Self::Gated(FusionMethod::WeightedAverage),
+        Self::Calibrated(FusionMethod::WeightedAverage),
+        Self::Calibrated(FusionMethod::MostConfident),
     ];
 
-    /// Name in tables; `gated-` before that of the method.
+    /// Name in tables; `gated-` or `calibrated-` before that of the method.
     #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Plain(method) => method.name().to_owned(),
             Self::Gated(method) => format!("gated-{method}"),
+            Self::Calibrated(method) => format!("calibrated-{method}"),
         }
     }
 
-    /// Returns the rule of a name.
+    /// Returns the rule of a name; any method may be gated or calibrated, not only those of [`FusionRule::ALL`].
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|rule| rule.name() == name)
+        let of = |rule: fn(FusionMethod) -> Self, method: &str| method.parse().ok().map(rule);
+        match name.split_once('-') {
+            Some(("gated", method)) => of(Self::Gated, method),
+            Some(("calibrated", method)) => of(Self::Calibrated, method),
+            _ => of(Self::Plain, name),
+        }
     }
 
-    /// Makes an estimator that starts from `init` in the first camera frame.
+    /// Returns whether it is a method of the paper.
+    #[must_use]
+    pub fn is_of_paper(self) -> bool {
+        matches!(self, Self::Plain(_))
+    }
+
+    /// Returns the probability that the squared Mahalanobis distance of the final pose from the truth is at most so much, by the
+    /// distribution that the rule assumes with an underlying pipeline.
+    pub(crate) fn probability_within(self, pipeline: &str, mahalanobis_squared: f64) -> f64 {
+        match self {
+            Self::Calibrated(_) => calibration(pipeline).probability_within(mahalanobis_squared),
+            _ => probability_within(mahalanobis_squared, f64::INFINITY),
+        }
+    }
+
+    /// Makes an estimator that starts from `init` in the first camera frame; `pipeline` is the name of the underlying one.
     pub(crate) fn estimator(
         self,
         stage: BoxedStage,
+        pipeline: &str,
         model: &Model,
         init: &Isometry3<f64>,
     ) -> Result<SequentialEstimator, FusionError> {
         let method = match self {
             Self::Gated(method) => {
                 return SequentialEstimator::for_object(stage, method, model, init);
+            }
+            Self::Calibrated(method) => {
+                let calibration = calibration(pipeline);
+                return SequentialEstimator::calibrated(stage, method, &calibration, model, init);
             }
             Self::Plain(method) => method,
         };
@@ -73,4 +104,9 @@ impl FusionRule {
         };
         SequentialEstimator::new(stage, fuser, config, init)
     }
+}
+
+/// The calibration for a pipeline by its name; that of `hybrid` for one that is no preset.
+fn calibration(pipeline: &str) -> Calibration {
+    Calibration::of(pipeline.parse().unwrap_or(Preset::Hybrid))
 }

@@ -98,9 +98,10 @@ fn instances<T>(
 }
 
 fn scene_camera(node: &Node<'_>) -> Result<SceneCamera, IoError> {
+    // Half a pose is damage: reading it says what is missing.
     let has_pose = ["cam_R_w2c", "cam_t_w2c"]
         .iter()
-        .all(|key| node.optional(key).is_some());
+        .any(|key| node.optional(key).is_some());
     let calibration = calibration(node)?;
     Ok(SceneCamera {
         matrix: calibration.matrix,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use hicp_core::{DepthImage, Mask};
+use hicp_core::{DepthImage, Isometry3, Mask};
 
 use super::annotations::{
     GroundTruth, GroundTruthInfo, SceneCamera, read_cameras, read_ground_truth, read_info,
@@ -66,6 +66,21 @@ impl Scene {
             key: "$".to_owned(),
             found: format!("{} images", self.cameras.len()),
             expected: format!("image {im_id} among them"),
+        })
+    }
+
+    /// Returns the pose of the world in the camera frame of an image, metres: by these the motion of the camera is known.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::camera`]; [`IoError::JsonValue`] when the file does not state the pose.
+    pub fn camera_from_world(&self, im_id: u32) -> Result<Isometry3<f64>, IoError> {
+        let stated = self.camera(im_id)?.camera_from_world;
+        stated.ok_or_else(|| IoError::JsonValue {
+            path: self.dir.join("scene_camera.json"),
+            key: format!("$.{im_id}"),
+            found: "no `cam_R_w2c` and no `cam_t_w2c`".to_owned(),
+            expected: "both, to know how the camera moved".to_owned(),
         })
     }
 
@@ -192,6 +207,10 @@ mod tests {
         assert_eq!(camera.depth_scale, Some(0.5));
         assert_eq!(camera.camera_from_world.unwrap().translation.z, 1.0);
         assert_eq!(scene.camera(2).unwrap().camera_from_world, None);
+        assert_eq!(scene.camera_from_world(10).unwrap().translation.z, 1.0);
+        assert!(
+            matches!(scene.camera_from_world(2), Err(IoError::JsonValue { key, .. }) if key == "$.2")
+        );
         assert!(matches!(scene.camera(3), Err(IoError::JsonValue { .. })));
         assert!(scene.ground_truth(2).is_none() && scene.ground_truth_info(2).is_none());
         assert!(scene.color_path(2).is_none());
@@ -200,6 +219,17 @@ mod tests {
             scene.read_visible_mask(2, 0),
             Err(IoError::Missing { .. })
         ));
+    }
+
+    #[test]
+    fn half_a_camera_pose_is_damage() {
+        let half = CAMERA.replace(r#", "cam_t_w2c": [0,0,1000]"#, "");
+        let (_dir, scene) = scene(&[("scene_camera.json", &half)]);
+        let error = scene.unwrap_err().to_string();
+        assert!(
+            error.contains("$.10") && error.contains("cam_t_w2c"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -44,6 +44,10 @@ pub(crate) struct Arguments {
     /// Images of every scene.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(), allow_negative_numbers = true)]
     images: u32,
+    /// Move the camera along a path through the images of a scene, nearer and round the objects, instead of looking from all
+    /// sides: for bop sequence.
+    #[arg(long)]
+    trajectory: bool,
     /// Objects of every scene; one may be there several times.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=40), allow_negative_numbers = true)]
     instances: u32,
@@ -231,7 +235,15 @@ impl Generator<'_> {
         let count = self.arguments.instances as usize;
         let clutter = Clutter::draw(&mut placing, &self.models, count)?;
         let mut looking = stream(seed, &["bop", "view"], place);
-        let view = clutter.view(&mut looking, &self.models, &self.camera, &self.sensor)?;
+        let (models, camera, sensor) = (&self.models, &self.camera, &self.sensor);
+        let view = if self.arguments.trajectory {
+            let mut moving = stream(seed, &["bop", "path"], u64::from(scene_id));
+            let images = self.arguments.images as usize;
+            let path = clutter.path(&mut moving, camera, images);
+            clutter.view_from(&mut looking, path[im_id as usize], models, camera, sensor)?
+        } else {
+            clutter.view(&mut looking, models, camera, sensor)?
+        };
         self.write_images(scene_id, im_id, &view)?;
 
         let infos: Vec<GroundTruthInfo> = view.instances.iter().map(info).collect();

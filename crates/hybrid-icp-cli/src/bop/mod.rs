@@ -15,6 +15,7 @@ mod problem;
 mod refine;
 mod refine_settings;
 mod refine_summary;
+mod sequence;
 mod show;
 mod show_estimates;
 mod show_lines;
@@ -33,6 +34,7 @@ pub(crate) enum Command {
     Generate(generate::Arguments),
     Compare(compare::Arguments),
     Show(show::Arguments),
+    Sequence(sequence::Arguments),
 }
 
 /// Runs the command.
@@ -43,6 +45,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Generate(arguments) => generate::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Show(arguments) => show::run(arguments),
+        Command::Sequence(arguments) => sequence::run(arguments),
     }
 }
 

@@ -1,0 +1,89 @@
+//! An error that all estimates have in common.
+
+use crate::error::FusionError;
+use crate::estimate::PoseEstimate;
+use crate::fuser::{Fuser, Update};
+use crate::motion::CameraMotion;
+use crate::unit::UnitCovariance;
+
+/// Adds to what a fuser believes the error that its estimates share: that of the model, of the camera's calibration. However many
+/// estimates there are, it does not average away.
+///
+/// The estimates that go in have the covariances of what differs between them; these alone weigh and are gated. The covariance that
+/// comes out is that of the fuser inside plus σ² U, with U the unit covariance at the pose: after one update it is larger than that
+/// update's.
+///
+/// ```
+/// use hicp_core::{Isometry3, Matrix6};
+/// use hicp_fusion::{BatchFuser, Fuser, FuserConfig, PoseEstimate, SharedError, UnitCovariance};
+/// # fn main() -> Result<(), hicp_fusion::FusionError> {
+/// let inner = BatchFuser::weighted_average(FuserConfig::default());
+/// let mut fuser = SharedError::new(inner, UnitCovariance::Identity, 0.001)?;
+/// let seen = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.5), Matrix6::identity() * 1e-4)?;
+/// (0..1000).for_each(|_| { fuser.update(&seen); });
+/// let variance = fuser.estimate().map_or(0.0, |fused| fused.covariance()[(0, 0)]);
+/// assert!((variance - (1e-4 / 1000.0 + 1e-6)).abs() < 1e-12);
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Debug)]
+pub struct SharedError<F> {
+    inner: F,
+    unit: UnitCovariance,
+    variance: f64,
+}
+
+impl<F: Fuser> SharedError<F> {
+    /// Adds a shared error of a standard deviation in units to a fuser; 0 adds nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError::Parameter`] when the standard deviation is not between 0 and 10⁶.
+    pub fn new(
+        inner: F,
+        unit: UnitCovariance,
+        standard_deviation: f64,
+    ) -> Result<Self, FusionError> {
+        if !(0.0..=1e6).contains(&standard_deviation) {
+            return Err(FusionError::Parameter {
+                name: "standard deviation of the shared error",
+                value: standard_deviation,
+                expected: "0 to 1e6 units",
+            });
+        }
+        Ok(Self {
+            inner,
+            unit,
+            variance: standard_deviation * standard_deviation,
+        })
+    }
+
+    /// The fuser inside, without the shared error.
+    #[must_use]
+    pub fn inner(&self) -> &F {
+        &self.inner
+    }
+}
+
+impl<F: Fuser> Fuser for SharedError<F> {
+    fn propagate(&mut self, motion: &CameraMotion) {
+        self.inner.propagate(motion);
+    }
+
+    fn update(&mut self, estimate: &PoseEstimate) -> Update {
+        self.inner.update(estimate)
+    }
+
+    fn estimate(&self) -> Option<PoseEstimate> {
+        let mut fused = self.inner.estimate()?;
+        fused.covariance += self.unit.at(&fused.camera_from_object) * self.variance;
+        Some(fused)
+    }
+
+    fn reset(&mut self) {
+        self.inner.reset();
+    }
+
+    fn name(&self) -> &'static str {
+        "shared-error"
+    }
+}

@@ -1,0 +1,32 @@
+//! The pose to start from.
+
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use hicp_io::bop::{ResultRow, read_results};
+use hybrid_icp::Isometry3;
+
+/// Reads a pose file, or the row with the highest score for a scene, image and object of a result file (`.csv`).
+pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isometry3<f64>> {
+    if path.extension().is_none_or(|extension| extension != "csv") {
+        let pose = hicp_io::read_pose_json(path).context("cannot read --init")?;
+        return Ok(pose.camera_from_object);
+    }
+    let (scene_id, im_id, obj_id) = place;
+    let rows = read_results(path).context("cannot read --init")?;
+    let of_place = |row: &&ResultRow| (row.scene_id, row.im_id, row.obj_id) == place;
+    // Of equal scores the first row.
+    let best = rows.iter().filter(of_place).reduce(
+        |best, row| {
+            if row.score > best.score { row } else { best }
+        },
+    );
+    match best {
+        Some(row) => Ok(row.camera_from_object()),
+        None => bail!(
+            "--init {}: none of its {} rows is for scene {scene_id}, image {im_id}, object {obj_id}; expected one: --first names another image to begin with",
+            path.display(),
+            rows.len()
+        ),
+    }
+}

@@ -1,0 +1,85 @@
+//! Factors that make the covariance of a registration what its errors say.
+
+use hicp_fusion::{Gate, InflatedCovariance, UnitCovariance, probability_within};
+
+use crate::preset::Preset;
+
+/// How far to trust the covariance of a pipeline's registration: factors of [`InflatedCovariance`], in units of the object (its radius
+/// and 1 rad), the error that all estimates along a trajectory share, and the tails of the errors.
+///
+/// The constants are fitted along trajectories toward the tuning objects, reconstructed with errors of 5 mm and 1.1° and seen with a
+/// D435's noise (`cargo run --release -p hicp-experiments --example calibration`). They belong to such models: of an exact
+/// model the shared error is much smaller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// Factor on the standard deviations of the registration.
+    pub scale: f64,
+    /// Standard deviation that no estimate is better than, the shared error apart.
+    pub floor: f64,
+    /// Standard deviation at an MVE of 1, as the growth below it has it.
+    pub mve_gain: f64,
+    /// How fast it grows with the MVE.
+    pub mve_power: f64,
+    /// Standard deviation where the registration determines no covariance.
+    pub undetermined: f64,
+    /// Standard deviation of the error that all estimates share: the model's.
+    pub shared: f64,
+    /// ν of Student's distribution of the errors; ∞ for normal errors. See [`Calibration::probability_within`].
+    pub degrees_of_freedom: f64,
+    /// What is not fused.
+    pub gate: Gate,
+}
+
+impl Calibration {
+    /// Fitted to `hybrid`.
+    pub const HYBRID: Self = Self {
+        scale: 1.0,
+        floor: 0.003,
+        mve_gain: 140.0,
+        mve_power: 5.0,
+        undetermined: 0.3,
+        shared: 0.021,
+        degrees_of_freedom: 4.0,
+        gate: Gate {
+            max_mve: Some(0.25),
+            max_mahalanobis_squared: Some(100.0),
+            restart_after: Some(3),
+        },
+    };
+
+    /// Fitted to `projective-cascade-point-plane`.
+    pub const PROJECTIVE_CASCADE_POINT_PLANE: Self = Self {
+        mve_gain: 40.0,
+        mve_power: 4.4,
+        ..Self::HYBRID
+    };
+
+    /// Returns the factors that were fitted to a preset; nothing was fitted to others than the two above, which get those of `hybrid`.
+    #[must_use]
+    pub fn of(preset: Preset) -> Self {
+        match preset {
+            Preset::ProjectiveCascadePointPlane => Self::PROJECTIVE_CASCADE_POINT_PLANE,
+            _ => Self::HYBRID,
+        }
+    }
+
+    /// The covariance of an estimate without the shared error.
+    #[must_use]
+    pub fn covariance(&self, unit: UnitCovariance) -> InflatedCovariance {
+        InflatedCovariance {
+            unit,
+            scale: self.scale,
+            floor: self.floor,
+            mve_gain: self.mve_gain,
+            mve_power: self.mve_power,
+            undetermined: self.undetermined,
+        }
+    }
+
+    /// Returns the probability that the squared Mahalanobis distance of the fused pose from the truth, by the stated covariance,
+    /// is at most so much.
+    #[must_use]
+    pub fn probability_within(&self, mahalanobis_squared: f64) -> f64 {
+        probability_within(mahalanobis_squared, self.degrees_of_freedom)
+    }
+}
