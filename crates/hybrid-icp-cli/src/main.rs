@@ -1,12 +1,15 @@
 //! The program `hybrid-icp`: `hybrid-icp --help` lists its commands.
 //!
-//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
+//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong; 130 interrupted.
 
 mod bop;
 mod choice;
 mod demo;
 mod doubts;
 mod experiment;
+mod inspect;
+mod interrupt;
+mod limits;
 mod objects;
 mod outputs;
 mod overlay;
@@ -32,6 +35,8 @@ use clap::{Parser, Subcommand};
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    limits: limits::Limits,
 }
 
 const EXAMPLES: &str = "\
@@ -41,12 +46,15 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
+  hybrid-icp inspect mug.ply --unit mm
   hybrid-icp pipelines
   hybrid-icp objects --out objects
   hybrid-icp experiment init-noise --poses 30
 
 `hybrid-icp help refine` tells all about a command.
-Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
+Exit codes: 0 done, 1 something failed, 2 the command line is wrong, 130
+interrupted (Ctrl-C or SIGTERM: within a second; bop refine and experiment keep
+what is done for --resume).";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -56,6 +64,7 @@ enum Command {
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(bop::Command),
+    Inspect(inspect::Arguments),
     Pipelines(pipelines::Arguments),
     Objects(objects::Arguments),
     #[command(subcommand)]
@@ -63,11 +72,15 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let cli = Cli::parse();
+    cli.limits.choose();
+    interrupt::listen();
+    let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Bop(command) => bop::run(&command),
+        Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
         Command::Objects(arguments) => objects::run(&arguments),
         Command::Experiment(command) => experiment::run(&command),
@@ -76,7 +89,11 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::complain(format_args!("{error:#}"));
-            ExitCode::FAILURE
+            if interrupt::asked() {
+                ExitCode::from(interrupt::EXIT_CODE)
+            } else {
+                ExitCode::FAILURE
+            }
         }
     }
 }

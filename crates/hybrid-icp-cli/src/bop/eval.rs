@@ -15,6 +15,7 @@ use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
 use super::models::Models;
 use super::targets::{self, FrameKey, Targets};
 use super::{errors_csv, problem, progress_bar, thread_pool};
+use crate::limits::limits;
 use crate::outputs;
 use crate::terminal::{say, warn};
 
@@ -125,8 +126,8 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     read.extend(arguments.targets.as_deref().map(|p| ("--targets", p)));
     outputs::check(&written, &read, &[])?;
 
-    let rows = hicp_io::bop::read_results(&arguments.results)?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let rows = limits().read_results(&arguments.results)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let targets = targets::choose(&dataset, &arguments.split, arguments.targets.as_deref())?;
     let scene_ids = targets.keys().map(|(scene_id, _)| *scene_id);

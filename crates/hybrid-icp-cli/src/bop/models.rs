@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use hicp_io::bop::{Dataset, ModelInfo, read_models_info};
-use hicp_io::{IoError, LengthUnit, read_mesh};
+use hicp_io::{IoError, LengthUnit};
 use hybrid_icp::{Model, ModelConfig};
 use rayon::prelude::*;
 
 use super::problem::chain;
+use crate::limits::limits;
 
 /// Models by object id, read once.
 #[derive(Debug)]
@@ -64,6 +65,6 @@ fn read_model(dir: &Path, info: Option<&ModelInfo>, obj_id: u32) -> Result<Optio
         symmetries: info.map(|i| i.symmetries.clone()).unwrap_or_default(),
         ..ModelConfig::default()
     };
-    let mesh = read_mesh(path, LengthUnit::Millimeters)?;
+    let mesh = limits().read_mesh(path, LengthUnit::Millimeters)?;
     Ok(Some(Model::with_config(mesh, config)))
 }

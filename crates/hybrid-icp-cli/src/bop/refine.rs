@@ -20,8 +20,9 @@ use super::problem::{self, Problem};
 use super::shard::Shard;
 use super::{median, progress_bar, thread_pool};
 use crate::choice::{Pipeline, PipelineArguments};
+use crate::limits::limits;
 use crate::terminal::{say, warn};
-use crate::{outputs, report};
+use crate::{interrupt, outputs, report};
 
 /// Refine every row of a result file.
 ///
@@ -91,7 +92,8 @@ Example:
 
 Exit codes: 0 done, with the rows kept and the reasons in the summary; 1 a file
 is damaged or no frame was found (the output is still written where that came up
-while refining); 2 the command line is wrong.";
+while refining); 2 the command line is wrong; 130 interrupted (Ctrl-C or
+SIGTERM), with the frames that are done in the journal for --resume.";
 
 /// A row's result.
 #[derive(Debug)]
@@ -139,10 +141,10 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     )?;
     let pipeline = arguments.pipeline.choose()?;
     let mut rows = arguments.rows()?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let detections = match &arguments.detections {
-        Some(path) => Some(hicp_io::bop::read_detections(path)?),
+        Some(path) => Some(limits().read_detections(path)?),
         None => None,
     };
     let frames = frames_of(&rows);
@@ -154,7 +156,8 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let (journal, mut results) = arguments.journal(&settings, &frames)?;
     let resumed = results.iter().flatten().count();
     let progress = progress_bar(rows.len(), "rows");
-    pool.install(|| {
+    interrupt::can_resume();
+    let ran = pool.install(|| {
         results
             .par_iter_mut()
             .zip(&frames)
@@ -164,6 +167,9 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
             .try_for_each_init(
                 || pipeline.refiner(),
                 |refiner, (place, (result, ((scene_id, im_id), indices)))| {
+                    if interrupt::asked() {
+                        bail!("interrupted");
+                    }
                     if result.is_none() {
                         let done = job.frame(refiner, *scene_id, *im_id, indices, &rows);
                         if let Some(journal) = &journal {
@@ -175,8 +181,16 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
                     Ok::<(), anyhow::Error>(())
                 },
             )
-    })?;
+    });
     progress.finish_and_clear();
+    if interrupt::asked() && ran.is_err() && journal.is_some() {
+        bail!(
+            "interrupted: {} of {} frames are done; --resume goes on from there",
+            results.iter().flatten().count(),
+            frames.len()
+        );
+    }
+    ran?;
     let results: Vec<FrameResult> = results.into_iter().flatten().collect();
 
     for (result, (_, indices)) in results.iter().zip(&frames) {
@@ -233,7 +247,7 @@ impl Arguments {
 
     /// Reads the rows that are to be refined and written.
     fn rows(&self) -> anyhow::Result<Vec<ResultRow>> {
-        let mut rows = hicp_io::bop::read_results(&self.results)?;
+        let mut rows = limits().read_results(&self.results)?;
         if let Some(limit) = self.limit {
             rows.truncate(limit as usize);
         }
