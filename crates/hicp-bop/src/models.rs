@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use hicp_io::bop::{Dataset, ModelInfo, read_models_info};
-use hicp_io::{IoError, LengthUnit, read_mesh};
+use hicp_io::{IoError, LengthUnit, ReadLimits};
 use hybrid_icp::{Model, ModelConfig};
 
 use crate::fault::chain;
@@ -14,6 +14,7 @@ use crate::fault::chain;
 pub struct ModelFolder {
     dir: PathBuf,
     infos: BTreeMap<u32, ModelInfo>,
+    limits: ReadLimits,
 }
 
 impl ModelFolder {
@@ -30,14 +31,25 @@ impl ModelFolder {
         } else {
             BTreeMap::new()
         };
-        Ok(Self { dir, infos })
+        Ok(Self {
+            dir,
+            infos,
+            limits: ReadLimits::DEFAULT,
+        })
+    }
+
+    /// Reads models within other limits than [`ReadLimits::DEFAULT`].
+    #[must_use]
+    pub fn with_limits(mut self, limits: ReadLimits) -> Self {
+        self.limits = limits;
+        self
     }
 
     /// Reads the model of an object, metres; `None` if there is none.
     ///
     /// # Errors
     ///
-    /// As [`read_mesh`].
+    /// As [`ReadLimits::read_mesh`].
     pub fn read(&self, obj_id: u32) -> Result<Option<Model>, IoError> {
         let path = Dataset::model_path_in(&self.dir, obj_id);
         if !path.is_file() {
@@ -49,7 +61,7 @@ impl ModelFolder {
             symmetries: info.map(|i| i.symmetries.clone()).unwrap_or_default(),
             ..ModelConfig::default()
         };
-        let mesh = read_mesh(path, LengthUnit::Millimeters)?;
+        let mesh = self.limits.read_mesh(path, LengthUnit::Millimeters)?;
         Ok(Some(Model::with_config(mesh, config)))
     }
 }

@@ -6,6 +6,9 @@ use crate::camera::PinholeCamera;
 use crate::error::ImageError;
 use crate::region::PixelRegion;
 
+/// Smallest depth that counts as measured, metres: the inverse of a smaller one, down to the denormals, loses its meaning in `f32`.
+pub const MIN_DEPTH_METERS: f32 = 1e-6;
+
 /// Depths beyond this many metres are taken as missing: no depth camera measures them, and their squares overflow.
 pub const MAX_DEPTH_METERS: f32 = 1000.0;
 
@@ -76,14 +79,14 @@ pub struct DepthImage(Raster<f32>);
 impl DepthImage {
     /// Makes a depth image from metres.
     ///
-    /// Values that are not finite, not positive, or beyond [`MAX_DEPTH_METERS`] are stored as 0, missing.
+    /// Values that are not finite, below [`MIN_DEPTH_METERS`], or beyond [`MAX_DEPTH_METERS`] are stored as 0, missing.
     ///
     /// # Errors
     ///
     /// [`ImageError::PixelCount`] when `meters` does not hold `width * height` values.
     pub fn from_meters(width: u32, height: u32, mut meters: Vec<f32>) -> Result<Self, ImageError> {
         for z in &mut meters {
-            if !(*z > 0.0 && *z <= MAX_DEPTH_METERS) {
+            if !(MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(z) {
                 *z = 0.0;
             }
         }

@@ -36,6 +36,7 @@ mod id;
 mod image;
 mod label;
 mod mesh;
+mod mesh_survey;
 mod model;
 mod normals;
 mod observation;
@@ -56,9 +57,10 @@ pub use derived::Derived;
 pub use diameter::diameter;
 pub use error::{CameraError, ImageError, MeshError, RotationError, SymmetryError};
 pub use id::Id;
-pub use image::{DepthImage, DistanceImage, MAX_DEPTH_METERS, Mask};
+pub use image::{DepthImage, DistanceImage, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask};
 pub use label::type_label;
 pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, TriMesh};
+pub use mesh_survey::MeshSurvey;
 pub use model::{Model, ModelConfig};
 pub use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,

@@ -7,8 +7,10 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::error::MeshError;
 
-/// Largest absolute vertex coordinate accepted, metres: beyond it squares lose their meaning in `f32`.
-pub const MAX_COORDINATE_METERS: f32 = 1.0e6;
+/// Largest absolute vertex coordinate accepted, metres: what a map grid reaches (a UTM northing ends at 10 000 km).
+///
+/// Far from the origin `f32` is coarse, 0.5 m at 5000 km: see [`TriMesh::coordinate_step`].
+pub const MAX_COORDINATE_METERS: f32 = 1.0e7;
 
 /// Largest number of vertices and of triangles accepted.
 pub const MAX_MESH_ELEMENTS: usize = 50_000_000;
@@ -160,6 +162,19 @@ impl TriMesh {
         (b - a).cross(&(c - a))
     }
 
+    /// Returns the largest distance between neighbouring `f32` numbers among the coordinates, metres: how finely they can be stated.
+    ///
+    /// Half of it is the rounding that reading the mesh may have cost. Beyond a thousandth of the diameter it is no mesh to
+    /// register: move the mesh to its origin.
+    #[must_use]
+    pub fn coordinate_step(&self) -> f64 {
+        let largest = self
+            .vertices
+            .iter()
+            .fold(0.0_f32, |most, p| most.max(p.coords.amax()));
+        f64::from(largest.next_up()) - f64::from(largest)
+    }
+
     /// Returns, for every vertex, whether a triangle uses it.
     #[must_use]
     pub fn used_vertices(&self) -> Vec<bool> {
@@ -234,7 +249,7 @@ fn find_facing(mesh: &TriMesh) -> Facing {
 }
 
 /// Maps every vertex to the first one at exactly the same position.
-fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
+pub(crate) fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
     let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(vertices.len());
     (0_u32..)
         .zip(vertices)
@@ -246,18 +261,18 @@ fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
         .collect()
 }
 
-struct DisjointSets {
+pub(crate) struct DisjointSets {
     parent: Vec<u32>,
 }
 
 impl DisjointSets {
-    fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         Self {
             parent: (0_u32..).take(count).collect(),
         }
     }
 
-    fn find(&mut self, mut x: u32) -> u32 {
+    pub(crate) fn find(&mut self, mut x: u32) -> u32 {
         while self.parent[x as usize] != x {
             let grandparent = self.parent[self.parent[x as usize] as usize];
             self.parent[x as usize] = grandparent;
@@ -266,7 +281,7 @@ impl DisjointSets {
         x
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub(crate) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }

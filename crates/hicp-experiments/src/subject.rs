@@ -46,7 +46,7 @@ impl Subject {
         let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         files.retain(|path| {
             let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-            ["obj", "ply", "stl"].iter().any(|e| extension == *e)
+            ["obj", "off", "ply", "stl"].iter().any(|e| extension == *e)
         });
         files.sort();
         if files.is_empty() {

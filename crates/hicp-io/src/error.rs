@@ -1,5 +1,6 @@
 //! What can go wrong with a file.
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +10,24 @@ use thiserror::Error;
 use crate::bop::RleError;
 
 type Source = Box<dyn std::error::Error + Send + Sync>;
+
+/// Where in a file something stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of text, from 1.
+    Line(usize),
+    /// An offset from the start of the file, bytes.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+        }
+    }
+}
 
 /// A file that cannot be read or written: which file, where in it, what was found and what was expected.
 ///
@@ -48,15 +67,47 @@ pub enum IoError {
         /// What was looked for.
         what: &'static str,
     },
-    /// A file larger than any that this library reads.
-    #[error("{} has {bytes} bytes, expected at most {limit}", path.display())]
-    FileTooLarge {
+    /// Something that is no regular file: a folder, or a pipe or device, which need not have an end.
+    #[error("{} is {found}, expected a regular file", path.display())]
+    NotAFile {
+        /// What was to be read.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+    },
+    /// A file that was written to while it was read.
+    #[error(
+        "{} changed while it was read, from {before} to {after} bytes: expected a file that nobody writes to",
+        path.display()
+    )]
+    Changed {
         /// The file.
         path: PathBuf,
-        /// Its size.
-        bytes: u64,
-        /// The largest size accepted.
+        /// Its size when it was opened, bytes.
+        before: u64,
+        /// Its size now, bytes.
+        after: u64,
+    },
+    /// A file that holds more than the reader was told to take in; see [`ReadLimits`](crate::ReadLimits).
+    #[error(
+        "{}{}: found {count} {what}, expected at most {limit}: raise the limit (--{} N, ReadLimits::{field}) if that is meant",
+        path.display(),
+        place.map(|place| format!(", {place}")).unwrap_or_default(),
+        field.replace('_', "-")
+    )]
+    Limit {
+        /// The file.
+        path: PathBuf,
+        /// Where the file says so; `None` for its size.
+        place: Option<Place>,
+        /// What is counted: bytes, vertices, triangles, pixels, rows.
+        what: &'static str,
+        /// How many there are, at least.
+        count: u64,
+        /// How many are accepted.
         limit: u64,
+        /// The field of [`ReadLimits`](crate::ReadLimits) that raises the limit.
+        field: &'static str,
     },
     /// A file name that does not say a format this library knows.
     #[error("{} has the extension {found:?}, expected {expected}", path.display())]
@@ -69,7 +120,7 @@ pub enum IoError {
         expected: &'static str,
     },
     /// Text that is not encoded as UTF-8.
-    #[error("{} is encoded as {found}, expected UTF-8", path.display())]
+    #[error("{}, byte 0: found text encoded as {found}, expected UTF-8", path.display())]
     Encoding {
         /// The file.
         path: PathBuf,
@@ -102,12 +153,14 @@ pub enum IoError {
     },
     /// A header that promises more than the file can hold; refused before anything is allocated.
     #[error(
-        "{} promises {count} {what}, which take at least {needed} bytes, but {available} bytes are left",
+        "{}, {place}: promises {count} {what}, which take at least {needed} bytes, but {available} bytes are left",
         path.display()
     )]
     Promise {
         /// The file.
         path: PathBuf,
+        /// Where it says so.
+        place: Place,
         /// What is promised: elements, triangles, pixels.
         what: String,
         /// How many.
@@ -118,14 +171,30 @@ pub enum IoError {
         available: u64,
     },
     /// Something the format allows and this library does not read.
-    #[error("{} holds {found}, expected {expected}", path.display())]
+    #[error("{}, {place}: found {found}, expected {expected}", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
+        /// Where it does.
+        place: Place,
         /// What it holds.
         found: String,
         /// What is supported.
         expected: &'static str,
+    },
+    /// A normal without a direction.
+    #[error("{}: vertex {vertex} has the normal ({x}, {y}, {z}), expected finite numbers that are not all 0", path.display())]
+    Normal {
+        /// The file.
+        path: PathBuf,
+        /// The vertex, from 0.
+        vertex: usize,
+        /// x.
+        x: f32,
+        /// y.
+        y: f32,
+        /// z.
+        z: f32,
     },
     /// A mesh that can be read but not used.
     #[error("{} does not hold a usable mesh", path.display())]
@@ -136,10 +205,16 @@ pub enum IoError {
         source: MeshError,
     },
     /// A face that names a vertex that is not there.
-    #[error("{}: face {face} uses vertex {index}, expected 0 to {} (counted from 0)", path.display(), vertices.saturating_sub(1))]
+    #[error(
+        "{}, {place}: face {face} uses vertex {index}, expected {} (counted from 0)",
+        path.display(),
+        match vertices { 0 => "no face, for there are no vertices".to_owned(), n => format!("0 to {}", n - 1) }
+    )]
     FaceIndex {
         /// The file.
         path: PathBuf,
+        /// Where in it.
+        place: Place,
         /// The face, from 0.
         face: usize,
         /// The index it holds.
@@ -167,7 +242,7 @@ pub enum IoError {
     },
     /// An image that is too large, by its header.
     #[error(
-        "{} is {width}x{height} pixels, expected sides of 1 to {max_side} and at most {max_pixels} pixels",
+        "{}, byte 16: {width}x{height} pixels, expected sides of 1 to {max_side} and at most {max_pixels} pixels: raise the limit (--max-pixels N, ReadLimits::max_pixels) if that is meant",
         path.display()
     )]
     ImageTooLarge {
@@ -367,6 +442,19 @@ impl IoError {
         Self::Mesh {
             path: path.to_owned(),
             source,
+        }
+    }
+
+    /// Something wrong at a place; `found` is quoted in text, or [`END_OF_FILE`].
+    pub(crate) fn at(path: &Path, place: Place, found: &str, expected: impl Into<String>) -> Self {
+        match place {
+            Place::Line(line) => Self::line(path, line, found, expected),
+            Place::Byte(offset) => Self::Bytes {
+                path: path.to_owned(),
+                offset,
+                found: found.to_owned(),
+                expected: expected.into(),
+            },
         }
     }
 

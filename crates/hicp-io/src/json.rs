@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::error::{IoError, quote};
-use crate::source::{read_bytes, text_bytes};
+use crate::limits::ReadLimits;
+use crate::source::{Limited, Source, text_bytes};
 
 /// A parsed JSON file.
 #[derive(Debug)]
@@ -17,7 +18,12 @@ pub(crate) struct Document {
 impl Document {
     /// Reads a JSON file whole. Numbers keep every digit of an `f64`.
     pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
-        let content = read_bytes(path)?;
+        Self::read_within(&ReadLimits::DEFAULT, path)
+    }
+
+    /// Reads a JSON file whole, within limits.
+    pub(crate) fn read_within(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
+        let content = Source::open(path)?.read(Limited::JsonBytes, limits.max_json_bytes)?;
         let value = serde_json::from_slice(text_bytes(path, &content)?).map_err(|error| {
             IoError::JsonSyntax {
                 path: path.to_owned(),

@@ -26,17 +26,20 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `error` (what can go wrong), `source` (whole files into memory, within limits), `atomic`
-//! (writing), `unit`, `mesh` (OBJ, PLY, STL), `point_cloud`, `image` (PNG), `json` (values with their key path),
+//! Modules in reading order: `error` (what can go wrong), `limits` (how much is read), `source` (whole files into memory, within limits), `atomic`
+//! (writing), `unit`, `mesh` (OBJ, OFF, PLY, STL), `point_cloud`, `image` (PNG), `json` (values with their key path),
 //! `pose`, `camera`, and [`bop`] (datasets, detections, results).
 
 mod error;
+
+mod limits;
+pub use limits::ReadLimits;
 
 mod source;
 
 mod atomic;
 pub use atomic::{check_writable, write_atomically};
-pub use error::IoError;
+pub use error::{IoError, Place};
 
 mod unit;
 pub use unit::{LengthUnit, UnknownUnit};

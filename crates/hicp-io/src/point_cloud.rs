@@ -7,7 +7,8 @@ use hicp_core::{Point3, UnitVector3, Vector3};
 
 use crate::atomic::write_atomically;
 use crate::error::IoError;
-use crate::mesh::ply;
+use crate::limits::ReadLimits;
+use crate::mesh::{Reading, ply};
 use crate::source::read_bytes;
 use crate::unit::LengthUnit;
 
@@ -22,37 +23,24 @@ pub struct PointCloud {
 
 /// Reads the vertices of a PLY file, ASCII or binary, as a point cloud; faces and other elements are skipped.
 ///
-/// Normals are read where the vertices have `nx`, `ny` and `nz`, and are brought to unit length.
+/// Normals are read where the vertices have `nx`, `ny` and `nz`, and are brought to unit length. Within [`ReadLimits::DEFAULT`].
 ///
 /// # Errors
 ///
-/// As [`crate::read_mesh`] for malformed files, and [`IoError::Unsupported`] for a coordinate that is not finite (as
-/// `f32`, in metres) or a normal that has no direction.
+/// As [`crate::read_mesh`] for malformed files and positions, and [`IoError::Normal`] for a normal that has no direction.
 pub fn read_point_cloud_ply(
     path: impl AsRef<Path>,
     unit: LengthUnit,
 ) -> Result<PointCloud, IoError> {
     let path = path.as_ref();
-    let (vertices, _) = ply::read(path, &read_bytes(path)?)?;
-    let bad = |number: usize, what: &str, value: &[f64], expected| IoError::Unsupported {
-        path: path.to_owned(),
-        found: format!("vertex {number} with the {what} {value:?}"),
-        expected,
-    };
-    let mut points = Vec::with_capacity(vertices.len());
-    for (number, vertex) in vertices.iter().enumerate() {
-        let position = Point3::from_slice(&vertex.value[..3]);
-        let point = (position / unit.units_per_meter()).cast::<f32>();
-        if !point.iter().all(|x| x.is_finite()) {
-            return Err(bad(
-                number,
-                "position",
-                &vertex.value[..3],
-                "finite positions",
-            ));
-        }
-        points.push(point);
-    }
+    let limits = &ReadLimits::DEFAULT;
+    let reading = Reading { path, unit, limits };
+    let vertices = ply::read_vertices(&reading, &read_bytes(path, limits.max_file_bytes)?)?;
+    let points = vertices
+        .iter()
+        .map(|vertex| Point3::from_slice(&vertex.value[..3]) / unit.units_per_meter())
+        .map(|point| point.cast::<f32>())
+        .collect();
     // A file states normals for all vertices or for none.
     let without = |v: &ply::Vertex| v.value[3..].iter().all(|x| x.is_nan());
     if vertices.iter().all(without) {
@@ -67,8 +55,13 @@ pub fn read_point_cloud_ply(
         match UnitVector3::try_new(normal, 1e-6) {
             Some(unit) if unit.iter().all(|x| x.is_finite()) => normals.push(unit),
             _ => {
-                let expected = "finite normals that are not zero";
-                return Err(bad(number, "normal", &vertex.value[3..], expected));
+                return Err(IoError::Normal {
+                    path: path.to_owned(),
+                    vertex: number,
+                    x: normal.x,
+                    y: normal.y,
+                    z: normal.z,
+                });
             }
         }
     }
@@ -187,7 +180,7 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             assert!(matches!(
                 read_point_cloud_ply(&path, LengthUnit::Meters),
-                Err(IoError::Unsupported { .. })
+                Err(IoError::Line { .. } | IoError::Normal { .. })
             ));
         }
     }

@@ -1,22 +1,12 @@
 //! What looks wrong about the inputs of a refinement although each of them is well-formed.
 
-use std::f64::consts::FRAC_PI_4;
 use std::path::Display;
 
 use hicp_io::LengthUnit;
-use hybrid_icp::{Isometry3, Model, Observation, Refinement, Verdict};
-
-/// Diameters beyond which an object is taken for one in another unit: a coin in metres, a car in millimetres.
-const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
+use hybrid_icp::{Doubt, Isometry3, Model, Observation, Refinement, Verdict};
 
 /// Where depth images end, as `DepthImage` has it.
 const MAX_DEPTH_METERS: f32 = 1000.0;
-
-/// How many times nearer or further than the pose says the measured surface may be.
-const DEPTH_RATIO: f64 = 3.0;
-
-/// How many times more pixels than the model can cover the mask may have.
-const MASK_RATIO: f64 = 10.0;
 
 /// Says why a refinement ended as it did; for a pose that was kept, the cause in the inputs where there is a plain one.
 pub(crate) fn reason(
@@ -43,68 +33,41 @@ pub(crate) fn reason(
     format!("{cause}, so that {ended}")
 }
 
-/// Returns what to warn of before a refinement: units that do not go together.
+/// Returns what to warn of: units that do not go together, with the files and options to look at.
 pub(crate) fn about_units(
     model: &Model,
     observation: &Observation,
     init: &Isometry3<f64>,
     names: &Names<'_>,
 ) -> Vec<String> {
-    let mut doubts = Vec::new();
-    let diameter = model.diameter();
-    if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
-        doubts.push(format!(
-            "{}: the model's diameter is {}, check --model-unit {}",
-            names.model,
-            meters(diameter),
-            names.model_unit
-        ));
-    }
-    let distance = (init * model.center()).z;
-    if distance <= 0.0 {
-        doubts.push(format!(
-            "{}: the object's centre is at z = {}, behind the camera, which looks along +z",
-            names.init,
-            meters(distance)
-        ));
-        return doubts;
-    }
-    let masked = observation.mask().pixels().iter().filter(|set| **set);
-    let masked = masked.count();
-    match median_depth(observation) {
-        None if masked > 0 => doubts.push(format!(
-            "{}: no depth inside the mask at {} mm per unit; depths beyond {MAX_DEPTH_METERS} m count as missing: check \
-             --depth-scale and {}",
-            names.depth, names.depth_scale, names.mask
-        )),
-        Some(depth) if !(distance / DEPTH_RATIO..=distance * DEPTH_RATIO).contains(&depth) => {
-            doubts.push(format!(
-                "{}: the median depth inside the mask is {}, but the object at the initial pose is at {}: check \
-                 --depth-scale (now {} mm per unit) and cam_t_m2c (mm)",
-                names.depth,
-                meters(depth),
-                meters(distance),
-                names.depth_scale
-            ));
+    let doubts = hybrid_icp::doubts(model, observation, init).into_iter();
+    doubts.map(|doubt| in_words(&doubt, names)).collect()
+}
+
+fn in_words(doubt: &Doubt, names: &Names<'_>) -> String {
+    let Names {
+        model,
+        model_unit,
+        depth,
+        depth_scale,
+        mask,
+        init,
+    } = names;
+    match doubt {
+        Doubt::Diameter { .. } => format!("{model}: {doubt}, check --model-unit {model_unit}"),
+        Doubt::BehindCamera { .. } => format!("{init}: {doubt}"),
+        Doubt::NoDepth => format!(
+            "{depth}: {doubt} at {depth_scale} mm per unit; depths beyond {MAX_DEPTH_METERS} m count as missing: check \
+             --depth-scale and {mask}"
+        ),
+        Doubt::Depth { .. } => format!(
+            "{depth}: {doubt}: check --depth-scale (now {depth_scale} mm per unit) and cam_t_m2c (mm)"
+        ),
+        Doubt::Mask { .. } => {
+            format!("{mask}: {doubt}: check --model-unit {model_unit} and cam_t_m2c (mm)")
         }
-        _ => {}
+        _ => format!("{model}: {doubt}"),
     }
-    // No silhouette of that diameter is larger than a disc.
-    let camera = observation.camera();
-    let most =
-        FRAC_PI_4 * (camera.fx() * diameter / distance) * (camera.fy() * diameter / distance);
-    // One doubt about the same numbers is enough.
-    if doubts.is_empty() && masked as f64 > MASK_RATIO * most.max(1.0) {
-        doubts.push(format!(
-            "{}: the mask has {masked} pixels, but the model ({}) at the initial pose ({}) covers at most {most:.0}: check \
-             --model-unit {} and cam_t_m2c (mm)",
-            names.mask,
-            meters(diameter),
-            meters(distance),
-            names.model_unit
-        ));
-    }
-    doubts
 }
 
 /// What the inputs are called in messages.
@@ -115,25 +78,4 @@ pub(crate) struct Names<'a> {
     pub(crate) depth_scale: f64,
     pub(crate) mask: Display<'a>,
     pub(crate) init: Display<'a>,
-}
-
-/// A length as people write it, however large or small.
-fn meters(length: f64) -> String {
-    match length.abs() {
-        size if size != 0.0 && !(1e-3..1e5).contains(&size) => format!("{length:.3e} m"),
-        _ => format!("{length:.4} m"),
-    }
-}
-
-fn median_depth(observation: &Observation) -> Option<f64> {
-    let depth = observation.depth().pixels();
-    let mask = observation.mask().pixels();
-    let mut inside: Vec<f32> = depth
-        .iter()
-        .zip(mask)
-        .filter(|(z, set)| **set && **z > 0.0)
-        .map(|(z, _)| *z)
-        .collect();
-    inside.sort_by(f32::total_cmp);
-    inside.get(inside.len() / 2).copied().map(f64::from)
 }

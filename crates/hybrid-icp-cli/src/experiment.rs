@@ -11,6 +11,7 @@ use hicp_experiments::{
 use hybrid_icp::{Preset, UnknownPreset};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::interrupt;
 use crate::terminal::say;
 
 /// Rerun the paper's studies, on its kind of objects or on any meshes.
@@ -140,13 +141,17 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     }
     bar.set_message(experiment.name());
     let mut begun = false;
+    interrupt::can_resume();
     let ran = run_study(&config, &subjects, &out, options, &mut |done| {
         bar.set_position(done as u64);
         if !begun {
             bar.reset_eta();
             begun = true;
         }
-        ControlFlow::Continue(())
+        match interrupt::asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     });
     bar.finish_and_clear();
     ran?;

@@ -1,6 +1,6 @@
 //! The program `hybrid-icp`: `hybrid-icp --help` lists its commands.
 //!
-//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong.
+//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong; 130 interrupted.
 
 mod bop;
 mod choice;
@@ -8,6 +8,9 @@ mod contour;
 mod demo;
 mod doubts;
 mod experiment;
+mod inspect;
+mod interrupt;
+mod limits;
 mod objects;
 mod outputs;
 mod overlay;
@@ -34,6 +37,8 @@ use clap::{Parser, Subcommand};
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    limits: limits::Limits,
 }
 
 const EXAMPLES: &str = "\
@@ -45,12 +50,15 @@ Examples:
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp bop show --dataset bop/ycbv --scene 50 --image 1 \\
       --results out.csv --against in.csv --out 50-1.png
+  hybrid-icp inspect mug.ply --unit mm
   hybrid-icp pipelines
   hybrid-icp objects --out objects
   hybrid-icp experiment init-noise --poses 30
 
 `hybrid-icp help refine` tells all about a command.
-Exit codes: 0 done, 1 something failed, 2 the command line is wrong.";
+Exit codes: 0 done, 1 something failed, 2 the command line is wrong, 130
+interrupted (Ctrl-C or SIGTERM: within a second; bop refine and experiment keep
+what is done for --resume).";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -60,6 +68,7 @@ enum Command {
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(bop::Command),
+    Inspect(inspect::Arguments),
     Pipelines(pipelines::Arguments),
     Objects(objects::Arguments),
     #[command(subcommand)]
@@ -67,11 +76,15 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let cli = Cli::parse();
+    cli.limits.choose();
+    interrupt::listen();
+    let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Bop(command) => bop::run(&command),
+        Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),
         Command::Objects(arguments) => objects::run(&arguments),
         Command::Experiment(command) => experiment::run(&command),
@@ -80,7 +93,11 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::complain(format_args!("{error:#}"));
-            ExitCode::FAILURE
+            if interrupt::asked() {
+                ExitCode::from(interrupt::EXIT_CODE)
+            } else {
+                ExitCode::FAILURE
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use hybrid_icp::{DepthImage, Mask, Model, Observation, PinholeCamera};
 
 use crate::choice::PipelineArguments;
 use crate::doubts::{self, Names};
+use crate::limits::limits;
 use crate::outputs::{self, Named};
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report::{self, Report};
@@ -19,7 +20,7 @@ use crate::trace_lines::{self, TraceLines};
 /// What a refinement reads.
 #[derive(Debug, Args)]
 pub(crate) struct Inputs {
-    /// The object's mesh: OBJ, PLY or STL.
+    /// The object's mesh: OBJ, OFF, PLY or STL.
     #[arg(long, value_name = "FILE")]
     pub(crate) model: PathBuf,
     /// Unit of the mesh's coordinates: m, mm or cm.
@@ -105,11 +106,12 @@ impl Inputs {
     /// Reads all files.
     pub(crate) fn read(&self) -> anyhow::Result<Read> {
         let (camera_file, depth_scale) = read_camera(self)?;
+        let limits = limits();
         Ok(Read {
-            depth: hicp_io::read_depth_png(&self.depth, depth_scale)?,
-            mask: hicp_io::read_mask_png(&self.mask)?,
+            depth: limits.read_depth_png(&self.depth, depth_scale)?,
+            mask: limits.read_mask_png(&self.mask)?,
             init: hicp_io::read_pose_json(&self.init)?,
-            model: Model::new(hicp_io::read_mesh(&self.model, self.model_unit)?),
+            model: Model::new(limits.read_mesh(&self.model, self.model_unit)?),
             camera: camera_file.camera,
             depth_scale,
         })

@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::choice::Pipeline;
+use crate::limits::limits;
 use crate::refine::Inputs;
 use crate::terminal::{say, warn};
 use crate::trace_lines::TraceLines;
@@ -25,7 +26,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let path = arguments.trace.as_path();
-    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let text = limits().read_text(path)?;
     let old = text
         .lines()
         .zip(1..)

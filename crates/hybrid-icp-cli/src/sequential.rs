@@ -11,6 +11,7 @@ use hicp_experiments::{
 use hybrid_icp::Preset;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::interrupt;
 use crate::terminal::say;
 
 /// Fusing estimates while the camera moves: trajectories toward an object, six methods and more (§VI-C).
@@ -91,13 +92,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     bar.set_message("sequential");
     let out = &arguments.out;
     let mut begun = false;
+    interrupt::can_resume();
     let ran = run_trajectories(&config, &subjects, out, options, &mut |done| {
         bar.set_position(done as u64);
         if !begun {
             bar.reset_eta();
             begun = true;
         }
-        ControlFlow::Continue(())
+        match interrupt::asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     });
     bar.finish_and_clear();
     ran?;

@@ -12,19 +12,6 @@ use hicp_io::bop::{ResultRow, read_results, write_results};
 use hybrid_icp::{Isometry3, Vector3};
 use world::*;
 
-/// Rows whose images stand together, several per instance.
-fn grouped(world: &World, per_instance: u64) -> Vec<ResultRow> {
-    let mut rows = Vec::new();
-    for ((scene, image), truths) in world.truths.iter().rev() {
-        for (id, pose) in truths {
-            for seed in 0..per_instance {
-                rows.push(ResultRow::new(*scene, *image, *id, nearby(pose, seed)));
-            }
-        }
-    }
-    rows
-}
-
 fn output(world: &World) -> Vec<u8> {
     std::fs::read(world.path("out.csv")).unwrap()
 }

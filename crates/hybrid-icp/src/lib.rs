@@ -40,6 +40,7 @@
 //! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `calibration` (its uncertainty), `trace` (what ran).
 
 mod calibration;
+mod doubt;
 pub mod pipeline;
 mod preset;
 pub mod presets;
@@ -49,6 +50,7 @@ mod suggest;
 mod trace;
 
 pub use calibration::Calibration;
+pub use doubt::{Doubt, doubts};
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
@@ -60,11 +62,11 @@ pub use hicp_association::{
 };
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
-    ImageError, Isometry3, Mask, Matrix3, Matrix6, MeshError, Model, ModelConfig, Mover,
-    NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2, Point3,
-    Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries, SymmetryAxis,
-    SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3, Vector6,
-    rotation_from_matrix, se3, so3,
+    ImageError, Isometry3, Mask, Matrix3, Matrix6, MeshError, MeshSurvey, Model, ModelConfig,
+    Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2,
+    Point3, Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries,
+    SymmetryAxis, SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
+    Vector6, rotation_from_matrix, se3, so3,
 };
 pub use hicp_fusion as fusion;
 pub use hicp_icp::{

@@ -9,7 +9,7 @@ use super::models_info::{ModelInfo, read_models_info};
 use super::scene::Scene;
 use super::targets::{Target, read_targets};
 use crate::error::IoError;
-use crate::mesh::read_mesh;
+use crate::limits::ReadLimits;
 use crate::unit::LengthUnit;
 
 /// A dataset in BOP's layout: a folder with models, and with scenes in folders such as `test` or `test_primesense`.
@@ -29,6 +29,7 @@ use crate::unit::LengthUnit;
 #[derive(Clone, Debug)]
 pub struct Dataset {
     root: PathBuf,
+    limits: ReadLimits,
 }
 
 impl Dataset {
@@ -40,10 +41,18 @@ impl Dataset {
     pub fn open(root: impl AsRef<Path>) -> Result<Self, IoError> {
         let root = root.as_ref().to_owned();
         if root.is_dir() {
-            Ok(Self { root })
+            let limits = ReadLimits::DEFAULT;
+            Ok(Self { root, limits })
         } else {
             Err(missing(root, "dataset folder"))
         }
+    }
+
+    /// Reads models and images within other limits than [`ReadLimits::DEFAULT`].
+    #[must_use]
+    pub fn with_limits(mut self, limits: ReadLimits) -> Self {
+        self.limits = limits;
+        self
     }
 
     /// The folder.
@@ -97,9 +106,10 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// As [`Dataset::models_dir`] and [`read_mesh`].
+    /// As [`Dataset::models_dir`] and [`read_mesh`](crate::read_mesh).
     pub fn read_model(&self, obj_id: u32) -> Result<TriMesh, IoError> {
-        read_mesh(self.model_path(obj_id)?, LengthUnit::Millimeters)
+        let path = self.model_path(obj_id)?;
+        self.limits.read_mesh(path, LengthUnit::Millimeters)
     }
 
     /// Reads the diameters and symmetries of all objects, by object id.
@@ -148,7 +158,8 @@ impl Dataset {
     ///
     /// [`IoError::Missing`] when the split or the scene does not exist, otherwise as [`Scene::open`].
     pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
-        Scene::open(self.split_dir(split)?.join(format!("{scene_id:06}")))
+        let folder = self.split_dir(split)?.join(format!("{scene_id:06}"));
+        Ok(Scene::open(folder)?.with_limits(self.limits))
     }
 
     fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {

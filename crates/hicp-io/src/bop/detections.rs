@@ -5,6 +5,7 @@ use std::path::Path;
 use super::rle::Rle;
 use crate::error::IoError;
 use crate::json::{Document, Node};
+use crate::limits::ReadLimits;
 
 /// An object instance found in an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +36,22 @@ pub struct Detection {
 /// What [`IoError`] says of JSON files, and [`IoError::Segmentation`] for a code that does not fit its image. Polygons
 /// are not supported.
 pub fn read_detections(path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
-    Document::read(path.as_ref())?
+    ReadLimits::DEFAULT.read_detections(path)
+}
+
+impl ReadLimits {
+    /// As [`read_detections`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_detections`].
+    pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
+        read_within(self, path.as_ref())
+    }
+}
+
+fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<Detection>, IoError> {
+    Document::read_within(limits, path)?
         .root()
         .items()?
         .iter()

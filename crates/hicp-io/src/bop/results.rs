@@ -8,9 +8,10 @@ use hicp_core::Isometry3;
 
 use super::result_cells::{COLUMNS, Cells, csv_error, find_columns, line_of};
 use crate::atomic::write_atomically;
-use crate::error::IoError;
+use crate::error::{IoError, Place};
+use crate::limits::ReadLimits;
 use crate::pose::pose_to_bop;
-use crate::source::{read_bytes, text_bytes};
+use crate::source::{Limited, read_bytes, text_bytes};
 
 /// One estimate: an object in an image, and where it is.
 ///
@@ -86,8 +87,22 @@ impl ResultRow {
 /// [`IoError::CsvHeader`], [`IoError::CsvFields`], [`IoError::CsvValue`] naming line and column, [`IoError::Rotation`],
 /// [`IoError::Read`].
 pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
-    let path = path.as_ref();
-    let content = read_bytes(path)?;
+    ReadLimits::DEFAULT.read_results(path)
+}
+
+impl ReadLimits {
+    /// As [`read_results`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_results`].
+    pub fn read_results(&self, path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
+        read_within(self, path.as_ref())
+    }
+}
+
+fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<ResultRow>, IoError> {
+    let content = read_bytes(path, limits.max_file_bytes)?;
     let text = text_bytes(path, &content)?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
@@ -119,6 +134,12 @@ pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
                     columns,
                 };
                 rows.push(cells.row()?);
+                let count = rows.len() as u64;
+                if count > limits.max_rows {
+                    let line = usize::try_from(line_of(text, record.position()));
+                    let place = Place::Line(line.unwrap_or(usize::MAX));
+                    Limited::Rows.check(path, Some(place), count, limits.max_rows)?;
+                }
             }
         }
     }

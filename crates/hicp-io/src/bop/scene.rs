@@ -10,12 +10,13 @@ use super::annotations::{
 };
 use super::dataset::missing;
 use crate::error::IoError;
-use crate::image::{read_depth_png, read_mask_png};
+use crate::limits::ReadLimits;
 
 /// A scene of a dataset. Its JSON files are in memory, its images are read on demand.
 #[derive(Clone, Debug)]
 pub struct Scene {
     dir: PathBuf,
+    limits: ReadLimits,
     cameras: BTreeMap<u32, SceneCamera>,
     ground_truth: Option<BTreeMap<u32, Vec<GroundTruth>>>,
     info: Option<BTreeMap<u32, Vec<GroundTruthInfo>>>,
@@ -41,7 +42,15 @@ impl Scene {
             ground_truth: read_ground_truth(&dir.join("scene_gt.json"))?,
             info: read_info(&dir.join("scene_gt_info.json"))?,
             dir,
+            limits: ReadLimits::DEFAULT,
         })
+    }
+
+    /// Reads images within other limits than [`ReadLimits::DEFAULT`].
+    #[must_use]
+    pub fn with_limits(mut self, limits: ReadLimits) -> Self {
+        self.limits = limits;
+        self
     }
 
     /// The folder.
@@ -123,7 +132,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`]; [`IoError::JsonValue`] when the camera states
+    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`](crate::read_depth_png); [`IoError::JsonValue`] when the camera states
     /// no `depth_scale`.
     pub fn read_depth(&self, im_id: u32) -> Result<DepthImage, IoError> {
         let path = self.depth_path(im_id)?;
@@ -136,7 +145,7 @@ impl Scene {
                 found: "no `depth_scale`".to_owned(),
                 expected: "one, to read depth images".to_owned(),
             })?;
-        read_depth_png(path, scale)
+        self.limits.read_depth_png(path, scale)
     }
 
     /// Returns the path of the colour or gray image of an image, or `None` when there is neither.
@@ -168,11 +177,11 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when there is none, otherwise as [`read_mask_png`].
+    /// [`IoError::Missing`] when there is none, otherwise as [`read_mask_png`](crate::read_mask_png).
     pub fn read_visible_mask(&self, im_id: u32, instance: usize) -> Result<Mask, IoError> {
         let path = self.visible_mask_path(im_id, instance);
         if path.is_file() {
-            read_mask_png(path)
+            self.limits.read_mask_png(path)
         } else {
             Err(missing(path, "mask"))
         }

@@ -7,6 +7,7 @@ use png::{BitDepth, ColorType, Transformations};
 
 use super::pixels;
 use crate::error::IoError;
+use crate::limits::ReadLimits;
 
 /// Reads a depth image from a PNG file of 16-bit gray values, `millimeters_per_unit` each; 0 means missing.
 ///
@@ -16,32 +17,48 @@ use crate::error::IoError;
 ///
 /// [`IoError::DepthScale`] for a scale that is not finite and positive, [`IoError::PixelType`] for anything but 16-bit
 /// gray, [`IoError::ImageTooLarge`] for a side above `hicp_core::MAX_IMAGE_SIDE` or more than
-/// [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating), [`IoError::Promise`] for a header whose image the
+/// [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating; [`ReadLimits::read_depth_png`] raises it), [`IoError::Promise`] for a header whose image the
 /// file is too small to hold, and [`IoError::Png`] or [`IoError::Read`] for the rest.
 pub fn read_depth_png(
     path: impl AsRef<Path>,
     millimeters_per_unit: f64,
 ) -> Result<DepthImage, IoError> {
-    let path = path.as_ref();
-    check_scale(path, millimeters_per_unit)?;
-    let image = pixels::read(path, Transformations::IDENTITY, |color, depth| {
-        match (color, depth) {
+    ReadLimits::DEFAULT.read_depth_png(path, millimeters_per_unit)
+}
+
+impl ReadLimits {
+    /// As [`read_depth_png`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_depth_png`].
+    pub fn read_depth_png(
+        &self,
+        path: impl AsRef<Path>,
+        millimeters_per_unit: f64,
+    ) -> Result<DepthImage, IoError> {
+        let path = path.as_ref();
+        check_scale(path, millimeters_per_unit)?;
+        let accept = |color, depth| match (color, depth) {
             (ColorType::Grayscale, BitDepth::Sixteen) => Ok(()),
             _ => Err("16-bit gray"),
-        }
-    })?;
-    let meters = image
-        .bytes
-        .chunks_exact(2)
-        .map(|bytes| {
-            let units = u16::from_be_bytes([bytes[0], bytes[1]]);
-            narrow(f64::from(units) * millimeters_per_unit / 1000.0)
+        };
+        let image = pixels::read(self, path, Transformations::IDENTITY, accept)?;
+        let meters = image
+            .bytes
+            .chunks_exact(2)
+            .map(|bytes| {
+                let units = u16::from_be_bytes([bytes[0], bytes[1]]);
+                narrow(f64::from(units) * millimeters_per_unit / 1000.0)
+            })
+            .collect();
+        DepthImage::from_meters(image.width, image.height, meters).map_err(|source| {
+            IoError::Image {
+                path: path.to_owned(),
+                source,
+            }
         })
-        .collect();
-    DepthImage::from_meters(image.width, image.height, meters).map_err(|source| IoError::Image {
-        path: path.to_owned(),
-        source,
-    })
+    }
 }
 
 /// Writes a depth image as a PNG file of 16-bit gray values, `millimeters_per_unit` each; missing depths become 0.

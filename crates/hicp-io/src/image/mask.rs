@@ -7,6 +7,7 @@ use png::{BitDepth, ColorType, Transformations};
 
 use super::pixels;
 use crate::error::IoError;
+use crate::limits::ReadLimits;
 
 /// Reads a mask from a PNG file of any pixel type: a pixel belongs to the object when a gray or colour sample is not 0.
 ///
@@ -16,27 +17,38 @@ use crate::error::IoError;
 ///
 /// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
 pub fn read_mask_png(path: impl AsRef<Path>) -> Result<Mask, IoError> {
-    let path = path.as_ref();
-    let image = pixels::read(path, Transformations::EXPAND, |_, _| Ok(()))?;
-    let sample_bytes = if image.depth == BitDepth::Sixteen {
-        2
-    } else {
-        1
-    };
-    let samples = image.color.samples();
-    let opaque = match image.color {
-        ColorType::GrayscaleAlpha | ColorType::Rgba => samples - 1,
-        _ => samples,
-    };
-    let mask = image
-        .bytes
-        .chunks_exact(samples * sample_bytes)
-        .map(|pixel| pixel[..opaque * sample_bytes].iter().any(|byte| *byte != 0))
-        .collect();
-    Mask::new(image.width, image.height, mask).map_err(|source| IoError::Image {
-        path: path.to_owned(),
-        source,
-    })
+    ReadLimits::DEFAULT.read_mask_png(path)
+}
+
+impl ReadLimits {
+    /// As [`read_mask_png`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_mask_png`].
+    pub fn read_mask_png(&self, path: impl AsRef<Path>) -> Result<Mask, IoError> {
+        let path = path.as_ref();
+        let image = pixels::read(self, path, Transformations::EXPAND, |_, _| Ok(()))?;
+        let sample_bytes = if image.depth == BitDepth::Sixteen {
+            2
+        } else {
+            1
+        };
+        let samples = image.color.samples();
+        let opaque = match image.color {
+            ColorType::GrayscaleAlpha | ColorType::Rgba => samples - 1,
+            _ => samples,
+        };
+        let mask = image
+            .bytes
+            .chunks_exact(samples * sample_bytes)
+            .map(|pixel| pixel[..opaque * sample_bytes].iter().any(|byte| *byte != 0))
+            .collect();
+        Mask::new(image.width, image.height, mask).map_err(|source| IoError::Image {
+            path: path.to_owned(),
+            source,
+        })
+    }
 }
 
 /// Writes a mask as a PNG file of 8-bit gray values: 255 for the object, 0 elsewhere.

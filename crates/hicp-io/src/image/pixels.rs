@@ -1,18 +1,18 @@
 //! Raw pixels from and to PNG files, within limits.
 
-use std::fs::File;
-use std::io::{self, BufReader, Cursor};
+use std::io::{self, Cursor};
 use std::path::Path;
 
 use hicp_core::MAX_IMAGE_SIDE;
 use png::{BitDepth, ColorType, DecodingError, Transformations};
 
 use crate::atomic::write_atomically;
-use crate::error::IoError;
-use crate::source::read_bytes;
+use crate::error::{IoError, Place};
+use crate::limits::ReadLimits;
+use crate::source::{Source, read_bytes};
 
-/// Largest number of pixels of an image that is read: 2²⁷, half a gigabyte of depth.
-pub const MAX_IMAGE_PIXELS: u64 = 1 << 27;
+/// Largest number of pixels of an image that is read unless told otherwise: 2²⁷, half a gigabyte of depth.
+pub const MAX_IMAGE_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
 
 /// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image it announces.
 const MAX_COMPRESSION: u64 = 1032;
@@ -30,16 +30,15 @@ pub(super) struct Pixels {
 ///
 /// `accept` sees the pixel type of the header, before anything is allocated; it says what it expects when it refuses.
 pub(super) fn read(
+    limits: &ReadLimits,
     path: &Path,
     transformations: Transformations,
     accept: impl FnOnce(ColorType, BitDepth) -> Result<(), &'static str>,
 ) -> Result<Pixels, IoError> {
-    let content = read_bytes(path)?;
+    let content = read_bytes(path, limits.max_file_bytes)?;
     let available = content.len() as u64;
-    let limits = png::Limits {
-        bytes: usize::try_from(MAX_IMAGE_PIXELS).unwrap_or(usize::MAX),
-    };
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(content), limits);
+    // Its own limit is on what it holds beside the image; this crate's, below, on the image.
+    let mut decoder = png::Decoder::new(Cursor::new(content));
     decoder.set_transformations(transformations);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
@@ -53,19 +52,20 @@ pub(super) fn read(
         expected,
     })?;
     let count = u64::from(width) * u64::from(height);
-    if width.max(height) > MAX_IMAGE_SIDE || count > MAX_IMAGE_PIXELS {
+    if width.max(height) > MAX_IMAGE_SIDE || count > limits.max_pixels {
         return Err(IoError::ImageTooLarge {
             path: path.to_owned(),
             width,
             height,
             max_side: MAX_IMAGE_SIDE,
-            max_pixels: MAX_IMAGE_PIXELS,
+            max_pixels: limits.max_pixels,
         });
     }
     let needed = (header.raw_bytes() as u64) / MAX_COMPRESSION;
     if needed > available {
         return Err(IoError::Promise {
             path: path.to_owned(),
+            place: Place::Byte(16),
             what: "pixels".to_owned(),
             count,
             needed,
@@ -97,8 +97,7 @@ pub(super) fn read(
 /// [`IoError::Read`], or [`IoError::Png`] when the file does not begin as a PNG image.
 pub fn read_png_size(path: impl AsRef<Path>) -> Result<(u32, u32), IoError> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(|e| IoError::read(path, e))?;
-    let mut decoder = png::Decoder::new(BufReader::new(file));
+    let mut decoder = png::Decoder::new(Cursor::new(Source::open(path)?.head()?));
     match decoder.read_header_info() {
         Ok(header) => Ok(header.size()),
         Err(error) => Err(failed(path, error)),

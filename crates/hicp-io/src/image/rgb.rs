@@ -6,6 +6,7 @@ use png::{BitDepth, ColorType, Transformations};
 
 use super::pixels;
 use crate::error::IoError;
+use crate::limits::ReadLimits;
 
 /// Reads a PNG file of any pixel type as 8-bit RGB: width, height, and 3 · width · height bytes, row-major.
 ///
@@ -16,7 +17,12 @@ use crate::error::IoError;
 /// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
 pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
-    let image = pixels::read(path.as_ref(), transformations, |_, _| Ok(()))?;
+    let image = pixels::read(
+        &ReadLimits::DEFAULT,
+        path.as_ref(),
+        transformations,
+        |_, _| Ok(()),
+    )?;
     let bytes = match image.color {
         ColorType::Rgb => image.bytes,
         ColorType::Rgba => drop_alpha(&image.bytes),

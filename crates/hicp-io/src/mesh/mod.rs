@@ -1,24 +1,27 @@
-//! Meshes from and to OBJ, PLY and STL files.
+//! Meshes from and to OBJ, OFF, PLY and STL files.
 
 use std::path::Path;
 
-use hicp_core::{Point3, TriMesh};
+use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh};
 
-use crate::error::IoError;
-use crate::source::read_bytes;
+use crate::error::{END_OF_FILE, IoError, Place};
+use crate::limits::ReadLimits;
+use crate::source::{Limited, Source};
 use crate::unit::LengthUnit;
 
 mod obj;
+mod off;
 pub(crate) mod ply;
 mod polygon;
 mod stl;
+mod weld;
 mod write;
 
 pub use write::{write_obj, write_ply};
 
-const SUPPORTED: &str = ".obj, .ply or .stl";
+const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 
-/// Reads a triangle mesh; the extension tells the format, in either case: `.obj`, `.ply` or `.stl`.
+/// Reads a triangle mesh; the extension tells the format, in either case: `.obj`, `.off`, `.ply` or `.stl`.
 ///
 /// Only geometry is read: materials, colours, normals and texture coordinates are skipped, lines and points too, and all
 /// objects and groups of a file make one mesh. Polygons are triangulated, concave ones by ear clipping. Coordinates are
@@ -26,58 +29,176 @@ const SUPPORTED: &str = ".obj, .ply or .stl";
 /// welded where their positions are equal; in OBJ files vertices that no face uses are dropped.
 ///
 /// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood.
+/// - OFF: text with or without normals and colours, comments, counts on the first line or the second.
 /// - PLY: ASCII and binary of either byte order, any numeric types, faces in `vertex_indices` or `vertex_index`.
 /// - STL: ASCII with any number of solids, and binary, also where the header starts with `solid`.
 ///
-/// Cost: the whole file is held in memory, and a small multiple of it while it is parsed.
+/// Cost: the whole file is held in memory, and a small multiple of it while it is parsed, within [`ReadLimits::DEFAULT`];
+/// [`ReadLimits::read_mesh`] is the same within others.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the file and where in it the trouble is: a file above 4 GiB, an unknown extension, text that
-/// is not UTF-8, a malformed or truncated file, a header that promises more than the file holds, a face whose vertex is
-/// not there, and, as [`IoError::Mesh`], whatever [`TriMesh::new`] refuses (no faces, coordinates that are not finite).
+/// [`IoError`] that names the file and where in it the trouble is: what is no regular file, or above a limit, an unknown
+/// extension, text that is not UTF-8, a malformed or truncated file, a header that promises more than the file holds, a face
+/// whose vertex is not there, a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`, a file without
+/// faces, and, as [`IoError::Mesh`], whatever else [`TriMesh::new`] refuses.
 pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
-    let path = path.as_ref();
-    let extension = path
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
-    let parse = match extension.as_str() {
-        "obj" => obj::parse,
-        "ply" => ply::parse_mesh,
-        "stl" => stl::parse,
-        _ => {
-            return Err(IoError::Extension {
-                path: path.to_owned(),
-                found: extension,
-                expected: SUPPORTED,
-            });
+    ReadLimits::DEFAULT.read_mesh(path, unit)
+}
+
+impl ReadLimits {
+    /// As [`read_mesh`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_mesh`].
+    pub fn read_mesh(&self, path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
+        let path = path.as_ref();
+        let extension = path
+            .extension()
+            .map(|extension| extension.to_string_lossy().to_lowercase())
+            .unwrap_or_default();
+        let (check_head, parse): (CheckHead, Parse) = match extension.as_str() {
+            "obj" => (|_, _, _| Ok(()), obj::parse),
+            "off" => (|_, _, _| Ok(()), off::parse),
+            "ply" => (ply::check_head, ply::parse_mesh),
+            "stl" => (stl::check_head, stl::parse),
+            _ => {
+                return Err(IoError::Extension {
+                    path: path.to_owned(),
+                    found: extension,
+                    expected: SUPPORTED,
+                });
+            }
+        };
+        let reading = Reading {
+            path,
+            unit,
+            limits: self,
+        };
+        let mut source = Source::open(path)?;
+        // Counts are refused by the first bytes, before a large file is read for nothing.
+        check_head(&reading, &source.head()?, source.bytes())?;
+        let content = source.read(Limited::FileBytes, self.max_file_bytes)?;
+        parse(&reading, content)?.finish(&reading)
+    }
+}
+
+type CheckHead = fn(&Reading<'_>, &[u8], u64) -> Result<(), IoError>;
+type Parse = fn(&Reading<'_>, Vec<u8>) -> Result<RawMesh, IoError>;
+
+/// What a parser is told beside the bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reading<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) unit: LengthUnit,
+    pub(crate) limits: &'a ReadLimits,
+}
+
+impl Reading<'_> {
+    pub(crate) fn check_vertices(&self, place: Place, count: usize) -> Result<(), IoError> {
+        let limit = self.limits.max_vertices;
+        Limited::Vertices.check(self.path, Some(place), count as u64, limit)
+    }
+
+    pub(crate) fn check_triangles(&self, place: Place, count: usize) -> Result<(), IoError> {
+        let limit = self.limits.max_triangles;
+        Limited::Triangles.check(self.path, Some(place), count as u64, limit)
+    }
+
+    /// Says what is wrong with a position in the units of the file: what was expected.
+    pub(crate) fn fault(&self, position: &[f64]) -> Option<String> {
+        let most = f64::from(MAX_COORDINATE_METERS) * self.unit.units_per_meter();
+        // Rounding to `f32` must not carry it over the limit, which is below 2^24 and so exact.
+        if position.iter().all(|x| x.abs() <= most) {
+            return None;
         }
-    };
-    parse(path, read_bytes(path)?)?.finish(path, unit)
+        Some(format!(
+            "finite coordinates within \u{b1}{MAX_COORDINATE_METERS} m (in {})",
+            self.unit
+        ))
+    }
+
+    pub(crate) fn check_position(&self, place: Place, position: &[f64]) -> Result<(), IoError> {
+        match self.fault(position) {
+            None => Ok(()),
+            Some(expected) => {
+                let found = format!("the position {position:?}");
+                Err(match place {
+                    Place::Line(line) => IoError::Line {
+                        path: self.path.to_owned(),
+                        line,
+                        found,
+                        expected,
+                    },
+                    Place::Byte(_) => IoError::at(self.path, place, &found, expected),
+                })
+            }
+        }
+    }
 }
 
 /// A mesh in the units of its file.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct RawMesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
+    /// Where the file ends, to tell what is missing there.
+    end: Place,
+    /// What cutting polygons may still cost.
+    clipping_budget: u64,
 }
 
 impl RawMesh {
-    /// Adds a face. Its corners must be vertices that are there.
-    fn add_face(&mut self, corners: &[u32]) {
-        polygon::triangulate(&self.vertices, corners, &mut self.triangles);
+    fn new(end: Place) -> Self {
+        Self {
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            end,
+            clipping_budget: polygon::CLIPPING_BUDGET,
+        }
     }
 
-    fn finish(self, path: &Path, unit: LengthUnit) -> Result<TriMesh, IoError> {
-        let scale = unit.units_per_meter();
+    /// Adds a face. Its corners must be vertices that are there.
+    fn add_face(
+        &mut self,
+        reading: &Reading<'_>,
+        place: Place,
+        corners: &[u32],
+    ) -> Result<(), IoError> {
+        let more = corners.len().saturating_sub(2);
+        reading.check_triangles(place, self.triangles.len() + more)?;
+        let budget = &mut self.clipping_budget;
+        polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget);
+        Ok(())
+    }
+
+    fn finish(self, reading: &Reading<'_>) -> Result<TriMesh, IoError> {
+        let path = reading.path;
+        let scale = reading.unit.units_per_meter();
         let vertices = self
             .vertices
             .iter()
             .map(|p| (p / scale).cast::<f32>())
             .collect();
-        TriMesh::new(vertices, self.triangles).map_err(|e| IoError::mesh(path, e))
+        TriMesh::new(vertices, self.triangles).map_err(|error| match error {
+            MeshError::NoTriangles { .. } => IoError::at(
+                path,
+                self.end,
+                END_OF_FILE,
+                "a face of three corners or more",
+            ),
+            error => IoError::mesh(path, error),
+        })
+    }
+}
+
+/// Returns the byte that ends lines: of old, carriage returns did.
+fn line_end(content: &[u8]) -> u8 {
+    if content.contains(&b'\n') {
+        b'\n'
+    } else {
+        b'\r'
     }
 }
 
@@ -85,9 +206,18 @@ impl RawMesh {
 mod tests {
     use super::*;
 
+    /// What the parsers' own tests read with.
+    pub(super) fn reading(name: &str) -> Reading<'_> {
+        Reading {
+            path: Path::new(name),
+            unit: LengthUnit::Meters,
+            limits: &ReadLimits::DEFAULT,
+        }
+    }
+
     #[test]
     fn other_extensions_are_refused_by_name() {
-        for (name, extension) in [("mesh.OFF", "off"), ("mesh", "")] {
+        for (name, extension) in [("mesh.GLTF", "gltf"), ("mesh.ply.gz", "gz"), ("mesh", "")] {
             match read_mesh(name, LengthUnit::Meters) {
                 Err(IoError::Extension {
                     found, expected, ..

@@ -4,18 +4,18 @@
 //! forgives broken colours, and it says what is wrong but not where. Handing it one record per line tells the line.
 
 use std::io::{self, BufRead, Read};
-use std::path::Path;
 
 use hicp_core::Point3;
 
-use super::RawMesh;
-use crate::error::IoError;
+use super::{RawMesh, Reading, line_end};
+use crate::error::{IoError, Place};
 use crate::source::text_bytes;
 
 /// Parses an OBJ file. Vertices that no face uses are dropped.
-pub(super) fn parse(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let records = Records::of(text_bytes(path, &content)?);
+pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+    let records = Records::of(reading, text_bytes(reading.path, &content)?)?;
     drop(content);
+    records.check_positions(reading)?;
     let options = tobj::LoadOptions {
         ignore_points: true,
         ignore_lines: true,
@@ -32,11 +32,13 @@ pub(super) fn parse(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
                 tobj::LoadError::FaceVertexOutOfBounds => records.first_missing_vertex(),
                 _ => reader.lines.saturating_sub(1),
             };
-            records.error(path, at_fault, error)
+            records.error(reading, at_fault, error)
         })?
         .0;
 
-    let mut mesh = RawMesh::default();
+    let end = Place::Line(records.end);
+    drop(records);
+    let mut mesh = RawMesh::new(end);
     for tobj::Model { mesh: part, .. } in models {
         // One model comes back, as no record that starts another gets through.
         mesh.vertices.extend(
@@ -46,13 +48,13 @@ pub(super) fn parse(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
         );
         if part.face_arities.is_empty() {
             for corners in part.indices.chunks_exact(3) {
-                mesh.add_face(corners);
+                mesh.add_face(reading, end, corners)?;
             }
         } else {
             let mut rest = part.indices.as_slice();
             for arity in part.face_arities {
                 let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
-                mesh.add_face(corners);
+                mesh.add_face(reading, end, corners)?;
                 rest = others;
             }
         }
@@ -65,37 +67,41 @@ pub(super) fn parse(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
 struct Records {
     text: String,
     lines: Vec<u32>,
+    vertices: usize,
+    triangles: usize,
+    /// The last line.
+    end: usize,
 }
 
 impl Records {
-    fn of(content: &[u8]) -> Self {
-        let end_of_line = if content.contains(&b'\n') {
-            b'\n'
-        } else {
-            b'\r'
-        };
+    fn of(reading: &Reading<'_>, content: &[u8]) -> Result<Self, IoError> {
+        let line_end = line_end(content);
         let mut records = Self::default();
         let mut pending = String::new();
-        for (number, line) in (1_u32..).zip(content.split(|byte| *byte == end_of_line)) {
+        for (number, line) in (1_u32..).zip(content.split(|byte| *byte == line_end)) {
+            records.end = number as usize;
             let line = String::from_utf8_lossy(line);
             let line = line.split('#').next().unwrap_or_default().trim();
             if let Some(start) = line.strip_suffix('\\') {
                 pending.push_str(start);
                 pending.push(' ');
             } else if pending.is_empty() {
-                records.add(line, number);
+                records.add(reading, line, number)?;
             } else {
                 pending.push_str(line);
-                records.add(&std::mem::take(&mut pending), number);
+                records.add(reading, &std::mem::take(&mut pending), number)?;
             }
         }
-        records
+        Ok(records)
     }
 
-    fn add(&mut self, line: &str, number: u32) {
+    fn add(&mut self, reading: &Reading<'_>, line: &str, number: u32) -> Result<(), IoError> {
+        let place = Place::Line(number as usize);
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
+                self.vertices += 1;
+                reading.check_vertices(place, self.vertices)?;
                 self.text.push('v');
                 // Three coordinates, or four with a weight; what follows is a colour.
                 let keep = if words.clone().count() == 4 { 4 } else { 3 };
@@ -106,16 +112,45 @@ impl Records {
             }
             Some("f") => {
                 self.text.push('f');
+                self.triangles += words.clone().count().saturating_sub(2);
+                reading.check_triangles(place, self.triangles)?;
                 for word in words {
                     let position = word.split('/').next().filter(|index| !index.is_empty());
                     self.text.push(' ');
                     self.text.push_str(position.unwrap_or(word));
                 }
             }
-            _ => return,
+            _ => return Ok(()),
         }
         self.text.push('\n');
         self.lines.push(number);
+        Ok(())
+    }
+
+    /// Refuses vertices whose coordinates no mesh can have; what is no number at all is told by the reader.
+    fn check_positions(&self, reading: &Reading<'_>) -> Result<(), IoError> {
+        for (record, line) in self.text.lines().zip(&self.lines) {
+            let mut words = record.split(' ');
+            if words.next() != Some("v") {
+                continue;
+            }
+            let mut numbers = words.map_while(|word| word.parse::<f64>().ok());
+            let position = [
+                numbers.next(),
+                numbers.next(),
+                numbers.next(),
+                numbers.next(),
+            ];
+            if let [Some(x), Some(y), Some(z), weight] = position {
+                let weight = weight.unwrap_or(1.0);
+                // The reader refuses a weight of 0 itself.
+                if weight != 0.0 {
+                    let position = [x, y, z].map(|value| value / weight);
+                    reading.check_position(Place::Line(*line as usize), &position)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Returns the record of the first face that names a vertex that is not there.
@@ -141,13 +176,9 @@ impl Records {
         0
     }
 
-    fn error(&self, path: &Path, record: usize, error: tobj::LoadError) -> IoError {
+    fn error(&self, reading: &Reading<'_>, record: usize, error: tobj::LoadError) -> IoError {
         use tobj::LoadError as E;
-        let vertices = self
-            .text
-            .lines()
-            .filter(|line| line.starts_with('v'))
-            .count();
+        let vertices = self.vertices;
         let expected = match error {
             E::PositionParseError => "`v` and three numbers".to_owned(),
             E::ScalingByZeroError => "a vertex whose weight is not 0".to_owned(),
@@ -159,7 +190,7 @@ impl Records {
         };
         let line = self.lines.get(record).copied().unwrap_or(1);
         let found = self.text.lines().nth(record).unwrap_or_default();
-        IoError::line(path, line as usize, found, expected)
+        IoError::line(reading.path, line as usize, found, expected)
     }
 }
 
@@ -192,9 +223,10 @@ impl BufRead for CountingReader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::tests::reading;
 
     fn read(text: &str) -> Result<RawMesh, IoError> {
-        parse(Path::new("a.obj"), text.as_bytes().to_vec())
+        parse(&reading("a.obj"), text.as_bytes().to_vec())
     }
 
     #[test]
@@ -216,7 +248,7 @@ mod tests {
     #[test]
     fn old_line_endings_and_latin_comments() {
         let text = b"# M\xfcller\rv 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r";
-        let mesh = parse(Path::new("a.obj"), text.to_vec()).unwrap();
+        let mesh = parse(&reading("a.obj"), text.to_vec()).unwrap();
         assert_eq!(mesh.triangles.len(), 1);
     }
 
@@ -240,6 +272,17 @@ mod tests {
                 }
                 other => panic!("{record}: {other:?}"),
             }
+        }
+    }
+
+    #[test]
+    fn positions_that_no_mesh_can_have_are_told_by_line() {
+        for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0", "v 1 2 3 1e-30"] {
+            let text = format!("v 0 0 0\n{record}\nv 0 1 0\nf 1 2 3\n");
+            assert!(
+                matches!(read(&text), Err(IoError::Line { line: 2, .. })),
+                "{record}"
+            );
         }
     }
 

@@ -5,14 +5,18 @@ use hicp_core::{Point2, Point3, Vector3};
 /// Polygons with more corners are cut into a fan: ear clipping is quadratic at best.
 const MAX_CLIPPED_CORNERS: usize = 1024;
 
+/// Looks at points that clipping ears may cost for all polygons of a file, some seconds: beyond it they are cut into fans.
+pub(super) const CLIPPING_BUDGET: u64 = 1 << 30;
+
 /// Appends the n − 2 triangles of a polygon of n corners, with its winding; nothing for fewer than three corners.
 ///
 /// A convex polygon becomes a fan, a concave one is clipped ear by ear in its mean plane. What is left of a polygon that
-/// crosses itself becomes a fan. Corners must be indices into `vertices`.
+/// crosses itself, or for which the budget does not suffice, becomes a fan. Corners must be indices into `vertices`.
 pub(super) fn triangulate(
     vertices: &[Point3<f64>],
     corners: &[u32],
     triangles: &mut Vec<[u32; 3]>,
+    budget: &mut u64,
 ) {
     if corners.len() <= 3 || corners.len() > MAX_CLIPPED_CORNERS {
         return fan(corners, triangles);
@@ -22,7 +26,7 @@ pub(super) fn triangulate(
     if (0..n).all(|i| turn(&points[(i + n - 1) % n], &points[i], &points[(i + 1) % n]) >= 0.0) {
         return fan(corners, triangles);
     }
-    clip_ears(&points, corners, triangles);
+    clip_ears(&points, corners, triangles, budget);
 }
 
 fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
@@ -53,14 +57,19 @@ fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
     (b - a).perp(&(c - a))
 }
 
-fn clip_ears(points: &[Point2<f64>], corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
+fn clip_ears(
+    points: &[Point2<f64>],
+    corners: &[u32],
+    triangles: &mut Vec<[u32; 3]>,
+    budget: &mut u64,
+) {
     let mut left: Vec<usize> = (0..points.len()).collect();
     let (mut at, mut misses) = (0, 0);
-    while left.len() > 3 && misses < left.len() {
+    while left.len() > 3 && misses < left.len() && *budget > 0 {
         let n = left.len();
         at %= n;
         let ear = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]];
-        if is_ear(points, &left, ear) {
+        if is_ear(points, &left, ear, budget) {
             triangles.push(ear.map(|i| corners[i]));
             left.remove(at);
             misses = 0;
@@ -73,21 +82,25 @@ fn clip_ears(points: &[Point2<f64>], corners: &[u32], triangles: &mut Vec<[u32; 
     fan(&rest, triangles);
 }
 
-fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3]) -> bool {
+fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3], budget: &mut u64) -> bool {
     let [a, b, c] = ear.map(|i| points[i]);
+    *budget = budget.saturating_sub(1);
     // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbour on the line.
     if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
         return false;
     }
-    left.iter().map(|i| points[*i]).all(|p| {
+    let blocking = left.iter().map(|i| points[*i]).position(|p| {
         // Corners are visited twice where a hole is bridged: equal positions do not block.
-        p == a
+        let outside = p == a
             || p == b
             || p == c
             || turn(&a, &b, &p) < 0.0
             || turn(&b, &c, &p) < 0.0
-            || turn(&c, &a, &p) < 0.0
-    })
+            || turn(&c, &a, &p) < 0.0;
+        !outside
+    });
+    *budget = budget.saturating_sub(blocking.unwrap_or(left.len()) as u64);
+    blocking.is_none()
 }
 
 #[cfg(test)]
@@ -110,7 +123,8 @@ mod tests {
     fn cut(vertices: &[Point3<f64>]) -> Vec<[u32; 3]> {
         let corners: Vec<u32> = (0..).take(vertices.len()).collect();
         let mut triangles = Vec::new();
-        triangulate(vertices, &corners, &mut triangles);
+        let mut budget = CLIPPING_BUDGET;
+        triangulate(vertices, &corners, &mut triangles, &mut budget);
         triangles
     }
 
@@ -163,6 +177,26 @@ mod tests {
         let many = vec![Point3::origin(); 100_000];
         assert_eq!(cut(&many).len(), 99_998);
         assert!(cut(&line[..2]).is_empty() && cut(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_spent_budget_leaves_fans_of_as_many_triangles() {
+        let dart = flat(&[[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]]);
+        let corners: Vec<u32> = (0..4).collect();
+        let mut triangles = Vec::new();
+        let mut budget = 0;
+        triangulate(&dart, &corners, &mut triangles, &mut budget);
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
+        // A comb: nearly every corner between its teeth is no ear for long.
+        let comb: Vec<[f64; 2]> = (0..1000)
+            .map(|i| [f64::from(i), f64::from(i % 2) * 100.0])
+            .chain([[1000.0, -1.0], [-1.0, -1.0]])
+            .collect();
+        let corners: Vec<u32> = (0..1002).rev().collect();
+        let mut budget = CLIPPING_BUDGET;
+        triangulate(&flat(&comb), &corners, &mut triangles, &mut budget);
+        assert_eq!(triangles.len(), 2 + 1000);
+        assert!(budget < CLIPPING_BUDGET);
     }
 
     proptest! {

@@ -13,6 +13,7 @@ use super::calibration::Calibration;
 use super::eval_report::{Report, Subject, Summary};
 use super::judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
 use super::{errors_csv, models, problem, progress_bar, targets, thread_pool};
+use crate::limits::limits;
 use crate::outputs;
 use crate::terminal::{say, warn};
 
@@ -122,8 +123,8 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     read.extend(arguments.targets.as_deref().map(|p| ("--targets", p)));
     outputs::check(&written, &read, &[])?;
 
-    let rows = hicp_io::bop::read_results(&arguments.results)?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let rows = limits().read_results(&arguments.results)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let targets = targets::choose(&dataset, &arguments.split, arguments.targets.as_deref())?;
     let objects: BTreeSet<u32> = targets.values().flat_map(|t| t.keys().copied()).collect();

@@ -8,9 +8,11 @@ use hicp_io::IoError;
 use hicp_io::bop::Dataset;
 use rayon::prelude::*;
 
+use crate::limits::limits;
+
 /// Reads the models of some objects from a folder, on all threads.
 pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoError> {
-    let folder = ModelFolder::open(dir)?;
+    let folder = ModelFolder::open(dir)?.with_limits(limits());
     let objects: Vec<u32> = objects.iter().copied().collect();
     let read: Vec<_> = objects
         .par_iter()

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::{Args, ValueEnum};
 use hicp_bop::{
     BoxMask, DatasetRefiner, FrameResult, FrameRows, MaskSource, Scenes, Shard, best_rows,
@@ -15,8 +16,9 @@ use super::journal::Journal;
 use super::refine_summary::{Told, mean_seconds, report_faults};
 use super::{models, progress_bar, refine_settings, targets, thread_pool};
 use crate::choice::{Pipeline, PipelineArguments};
-use crate::outputs;
+use crate::limits::limits;
 use crate::terminal::{say, warn};
+use crate::{interrupt, outputs};
 
 /// Refine every row of a result file.
 ///
@@ -114,7 +116,8 @@ Example:
 
 Exit codes: 0 done, with the rows kept and the reasons in the summary; 1 a file
 is damaged or no frame was found (the output is still written where that came up
-while refining); 2 the command line is wrong.";
+while refining); 2 the command line is wrong; 130 interrupted (Ctrl-C or
+SIGTERM), with the frames that are done in the journal for --resume.";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -126,7 +129,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     arguments.check_files()?;
     let pipeline = arguments.pipeline.choose()?;
     let mut rows = arguments.rows()?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let masks = arguments.masks()?;
     let frames = frames_of(&rows);
@@ -192,10 +195,14 @@ fn work(
     results: &mut [Option<FrameResult>],
 ) -> anyhow::Result<()> {
     let progress = progress_bar(rows.len(), "rows");
+    interrupt::can_resume();
     let places = results.iter_mut().zip(frames).enumerate();
-    places.par_bridge().try_for_each_init(
+    let ran = places.par_bridge().try_for_each_init(
         || pipeline.refiner(),
         |refiner, (place, (result, (frame, indices)))| {
+            if interrupt::asked() {
+                bail!("interrupted");
+            }
             if result.is_none() {
                 let done = shared.frame(refiner, *frame, rows, indices);
                 if let Some(journal) = journal {
@@ -206,9 +213,16 @@ fn work(
             progress.inc(indices.len() as u64);
             Ok::<(), anyhow::Error>(())
         },
-    )?;
+    );
     progress.finish_and_clear();
-    Ok(())
+    if interrupt::asked() && ran.is_err() && journal.is_some() {
+        bail!(
+            "interrupted: {} of {} frames are done; --resume goes on from there",
+            results.iter().flatten().count(),
+            frames.len()
+        );
+    }
+    ran
 }
 
 impl Arguments {
@@ -257,7 +271,7 @@ impl Arguments {
 
     /// Reads the rows that are to be refined and written.
     fn rows(&self) -> anyhow::Result<Vec<ResultRow>> {
-        let mut rows = hicp_io::bop::read_results(&self.results)?;
+        let mut rows = limits().read_results(&self.results)?;
         if let Some(limit) = self.limit {
             rows.truncate(limit as usize);
         }
@@ -282,7 +296,7 @@ impl Arguments {
 
     fn masks(&self) -> anyhow::Result<MaskSource> {
         Ok(match (&self.detections, self.mask) {
-            (Some(path), _) => MaskSource::detections(hicp_io::bop::read_detections(path)?),
+            (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),
             (None, MaskKind::Visible) => MaskSource::Visible,
             (None, MaskKind::None) => MaskSource::Box(BoxMask::default()),
         })

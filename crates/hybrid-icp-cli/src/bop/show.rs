@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use hicp_bop::{Image, MaskSource, Models, Scenes};
-use hicp_io::bop::{Dataset, ResultRow, read_detections, read_results};
+use hicp_io::bop::{Dataset, ResultRow};
 
 use super::eval::DELTA_MM;
 use super::models;
 use super::show_estimates::{Estimates, Inspection};
 use super::show_lines::{self, HEADS, Line, cells};
 use super::show_picture::{self, FileLegend, Scenery};
+use crate::limits::limits;
 use crate::outputs;
 use crate::overlay::Picture;
 use crate::terminal::{complain, say, warn};
@@ -82,7 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     read.extend(arguments.detections.as_deref().map(|p| ("--detections", p)));
     outputs::check(&[("--out", &arguments.out)], &read, &[])?;
     let files = arguments.files()?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let masks = arguments.masks()?;
 
@@ -184,7 +185,7 @@ impl Arguments {
         let paths = std::iter::once(&self.results).chain(&self.against);
         let mut files = Vec::new();
         for path in paths {
-            let rows = read_results(path)?;
+            let rows = limits().read_results(path)?;
             if !rows.iter().any(|row| self.shows(row)) {
                 let images: BTreeSet<u32> = rows
                     .iter()
@@ -234,7 +235,7 @@ impl Arguments {
         let Some(path) = &self.detections else {
             return Ok(MaskSource::Visible);
         };
-        let mut detections = read_detections(path)?;
+        let mut detections = limits().read_detections(path)?;
         detections.retain(|d| (d.scene_id, d.image_id) == (self.scene, self.image));
         Ok(MaskSource::detections(detections))
     }

@@ -206,3 +206,16 @@ pub(crate) fn nearby(pose: &Isometry3<f64>, seed: u64) -> Isometry3<f64> {
 pub(crate) fn same_pose(a: &ResultRow, b: &ResultRow) -> bool {
     a.rotation() == b.rotation() && a.translation_mm() == b.translation_mm()
 }
+
+/// Rows whose images stand together, several per instance.
+pub(crate) fn grouped(world: &World, per_instance: u64) -> Vec<ResultRow> {
+    let mut rows = Vec::new();
+    for ((scene, image), truths) in world.truths.iter().rev() {
+        for (id, pose) in truths {
+            for seed in 0..per_instance {
+                rows.push(ResultRow::new(*scene, *image, *id, nearby(pose, seed)));
+            }
+        }
+    }
+    rows
+}

@@ -68,10 +68,10 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineError::Read`] when it cannot be read.
+    /// [`PipelineError::Read`] when it cannot be read, is no regular file or has more than 1 MiB.
     pub fn read_text(path: impl AsRef<Path>) -> Result<String, PipelineError> {
         let path = path.as_ref();
-        std::fs::read_to_string(path).map_err(|source| PipelineError::Read {
+        read_small_file(path).map_err(|source| PipelineError::Read {
             path: path.to_owned(),
             source,
         })
@@ -111,4 +111,21 @@ impl PipelineFile {
         };
         build::stage(&Reader::new(&self.tree, PartKind::Stage, place)?)
     }
+}
+/// Largest file that is read.
+const MAX_PIPELINE_BYTES: u64 = 1 << 20;
+
+/// Reads a file that ends: a pipe or a device need not.
+fn read_small_file(path: &Path) -> std::io::Result<String> {
+    let metadata = std::fs::metadata(path)?;
+    if metadata.is_file() && metadata.len() <= MAX_PIPELINE_BYTES {
+        return std::fs::read_to_string(path);
+    }
+    let kind = match (metadata.is_file(), metadata.len()) {
+        (true, bytes) => format!("a file of {bytes} bytes"),
+        (false, _) => "no regular file".to_owned(),
+    };
+    Err(std::io::Error::other(format!(
+        "found {kind}, expected a regular file of at most {MAX_PIPELINE_BYTES} bytes"
+    )))
 }

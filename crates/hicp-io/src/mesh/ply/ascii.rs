@@ -4,33 +4,40 @@
 
 use std::path::Path;
 
-use ply_rs_bw::ply::{
-    ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
-};
+use ply_rs_bw::ply::{ElementDef, Property, PropertyAccessResult, PropertyType, ScalarType};
 
+use super::Header;
 use super::header::parse_scalar;
-use crate::error::{END_OF_FILE, IoError};
+use super::rows::Row;
+use crate::error::{END_OF_FILE, IoError, Place};
+use crate::mesh::Reading;
 
 /// The lines of a payload, one element each.
 pub(super) struct Lines<'a> {
     path: &'a Path,
     rest: &'a [u8],
+    line_end: u8,
     line: usize,
 }
 
 impl<'a> Lines<'a> {
-    /// Makes the lines of `rest`, which follows `header_lines` lines of header.
-    pub(super) fn new(path: &'a Path, rest: &'a [u8], header_lines: usize) -> Self {
+    /// Makes the lines that follow a header.
+    pub(super) fn new(path: &'a Path, content: &'a [u8], header: &Header) -> Self {
         Self {
             path,
-            rest,
-            line: header_lines,
+            rest: &content[header.bytes..],
+            line_end: header.line_end,
+            line: header.lines,
         }
     }
 
-    pub(super) fn read<E: PropertyAccess>(&mut self, def: &ElementDef) -> Result<Vec<E>, IoError> {
-        // The header's count was checked against the size of the file, but an element takes more here than there.
-        let mut elements = Vec::with_capacity(def.count.min(1 << 16));
+    /// Reads the elements of a kind, and hands over each.
+    pub(super) fn read<E: Row>(
+        &mut self,
+        reading: &Reading<'_>,
+        def: &ElementDef,
+        take: &mut impl FnMut(Place, E) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
         for number in 0..def.count {
             let Some(text) = self.next_line() else {
                 let expected = format!(
@@ -54,15 +61,17 @@ impl<'a> Lines<'a> {
                     return Err(IoError::line(self.path, self.line, text, expected));
                 }
             }
-            elements.push(element);
+            let place = Place::Line(self.line);
+            element.check(reading, place)?;
+            take(place, element)?;
         }
-        Ok(elements)
+        Ok(())
     }
 
     /// Returns the next line that is not blank.
     fn next_line(&mut self) -> Option<&'a str> {
         while !self.rest.is_empty() {
-            let end = self.rest.iter().position(|byte| *byte == b'\n');
+            let end = self.rest.iter().position(|byte| *byte == self.line_end);
             let (line, rest) = match end {
                 Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
                 None => (self.rest, &[][..]),
@@ -128,6 +137,7 @@ fn describe(data_type: &PropertyType) -> &'static str {
 mod tests {
     use super::super::parse_mesh;
     use super::*;
+    use crate::mesh::tests::reading;
 
     const HEAD: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
         property double z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nend_header\n";
@@ -135,7 +145,7 @@ mod tests {
     #[test]
     fn numbers_as_people_write_them() {
         let text = format!("{HEAD}.5 1. +1e0\r\n\n  -.5\t0 0 99\n1 1 1E-3\n\n3 0 1 2 255");
-        let mesh = parse_mesh(Path::new("a.ply"), text.into_bytes()).unwrap();
+        let mesh = parse_mesh(&reading("a.ply"), text.into_bytes()).unwrap();
         assert_eq!(mesh.vertices[0].coords.as_slice(), [0.5, 1.0, 1.0]);
         assert_eq!(mesh.vertices[2].z, 0.001);
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
@@ -152,8 +162,11 @@ mod tests {
             ("0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5 0\n", 14),
             ("0 0 0\n1 0 0\n0 1 0\n-3 0 1 2 0\n", 14),
             ("0 0 0\n1 0 0\n0 1 0 0 0 0 0 0\n\n", 14),
+            ("0 0 0\n1 0 nan\n0 1 0\n3 0 1 2 0\n", 12),
+            ("0 0 0\n1 0 0\n0 1 -1e9\n3 0 1 2 0\n", 13),
+            ("0 0 0\n1 0 0\n0 1 0\n3\n0 1 2 0\n", 14),
         ] {
-            match parse_mesh(Path::new("a.ply"), format!("{HEAD}{body}").into_bytes()) {
+            match parse_mesh(&reading("a.ply"), format!("{HEAD}{body}").into_bytes()) {
                 Err(IoError::Line { line, .. }) => assert_eq!(line, at, "{body:?}"),
                 other => panic!("{body:?}: {other:?}"),
             }

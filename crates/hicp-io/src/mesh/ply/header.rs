@@ -7,7 +7,7 @@ use ply_rs_bw::ply::{
     self, DefaultElement, ElementDef, Encoding, Property, PropertyType, ScalarType,
 };
 
-use crate::error::{END_OF_FILE, IoError};
+use crate::error::{END_OF_FILE, IoError, Place};
 
 /// What the list of a face's corners is called; some exporters say `vertex_index`.
 pub(super) const FACE_LIST: &str = "vertex_indices";
@@ -22,11 +22,17 @@ pub(super) struct Header {
     pub(super) ply: ply::Header,
     pub(super) bytes: usize,
     pub(super) lines: usize,
+    /// What ends its lines, and those of an ASCII payload.
+    pub(super) line_end: u8,
+    /// In characters that the grammar allows.
+    text: String,
 }
 
 impl Header {
-    pub(super) fn parse(path: &Path, content: &[u8]) -> Result<Self, IoError> {
-        let (text, bytes) = plain_header(path, content)?;
+    /// Parses the header that `content` begins with, and holds its promises to `file_bytes`, the size of the whole file.
+    pub(super) fn parse(path: &Path, content: &[u8], file_bytes: u64) -> Result<Self, IoError> {
+        let line_end = line_end(content);
+        let (text, bytes) = plain_header(path, content, line_end)?;
         let lines = text.lines().count();
         let parsed = Parser::<DefaultElement>::new()
             .read_header(&mut Reader::new(text.as_bytes()))
@@ -46,16 +52,37 @@ impl Header {
             ply: parsed,
             bytes,
             lines,
+            line_end,
+            text,
         };
-        header.check_promises(path, content.len() - bytes)?;
+        header.check_promises(path, file_bytes.saturating_sub(bytes as u64))?;
         Ok(header)
     }
 
+    /// The line that announces an element.
+    pub(super) fn place_of(&self, element: &str) -> Place {
+        let announces = |line: &str| {
+            let mut words = line.split_whitespace();
+            words.next() == Some("element") && words.next() == Some(element)
+        };
+        Place::Line(1 + self.text.lines().position(announces).unwrap_or(0))
+    }
+
+    /// The number of elements of a name, and the line that announces them.
+    pub(super) fn count_of(&self, name: &str) -> (Place, usize) {
+        let count = self
+            .ply
+            .elements
+            .get(name)
+            .map_or(0, |element| element.count);
+        (self.place_of(name), count)
+    }
+
     /// Refuses counts that the rest of the file cannot hold.
-    fn check_promises(&self, path: &Path, available: usize) -> Result<(), IoError> {
+    fn check_promises(&self, path: &Path, available: u64) -> Result<(), IoError> {
         let ascii = self.ply.encoding == Encoding::Ascii;
         // The last token of a file need not be followed by a separator.
-        let mut left = available as u64 + u64::from(ascii);
+        let mut left = available + u64::from(ascii);
         for element in self.ply.elements.values() {
             let least = element
                 .properties
@@ -74,6 +101,7 @@ impl Header {
             if needed > left {
                 return Err(IoError::Promise {
                     path: path.to_owned(),
+                    place: self.place_of(&element.name),
                     what: format!("elements `{}`", element.name),
                     count,
                     needed,
@@ -103,6 +131,7 @@ impl Header {
         let names: Vec<&str> = element.properties.keys().map(String::as_str).collect();
         Err(IoError::Unsupported {
             path: path.to_owned(),
+            place: self.place_of(&element.name),
             found: format!("an element `{}` with properties {names:?}", element.name),
             expected: match name {
                 FACE_LIST => "a list property `vertex_indices` or `vertex_index`",
@@ -137,13 +166,21 @@ pub(super) fn parse_scalar(text: &str, scalar: &ScalarType) -> Option<Property> 
     })
 }
 
+/// Returns the byte that ends the lines: a carriage return where the first line has no other end, as files of old do.
+fn line_end(content: &[u8]) -> u8 {
+    match content.strip_prefix(b"ply") {
+        Some([b'\r', next, ..]) if *next != b'\n' => b'\r',
+        _ => b'\n',
+    }
+}
+
 /// Returns the header in the characters its grammar allows, line for line, and its length in bytes.
 ///
 /// Comments come in any encoding and some exporters put punctuation into property names; neither matters here.
-fn plain_header(path: &Path, content: &[u8]) -> Result<(String, usize), IoError> {
+fn plain_header(path: &Path, content: &[u8], line_end: u8) -> Result<(String, usize), IoError> {
     let mut text = String::new();
     let mut bytes = 0;
-    for (number, line) in (1_usize..).zip(content.split_inclusive(|byte| *byte == b'\n')) {
+    for (number, line) in (1_usize..).zip(content.split_inclusive(|byte| *byte == line_end)) {
         bytes += line.len();
         let line = String::from_utf8_lossy(line);
         let line = line.trim();
@@ -187,7 +224,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Header, IoError> {
-        Header::parse(Path::new("a.ply"), text.as_bytes())
+        Header::parse(Path::new("a.ply"), text.as_bytes(), text.len() as u64)
     }
 
     #[test]

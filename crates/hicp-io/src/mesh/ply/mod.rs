@@ -1,140 +1,205 @@
 //! PLY files: headers and binary payloads through `ply-rs-bw`, ASCII payloads by [`ascii`].
 
-use std::path::Path;
-
 use hicp_core::Point3;
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Encoding, PropertyAccess};
+use ply_rs_bw::ply::{ElementDef, Encoding};
 
-use super::RawMesh;
-use crate::error::{END_OF_FILE, IoError};
+use super::{RawMesh, Reading};
+use crate::error::{END_OF_FILE, IoError, Place};
 
 mod ascii;
 mod header;
 mod rows;
 
 use header::Header;
-use rows::Skipped;
-pub(crate) use rows::{Face, Vertex};
+pub(crate) use rows::Vertex;
+use rows::{Face, Row, Skipped};
+
+/// Refuses a file by its header, when it may have the elements that it promises and they are too many.
+///
+/// A header that is longer than the head, or broken, is left to the parser.
+pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
+    match Header::parse(reading.path, head, bytes) {
+        Ok(header) => check_counts(reading, &header),
+        Err(_) => Ok(()),
+    }
+}
+
+fn check_counts(reading: &Reading<'_>, header: &Header) -> Result<(), IoError> {
+    let (place, count) = header.count_of("vertex");
+    reading.check_vertices(place, count)?;
+    let (place, count) = header.count_of("face");
+    reading.check_triangles(place, count)
+}
 
 /// Parses the vertices and faces of a PLY file.
-pub(super) fn parse_mesh(path: &Path, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let (vertices, faces) = read(path, &content)?;
+pub(super) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+    let mut faces = Faces::default();
+    let (vertices, header) = read(reading, &content, &mut faces)?;
     drop(content);
-    let mut mesh = RawMesh {
-        vertices: vertices
-            .iter()
-            .map(|v| Point3::new(v.value[0], v.value[1], v.value[2]))
-            .collect(),
-        triangles: Vec::with_capacity(faces.len()),
-    };
+    let mut mesh = RawMesh::new(match header.ply.elements.contains_key("face") {
+        true => header.place_of("face"),
+        false => Place::Line(header.lines),
+    });
+    mesh.vertices = vertices
+        .iter()
+        .map(|v| Point3::new(v.value[0], v.value[1], v.value[2]))
+        .collect();
+    drop(vertices);
+    mesh.triangles.reserve(faces.places.len());
     let mut corners = Vec::new();
-    for (number, face) in faces.into_iter().enumerate() {
+    let mut rest = faces.corners.as_slice();
+    for (face, (place, count)) in faces.places.into_iter().enumerate() {
+        let (indices, others) = rest.split_at(count.min(rest.len()));
+        rest = others;
         corners.clear();
-        for index in face.corners {
+        for &index in indices {
             match u32::try_from(index) {
                 Ok(corner) if (corner as usize) < mesh.vertices.len() => corners.push(corner),
                 _ => {
                     return Err(IoError::FaceIndex {
-                        path: path.to_owned(),
-                        face: number,
+                        path: reading.path.to_owned(),
+                        place,
+                        face,
                         index,
                         vertices: mesh.vertices.len(),
                     });
                 }
             }
         }
-        mesh.add_face(&corners);
+        mesh.add_face(reading, place, &corners)?;
     }
     Ok(mesh)
 }
 
-/// Reads all vertices and faces of a PLY file.
-pub(crate) fn read(path: &Path, content: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), IoError> {
-    let header = Header::parse(path, content)?;
-    let mut payload = Payload::new(path, content, &header);
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+/// The corners of all faces one after the other, and of each where it stands and how many are its own.
+#[derive(Debug, Default)]
+struct Faces {
+    corners: Vec<i64>,
+    places: Vec<(Place, usize)>,
+}
+
+/// Reads all vertices of a PLY file.
+pub(crate) fn read_vertices(reading: &Reading<'_>, content: &[u8]) -> Result<Vec<Vertex>, IoError> {
+    Ok(read(reading, content, &mut Faces::default())?.0)
+}
+
+fn read(
+    reading: &Reading<'_>,
+    content: &[u8],
+    faces: &mut Faces,
+) -> Result<(Vec<Vertex>, Header), IoError> {
+    let path = reading.path;
+    let header = Header::parse(path, content, content.len() as u64)?;
+    check_counts(reading, &header)?;
+    let mut payload = Payload::new(reading, content, &header);
+    let mut vertices = Vec::new();
     for element in header.ply.elements.values() {
         match element.name.as_str() {
             "vertex" => {
                 for name in ["x", "y", "z"] {
                     header.require(path, element, name)?;
                 }
-                vertices = payload.read(element)?;
+                payload.read(element, |_, vertex| {
+                    vertices.push(vertex);
+                    Ok(())
+                })?;
             }
             "face" => {
                 header.require(path, element, header::FACE_LIST)?;
-                faces = payload.read(element)?;
+                payload.read(element, |place, face: Face| {
+                    // A triangle fan has two corners more than triangles.
+                    reading.check_triangles(place, face.corners.len().saturating_sub(2))?;
+                    faces.places.push((place, face.corners.len()));
+                    faces.corners.extend(face.corners);
+                    Ok(())
+                })?;
             }
             "tristrips" if element.count > 0 => {
                 return Err(IoError::Unsupported {
                     path: path.to_owned(),
+                    place: header.place_of("tristrips"),
                     found: "triangle strips".to_owned(),
                     expected: "an element `face`",
                 });
             }
-            _ => {
-                payload.read::<Skipped>(element)?;
-            }
+            _ => payload.read(element, |_, _: Skipped| Ok(()))?,
         }
     }
-    Ok((vertices, faces))
+    Ok((vertices, header))
 }
 
 /// What follows the header.
 enum Payload<'a> {
-    Ascii(ascii::Lines<'a>),
+    Ascii(&'a Reading<'a>, ascii::Lines<'a>),
     Binary {
-        path: &'a Path,
-        header: &'a Header,
+        reading: &'a Reading<'a>,
+        big_endian: bool,
         length: usize,
         reader: Reader<&'a [u8]>,
     },
 }
 
 impl<'a> Payload<'a> {
-    fn new(path: &'a Path, content: &'a [u8], header: &'a Header) -> Self {
-        let rest = &content[header.bytes..];
-        match header.ply.encoding {
-            Encoding::Ascii => Self::Ascii(ascii::Lines::new(path, rest, header.lines)),
-            Encoding::BinaryBigEndian | Encoding::BinaryLittleEndian => Self::Binary {
-                path,
-                header,
-                length: content.len(),
-                reader: Reader::new(rest),
-            },
+    fn new(reading: &'a Reading<'a>, content: &'a [u8], header: &Header) -> Self {
+        if header.ply.encoding == Encoding::Ascii {
+            return Self::Ascii(reading, ascii::Lines::new(reading.path, content, header));
+        }
+        Self::Binary {
+            reading,
+            big_endian: header.ply.encoding == Encoding::BinaryBigEndian,
+            length: content.len(),
+            reader: Reader::new(&content[header.bytes..]),
         }
     }
 
-    fn read<E: PropertyAccess>(&mut self, element: &ElementDef) -> Result<Vec<E>, IoError> {
-        match self {
-            Self::Ascii(lines) => lines.read(element),
+    /// Reads the elements of a kind, and hands over each with the place where it begins.
+    fn read<E: Row>(
+        &mut self,
+        element: &ElementDef,
+        mut take: impl FnMut(Place, E) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        let (reading, big_endian, length, reader) = match self {
+            Self::Ascii(reading, lines) => return lines.read(reading, element, &mut take),
             Self::Binary {
-                path,
-                header,
+                reading,
+                big_endian,
                 length,
                 reader,
-            } => Parser::<E>::new()
-                .read_payload_for_element(reader, element, &header.ply)
-                .map_err(|error| IoError::Bytes {
-                    path: path.to_path_buf(),
-                    offset: (*length - reader.get_ref().len()) as u64,
-                    found: match error.kind() {
-                        std::io::ErrorKind::UnexpectedEof => END_OF_FILE.to_owned(),
-                        _ => crate::error::quote(&error.to_string()),
-                    },
-                    expected: format!("{} elements `{}`", element.count, element.name),
-                }),
+            } => (reading, *big_endian, *length, reader),
+        };
+        let parser = Parser::<E>::new();
+        for number in 0..element.count {
+            let place = Place::Byte((length - reader.get_ref().len()) as u64);
+            let row = match big_endian {
+                true => parser.read_big_endian_element(reader.get_mut(), element),
+                false => parser.read_little_endian_element(reader.get_mut(), element),
+            };
+            let row = row.map_err(|error| {
+                let found = match error.kind() {
+                    std::io::ErrorKind::UnexpectedEof => END_OF_FILE.to_owned(),
+                    _ => crate::error::quote(&error.to_string()),
+                };
+                let expected = format!(
+                    "element {number} of {} elements `{}`",
+                    element.count, element.name
+                );
+                IoError::at(reading.path, place, &found, expected)
+            })?;
+            row.check(reading, place)?;
+            take(place, row)?;
         }
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::tests::reading;
 
     fn mesh(content: &[u8]) -> Result<RawMesh, IoError> {
-        parse_mesh(Path::new("a.ply"), content.to_vec())
+        parse_mesh(&reading("a.ply"), content.to_vec())
     }
 
     const CORNERS: [[f32; 3]; 4] = [

@@ -3,6 +3,26 @@
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
 use super::header::is_face_list;
+use crate::error::{IoError, Place};
+use crate::mesh::Reading;
+
+/// An element that a file holds one of per row.
+pub(super) trait Row: PropertyAccess {
+    /// Refuses what was read where it stands.
+    fn check(&self, _: &Reading<'_>, _: Place) -> Result<(), IoError> {
+        Ok(())
+    }
+}
+
+impl Row for Vertex {
+    fn check(&self, reading: &Reading<'_>, place: Place) -> Result<(), IoError> {
+        reading.check_position(place, &self.value[..3])
+    }
+}
+
+impl Row for Face {}
+
+impl Row for Skipped {}
 
 /// A vertex: x, y, z, nx, ny, nz; NaN where the file says nothing.
 #[derive(Clone, Copy, Debug)]

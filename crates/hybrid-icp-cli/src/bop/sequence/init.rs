@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
-use hicp_io::bop::{ResultRow, read_results};
+use hicp_io::bop::ResultRow;
 use hybrid_icp::Isometry3;
+
+use crate::limits::limits;
 
 /// Reads a pose file, or the row with the highest score for a scene, image and object of a result file (`.csv`).
 pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isometry3<f64>> {
@@ -13,7 +15,7 @@ pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isomet
         return Ok(pose.camera_from_object);
     }
     let (scene_id, im_id, obj_id) = place;
-    let rows = read_results(path).context("cannot read --init")?;
+    let rows = limits().read_results(path).context("cannot read --init")?;
     let of_place = |row: &&ResultRow| (row.scene_id, row.im_id, row.obj_id) == place;
     // Of equal scores the first row.
     let best = rows.iter().filter(of_place).reduce(

@@ -21,6 +21,7 @@ use self::lines::Line;
 use self::tracker::Tracker;
 use super::{median, progress_bar};
 use crate::choice::{Pipeline, PipelineArguments};
+use crate::limits::limits;
 use crate::outputs;
 use crate::terminal::{complain, say};
 
@@ -99,7 +100,7 @@ way); 2 the command line is wrong.";
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.check_outputs()?;
     let pipeline = arguments.pipeline.choose()?;
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     let scene = dataset.scene(&arguments.split, arguments.scene)?;
     let path = CameraPath::of(&scene, arguments.first)?;
     check_object(&scene, &path, arguments.object)?;
@@ -214,7 +215,7 @@ fn check_object(scene: &Scene, path: &CameraPath, object: u32) -> anyhow::Result
 
 /// Reads the object's model, with its size and symmetries where the dataset states them.
 fn read_model(dir: &Path, object: u32) -> anyhow::Result<Model> {
-    let model = ModelFolder::open(dir)?.read(object)?;
+    let model = ModelFolder::open(dir)?.with_limits(limits()).read(object)?;
     model.with_context(|| {
         format!(
             "model of object {object} is missing: {} does not exist",

@@ -1,0 +1,58 @@
+//! How much the program reads before it refuses a file.
+
+use std::sync::OnceLock;
+
+use clap::Args;
+use hicp_io::ReadLimits;
+
+/// Limits on what is read.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Limits on what is read")]
+pub(crate) struct Limits {
+    /// Bytes of a file; of JSON files too where it is larger than their limit of 256 MiB. 1 GiB if not given.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_file_bytes: Option<u64>,
+    /// Bytes of a JSON file, of which several dozen times as many are needed in memory. 256 MiB if not given.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_json_bytes: Option<u64>,
+    /// Vertices of a mesh. 10 million if not given; never more than 50 million.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_vertices: Option<u64>,
+    /// Triangles of a mesh, after polygons are cut. 10 million if not given; never more than 50 million.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_triangles: Option<u64>,
+    /// Pixels of an image. 2^27 if not given; sides are never longer than 32768.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_pixels: Option<u64>,
+    /// Rows of a result file. 10 million if not given.
+    #[arg(long, value_name = "N", global = true, hide_short_help = true)]
+    max_rows: Option<u64>,
+}
+
+static CHOSEN: OnceLock<ReadLimits> = OnceLock::new();
+
+impl Limits {
+    /// Sets the limits of this run of the program.
+    pub(crate) fn choose(&self) {
+        let default = ReadLimits::DEFAULT;
+        let max_file_bytes = self.max_file_bytes.unwrap_or(default.max_file_bytes);
+        let chosen = ReadLimits {
+            max_file_bytes,
+            max_json_bytes: self.max_json_bytes.unwrap_or(match self.max_file_bytes {
+                Some(bytes) => default.max_json_bytes.max(bytes),
+                None => default.max_json_bytes,
+            }),
+            max_vertices: self.max_vertices.unwrap_or(default.max_vertices),
+            max_triangles: self.max_triangles.unwrap_or(default.max_triangles),
+            max_pixels: self.max_pixels.unwrap_or(default.max_pixels),
+            max_rows: self.max_rows.unwrap_or(default.max_rows),
+        };
+        // Once per run of the program: nothing was set before.
+        let _ = CHOSEN.set(chosen);
+    }
+}
+
+/// The limits of this run of the program.
+pub(crate) fn limits() -> ReadLimits {
+    CHOSEN.get().copied().unwrap_or_default()
+}

@@ -1,0 +1,167 @@
+//! What looks wrong about inputs of which each is well-formed: mostly units that do not go together.
+
+use std::f64::consts::FRAC_PI_4;
+
+use hicp_core::{Isometry3, Model, Observation};
+use thiserror::Error;
+
+/// Diameters beyond which an object is taken for one in another unit: a coin in metres, a car in millimetres.
+const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
+
+/// Share of the diameter that rounding the coordinates may cost.
+const COARSE: f64 = 1e-3;
+
+/// How many times nearer or further than the pose says the measured surface may be.
+const DEPTH_RATIO: f64 = 3.0;
+
+/// How many times more pixels than the model can cover the mask may have.
+const MASK_RATIO: f64 = 10.0;
+
+/// Something that looks wrong about the inputs of a refinement, though none of them is refused. Lengths are metres.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Doubt {
+    /// The object is smaller or larger than what is looked at with a depth camera: probably a wrong unit of the mesh.
+    #[error("the model's diameter is {}", Meters(*diameter))]
+    Diameter {
+        /// Diameter of the model.
+        diameter: f64,
+    },
+    /// The mesh is so far from its origin that `f32` rounds its shape.
+    #[error(
+        "the model's coordinates are so far from its origin that they are rounded to steps of {}, with a diameter of {}",
+        Meters(*step),
+        Meters(*diameter)
+    )]
+    CoarseCoordinates {
+        /// Distance between neighbouring coordinates.
+        step: f64,
+        /// Diameter of the model.
+        diameter: f64,
+    },
+    /// The object is behind the camera at the initial pose, or the pose is not finite.
+    #[error("the object's centre is at z = {}, behind the camera, which looks along +z", Meters(*z))]
+    BehindCamera {
+        /// z of the centre of the object in the camera frame.
+        z: f64,
+    },
+    /// There is a mask, but no depth inside.
+    #[error("no depth inside the mask")]
+    NoDepth,
+    /// The surface inside the mask is much nearer or further than the object at the initial pose: probably a wrong depth scale or a
+    /// translation in another unit.
+    #[error(
+        "the median depth inside the mask is {}, but the object at the initial pose is at {}",
+        Meters(*measured),
+        Meters(*expected)
+    )]
+    Depth {
+        /// Median depth inside the mask.
+        measured: f64,
+        /// z of the centre of the object.
+        expected: f64,
+    },
+    /// The mask has many more pixels than the object can cover at its distance: probably a wrong unit of the mesh.
+    #[error(
+        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) covers at most {at_most:.0}",
+        Meters(*diameter),
+        Meters(*distance)
+    )]
+    Mask {
+        /// Pixels of the mask.
+        pixels: usize,
+        /// Pixels of a disc of the model's diameter at its distance.
+        at_most: f64,
+        /// Diameter of the model.
+        diameter: f64,
+        /// z of the centre of the object.
+        distance: f64,
+    },
+}
+
+/// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, metres.
+///
+/// Nothing is refused for it: a caller with a person to tell tells them, a robot cell counts them. Cost: one look at the
+/// pixels of the mask.
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// // The wall is 0.8 m away, but the depth was read at a tenth of its scale.
+/// let depth = DepthImage::from_meters(64, 48, vec![0.08; 64 * 48])?;
+/// let camera = PinholeCamera::new(60.0, 60.0, 31.5, 23.5, 64, 48)?;
+/// let observation = Observation::new(depth, Mask::full(64, 48), camera)?;
+/// let doubts = doubts(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.8));
+/// assert!(matches!(doubts[0], Doubt::Depth { .. }));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn doubts(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    let diameter = model.diameter();
+    if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
+        doubts.push(Doubt::Diameter { diameter });
+    }
+    let step = model.mesh().coordinate_step();
+    if step > COARSE * diameter {
+        doubts.push(Doubt::CoarseCoordinates { step, diameter });
+    }
+    let distance = (init * model.center()).z;
+    if distance.is_nan() || distance <= 0.0 {
+        doubts.push(Doubt::BehindCamera { z: distance });
+        return doubts;
+    }
+    let pixels = observation.mask().pixels().iter();
+    let pixels = pixels.filter(|set| **set).count();
+    let plausible = distance / DEPTH_RATIO..=distance * DEPTH_RATIO;
+    match median_depth(observation) {
+        None if pixels > 0 => doubts.push(Doubt::NoDepth),
+        Some(measured) if !plausible.contains(&measured) => doubts.push(Doubt::Depth {
+            measured,
+            expected: distance,
+        }),
+        _ => {}
+    }
+    // No silhouette of that diameter is larger than a disc.
+    let camera = observation.camera();
+    let at_most =
+        FRAC_PI_4 * (camera.fx() * diameter / distance) * (camera.fy() * diameter / distance);
+    // One doubt about the same numbers is enough.
+    if doubts.is_empty() && pixels as f64 > MASK_RATIO * at_most.max(1.0) {
+        doubts.push(Doubt::Mask {
+            pixels,
+            at_most,
+            diameter,
+            distance,
+        });
+    }
+    doubts
+}
+
+/// A length as people write it, however large or small.
+struct Meters(f64);
+
+impl std::fmt::Display for Meters {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let length = self.0;
+        match length.abs() {
+            size if size != 0.0 && !(1e-3..1e5).contains(&size) => write!(f, "{length:.3e} m"),
+            _ => write!(f, "{length:.4} m"),
+        }
+    }
+}
+
+fn median_depth(observation: &Observation) -> Option<f64> {
+    let depth = observation.depth().pixels();
+    let mask = observation.mask().pixels();
+    let mut inside: Vec<f32> = depth
+        .iter()
+        .zip(mask)
+        .filter(|(z, set)| **set && **z > 0.0)
+        .map(|(z, _)| *z)
+        .collect();
+    inside.sort_by(f32::total_cmp);
+    inside.get(inside.len() / 2).copied().map(f64::from)
+}

@@ -1,0 +1,280 @@
+//! Numbers that are none, or cannot be: refused where a type is made, or an honest outcome; never a NaN in a result.
+#![allow(clippy::unwrap_used)]
+
+use hicp_io::pose_from_bop;
+use hybrid_icp::{
+    CameraError, DepthImage, Doubt, Isometry3, Mask, Matrix3, Model, Observation, PinholeCamera,
+    Point3, Preset, Refinement, Refiner, TriMesh, Verdict, doubts, render_depth_image,
+};
+
+const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::new(300.0, 300.0, 79.5, 59.5, 160, 120).unwrap()
+}
+
+fn cuboid(sides: [f32; 3]) -> TriMesh {
+    let corner = |i: usize| {
+        let side = |axis: usize| sides[axis] * if (i >> axis) & 1 == 1 { 0.5 } else { -0.5 };
+        Point3::new(side(0), side(1), side(2))
+    };
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = faces
+        .iter()
+        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+        .collect();
+    TriMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+}
+
+struct Scene {
+    model: Model,
+    truth: Isometry3<f64>,
+    depth: DepthImage,
+    mask: Mask,
+}
+
+fn scene() -> Scene {
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let truth = Isometry3::new([0.01, -0.005, 0.4].into(), [0.6, -0.4, 0.3].into());
+    let depth = render_depth_image(&mesh, &camera(), &truth);
+    let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
+    let mask = Mask::new(160, 120, pixels).unwrap();
+    Scene {
+        model: Model::new(mesh),
+        truth,
+        depth,
+        mask,
+    }
+}
+
+impl Scene {
+    fn observe(&self, depth: DepthImage) -> Observation {
+        Observation::new(depth, self.mask.clone(), camera()).unwrap()
+    }
+
+    /// The depth with every pixel changed.
+    fn changed(&self, change: impl Fn(f32) -> f32) -> DepthImage {
+        let pixels = self.depth.pixels().iter().map(|z| change(*z)).collect();
+        DepthImage::from_meters(160, 120, pixels).unwrap()
+    }
+}
+
+#[track_caller]
+fn honest(refined: &Refinement, init: &Isometry3<f64>) {
+    let pose = refined.outcome.camera_from_object;
+    if init
+        .translation
+        .vector
+        .iter()
+        .chain(init.rotation.coords.iter())
+        .all(|x| x.is_finite())
+    {
+        let matrix = pose.to_homogeneous();
+        assert!(matrix.iter().all(|x| x.is_finite()), "{pose}");
+        assert!((pose.rotation.norm() - 1.0).abs() < 1e-9);
+    } else {
+        assert!(matches!(refined.outcome.verdict, Verdict::KeptInitial(_)));
+    }
+    for mve in [refined.mve, refined.mve_initial] {
+        assert!((0.0..=1.0).contains(&mve), "{mve}");
+    }
+}
+
+#[test]
+fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
+    let scene = scene();
+    let init = scene.truth * Isometry3::translation(0.003, 0.0, 0.0);
+    let plain = Refiner::preset(Preset::Hybrid).refine(
+        &scene.model,
+        &scene.observe(scene.depth.clone()),
+        &init,
+    );
+    assert_eq!(plain.outcome.verdict, Verdict::Refined);
+    // What the sensor writes for nothing: not a number, infinite, negative, a denormal, absurdly far.
+    for nothing in [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        -0.4,
+        -0.0,
+        1e-40,
+        1e30,
+    ] {
+        let mut number = 0;
+        let pixels: Vec<f32> = scene
+            .depth
+            .pixels()
+            .iter()
+            .map(|z| {
+                number += 1;
+                if *z == 0.0 || number % 7 == 0 {
+                    nothing
+                } else {
+                    *z
+                }
+            })
+            .collect();
+        let observation = scene.observe(DepthImage::from_meters(160, 120, pixels).unwrap());
+        assert!(
+            observation
+                .depth()
+                .pixels()
+                .iter()
+                .all(|z| *z == 0.0 || *z > 0.3),
+            "{nothing}"
+        );
+        for preset in Preset::ALL {
+            honest(
+                &Refiner::preset(preset).refine(&scene.model, &observation, &init),
+                &init,
+            );
+        }
+        let refined = Refiner::preset(Preset::Hybrid).refine(&scene.model, &observation, &init);
+        assert_eq!(refined.outcome.verdict, Verdict::Refined, "{nothing}");
+        let off = (refined.outcome.camera_from_object.translation.vector
+            - scene.truth.translation.vector)
+            .norm();
+        assert!(off < 0.002, "{nothing}: {off} m");
+    }
+}
+
+#[test]
+fn depth_in_another_unit_is_doubted() {
+    let scene = scene();
+    assert_eq!(
+        doubts(
+            &scene.model,
+            &scene.observe(scene.depth.clone()),
+            &scene.truth
+        ),
+        []
+    );
+    for (factor, expected) in [(0.1, 0.04), (10.0, 4.0), (0.001, 0.0004)] {
+        let observation = scene.observe(scene.changed(|z| z * factor));
+        let found = doubts(&scene.model, &observation, &scene.truth);
+        let [Doubt::Depth { measured, .. }] = found[..] else {
+            panic!("{factor}: {found:?}");
+        };
+        assert!((measured / expected - 1.0).abs() < 0.2, "{measured}");
+        for preset in Preset::ALL {
+            let refined = Refiner::preset(preset).refine(&scene.model, &observation, &scene.truth);
+            honest(&refined, &scene.truth);
+        }
+    }
+    let nothing = scene.observe(scene.changed(|z| z * 1000.0 * 1000.0));
+    assert_eq!(
+        doubts(&scene.model, &nothing, &scene.truth),
+        [Doubt::NoDepth]
+    );
+}
+
+#[test]
+fn models_in_another_unit_or_far_from_their_origin_are_doubted() {
+    let scene = scene();
+    let observation = scene.observe(scene.depth.clone());
+    for (scale, doubted) in [
+        (1000.0, "diameter is 123."),
+        (0.001, "diameter is 1.233e-4 m"),
+    ] {
+        let model = Model::new(cuboid([0.1 * scale, 0.06 * scale, 0.04 * scale]));
+        let found = doubts(&model, &observation, &scene.truth);
+        assert!(found[0].to_string().contains(doubted), "{found:?}");
+        honest(
+            &Refiner::preset(Preset::Hybrid).refine(&model, &observation, &scene.truth),
+            &scene.truth,
+        );
+    }
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let vertices = mesh
+        .vertices()
+        .iter()
+        .map(|p| Point3::new(p.x + 4096.0, p.y, p.z))
+        .collect();
+    let model = Model::new(TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap());
+    let init = scene.truth * Isometry3::translation(-4096.0, 0.0, 0.0);
+    let found = doubts(&model, &observation, &init);
+    assert!(
+        matches!(found[..], [Doubt::CoarseCoordinates { step, .. }] if step > 4e-4),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn cameras_that_cannot_be() {
+    for bad in [0.0, -0.0, -400.0, f64::NAN, f64::INFINITY] {
+        for (fx, fy, name) in [(bad, 400.0, "fx"), (400.0, bad, "fy")] {
+            let refused = PinholeCamera::new(fx, fy, 80.0, 60.0, 160, 120).unwrap_err();
+            assert!(matches!(refused, CameraError::FocalLength { name: n, .. } if n == name));
+        }
+    }
+    for bad in BAD {
+        assert!(PinholeCamera::new(400.0, 400.0, bad, 60.0, 160, 120).is_err());
+    }
+}
+
+#[test]
+fn matrices_that_are_no_rotation_are_refused() {
+    let told = |matrix: &Matrix3<f64>| {
+        let rows: [f64; 9] = matrix.transpose().as_slice().try_into().unwrap();
+        pose_from_bop(&rows, &[0.0; 3]).unwrap_err().to_string()
+    };
+    for axis in 0..3 {
+        let mut reflection = Matrix3::identity();
+        reflection[(axis, axis)] = -1.0;
+        assert!(told(&reflection).contains("determinant -1"));
+    }
+    let mut skewed = Matrix3::identity();
+    skewed[(0, 1)] = 0.01;
+    for bad in [
+        skewed,
+        Matrix3::identity() * 1.01,
+        Matrix3::zeros(),
+        Matrix3::identity() * 1e200,
+    ] {
+        assert!(told(&bad).contains("not orthogonal"), "{bad}");
+    }
+    for bad in BAD {
+        let mut matrix = Matrix3::identity();
+        matrix[(2, 1)] = bad;
+        told(&matrix);
+    }
+}
+
+#[test]
+fn poses_a_million_metres_away_or_not_finite_end_honestly() {
+    let scene = scene();
+    let observation = scene.observe(scene.depth.clone());
+    for direction in 0..3 {
+        for length in [
+            1e6,
+            -1e6,
+            1e12,
+            -1e300,
+            f64::MIN_POSITIVE,
+            f64::NAN,
+            f64::INFINITY,
+        ] {
+            let mut init = scene.truth;
+            init.translation.vector[direction] += length;
+            for preset in Preset::ALL {
+                honest(
+                    &Refiner::preset(preset).refine(&scene.model, &observation, &init),
+                    &init,
+                );
+            }
+            let z = (init * scene.model.center()).z;
+            let behind = doubts(&scene.model, &observation, &init);
+            let behind = behind
+                .iter()
+                .any(|doubt| matches!(doubt, Doubt::BehindCamera { .. }));
+            assert_eq!(behind, z.is_nan() || z <= 0.0, "{length}");
+        }
+    }
+}
