@@ -65,7 +65,7 @@ impl Stage for Recorder {
         all.push(seconds);
         let mut tape = self.tape.lock().unwrap_or_else(PoisonError::into_inner);
         if tape.len() < IMAGES {
-            tape.push(outcome.clone());
+            tape.push(outcome);
         }
         outcome
     }
@@ -74,7 +74,7 @@ impl Stage for Recorder {
 impl Stage for Player {
     fn run(&mut self, _: &Problem<'_>, _: &Isometry3<f64>, _: &mut Session<'_>) -> Outcome {
         let tape = self.tape.lock().unwrap_or_else(PoisonError::into_inner);
-        let outcome = tape[self.next % tape.len()].clone();
+        let outcome = tape[self.next % tape.len()];
         self.next += 1;
         outcome
     }
