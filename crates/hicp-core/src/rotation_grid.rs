@@ -50,7 +50,8 @@ mod tests {
             for probe in 0..2000 {
                 let x = f64::from(probe);
                 let axis = Vector3::new((x * 1.7).sin(), (x * 2.3).cos(), (x * 0.9).sin());
-                let rotation = so3::exp(&(axis.normalize() * (x * 0.618).rem_euclid(3.14)));
+                let rotation =
+                    so3::exp(&(axis.normalize() * (x * 0.618).rem_euclid(std::f64::consts::PI)));
                 let gap = grid.iter().map(|r| r.angle_to(&rotation));
                 worst = worst.max(gap.fold(f64::INFINITY, f64::min));
             }
