@@ -21,7 +21,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order, by file: `so3`, `se3` (rigid motions), `camera`, `image`, `region`, `surfel`, `observation` and
+//! Modules in reading order, by file: `so3`, `rotation_grid`, `se3` (rigid motions), `camera`, `image`, `region`, `surfel`, `observation` and
 //! its `normals`, `mesh`, `sampling`, `symmetry`, `model`, `derived` (shared caches), `render`, `problem`, `correspondences`, `vectorized` (loops for AVX2), `error`.
 
 // Counts and pixel coordinates become floating point numbers all over this crate; all are far below 2²⁴.
@@ -44,6 +44,7 @@ mod problem;
 mod region;
 mod render;
 mod rotation;
+mod rotation_grid;
 mod sampling;
 pub mod se3;
 pub mod so3;
@@ -71,6 +72,7 @@ pub use problem::{Context, Problem};
 pub use region::PixelRegion;
 pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
 pub use rotation::{ROTATION_TOLERANCE, rotation_from_matrix};
+pub use rotation_grid::rotation_grid;
 pub use sampling::sample_surface;
 pub use surfel::Surfel;
 pub use symmetry::{CONTINUOUS_STEPS, Symmetries, SymmetryAxis};

@@ -3,12 +3,14 @@
 use hicp_sim::stream;
 use rand::RngExt;
 
-use crate::experiment::Experiment;
+use crate::experiment::{DEPTH_LEVEL, Experiment, MASK_LEVEL, MODEL_LEVEL};
 use crate::row::Measured;
 use crate::study::Study;
 
 /// A mean VSD above this is a failure.
 pub const FAILURE_VSD: f64 = 0.3;
+/// A mean VSD that rose by more than this made the pose worse.
+pub const WORSE_VSD: f64 = 0.02;
 /// An ADD(-S) below this share of the diameter is a success, as in the literature on ADD.
 pub const ADD_SHARE: f64 = 0.1;
 /// Number of bootstrap samples.
@@ -27,16 +29,21 @@ pub enum Metric {
     Failure,
     /// Processor time, milliseconds.
     CpuMs,
+    /// Whether the mean VSD is above that of the initial pose by more than [`WORSE_VSD`].
+    Worse,
 }
 
 impl Metric {
-    const ALL: [Self; 3] = [Self::Vsd, Self::Failure, Self::CpuMs];
+    const ALL: [Self; 4] = [Self::Vsd, Self::Failure, Self::CpuMs, Self::Worse];
 
     fn of(self, measured: &Measured) -> Option<f64> {
         match self {
             Self::Vsd => Some(measured.vsd_final),
             Self::Failure => Some(f64::from(u8::from(measured.vsd_final > FAILURE_VSD))),
             Self::CpuMs => measured.cpu_ms,
+            Self::Worse => Some(f64::from(u8::from(
+                measured.vsd_final > measured.vsd_initial + WORSE_VSD,
+            ))),
         }
     }
 }
@@ -385,7 +392,13 @@ fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group
         bins,
         single: false,
     };
-    if experiment == Experiment::InitNoise {
+    if matches!(experiment, Experiment::InitNoise | Experiment::Beyond) {
+        // Of a study with imperfect images, the bins are those of its perfect ones.
+        let all = if experiment == Experiment::Beyond {
+            vec![0]
+        } else {
+            all.clone()
+        };
         for bin in 0..n_bins {
             let edge = |bin: usize| bin as f64 / n_bins as f64;
             groups.push(Group {
@@ -396,14 +409,26 @@ fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group
             });
         }
         groups.push(range(LOW, all.clone(), Some(LOW_BINS)));
-        groups.push(range(HIGH, all.clone(), Some(HIGH_BINS)));
-    } else {
+        groups.push(range(HIGH, all, Some(HIGH_BINS)));
+    }
+    if experiment != Experiment::InitNoise {
         groups.extend(all.iter().map(|level| Group {
             label: levels[*level].clone(),
             levels: vec![*level],
             bins: None,
-            single: true,
+            single: experiment != Experiment::Beyond,
         }));
+    }
+    if experiment == Experiment::Beyond {
+        for (label, prefix) in [
+            (NOISY_DEPTH, DEPTH_LEVEL),
+            (NOISY_MODEL, MODEL_LEVEL),
+            (FAULTY_MASK, MASK_LEVEL),
+        ] {
+            let with = |level: &usize| levels[*level].starts_with(prefix);
+            let of_kind = (0..levels.len()).filter(with).collect();
+            groups.push(range(label, of_kind, None));
+        }
     }
     if matches!(experiment, Experiment::DepthNoise | Experiment::ModelNoise) {
         groups.push(range(NOISY, all[1..].to_vec(), None));
@@ -418,6 +443,12 @@ pub const LOW: &str = "low (< 0.3)";
 pub const HIGH: &str = "high (≥ 0.7)";
 /// Label of the group of every level with noise.
 pub const NOISY: &str = "with noise";
+/// Label of the group of all depth noise of [`Experiment::Beyond`].
+pub const NOISY_DEPTH: &str = "depth noise";
+/// Label of the group of its reconstructed models.
+pub const NOISY_MODEL: &str = "model noise";
+/// Label of the group of its imperfect masks.
+pub const FAULTY_MASK: &str = "imperfect masks";
 /// Label of the group of all rows.
 pub const ALL: &str = "all";
 

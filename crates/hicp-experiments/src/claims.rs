@@ -1,5 +1,6 @@
 //! What the paper claims, held against a study.
 
+use crate::aims::aims;
 use crate::analysis::{Analysis, HIGH, Interval, LOW, Metric, NOISY};
 use crate::experiment::Experiment;
 
@@ -29,7 +30,7 @@ impl Verdict {
 /// A claim and what became of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// Where the paper makes it.
+    /// Where the paper makes it; `aim` where it is not the paper's.
     pub section: &'static str,
     /// In words, with what was tested.
     pub text: String,
@@ -97,12 +98,13 @@ pub fn claims(analysis: &Analysis) -> Vec<Claim> {
         ],
         Experiment::Timing => vec![tester.projective_fastest(), tester.table_order()],
         Experiment::Alpha => vec![tester.alpha()],
+        Experiment::Beyond => return aims(analysis),
     };
     found.into_iter().flatten().collect()
 }
 
 /// The verdict on "all of these are negative".
-fn all_negative(contrasts: impl IntoIterator<Item = Interval>) -> Verdict {
+pub(crate) fn all_negative(contrasts: impl IntoIterator<Item = Interval>) -> Verdict {
     let mut verdict = Verdict::Holds;
     for contrast in contrasts {
         if contrast.low > 0.0 {
@@ -116,12 +118,12 @@ fn all_negative(contrasts: impl IntoIterator<Item = Interval>) -> Verdict {
 }
 
 /// An interval as text, with its sign.
-fn signed(i: &Interval) -> String {
+pub(crate) fn signed(i: &Interval) -> String {
     format!("{:+.3} [{:+.3}, {:+.3}]", i.estimate, i.low, i.high)
 }
 
 /// An interval as text.
-fn plain(i: &Interval) -> String {
+pub(crate) fn plain(i: &Interval) -> String {
     format!("{:.3} [{:.3}, {:.3}]", i.estimate, i.low, i.high)
 }
 

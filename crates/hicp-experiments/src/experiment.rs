@@ -20,6 +20,8 @@ pub enum Experiment {
     Timing,
     /// The threshold α of Dynamic Switching (§IV-A), on the tuning objects.
     Alpha,
+    /// The presets that go beyond the paper: all bins of the initial VSD under depth noise, model noise and imperfect masks.
+    Beyond,
 }
 
 /// The conditions under which a case is looked at.
@@ -33,6 +35,23 @@ pub struct Condition {
     pub model_level: u32,
     /// The threshold α, where it is what is studied.
     pub alpha: Option<f64>,
+    /// What is wrong with the mask.
+    pub mask: MaskFault,
+}
+
+/// What is wrong with the mask of a condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaskFault {
+    /// Nothing.
+    None,
+    /// Eroded by 3 pixels.
+    Eroded,
+    /// Dilated by 3 pixels, over a wall 10 cm behind the object.
+    Dilated,
+    /// A straight cut removed 20 % of it.
+    Missing,
+    /// A board in front of the object hides 30 % of it.
+    Occluded,
 }
 
 impl Condition {
@@ -41,6 +60,7 @@ impl Condition {
         depth_percent: 0.0,
         model_level: 0,
         alpha: None,
+        mask: MaskFault::None,
     };
     const OFF: Self = Self {
         binned: false,
@@ -57,12 +77,13 @@ const MODEL_STEPS: u32 = 4;
 
 impl Experiment {
     /// Every study.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::InitNoise,
         Self::DepthNoise,
         Self::ModelNoise,
         Self::Timing,
         Self::Alpha,
+        Self::Beyond,
     ];
 
     /// Name on the command line and in files.
@@ -74,6 +95,7 @@ impl Experiment {
             Self::ModelNoise => "model-noise",
             Self::Timing => "timing",
             Self::Alpha => "alpha",
+            Self::Beyond => "beyond",
         }
     }
 
@@ -86,6 +108,7 @@ impl Experiment {
             Self::ModelNoise => "Robustness to model noise (§VI-B.3)",
             Self::Timing => "Time (§VI-B.4, Table I)",
             Self::Alpha => "The threshold α (§IV-A)",
+            Self::Beyond => "Beyond the paper: every start, every imperfection",
         }
     }
 
@@ -98,6 +121,7 @@ impl Experiment {
             Self::ModelNoise => "model noise level (0: the original)",
             Self::Timing => "conditions",
             Self::Alpha => "α",
+            Self::Beyond => "initial VSD (perfect images), then by condition (all starts)",
         }
     }
 
@@ -115,7 +139,7 @@ impl Experiment {
     pub fn paper_poses(self) -> u64 {
         match self {
             Self::InitNoise | Self::Alpha => 1000,
-            Self::DepthNoise | Self::ModelNoise | Self::Timing => 100,
+            Self::DepthNoise | Self::ModelNoise | Self::Timing | Self::Beyond => 100,
         }
     }
 
@@ -132,13 +156,14 @@ impl Experiment {
             Self::Alpha => (0..=ALPHA_STEPS)
                 .map(|s| format!("{:.2}", alpha(s)))
                 .collect(),
+            Self::Beyond => beyond().map(|(label, _)| label).collect(),
         }
     }
 
     /// Whether the initial VSD of its cases falls into bins.
     #[must_use]
     pub fn is_binned(self) -> bool {
-        matches!(self, Self::InitNoise | Self::Alpha)
+        matches!(self, Self::InitNoise | Self::Alpha | Self::Beyond)
     }
 
     /// The conditions of a level, by its index in [`Experiment::levels`], for a case.
@@ -167,9 +192,59 @@ impl Experiment {
                 alpha: Some(alpha(step)),
                 ..Condition::PERFECT
             },
+            Self::Beyond => beyond()
+                .nth(level)
+                .map_or(Condition::PERFECT, |(_, condition)| condition),
         }
     }
 }
+
+/// The levels of [`Experiment::Beyond`] with their conditions.
+fn beyond() -> impl Iterator<Item = (String, Condition)> {
+    let perfect = Condition::PERFECT;
+    let depth = (1..=DEPTH_STEPS).map(move |percent| {
+        let depth_percent = f64::from(percent);
+        (
+            format!("{DEPTH_LEVEL}{percent}"),
+            Condition {
+                depth_percent,
+                ..perfect
+            },
+        )
+    });
+    let model = (1..=MODEL_STEPS).map(move |model_level| {
+        (
+            format!("{MODEL_LEVEL}{model_level}"),
+            Condition {
+                model_level,
+                ..perfect
+            },
+        )
+    });
+    let mask = [
+        ("eroded", MaskFault::Eroded),
+        ("dilated", MaskFault::Dilated),
+        ("missing", MaskFault::Missing),
+        ("occluded", MaskFault::Occluded),
+    ];
+    let mask = mask.into_iter().map(move |(label, mask)| {
+        (
+            format!("{MASK_LEVEL}{label}"),
+            Condition { mask, ..perfect },
+        )
+    });
+    std::iter::once(("perfect".to_owned(), perfect))
+        .chain(depth)
+        .chain(model)
+        .chain(mask)
+}
+
+/// What the names of the levels of [`Experiment::Beyond`] with depth noise begin with; then comes the percentage.
+pub(crate) const DEPTH_LEVEL: &str = "depth-";
+/// And of those with a reconstructed model; then comes the level.
+pub(crate) const MODEL_LEVEL: &str = "model-";
+/// And of those with an imperfect mask.
+pub(crate) const MASK_LEVEL: &str = "mask-";
 
 fn alpha(step: u32) -> f64 {
     f64::from(step) / f64::from(ALPHA_STEPS)
@@ -207,6 +282,14 @@ mod tests {
         assert_eq!(Experiment::ModelNoise.levels().len(), 5);
         assert_eq!(Experiment::ModelNoise.condition(4, 0).model_level, 4);
         assert!(!Experiment::ModelNoise.condition(4, 0).binned);
+        let beyond = Experiment::Beyond.levels();
+        assert_eq!((beyond.len(), beyond[3].as_str()), (14, "depth-3"));
+        assert_eq!(Experiment::Beyond.condition(9, 0).model_level, 4);
+        let occluded = Experiment::Beyond.condition(13, 0);
+        assert_eq!(
+            (occluded.mask, occluded.binned),
+            (MaskFault::Occluded, true)
+        );
         let alphas = Experiment::Alpha.levels();
         assert_eq!((alphas.len(), alphas[8].as_str()), (21, "0.40"));
         assert_eq!(Experiment::Alpha.condition(8, 0).alpha, Some(0.4));

@@ -141,7 +141,7 @@ fn top(row: &[Panel]) -> f64 {
 
 fn row_of(analysis: &Analysis) -> Vec<Panel> {
     let (x_title, x): (&str, Range<f64>) = match analysis.experiment() {
-        Experiment::InitNoise => ("pre-ICP VSD", 0.0..1.0),
+        Experiment::InitNoise | Experiment::Beyond => ("pre-ICP VSD", 0.0..1.0),
         Experiment::DepthNoise => ("depth noise, % of the depth", -0.2..5.2),
         Experiment::ModelNoise => ("model noise level", -0.2..4.2),
         Experiment::Alpha => ("α", 0.0..1.0),
@@ -182,9 +182,14 @@ fn row_of(analysis: &Analysis) -> Vec<Panel> {
             .map(|(style, v)| curve(analysis, *v, style))
             .collect(),
     };
-    if analysis.experiment() == Experiment::Alpha {
+    let whole = match analysis.experiment() {
+        Experiment::Alpha => Some("mean VSD against the threshold"),
+        Experiment::Beyond => Some("perfect images"),
+        _ => None,
+    };
+    if let Some(title) = whole {
         let all: Vec<usize> = (0..names.len()).collect();
-        return vec![panel("mean VSD against the threshold", &all)];
+        return vec![panel(title, &all)];
     }
     [
         panel("nearest neighbours", &nearest),

@@ -30,12 +30,13 @@
 //!
 //! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
 //! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
-//! differences), `claims` (the paper's, tested), `figure`, `html`, `tables`, `report`; `sequential` (the study of trajectories:
+//! differences), `claims` (the paper's, tested), `aims` (of what goes beyond it), `figure`, `html`, `tables`, `report`; `sequential` (the study of trajectories:
 //! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), and `clock`, `error`.
 
 // Counts and indices of rows become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
+mod aims;
 mod analysis;
 mod claims;
 mod clock;
@@ -55,13 +56,13 @@ mod tables;
 mod variant;
 
 pub use analysis::{
-    ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, Group, HIGH, Interval, LOW, Metric, NOISY,
-    REPLICATES,
+    ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, FAULTY_MASK, Group, HIGH, Interval, LOW, Metric,
+    NOISY, NOISY_DEPTH, NOISY_MODEL, REPLICATES, WORSE_VSD,
 };
 pub use claims::{Claim, TABLE_I, Verdict, claims};
 pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};
 pub use error::ExperimentError;
-pub use experiment::{Condition, Experiment};
+pub use experiment::{Condition, Experiment, MaskFault};
 pub use figure::{Curve, Figure, Panel};
 pub use html::{Table, escaped as html_escaped, page as html_page};
 pub use report::Report;

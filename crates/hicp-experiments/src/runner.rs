@@ -5,17 +5,20 @@ use std::sync::OnceLock;
 use hicp_core::{Isometry3, Model, Observation, Point3, Problem};
 use hicp_score::{add, adi};
 use hicp_sim::{
-    Case, CaseMaker, Corruption, DepthNoise, DepthSensor, Reconstruction, ReconstructionNoise,
-    RelativeGaussian,
+    Case, CaseMaker, Corruption, DepthNoise, DepthSensor, MaskDefects, Reconstruction,
+    ReconstructionNoise, RelativeGaussian,
 };
 use hybrid_icp::{BoxedStage, Rasterizer, Session, Workspace};
 
 use crate::clock::thread_time;
 use crate::config::Config;
 use crate::error::ExperimentError;
-use crate::experiment::Condition;
+use crate::experiment::{Condition, MaskFault};
 use crate::row::{Measured, Row};
 use crate::subject::Subject;
+
+/// Distance of the wall behind an object whose mask is dilated, metres: what the mask adds has a depth.
+const WALL_METERS: f64 = 0.1;
 
 /// More renders than a workspace remembers.
 const FORGET: u32 = 8;
@@ -214,12 +217,20 @@ fn corruption(condition: &Condition) -> Corruption {
     let noise = DepthNoise::Relative(RelativeGaussian {
         percent: condition.depth_percent,
     });
+    let fault = |fault| condition.mask == fault;
+    let defect = |is, size| if is { size } else { 0 };
     Corruption {
+        wall_behind_meters: fault(MaskFault::Dilated).then_some(WALL_METERS),
+        occluded_share: if fault(MaskFault::Occluded) { 0.3 } else { 0.0 },
         sensor: DepthSensor {
             noise,
             ..DepthSensor::default()
         },
-        ..Corruption::default()
+        mask: MaskDefects {
+            missing_share: if fault(MaskFault::Missing) { 0.2 } else { 0.0 },
+            erosion_pixels: defect(fault(MaskFault::Eroded), 3),
+            dilation_pixels: defect(fault(MaskFault::Dilated), 3),
+        },
     }
 }
 

@@ -25,6 +25,9 @@ pub(crate) fn summary(studies: &[(String, Analysis)]) -> Table {
         "failure_share",
         "failure_low",
         "failure_high",
+        "worse_share",
+        "worse_low",
+        "worse_high",
         "add_median_mm",
         "add_below_tenth_diameter",
         "iterations",
@@ -41,6 +44,7 @@ pub(crate) fn summary(studies: &[(String, Analysis)]) -> Table {
                 };
                 let vsd = analysis.mean(Metric::Vsd, group, variant);
                 let failure = analysis.mean(Metric::Failure, group, variant);
+                let worse = analysis.mean(Metric::Worse, group, variant);
                 let time = |v| {
                     analysis
                         .mean(Metric::CpuMs, group, v)
@@ -60,6 +64,9 @@ pub(crate) fn summary(studies: &[(String, Analysis)]) -> Table {
                     number(failure.map(|i| i.estimate), 4),
                     number(failure.map(|i| i.low), 4),
                     number(failure.map(|i| i.high), 4),
+                    number(worse.map(|i| i.estimate), 4),
+                    number(worse.map(|i| i.low), 4),
+                    number(worse.map(|i| i.high), 4),
                     number(Some(cell.add_median_mm), 3),
                     number(Some(cell.add_success), 4),
                     number(Some(cell.iterations), 2),
@@ -175,6 +182,7 @@ pub(crate) fn overall(analysis: &Analysis) -> Table {
         "rows",
         "mean VSD",
         "VSD > 0.3",
+        "worse by > 0.02",
         "median ADD(-S), mm",
         "ADD(-S) < 0.1 d",
         "iterations",
@@ -201,14 +209,16 @@ pub(crate) fn overall(analysis: &Analysis) -> Table {
         let time = |v| analysis.mean(Metric::CpuMs, group, v).map(|i| i.estimate);
         let spent = time(variant)
             .map(|mean| format!("{mean:.2} ± {:.2}", cell.cpu_deviation_ms.unwrap_or(0.0)));
-        let failure = analysis.mean(Metric::Failure, group, variant).map(|i| {
-            format!(
-                "{} [{}, {}]",
-                percent(i.estimate),
-                percent(i.low),
-                percent(i.high)
-            )
-        });
+        let share = |metric| {
+            analysis.mean(metric, group, variant).map(|i| {
+                format!(
+                    "{} [{}, {}]",
+                    percent(i.estimate),
+                    percent(i.low),
+                    percent(i.high)
+                )
+            })
+        };
         let difference = (variant != ours)
             .then(|| analysis.contrast(Metric::Vsd, &[(group, ours, 1.0), (group, variant, -1.0)]))
             .flatten();
@@ -222,7 +232,8 @@ pub(crate) fn overall(analysis: &Analysis) -> Table {
                 .mean(Metric::Vsd, group, variant)
                 .map(interval)
                 .unwrap_or_default(),
-            failure.unwrap_or_default(),
+            share(Metric::Failure).unwrap_or_default(),
+            share(Metric::Worse).unwrap_or_default(),
             number(Some(cell.add_median_mm), 2),
             percent(cell.add_success),
             number(Some(cell.iterations), 1),

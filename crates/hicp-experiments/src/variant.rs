@@ -22,7 +22,24 @@ impl Variant {
     /// The nine variants of the paper, Hybrid ICP first.
     #[must_use]
     pub fn paper() -> Vec<Self> {
-        Preset::ALL.into_iter().map(Self::preset).collect()
+        Preset::PAPER.into_iter().map(Self::preset).collect()
+    }
+
+    /// What [`crate::Experiment::Beyond`] compares: Hybrid ICP, the best baseline of either family, and the presets that go
+    /// beyond the paper.
+    #[must_use]
+    pub fn beyond() -> Vec<Self> {
+        [
+            Preset::Hybrid,
+            Preset::ProjectiveCascadePointPlane,
+            Preset::NnCascadePointPlane,
+            Preset::HybridVisible,
+            Preset::Local,
+            Preset::Search,
+            Preset::Auto,
+        ]
+        .map(Self::preset)
+        .to_vec()
     }
 
     /// Makes the variant of a preset.

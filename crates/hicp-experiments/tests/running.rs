@@ -151,7 +151,7 @@ fn another_study_in_the_folder_is_refused() {
 
 #[test]
 fn every_variant_and_level_gets_the_same_start() {
-    let config = config(Experiment::DepthNoise, &Preset::ALL, 2);
+    let config = config(Experiment::DepthNoise, &Preset::PAPER, 2);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 2, false).unwrap();
     let study = Study::read(folder.path()).unwrap();

@@ -19,18 +19,20 @@
 //! ```
 //!
 //! Modules in reading order: `stage` (trait), `icp` (the engine), `outcome`, `stop`, `divergence`, `motion` and `limits` (stop
-//! rules), `compose` (cascade, repeat), `guard` (stages that answer to a score), `resolution`, `anderson`, `session` (workspace), `observer`.
+//! rules), `compose` (cascade, repeat), `guard` (stages that answer to a score), `search` (from `hypotheses`), `resolution`, `anderson`, `session` (workspace), `observer`.
 
 mod anderson;
 mod compose;
 mod divergence;
 mod guard;
+mod hypotheses;
 mod icp;
 mod limits;
 mod motion;
 mod observer;
 mod outcome;
 mod resolution;
+mod search;
 mod session;
 mod stage;
 mod stop;
@@ -39,12 +41,14 @@ pub use anderson::Anderson;
 pub use compose::{Cascade, Repeat};
 pub use divergence::{Divergence, LossRule};
 pub use guard::{Guard, KeepBest};
+pub use hypotheses::Rotations;
 pub use icp::{Icp, MAX_ITERATIONS};
 pub use limits::{AbsoluteLoss, Deadline, TimeLimit};
 pub use motion::{Bound, Motion, Oscillation};
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
 pub use outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 pub use resolution::AtResolution;
+pub use search::{HypothesisSearch, SearchOptions};
 pub use session::{Session, Workspace};
 pub use stage::Stage;
 pub use stop::{Convergence, IterationLimit, Progress, StopRule};

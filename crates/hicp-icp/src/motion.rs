@@ -61,12 +61,18 @@ impl Default for Bound {
     }
 }
 
+impl Bound {
+    /// Returns whether a pose lies within the bound about another.
+    #[must_use]
+    pub fn contains(&self, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
+        let (angle, distance) = se3::pose_distance(pose, init);
+        distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees
+    }
+}
+
 impl StopRule for Bound {
     fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        let (angle, distance) = se3::pose_distance(progress.camera_from_object, progress.init);
-        let inside =
-            distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees;
-        if inside {
+        if self.contains(progress.init, progress.camera_from_object) {
             ControlFlow::Continue(())
         } else {
             ControlFlow::Break(Termination::OutOfBounds)

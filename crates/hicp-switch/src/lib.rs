@@ -17,12 +17,14 @@
 //! }
 //! ```
 //!
-//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stages).
+//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stages), `alternate`.
 
+mod alternate;
 mod switch;
 mod switcher;
 mod threshold;
 
+pub use alternate::Alternate;
 pub use hicp_icp::{Regime, RegimeEvent};
 pub use switch::{Switch, SwitchAmong};
 pub use switcher::Switcher;

@@ -9,7 +9,7 @@ use hicp_testkit::{
     scenes,
 };
 use hybrid_icp::{
-    AbsoluteLoss, AllSamples, AtResolution, Bound, BoundaryTargets, ClosestPointOnMesh,
+    AbsoluteLoss, AllSamples, Alternate, AtResolution, Bound, BoundaryTargets, ClosestPointOnMesh,
     Conditioned, ConstantWeight, Convergence, Deadline, Degeneracy, DistanceWeight, Divergence,
     ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Guard, IterationLimit, KNearest,
     KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
@@ -17,9 +17,9 @@ use hybrid_icp::{
     NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
     Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
     Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
-    Regime, Robust, Scale, Schedule, SensorNoiseWeight, StableSampling, Symmetric, Threshold,
-    Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd,
-    WarmNearestNeighbor, WeightedSum, WithoutBoundary,
+    Regime, Robust, SampledMve, Scale, Schedule, SensorNoiseWeight, StableSampling, Symmetric,
+    Threshold, Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid,
+    Vsd, WarmNearestNeighbor, WeightedSum, WithoutBoundary,
 };
 
 #[test]
@@ -238,6 +238,7 @@ fn scores_and_switchers() {
     };
     check_score(MeanVsd::default, share);
     check_score(MeanVsd::paper, share);
+    check_score(SampledMve::default, share);
     let truth = scenes()[0].truth;
     check_score(
         || Vsd::new(truth),
@@ -280,6 +281,18 @@ fn stages() {
             times: 3,
             stage: fine(),
             score: MeanVsd::default(),
+        },
+        laws,
+    );
+    check_stage(
+        || Alternate {
+            score: MeanVsd::default(),
+            alpha: 0.4,
+            aligned: fine(),
+            misaligned: Preset::NnPointToPoint.build(),
+            max_steps: 3,
+            min_gain: 0.01,
+            good_enough: 0.02,
         },
         laws,
     );

@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use hicp_experiments::{
     Config, Experiment, Report, RunOptions, Study, Subject, Variant, run as run_study,
 };
+use hicp_sim::Household;
 use hybrid_icp::{Preset, UnknownPreset};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -31,6 +32,8 @@ pub(crate) enum Command {
     Timing(Arguments),
     /// The threshold of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
     Alpha(Arguments),
+    /// The presets that go beyond the paper: every start under depth noise, model noise and imperfect masks.
+    Beyond(Arguments),
     Sequential(crate::sequential::Arguments),
     Report(ReportArguments),
 }
@@ -40,11 +43,15 @@ pub(crate) struct Arguments {
     /// A folder of meshes in metres (OBJ, PLY, STL) instead of the ten household objects.
     #[arg(long, value_name = "DIR")]
     objects: Option<PathBuf>,
+    /// The household objects to run on: those that everything was chosen on, or those that results are reported on; each
+    /// study has its own unless told otherwise.
+    #[arg(long, value_enum, conflicts_with = "objects")]
+    household: Option<HouseholdSet>,
     /// Cases per object, spread evenly over the bins where there are bins.
     #[arg(long, value_name = "N", default_value_t = 30)]
     poses: u64,
     /// Which pipelines: names (`hybrid-icp pipelines` lists them) and TOML files, separated by commas, or all; alpha takes those
-    /// that switch, hybrid unless told otherwise.
+    /// that switch, hybrid unless told otherwise; beyond takes hybrid, two baselines and what goes beyond the paper.
     #[arg(long, value_name = "LIST|all", value_delimiter = ',')]
     variants: Vec<Choice>,
     /// Seed of everything random.
@@ -75,6 +82,13 @@ pub(crate) struct ReportArguments {
     out: PathBuf,
 }
 
+/// Half of the household objects.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum HouseholdSet {
+    Tuning,
+    Test,
+}
+
 /// What `--variants` names.
 #[derive(Clone, Debug)]
 enum Choice {
@@ -103,6 +117,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::ModelNoise(arguments) => study(Experiment::ModelNoise, arguments),
         Command::Timing(arguments) => study(Experiment::Timing, arguments),
         Command::Alpha(arguments) => study(Experiment::Alpha, arguments),
+        Command::Beyond(arguments) => study(Experiment::Beyond, arguments),
         Command::Sequential(arguments) => crate::sequential::run(arguments),
         Command::Report(arguments) => report(&arguments.studies, &arguments.out),
     }
@@ -111,7 +126,11 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
 fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let subjects = match &arguments.objects {
         Some(folder) => Subject::read_folder(folder)?,
-        None => Subject::household(&experiment.household())?,
+        None => Subject::household(&match arguments.household {
+            None => experiment.household(),
+            Some(HouseholdSet::Tuning) => Household::TUNING,
+            Some(HouseholdSet::Test) => Household::TEST,
+        })?,
     };
     let variants = variants(experiment, &arguments.variants)?;
     let mut config = Config::new(
@@ -162,6 +181,7 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
     if choices.is_empty() {
         return Ok(match experiment {
             Experiment::Alpha => vec![Variant::preset(Preset::Hybrid)],
+            Experiment::Beyond => Variant::beyond(),
             _ => Variant::paper(),
         });
     }

@@ -66,14 +66,15 @@ pub use hicp_core::{
     Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2,
     Point3, Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries,
     SymmetryAxis, SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
-    Vector6, rotation_from_matrix, se3, so3,
+    Vector6, rotation_from_matrix, rotation_grid, se3, so3,
 };
 pub use hicp_fusion as fusion;
 pub use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
-    Evaluation, Guard, Icp, IterationEvent, IterationLimit, KeepBest, LossRule, Motion, Observer,
-    Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Session, Stage,
-    StageEvent, StopRule, Termination, TimeLimit, Verdict, Workspace,
+    Evaluation, Guard, HypothesisSearch, Icp, IterationEvent, IterationLimit, KeepBest, LossRule,
+    Motion, Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat,
+    Rotations, SearchOptions, Session, Stage, StageEvent, StopRule, Termination, TimeLimit,
+    Verdict, Workspace,
 };
 pub use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
@@ -84,11 +85,13 @@ pub use hicp_metric::{
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
-    ReliabilityBin, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd, add, adi,
-    bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area, spheres_overlap,
-    tolerances, top_estimates, visibility_masks, vsd,
+    ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd,
+    add, adi, bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area,
+    spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
 };
-pub use hicp_switch::{PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
+pub use hicp_switch::{
+    Alternate, PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds,
+};
 pub use pipeline::{PipelineError, PipelineFile};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};

@@ -11,7 +11,8 @@ use crate::suggest::nearest;
 /// A pipeline behind a box, as it is read from a name: the same code and the same bits as the literal.
 pub type BoxedStage = Box<dyn Stage + Send>;
 
-/// A pipeline that ships with the library: Hybrid ICP or one of the eight baselines, by its name in the paper.
+/// A pipeline that ships with the library: Hybrid ICP or one of the eight baselines, by its name in the paper, or one that goes
+/// beyond it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Preset {
@@ -33,11 +34,36 @@ pub enum Preset {
     NnCascadePointPlane,
     /// [`presets::nn_cascade_plane_point`].
     NnCascadePlanePoint,
+    /// [`presets::hybrid_visible`].
+    HybridVisible,
+    /// [`presets::local`].
+    Local,
+    /// [`presets::search`].
+    Search,
+    /// [`presets::auto`].
+    Auto,
 }
 
 impl Preset {
-    /// Every preset, Hybrid ICP first.
-    pub const ALL: [Self; 9] = [
+    /// Every preset, Hybrid ICP first, those of the paper before the others.
+    pub const ALL: [Self; 13] = [
+        Self::Hybrid,
+        Self::ProjectivePointToPoint,
+        Self::ProjectivePointToPlane,
+        Self::ProjectiveCascadePointPlane,
+        Self::ProjectiveCascadePlanePoint,
+        Self::NnPointToPoint,
+        Self::NnPointToPlane,
+        Self::NnCascadePointPlane,
+        Self::NnCascadePlanePoint,
+        Self::HybridVisible,
+        Self::Local,
+        Self::Search,
+        Self::Auto,
+    ];
+
+    /// The presets of the paper, Hybrid ICP first: what its studies compare.
+    pub const PAPER: [Self; 9] = [
         Self::Hybrid,
         Self::ProjectivePointToPoint,
         Self::ProjectivePointToPlane,
@@ -62,6 +88,10 @@ impl Preset {
             Self::NnPointToPlane => "nn-point-to-plane",
             Self::NnCascadePointPlane => "nn-cascade-point-plane",
             Self::NnCascadePlanePoint => "nn-cascade-plane-point",
+            Self::HybridVisible => "hybrid-visible",
+            Self::Local => "local",
+            Self::Search => "search",
+            Self::Auto => "auto",
         }
     }
 
@@ -87,6 +117,18 @@ impl Preset {
             }
             Self::NnCascadePlanePoint => {
                 "nearest-neighbour point-to-plane, then nearest-neighbour point-to-point"
+            }
+            Self::HybridVisible => {
+                "Hybrid ICP with visible points for nearest neighbours too, gates and the symmetric metric"
+            }
+            Self::Local => {
+                "local refinement that never raises the MVE: steps until it stalls, observed points to the model from afar"
+            }
+            Self::Search => {
+                "global: local, and above an MVE of 0.15 a search over 256 rotations; may end at an equivalent pose"
+            }
+            Self::Auto => {
+                "global where needed: local, and above an MVE of 0.3 a search over 128 rotations"
             }
         }
     }
@@ -120,6 +162,10 @@ impl Preset {
             Self::NnCascadePlanePoint => {
                 include_str!("../pipelines/nn-cascade-plane-point.toml")
             }
+            Self::HybridVisible => include_str!("../pipelines/hybrid-visible.toml"),
+            Self::Local => include_str!("../pipelines/local.toml"),
+            Self::Search => include_str!("../pipelines/search.toml"),
+            Self::Auto => include_str!("../pipelines/auto.toml"),
         }
     }
 
@@ -140,6 +186,10 @@ impl Preset {
             Self::NnPointToPlane => Box::new(presets::nn_point_to_plane()),
             Self::NnCascadePointPlane => Box::new(presets::nn_cascade_point_plane()),
             Self::NnCascadePlanePoint => Box::new(presets::nn_cascade_plane_point()),
+            Self::HybridVisible => Box::new(presets::hybrid_visible()),
+            Self::Local => Box::new(presets::local()),
+            Self::Search => Box::new(presets::search()),
+            Self::Auto => Box::new(presets::auto()),
         }
     }
 }

@@ -1,12 +1,17 @@
-//! Hybrid ICP and the eight baselines of the paper's Table I, each a plain composition of public parts.
+//! Hybrid ICP and the eight baselines of the paper's Table I, each a plain composition of public parts; and what goes beyond
+//! the paper ([`hybrid_visible`], [`local`], [`search`], [`auto`]), in a file of its own.
 //!
 //! Read beside the paper: §III-A for the parts, §IV-B for the cascade and its divergence rules, §IV-C for Hybrid ICP,
-//! §VI-B for the baselines. What all of them share where the paper leaves it open:
+//! §VI-B for the baselines. What those of the paper share where the paper leaves it open:
 //!
 //! - O is the whole surface for nearest neighbours ([`AllSamples`]) and the visible one for projective association
 //!   ([`VisibleSurface`], V_O rendered at the stage's initial estimate).
 //! - τ_max and θ_max are off.
 //! - Every stage ends by the same rules: the paper's divergence rules as written, convergence of the loss, 50 iterations.
+
+mod beyond;
+
+pub use beyond::{auto, hybrid_visible, local, search, search_with};
 
 use hicp_association::{
     AllSamples, DataAssociation, PointSelection, Projective, VisibleSurface, WarmNearestNeighbor,

@@ -10,20 +10,22 @@ use hicp_association::{
     VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
 };
 use hicp_icp::{
-    AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard, Icp,
-    IterationLimit, KeepBest, LossRule, Motion, Oscillation, Repeat, StopRule, TimeLimit,
+    AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard,
+    HypothesisSearch, Icp, IterationLimit, KeepBest, LossRule, Motion, Oscillation, Repeat,
+    StopRule, TimeLimit,
 };
 use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
     LevenbergMarquardt, MetricSchedule, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
     Robust, Scale, Symmetric, WeightedSum,
 };
-use hicp_score::{MeanVsd, Score};
-use hicp_switch::{Switch, SwitchAmong, Switcher, Threshold, Thresholds};
+use hicp_score::{MeanVsd, SampledMve, Score};
+use hicp_switch::{Alternate, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
 
 use super::catalog::PartKind;
 use super::error::PipelineError;
 use super::reader::Reader;
+use super::search::search_options;
 use crate::preset::BoxedStage;
 
 type Boxed<T> = Box<T>;
@@ -66,6 +68,22 @@ pub(crate) fn stage(part: &Reader<'_>) -> Result<BoxedStage, PipelineError> {
             switcher: switcher(&part.part("switcher")?)?,
             stages: many("stages")?,
         }),
+        "alternate" => Box::new(Alternate {
+            score: score(&part.part("score")?)?,
+            alpha: part.number("alpha")?,
+            aligned: one("aligned")?,
+            misaligned: one("misaligned")?,
+            max_steps: part.count("max_steps")? as usize,
+            min_gain: part.number("min_gain")?,
+            good_enough: part.number("good_enough")?,
+        }),
+        "hypothesis-search" => Box::new(HypothesisSearch::new(
+            one("stage")?,
+            one("explore")?,
+            score(&part.part("ranking")?)?,
+            score(&part.part("score")?)?,
+            search_options(part)?,
+        )),
         "at-resolution" => Box::new(AtResolution {
             factor: part.count("factor")?,
             stage: one("stage")?,
@@ -389,6 +407,10 @@ fn stop(part: &Reader<'_>) -> Result<Stop, PipelineError> {
 
 fn score(part: &Reader<'_>) -> Result<BoxedScore, PipelineError> {
     Ok(match part.name() {
+        "sampled-mve" => Box::new(SampledMve::new(
+            part.count("samples")? as usize,
+            part.count("pixels")? as usize,
+        )),
         "mve" => {
             let tolerance = part.number("occlusion_tolerance")?;
             Box::new(MeanVsd {

@@ -33,6 +33,7 @@ mod error;
 mod page;
 mod parts;
 mod reader;
+mod search;
 mod tree;
 
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! The stages of the catalogue.
 
 use super::super::catalog::{Part, PartKind};
-use super::parameter::{POSITIVE, count, number, part, parts};
+use super::parameter::{INFINITE, POSITIVE, count, number, part, parts, word};
 
 /// How a stage of the paper's variants ends; what `stop` is when a file does not say.
 pub(crate) const PAPER_STOP: &[&str] = &["divergence", "convergence", "iteration-limit"];
@@ -111,6 +111,135 @@ pub(super) const PARTS: &[Part] = &[
                 Some("threshold"),
             ),
             parts("stages", "what runs, by regime", PartKind::Stage, None),
+        ],
+    },
+    Part {
+        kind: PartKind::Stage,
+        name: "alternate",
+        rust: "Alternate",
+        summary: "dynamic switching until the score stalls, the other stage tried once; the best pose by the score",
+        source: "§IV-A.2, repeated",
+        cost: "max_steps × (a stage and a score)",
+        parameters: &[
+            part("score", "the judge", PartKind::Score, Some("mve")),
+            number(
+                "alpha",
+                "",
+                "score from which on an estimate is misaligned",
+                POSITIVE,
+                Some(0.4),
+            ),
+            part(
+                "aligned",
+                "runs where the estimate agrees with the image",
+                PartKind::Stage,
+                None,
+            ),
+            part(
+                "misaligned",
+                "runs where it does not",
+                PartKind::Stage,
+                None,
+            ),
+            count("max_steps", "how many at most", 0, Some(4)),
+            number(
+                "min_gain",
+                "",
+                "gain of the score below which a step is a stall",
+                POSITIVE,
+                Some(0.01),
+            ),
+            number(
+                "good_enough",
+                "",
+                "score at which no further step is taken",
+                POSITIVE,
+                Some(0.0),
+            ),
+        ],
+    },
+    Part {
+        kind: PartKind::Stage,
+        name: "hypothesis-search",
+        rust: "HypothesisSearch",
+        summary: "a local stage, and where its score stays bad the same from the best ranked of many rotations; not local",
+        source: "-",
+        cost: "the stage; where it fails hypotheses × ranking and refined × explore",
+        parameters: &[
+            part(
+                "stage",
+                "refines the initial pose, and the best hypothesis",
+                PartKind::Stage,
+                None,
+            ),
+            part(
+                "explore",
+                "refines hypotheses, cheaply",
+                PartKind::Stage,
+                None,
+            ),
+            part(
+                "ranking",
+                "ranks hypotheses",
+                PartKind::Score,
+                Some("sampled-mve"),
+            ),
+            part("score", "the judge", PartKind::Score, Some("mve")),
+            number(
+                "threshold",
+                "",
+                "score above which the search begins",
+                POSITIVE,
+                Some(0.15),
+            ),
+            number(
+                "good_enough",
+                "",
+                "score at which it ends at once",
+                POSITIVE,
+                Some(0.05),
+            ),
+            number(
+                "min_gain",
+                "",
+                "by how much a hypothesis must beat the local pose",
+                POSITIVE,
+                Some(0.03),
+            ),
+            word(
+                "rotations",
+                "which are tried: of SO(3), about the ray to the object, or about its declared symmetries",
+                &["even", "view-axis", "symmetry"],
+                "even",
+            ),
+            count("hypotheses", "how many of them", 0, Some(256)),
+            count(
+                "refined",
+                "how many of the best ranked are refined",
+                0,
+                Some(8),
+            ),
+            number(
+                "max_translation_meters",
+                "m",
+                "how far from the initial pose the result may be",
+                POSITIVE,
+                Some(INFINITE),
+            ),
+            number(
+                "max_rotation_degrees",
+                "degrees",
+                "and how far turned",
+                POSITIVE,
+                Some(INFINITE),
+            ),
+            number(
+                "milliseconds",
+                "ms",
+                "how long a run may take; if finite, results depend on the clock",
+                POSITIVE,
+                Some(INFINITE),
+            ),
         ],
     },
     Part {

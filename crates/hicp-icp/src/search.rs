@@ -1,0 +1,265 @@
+//! Global search over hypotheses.
+
+use std::time::{Duration, Instant};
+
+use hicp_core::{Isometry3, Problem, se3};
+use hicp_score::Score;
+
+use crate::hypotheses::{Hypotheses, Rotations};
+use crate::motion::Bound;
+use crate::outcome::{Outcome, Termination, Verdict};
+use crate::session::Session;
+use crate::stage::Stage;
+
+/// How far, how long and when a [`HypothesisSearch`] searches. Any value is valid: what is out of range searches nothing, or
+/// nothing better is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchOptions {
+    /// The score above which the search begins: where the local stage ends at or below it, nothing else is tried.
+    pub threshold: f64,
+    /// The score at which no further hypothesis is refined.
+    pub good_enough: f64,
+    /// By how much a hypothesis must beat the local pose to take its place: where masks are imperfect the score is no
+    /// better judge than that.
+    pub min_gain: f64,
+    /// Which rotations are tried, beside the neighbours of the initial pose.
+    pub rotations: Rotations,
+    /// How many of them.
+    pub hypotheses: usize,
+    /// How many of the best ranked are refined.
+    pub refined: usize,
+    /// How far from the initial pose the result may be; `None` for anywhere.
+    pub bound: Option<Bound>,
+    /// How long a run may take; the best pose so far is returned with [`Termination::Deadline`]. Results then depend on the
+    /// clock; `hypotheses` and `refined` are the budget that does not. The clock is read between hypotheses, so that a run
+    /// ends later by at most one of them.
+    pub time_limit: Option<Duration>,
+}
+
+impl Default for SearchOptions {
+    /// 256 rotations of SO(3), 8 refined, above a score of 0.15, without bound; a hypothesis must be better by 0.03.
+    fn default() -> Self {
+        Self {
+            threshold: 0.15,
+            good_enough: 0.05,
+            min_gain: 0.03,
+            rotations: Rotations::Even,
+            hypotheses: 256,
+            refined: 8,
+            bound: None,
+            time_limit: None,
+        }
+    }
+}
+
+/// Runs a local stage, and where its score stays bad, searches: hypotheses are ranked by a cheap score, the best of them refined
+/// by a cheap stage, and the one that ends with the lowest score by the local stage, which is kept if it is better.
+///
+/// **This is not local refinement.** Unless a bound is set it can end anywhere in the image, and on an object that looks the
+/// same from several sides it can land on an equivalent pose.
+///
+/// Hypotheses are rotations from [`SearchOptions::rotations`] and neighbours of the initial and the local pose, each placed so
+/// that what it shows lies about the centroid of what was observed.
+///
+/// **Contract**: the score of the returned pose is never above that of the initial one, nor, without a bound, of the local
+/// stage's. With a bound no pose outside of it is returned; the initial one is kept where there is no other.
+///
+/// Cost: the local stage; where its score stays above the threshold, `hypotheses` × the ranking score, `refined` × the exploring
+/// stage, and the local stage once more.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HypothesisSearch<S, E, R, C> {
+    /// Refines the initial pose, and the best hypothesis.
+    pub stage: S,
+    /// Refines hypotheses, cheaply.
+    pub explore: E,
+    /// Ranks hypotheses; lower is better.
+    pub ranking: R,
+    /// Judges poses; lower is better.
+    pub score: C,
+    /// How far, how long and when.
+    pub options: SearchOptions,
+    /// The best ranked hypotheses, best first.
+    ranked: Vec<(f64, Isometry3<f64>)>,
+}
+
+impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
+    /// Makes the stage.
+    #[must_use]
+    pub fn new(stage: S, explore: E, ranking: R, score: C, options: SearchOptions) -> Self {
+        Self {
+            stage,
+            explore,
+            ranking,
+            score,
+            options,
+            ranked: Vec::new(),
+        }
+    }
+}
+
+/// A pose found, with its score.
+#[derive(Clone, Copy)]
+struct Found {
+    score: f64,
+    outcome: Outcome,
+}
+
+impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
+    /// Scores an outcome: `None` where it is the pose that it started from, which nobody evaluated, or outside of the bound.
+    fn found(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        outcome: Outcome,
+        session: &mut Session<'_>,
+    ) -> Option<Found> {
+        let pose = &outcome.camera_from_object;
+        let allowed = self.options.bound.is_none_or(|b| b.contains(init, pose));
+        (outcome.verdict == Verdict::Refined && allowed).then(|| {
+            let mut context = session.workspace.context(problem);
+            let score = self.score.score(&mut context, pose);
+            Found { score, outcome }
+        })
+    }
+
+    /// Ranks hypotheses into the list of the best, as many as there is time for.
+    fn rank(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        local: &Isometry3<f64>,
+        clock: &Clock,
+        session: &mut Session<'_>,
+    ) {
+        self.ranked.clear();
+        let Some(from) = Hypotheses::new(problem, init, self.options.bound) else {
+            return;
+        };
+        let options = self.options;
+        // With the one that is pushed out again.
+        self.ranked.reserve(options.refined.min(MAX_REFINED) + 1);
+        let hypotheses = from
+            .neighbors(init)
+            .chain(from.neighbors(local))
+            .chain(from.of(options.rotations, options.hypotheses));
+        for pose in hypotheses {
+            if clock.is_over() {
+                return;
+            }
+            let mut context = session.workspace.context(problem);
+            let score = self.ranking.score(&mut context, &pose);
+            let place = self.ranked.partition_point(|(other, _)| *other <= score);
+            if place < options.refined.min(MAX_REFINED) {
+                self.ranked.insert(place, (score, pose));
+                self.ranked.truncate(options.refined.min(MAX_REFINED));
+            }
+        }
+    }
+
+    /// Refines the ranked hypotheses and returns the best, after the local stage, and the iterations spent.
+    fn explore(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        clock: &Clock,
+        session: &mut Session<'_>,
+    ) -> (Option<Found>, usize) {
+        let mut best: Option<Found> = None;
+        let mut iterations = 0;
+        for index in 0..self.ranked.len() {
+            if clock.is_over() {
+                return (best, iterations);
+            }
+            let (_, start) = self.ranked[index];
+            let outcome = self.explore.run(problem, &start, session);
+            iterations += outcome.iterations;
+            if let Some(found) = self.found(problem, init, outcome, session)
+                && best.is_none_or(|best| found.score < best.score)
+            {
+                best = Some(found);
+            }
+            if outcome.termination == Termination::Stopped {
+                return (best, iterations);
+            }
+            if best.is_some_and(|best| best.score <= self.options.good_enough) {
+                break;
+            }
+        }
+        if let Some(explored) = best {
+            let start = explored.outcome.camera_from_object;
+            let next = self.stage.run(problem, &start, session);
+            iterations += next.iterations;
+            let outcome = explored.outcome.then(next);
+            if let Some(found) = self.found(problem, init, outcome, session)
+                && found.score <= explored.score
+            {
+                best = Some(found);
+            }
+        }
+        (best, iterations)
+    }
+}
+
+/// More hypotheses than this are never refined: their list is kept in order.
+const MAX_REFINED: usize = 10_000;
+
+/// When a run has to end.
+struct Clock(Option<(Instant, Duration)>);
+
+impl Clock {
+    fn start(limit: Option<Duration>) -> Self {
+        Self(limit.map(|limit| (Instant::now(), limit)))
+    }
+
+    fn is_over(&self) -> bool {
+        self.0
+            .is_some_and(|(begun, limit)| begun.elapsed() >= limit)
+    }
+}
+
+impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R, C> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let clock = Clock::start(self.options.time_limit);
+        let mut local = self.stage.run(problem, init, session);
+        if !se3::is_finite(init) || problem.observation.n_surfels() == 0 {
+            return local;
+        }
+        let mut iterations = local.iterations;
+        let mut context = session.workspace.context(problem);
+        let mut score = self.score.score(&mut context, init);
+        match self.found(problem, init, local, session) {
+            Some(found) if found.score <= score => score = found.score,
+            Some(_) => local = Outcome::kept(init, Termination::ScoreNotImproved),
+            None if local.verdict == Verdict::Refined => {
+                local = Outcome::kept(init, Termination::OutOfBounds);
+            }
+            None => {}
+        }
+        if score > self.options.threshold && local.termination != Termination::Stopped {
+            let start = local.camera_from_object;
+            self.rank(problem, init, &start, &clock, session);
+            let (found, spent) = self.explore(problem, init, &clock, session);
+            iterations += spent;
+            if let Some(found) = found
+                && found.score < score - self.options.min_gain
+            {
+                local = found.outcome;
+            }
+            if clock.is_over() {
+                local.termination = Termination::Deadline;
+                if local.verdict != Verdict::Refined {
+                    local.verdict = Verdict::KeptInitial(Termination::Deadline);
+                }
+            }
+        }
+        Outcome {
+            iterations,
+            ..local
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The mean VSD estimate from a sampling of the model instead of a render.
+
+use std::sync::Arc;
+
+use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
+
+use crate::mean_vsd::VISIBILITY_TOLERANCE_METERS;
+use crate::score::Score;
+use crate::tolerances::{AgreementCounts, mean};
+
+/// An estimate of the MVE at low resolution, for ranking many poses: points of the model's surface are splatted into a coarse
+/// depth buffer, which is compared with the observation as [`crate::MeanVsd`] compares a render.
+///
+/// It costs a few microseconds whatever the mesh, and is no substitute for the MVE where a pose is accepted or reported:
+/// pixels that no sample hits count as not rendered, and thin parts come and go. Samples of a closed mesh that face away from
+/// the camera are passed over. Occlusion is recognised with BOP's tolerance, as [`crate::MeanVsd::default`] does.
+///
+/// Cost: O(samples) per pose; the sampling is made once per model and shared, and so is the coarse observation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledMve {
+    /// Number of points on the model; 0 scores every pose 1.
+    pub samples: usize,
+    /// About how many pixels of the mask are looked at.
+    pub pixels: usize,
+    /// The depth buffer of the coarse image, empty (0) between two poses.
+    buffer: Vec<f32>,
+    /// The pixels of the buffer that were written.
+    touched: Vec<u32>,
+}
+
+impl SampledMve {
+    /// Makes the score.
+    #[must_use]
+    pub fn new(samples: usize, pixels: usize) -> Self {
+        Self {
+            samples,
+            pixels,
+            buffer: Vec::new(),
+            touched: Vec::new(),
+        }
+    }
+
+    /// The factor by which the image is coarsened.
+    fn factor(&self, observation: &Observation) -> u32 {
+        let ratio = observation.n_measured() as f64 / self.pixels.max(1) as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // At most √(2³⁰), not negative.
+        let factor = ratio.sqrt().round() as u32;
+        factor.max(1)
+    }
+
+    /// Fills the depth buffer.
+    fn splat(&mut self, coarse: &Observation, surface: &Surface, pose: &Isometry3<f64>) {
+        let camera = coarse.camera();
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        if self.buffer.len() < width * height {
+            self.buffer.resize(width * height, 0.0);
+            self.touched.reserve(width * height);
+        }
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let (fx, fy, cx, cy) = (
+            camera.fx() as f32,
+            camera.fy() as f32,
+            camera.cx() as f32,
+            camera.cy() as f32,
+        );
+        let eye = pose.inverse().translation.vector.cast::<f32>();
+        let pose: Isometry3<f32> = pose.cast();
+        let rotation = pose.rotation.to_rotation_matrix();
+        for surfel in &surface.surfels {
+            if surface.oriented && surfel.normal.dot(&(surfel.point.coords - eye)) >= 0.0 {
+                continue;
+            }
+            let p = rotation * surfel.point.coords + pose.translation.vector;
+            if p.z <= f32::EPSILON {
+                continue;
+            }
+            let (u, v) = (fx * p.x / p.z + cx + 0.5, fy * p.y / p.z + cy + 0.5);
+            // False for NaN.
+            if !(u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32) {
+                continue;
+            }
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // Within the image.
+            let index = v as usize * width + u as usize;
+            let nearest = &mut self.buffer[index];
+            if *nearest <= 0.0 {
+                // At most 2³⁰ pixels in any accepted image.
+                self.touched.push(u32::try_from(index).unwrap_or(0));
+                *nearest = p.z;
+            } else if p.z < *nearest {
+                *nearest = p.z;
+            }
+        }
+    }
+
+    /// Compares the depth buffer with the observation, and empties it.
+    fn compare(&mut self, coarse: &Observation, diameter: f64) -> f64 {
+        let camera = coarse.camera();
+        let width = camera.width();
+        let (depth, mask) = (coarse.depth().pixels(), coarse.mask().pixels());
+        let mut correct = AgreementCounts::new(diameter);
+        let mut outside = 0;
+        for index in self.touched.drain(..) {
+            let place = index as usize;
+            let z = f64::from(std::mem::take(&mut self.buffer[place]));
+            let measured = f64::from(depth[place]);
+            let x = (f64::from(index % width) - camera.cx()) / camera.fx();
+            let y = (f64::from(index / width) - camera.cy()) / camera.fy();
+            let behind = (z - measured) * (x * x + y * y + 1.0).sqrt();
+            let known = measured > 0.0;
+            if mask[place] {
+                if known {
+                    correct.add(behind.abs());
+                }
+            } else if !(known && behind > VISIBILITY_TOLERANCE_METERS) {
+                outside += 1;
+            }
+        }
+        mean(&correct.errors(coarse.n_measured() as u64 + outside))
+    }
+}
+
+impl Default for SampledMve {
+    /// 1500 points against about 200 pixels.
+    fn default() -> Self {
+        Self::new(1500, 200)
+    }
+}
+
+impl Score for SampledMve {
+    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        let problem = context.problem;
+        let factor = self.factor(problem.observation);
+        let coarse = problem.observation.decimated(factor);
+        let surface = Surface::of(problem.model, self.samples);
+        self.splat(&coarse, &surface, camera_from_object);
+        self.compare(&coarse, problem.model.diameter())
+    }
+
+    fn name(&self) -> &'static str {
+        "sampled-mve"
+    }
+}
+
+/// A sampling of a model.
+struct Surface {
+    surfels: Vec<Surfel>,
+    /// Whether normals are known to point out of the object.
+    oriented: bool,
+}
+
+impl Surface {
+    fn of(model: &Model, samples: usize) -> Arc<Self> {
+        model.derived().get_or_build(samples as u64, || Self {
+            surfels: sample_surface(model.mesh(), samples),
+            oriented: model.mesh().is_closed(),
+        })
+    }
+}

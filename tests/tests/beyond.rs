@@ -1,0 +1,162 @@
+//! What the presets that go beyond the paper promise: `local` and `auto` never raise the MVE, a bounded search stays in its
+//! bound, and a search finds the object, or what looks the same.
+
+use std::f64::consts::PI;
+use std::time::Duration;
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::{Scene, scene};
+use hybrid_icp::{
+    Bound, Isometry3, Point3, Preset, Refiner, Rotations, SearchOptions, Termination,
+    UnitQuaternion, Vector3, Verdict, adi, presets, se3,
+};
+use proptest::prelude::*;
+
+/// The object turned half about an axis of its frame, where it stands.
+fn flipped(scene: &Scene, axis: Vector3<f64>) -> Isometry3<f64> {
+    let Point3 { coords: center } = scene.model.center();
+    let turn = UnitQuaternion::new(axis * PI);
+    scene.truth * Isometry3::from_parts((center - turn * center).into(), turn)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// The contract of `local`, and of what is built on it: whatever the start, the image and the noise.
+    #[test]
+    fn the_mve_is_never_raised(
+        object in 0..Household::ALL.len(),
+        seed in 0_u64..1000,
+        noise in 0.0..4.0_f64,
+        meters in 0.0..0.15_f64,
+        angle in 0.0..PI,
+    ) {
+        let mut rng = rng(seed);
+        let scene = scene(Household::ALL[object], noise, &mut rng);
+        let init = perturb(&mut rng, &scene.truth, meters, angle);
+        // A part of the object is hidden in every other scene, and what hides it taken for the object in every fourth.
+        let observation = match seed % 4 {
+            0 => scene.behind_a_bar(0.3, 0.05, false),
+            1 => scene.behind_a_bar(0.3, 0.05, true),
+            _ => scene.observe_anew(),
+        };
+        for preset in [Preset::Local, Preset::Search, Preset::Auto] {
+            let refined = Refiner::preset(preset).refine(&scene.model, &observation, &init);
+            prop_assert!(refined.mve <= refined.mve_initial, "{preset}: {refined:?}");
+            let kept = refined.outcome.camera_from_object == init;
+            prop_assert_eq!(kept, matches!(refined.outcome.verdict, Verdict::KeptInitial(_)));
+        }
+    }
+
+    /// A bound holds for the local stage of the search as well as for its hypotheses.
+    #[test]
+    fn a_bounded_search_stays_in_its_bound(
+        object in 0..Household::ALL.len(),
+        seed in 0_u64..1000,
+        meters in 0.0..0.1_f64,
+        angle in 0.0..PI,
+        translation_meters in 0.001..0.1_f64,
+        rotation_degrees in 1.0..180.0_f64,
+        rotations in prop_oneof![Just(Rotations::Even), Just(Rotations::ViewAxis), Just(Rotations::Symmetry)],
+    ) {
+        let mut rng = rng(seed);
+        let scene = scene(Household::ALL[object], 0.5, &mut rng);
+        let init = perturb(&mut rng, &scene.truth, meters, angle);
+        let options = SearchOptions {
+            bound: Some(Bound { translation_meters, rotation_degrees }),
+            hypotheses: 64,
+            refined: 3,
+            rotations,
+            ..SearchOptions::default()
+        };
+        let mut refiner = Refiner::new(presets::search_with(options));
+        let refined = refiner.refine(&scene.model, &scene.observation, &init);
+        let (turned, moved) = se3::pose_distance(&refined.outcome.camera_from_object, &init);
+        prop_assert!(moved <= translation_meters && turned.to_degrees() <= rotation_degrees);
+        prop_assert!(refined.mve <= refined.mve_initial);
+    }
+}
+
+/// What `local` cannot see, and the score can: an object that is the wrong way round. Where the image tells, that is; a mug seen
+/// from the side looks the same upside down.
+#[test]
+fn a_search_turns_round_what_is_the_wrong_way_round() {
+    let (mut told, mut righted) = (0, 0);
+    for (seed, object) in (0..).zip([Household::Mug, Household::Car, Household::Teapot]) {
+        let scene = scene(object, 0.3, &mut rng(seed));
+        let refine = |preset: Preset, init: &Isometry3<f64>| {
+            Refiner::preset(preset).refine(&scene.model, &scene.observation, init)
+        };
+        let truth = refine(Preset::Local, &scene.truth).mve_initial;
+        for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            let init = flipped(&scene, axis);
+            let local = refine(Preset::Local, &init).mve;
+            if local <= SearchOptions::default().threshold {
+                continue;
+            }
+            told += 1;
+            let found = refine(Preset::Search, &init);
+            assert!(
+                found.mve < truth + 0.02,
+                "{object:?} {axis:?}: {local} {} {truth}",
+                found.mve
+            );
+            let pose = found.outcome.camera_from_object;
+            let (angle, distance) = se3::pose_distance(&pose, &scene.truth);
+            righted += usize::from(angle.to_degrees() < 2.0 && distance < 0.003);
+        }
+    }
+    assert!(told >= 4, "{told} flips of 9 are a test of a search");
+    assert!(
+        righted + 1 >= told,
+        "{righted} of {told} ended at the truth"
+    );
+}
+
+/// Of a body of revolution no image tells the turn about its axis: any will do, and the symmetry-aware error says so.
+#[test]
+fn of_a_symmetric_object_an_equivalent_pose_is_found() {
+    let scene = scene(Household::Bottle, 0.3, &mut rng(4));
+    let samples: Vec<_> = scene.model.samples().iter().map(|s| s.point).collect();
+    let init = flipped(&scene, Vector3::new(0.6, 0.8, 0.0));
+    let refined = Refiner::preset(Preset::Search).refine(&scene.model, &scene.observation, &init);
+    let pose = refined.outcome.camera_from_object;
+    assert!(adi(&pose, &scene.truth, &samples) < 0.002);
+    let (turned, _) = se3::pose_distance(&pose, &scene.truth);
+    assert!(turned.to_degrees() > 5.0, "the true turn was found");
+}
+
+/// No time at all: the local pose, and an outcome that says why there was nothing more.
+#[test]
+fn a_search_out_of_time_returns_what_it_has() {
+    let scene = scene(Household::Mug, 0.3, &mut rng(0));
+    let init = flipped(&scene, Vector3::z());
+    let options = SearchOptions {
+        time_limit: Some(Duration::ZERO),
+        ..SearchOptions::default()
+    };
+    let mut refiner = Refiner::new(presets::search_with(options));
+    let refined = refiner.refine(&scene.model, &scene.observation, &init);
+    let local = Refiner::preset(Preset::Local).refine(&scene.model, &scene.observation, &init);
+    assert!(local.mve > options.threshold, "nothing to search for");
+    assert_eq!(refined.outcome.termination, Termination::Deadline);
+    assert_eq!(
+        refined.outcome.camera_from_object,
+        local.outcome.camera_from_object
+    );
+}
+
+/// A threshold that is never passed makes a search what its local stage is.
+#[test]
+fn without_need_nothing_is_searched() {
+    let scene = scene(Household::Mug, 0.3, &mut rng(0));
+    let init = flipped(&scene, Vector3::z());
+    let options = SearchOptions {
+        threshold: 1.0,
+        ..SearchOptions::default()
+    };
+    let mut refiner = Refiner::new(presets::search_with(options));
+    let refined = refiner.refine(&scene.model, &scene.observation, &init);
+    let local = Refiner::preset(Preset::Local).refine(&scene.model, &scene.observation, &init);
+    assert_eq!(refined, local);
+}
