@@ -1,5 +1,6 @@
 //! Scenes that the cross-crate tests share.
 
+pub mod fuzz;
 pub mod nees;
 pub mod room;
 pub mod starts;
