@@ -1,6 +1,7 @@
 //! What the cross-crate tests and the benches share: scenes, starts, data, an allocator that counts.
 
 pub mod allocations;
+pub mod fuzz;
 pub mod nees;
 pub mod room;
 pub mod starts;

@@ -112,3 +112,60 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
     // The cases are worth something only if they differ.
     assert!(expected.iter().any(|r| r.mve < 0.1) && expected.iter().any(|r| r.mve_initial > 0.4));
 }
+
+#[test]
+fn the_functions_of_the_presets_are_what_their_names_build() {
+    let cases = cases();
+    let functions: [(Preset, Refiner); 9] = [
+        (Preset::Hybrid, Refiner::new(presets::hybrid())),
+        (
+            Preset::ProjectivePointToPoint,
+            Refiner::new(presets::projective_point_to_point()),
+        ),
+        (
+            Preset::ProjectivePointToPlane,
+            Refiner::new(presets::projective_point_to_plane()),
+        ),
+        (
+            Preset::ProjectiveCascadePointPlane,
+            Refiner::new(presets::projective_cascade_point_plane()),
+        ),
+        (
+            Preset::ProjectiveCascadePlanePoint,
+            Refiner::new(presets::projective_cascade_plane_point()),
+        ),
+        (
+            Preset::NnPointToPoint,
+            Refiner::new(presets::nn_point_to_point()),
+        ),
+        (
+            Preset::NnPointToPlane,
+            Refiner::new(presets::nn_point_to_plane()),
+        ),
+        (
+            Preset::NnCascadePointPlane,
+            Refiner::new(presets::nn_cascade_point_plane()),
+        ),
+        (
+            Preset::NnCascadePlanePoint,
+            Refiner::new(presets::nn_cascade_plane_point()),
+        ),
+    ];
+    assert_eq!(functions.each_ref().map(|(preset, _)| *preset), Preset::ALL);
+    let mut results = Vec::new();
+    for (preset, mut refiner) in functions {
+        let found = run(&mut refiner, &cases);
+        assert_eq!(found, run(&mut Refiner::preset(preset), &cases), "{preset}");
+        assert!(!results.contains(&found), "{preset} does what another does");
+        results.push(found);
+    }
+    // The paper's stop rules are those of its stages.
+    let by_hand = Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter: (),
+        metric: PointToPlane,
+        stop: presets::paper_stop(),
+    };
+    assert_eq!(run(&mut Refiner::new(by_hand), &cases), results[2]);
+}

@@ -213,3 +213,19 @@ fn overrides_reach_into_the_tree() {
         "hybrid: stage.switcher.alpha: found the text \"high\", expected a number from -inf to inf"
     );
 }
+
+#[test]
+fn the_text_of_a_file_is_what_is_read_and_an_absent_one_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.toml");
+    std::fs::write(&path, Preset::Hybrid.toml()).unwrap();
+    assert_eq!(
+        PipelineFile::read_text(&path).unwrap(),
+        Preset::Hybrid.toml()
+    );
+    let origin = path.to_string_lossy();
+    let parsed = PipelineFile::parse(Preset::Hybrid.toml(), &origin).unwrap();
+    assert_eq!(PipelineFile::read(&path).unwrap(), parsed);
+    let absent = PipelineFile::read_text(folder.path().join("absent.toml"));
+    assert!(absent.unwrap_err().to_string().contains("absent.toml"));
+}

@@ -10,7 +10,8 @@ use hybrid_icp::fusion::{
 };
 use hybrid_icp::{
     Calibration, DepthImage, Isometry3, Mask, Model, Observation, Outcome, Preset, Problem,
-    SequentialConfig, SequentialEstimator, SequentialEvent, Session, Stage, Vector6, presets, se3,
+    SequentialConfig, SequentialEstimator, SequentialEvent, Session, Stage, Trace, Vector6,
+    presets, se3,
 };
 
 /// What a camera sees that moves toward an object: images, true poses, and the motion before each.
@@ -392,4 +393,40 @@ fn a_step_beyond_its_icp_costs_less_than_a_hundredth_of_it() {
         );
         assert!(share < 0.01, "{method} over {preset}: {share}");
     }
+}
+
+#[test]
+fn a_camera_that_moves_without_an_image_takes_the_pose_along() {
+    let Path { model, frames } = path(Household::Mug, 3, 0.3, 12);
+    let (observation, truth, _) = &frames[0];
+    let estimator = || {
+        let stage = presets::projective_point_to_plane();
+        SequentialEstimator::for_object(stage, FusionMethod::Average, &model, truth)
+            .expect("a valid start")
+    };
+    let motion = frames[1].2;
+    // Before any estimate it is the initial pose that moves.
+    let mut blind = estimator();
+    assert!(blind.fuser().estimate().is_none());
+    blind.move_camera(&motion);
+    assert_eq!(blind.camera_from_object(), motion.apply(truth));
+    // Two motions without an image in between are as one step with both.
+    let mut first = estimator();
+    let mut trace = Trace::new();
+    let step = first.step_observed(&model, observation, &CameraMotion::none(), &mut trace);
+    assert_eq!(trace.stages.len(), 1);
+    assert_eq!(trace.stages[0].outcome, step.outcome);
+    assert_eq!(trace.stages[0].metric, "point-to-plane");
+    trace.clear();
+    assert_eq!(trace, Trace::new());
+    let before = first.camera_from_object();
+    first.move_camera(&motion);
+    let (angle, distance) = se3::pose_distance(&first.camera_from_object(), &motion.apply(&before));
+    assert!(angle < 1e-9 && distance < 1e-9, "{angle} {distance}");
+    assert_eq!(first.fuser().estimate(), first.estimate());
+    let mut unobserved = estimator();
+    assert_eq!(
+        unobserved.step(&model, observation, &CameraMotion::none()),
+        step
+    );
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::{Findings, counts, instructions, tidy};
+use crate::{Findings, api, counts, deny, instructions, tidy, valgrind};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run(root: &Path) -> Findings {
@@ -26,6 +26,8 @@ pub(crate) fn run(root: &Path) -> Findings {
         &none,
     )?;
     step("tidy", || tidy::run(root))?;
+    step("public functions", || api::run(root))?;
+    step("licences and sources", || deny::run(root))?;
     cargo(root, "tests", &["test", "--workspace"], &none)?;
     cargo(
         root,
@@ -41,6 +43,7 @@ pub(crate) fn run(root: &Path) -> Findings {
     )?;
     step("work counts", || counts::check(root))?;
     step("instruction counts", || instructions::check(root))?;
+    step("vectorised loops under memcheck", || valgrind::run(root))?;
     cargo(
         root,
         "association without the k-d tree",

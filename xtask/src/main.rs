@@ -1,15 +1,21 @@
 //! Automation of the workspace: `cargo xtask help` lists the commands.
 
+mod api;
 mod bench;
 mod ci;
 mod counts;
+mod deny;
 mod deviations;
+mod fuzz;
 mod instructions;
+mod miri;
+mod mutants;
 mod peers;
 mod process;
 mod repro;
 mod scale;
 mod tidy;
+mod valgrind;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,7 +27,8 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   ci      everything that must pass before a change lands: formatting, clippy, tests, documentation,
-          benches in test mode, counts, instructions, tidy, and the README's commands
+          benches in test mode, counts, instructions, tidy, api, deny, valgrind, and the
+          README's commands
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
           crate documentation, nothing left open, docs/deviations.md up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
@@ -39,6 +46,16 @@ cargo xtask COMMAND
   scale [--rows N] [--threads N]
           20,000 rows over generated images through `bop refine`: throughput, peak memory, kill and resume, shards;
           fails where the bytes differ
+  api     public functions that no test and no example names
+  deny    licences, sources and duplicates of what is linked, against deny.toml; runs cargo-deny as well where it is
+  fuzz [--minutes N] [--target T]
+          every fuzz target, or one, for N minutes each (5); wants cargo-fuzz and a C++ compiler
+  mutants [CRATE [K/N]]
+          changes to the numerical crates that no test notices; every N-th from the K-th on; wants cargo-mutants
+  valgrind
+          the vectorised loops under memcheck; wants valgrind
+  miri    unit tests under miri; wants a nightly toolchain that has it
+
   repro   fig6, fig7, table1 or alpha: reruns that part of the paper's studies into target/study;
           --quick takes minutes instead of the paper's number of poses
 ";
@@ -56,6 +73,12 @@ fn main() -> ExitCode {
         ["instructions", "--bless"] => instructions::bless(&root()),
         ["peers", ref options @ ..] => peers::run(&root(), options),
         ["scale", ref options @ ..] => scale::run(&root(), options),
+        ["api"] => api::run(&root()),
+        ["deny"] => deny::run(&root()),
+        ["fuzz", ref options @ ..] => fuzz::run(&root(), options),
+        ["mutants", ref options @ ..] => mutants::run(&root(), options),
+        ["valgrind"] => valgrind::run(&root()),
+        ["miri"] => miri::run(&root()),
         ["repro", what] => repro::run(&root(), what, false),
         ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {

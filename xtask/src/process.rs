@@ -49,6 +49,15 @@ pub(crate) fn is_there(program: &str) -> bool {
         .is_ok_and(|status| status.success())
 }
 
+/// Returns whether cargo has a subcommand: it can be started with `--version`.
+pub(crate) fn has_subcommand(root: &Path, name: &str) -> bool {
+    cargo(root, &[name, "--version"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
 /// The folder of build artifacts.
 pub(crate) fn target(root: &Path) -> PathBuf {
     // A relative one is relative to where cargo was called, which may not be here; the root is the usual place.

@@ -39,6 +39,11 @@ const LEFT_OPEN: &[(&str, &str)] = &[
     ("dbg", "!("),
 ];
 
+/// The names of the crates, from the lowest level up.
+pub(crate) fn crates() -> impl Iterator<Item = &'static str> {
+    LAYERS.iter().map(|(name, _)| *name)
+}
+
 /// Runs every rule.
 pub(crate) fn run(root: &Path) -> Findings {
     let mut findings = layers(root);

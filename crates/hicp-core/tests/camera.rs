@@ -195,3 +195,19 @@ fn the_camera_of_another_image_is_refused() {
         })
     ));
 }
+
+#[test]
+fn every_nth_pixel_of_a_camera_looks_along_the_same_ray() {
+    let camera = PinholeCamera::new(500.0, 510.0, 321.5, 238.25, 641, 480).unwrap();
+    assert_eq!(camera.scaled_down(0), camera);
+    assert_eq!(camera.scaled_down(1), camera);
+    let coarse = camera.scaled_down(4);
+    assert_eq!((coarse.width(), coarse.height()), (161, 120));
+    for (u, v) in [(0.0, 0.0), (17.0, 93.0), (160.0, 119.0)] {
+        let (a, b) = (
+            coarse.unproject(u, v, 0.7),
+            camera.unproject(4.0 * u, 4.0 * v, 0.7),
+        );
+        assert!((a - b).norm() < 1e-15, "{a} {b}");
+    }
+}

@@ -5,7 +5,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier};
 
-use hicp_core::Derived;
+use hicp_core::{DepthImage, Derived, Mask, Model, Observation, PinholeCamera, Point3, TriMesh};
 
 #[test]
 fn a_derived_value_is_built_once_by_however_many_threads() {
@@ -43,4 +43,21 @@ fn derived_values_are_told_apart_by_type_and_key() {
     assert_eq!(*derived.get_or_build(1, || 99_u64), 30);
     // A clone starts afresh.
     assert_eq!(*derived.clone().get_or_build(1, || 40_u32), 40);
+}
+
+#[test]
+fn what_is_derived_of_a_model_or_an_observation_is_theirs_and_not_their_clones() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
+    let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap());
+    let camera = PinholeCamera::new(10.0, 10.0, 1.0, 1.0, 3, 3).unwrap();
+    let depth = DepthImage::from_meters(3, 3, vec![1.0; 9]).unwrap();
+    let observation = Observation::new(depth, Mask::full(3, 3), camera).unwrap();
+    for (owner, clone) in [
+        (model.derived(), model.clone().derived()),
+        (observation.derived(), observation.clone().derived()),
+    ] {
+        assert_eq!(*owner.get_or_build(1, || 5_u64), 5);
+        assert_eq!(*owner.get_or_build(1, || 6_u64), 5);
+        assert_eq!(*clone.get_or_build(1, || 7_u64), 7);
+    }
 }

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use hicp_experiments::{
-    Analysis, Config, Experiment, HIGH, LOW, Measured, Metric, NOISY, Report, Row, Study, Subject,
-    Variant, Verdict, claims,
+    Analysis, Config, Experiment, Figure, HIGH, LOW, Measured, Metric, NOISY, Report, Row, Study,
+    Subject, Variant, Verdict, claims,
 };
 use hicp_sim::Household;
 
@@ -82,6 +82,7 @@ fn means_and_differences_are_what_was_put_in() {
         analysis.variant("nn-point-to-point").unwrap(),
     );
     let first = analysis.group("0.0-0.1").unwrap();
+    assert_eq!(analysis.groups()[first].label, "0.0-0.1");
     // Cases 0 and 10: 0.002 · (0 + 1)/2; objects: 0.01 · 1.5.
     let mean = analysis.mean(Metric::Vsd, first, nn).unwrap();
     assert!(
@@ -331,4 +332,21 @@ fn a_report_holds_figures_tables_and_what_could_not_be_made() {
     let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("figure.png")).unwrap();
     assert!(width > 1000 && height > 300 && rgb.iter().any(|b| *b != 255));
     assert!(!folder.path().join("alpha.svg").exists());
+}
+
+#[test]
+fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
+    let init = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0));
+    let depth = Analysis::of(&study(Experiment::DepthNoise, 12, as_in_the_paper, |_| 2.0));
+    let figure = Figure::of([&init, &depth]);
+    assert!(!figure.is_empty() && figure.rows.len() == 2);
+    for row in &figure.rows {
+        // Nearest neighbours, projective, and the rest with the best of either.
+        assert_eq!(row.len(), 3);
+        assert_eq!(row[0].curves.len(), 4);
+        assert_eq!(row[1].curves.len(), 4);
+        assert!(row[2].curves.iter().any(|curve| curve.label == "hybrid"));
+    }
+    let timing = Analysis::of(&study(Experiment::Timing, 4, as_in_the_paper, |_| 2.0));
+    assert!(Figure::of([&timing]).is_empty());
 }

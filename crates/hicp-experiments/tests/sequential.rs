@@ -79,6 +79,10 @@ fn a_small_study_runs_to_its_report() {
     let first = analysis.mean(Metric::Vsd, 0, average).unwrap();
     assert!(first.estimate < 0.3, "{first:?}");
     assert_eq!(report.claims().len(), 2 * 6 + 2);
+    // A panel per underlying pipeline with the paper's six methods, and one for the gated ones.
+    let row = &report.figure().rows[0];
+    assert_eq!(row.len(), 2 + 1);
+    assert_eq!((row[0].curves.len(), row[1].curves.len()), (6, 6));
     report.write(folder.path()).unwrap();
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for part in [

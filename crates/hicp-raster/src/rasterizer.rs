@@ -191,6 +191,10 @@ fn draw_clipped(
         .corners(id as usize)
         .map(|corner| projection.homogeneous(&corner));
     let polygon = clipper.clip(triangle, near);
+    // Beyond the range of `f64` there are no pixels: infinities of both signs have met in clipping.
+    if !polygon.iter().all(|h| h.is_finite()) {
+        return;
+    }
     let (low, high) = polygon
         .iter()
         .map(|h| 1.0 / h.z)

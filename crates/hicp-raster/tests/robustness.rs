@@ -369,3 +369,34 @@ fn a_warm_view_keeps_its_buffers() {
         before
     );
 }
+
+/// Calibrations that no camera has take pixels beyond the range of `f64`, where infinities of both signs meet in clipping.
+#[test]
+fn pixels_beyond_the_range_of_numbers_are_survived() {
+    // Seen with a focal length near the largest number, an edge overflows while another corner stays in the image.
+    let corners = [[-0.57, -0.57, 0.125], [0.5, 0.5, 0.42], [0.0, 0.0, -0.1]].map(Point3::from);
+    let long = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+    for huge in [1e12, 1e290, 1e305, f64::MAX] {
+        let cameras = [
+            (huge, 500.0, 16.0, 12.0),
+            (500.0, huge, 16.0, 12.0),
+            (500.0, 500.0, huge, 12.0),
+            (500.0, 500.0, 16.0, -huge),
+            (huge, 500.0, -huge, 12.0),
+            (huge, huge, 16.0, 12.0),
+        ];
+        for (fx, fy, cx, cy) in cameras {
+            let camera = PinholeCamera::new(fx, fy, cx, cy, 32, 24).unwrap();
+            for mesh in [&long, &square(1e-3), &square(1.0), &square(1e5)] {
+                for tilt in [0.0, 0.3, 1.2] {
+                    // Across the near plane and beyond it.
+                    for z in [0.0, 0.5, 0.6, 1e3] {
+                        let turn = Isometry3::rotation([tilt, tilt, 0.0].into());
+                        let view = render(Culling::Never, mesh, &camera, &(at(0.0, 0.0, z) * turn));
+                        assert!(view.depth().iter().all(|z| z.is_finite() && *z >= 0.0));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -174,3 +174,16 @@ fn instances_are_left_with_the_adi_of_their_estimate() {
     assert_eq!(found, [Some(0.2 * DIAMETER), Some(0.1 * DIAMETER)]);
     assert_eq!(target(1, Vec::new()).adi_of_instances(), [None]);
 }
+
+#[test]
+fn from_a_diameter_on_and_without_a_number_origins_are_apart() {
+    let at = |translation_m| PoseErrors {
+        translation_m,
+        ..errors(0.0)
+    };
+    assert!(!at(0.0).is_apart(DIAMETER));
+    assert!(!at(DIAMETER * (1.0 - 1e-12)).is_apart(DIAMETER));
+    assert!(at(DIAMETER).is_apart(DIAMETER));
+    assert!(at(f64::INFINITY).is_apart(DIAMETER));
+    assert!(at(f64::NAN).is_apart(DIAMETER));
+}

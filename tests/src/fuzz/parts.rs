@@ -1,0 +1,96 @@
+//! Arbitrary bytes into the text of a pipeline file, through the catalogue of parts.
+
+use hybrid_icp::pipeline::{Accepts, PARTS, Parameter, Part, PartKind};
+
+use super::bytes::Bytes;
+
+/// Depth below which parts hold no parts of their own kind: TOML files may not be nested without end.
+const DEEPEST: usize = 3;
+
+/// A pipeline file whose parts exist and whose values are mostly within their ranges; small counts, so that it ends soon.
+pub(super) fn pipeline(bytes: &mut Bytes<'_>) -> String {
+    let part = choose(bytes, PartKind::Stage, 0);
+    fields(bytes, part, 0).join("\n")
+}
+
+fn choose(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> &'static Part {
+    let holds_its_kind = |part: &Part| {
+        part.parameters.iter().any(|p| match p.accepts {
+            Accepts::Part { kind: held, .. } | Accepts::Parts { kind: held, .. } => held == kind,
+            _ => false,
+        })
+    };
+    // A clock decides about the time limit, and a target must do the same every time.
+    let choices: Vec<&Part> = PARTS
+        .iter()
+        .filter(|part| part.kind == kind && part.name != "time-limit")
+        .filter(|part| depth < DEEPEST || !holds_its_kind(part))
+        .collect();
+    bytes.pick(&choices)
+}
+
+fn fields(bytes: &mut Bytes<'_>, part: &Part, depth: usize) -> Vec<String> {
+    let mut fields = vec![format!("type = \"{}\"", part.name)];
+    for parameter in part.parameters {
+        // Defaults of counts are for good results, not for speed.
+        let is_count = matches!(parameter.accepts, Accepts::Count { .. });
+        if must_be_given(parameter) || is_count || bytes.one_in(2) {
+            let value = value(bytes, &parameter.accepts, depth);
+            fields.push(format!("{} = {value}", parameter.name));
+        }
+    }
+    fields
+}
+
+fn must_be_given(parameter: &Parameter) -> bool {
+    matches!(
+        parameter.accepts,
+        Accepts::Number { default: None, .. }
+            | Accepts::Count { default: None, .. }
+            | Accepts::NumberList
+            | Accepts::Part { default: None, .. }
+            | Accepts::Parts { default: None, .. }
+    )
+}
+
+fn value(bytes: &mut Bytes<'_>, accepts: &Accepts, depth: usize) -> String {
+    match *accepts {
+        Accepts::Number { min, max, .. } => number(bytes, min, max),
+        Accepts::Count { min, .. } => (min as usize + bytes.below(4)).to_string(),
+        Accepts::Flag { .. } => bytes.one_in(2).to_string(),
+        Accepts::Word { words, .. } => format!("\"{}\"", bytes.pick(words)),
+        Accepts::NumberList => list(bytes, |b| number(b, 0.0, f64::INFINITY)),
+        Accepts::Flags { count } => {
+            let flags: Vec<String> = (0..count).map(|_| bytes.one_in(2).to_string()).collect();
+            format!("[{}]", flags.join(", "))
+        }
+        Accepts::Part { kind, .. } => inline(bytes, kind, depth + 1),
+        Accepts::Parts { kind, .. } => list(bytes, |b| inline(b, kind, depth + 1)),
+    }
+}
+
+fn inline(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> String {
+    let part = choose(bytes, kind, depth);
+    format!("{{ {} }}", fields(bytes, part, depth).join(", "))
+}
+
+fn list(bytes: &mut Bytes<'_>, mut item: impl FnMut(&mut Bytes<'_>) -> String) -> String {
+    let items: Vec<String> = (0..=bytes.below(3)).map(|_| item(bytes)).collect();
+    format!("[{}]", items.join(", "))
+}
+
+/// The ends of the range, a value near where things usually are, or one within it.
+fn number(bytes: &mut Bytes<'_>, min: f64, max: f64) -> String {
+    let usual = [min, max, 0.1, 0.01, 1e-3, 1.0, 10.0, 90.0, 1e-9, 1e9];
+    let value = if bytes.one_in(4) {
+        let (low, high) = (min.max(-1e3), max.min(1e3));
+        low + bytes.signed().abs() * (high - low)
+    } else {
+        bytes.pick(&usual)
+    };
+    // With a decimal point or an exponent in every case: TOML has whole numbers and others.
+    match value {
+        v if v.is_infinite() => if v > 0.0 { "inf" } else { "-inf" }.to_owned(),
+        v => format!("{v:e}"),
+    }
+}

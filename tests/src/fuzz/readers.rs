@@ -1,0 +1,262 @@
+//! A target per reader: whatever the bytes, a value that keeps its promises or an error that names the file.
+
+use std::path::Path;
+
+use hicp_io::bop::{
+    Rle, Scene, read_detections, read_models_info, read_results, read_targets, write_results,
+};
+use hicp_io::{
+    IoError, LengthUnit, read_camera_json, read_depth_png, read_mask_png, read_mesh,
+    read_point_cloud_ply, read_pose_json, read_rgb_png, write_mask_png, write_ply, write_pose_json,
+};
+use hybrid_icp::{PipelineFile, TriMesh, se3};
+
+use super::file::{beside, with_bytes};
+
+/// Returns the value; an error must name the file, on one line, without the file's own bytes drowning it.
+fn checked<T>(path: &Path, result: Result<T, IoError>) -> Option<T> {
+    match result {
+        Ok(value) => Some(value),
+        Err(error) => {
+            let message = error.to_string();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            assert!(message.contains(&*name), "{message:?} does not name {name}");
+            assert!(message.len() < 2000, "{} bytes: {message}", message.len());
+            None
+        }
+    }
+}
+
+fn mesh(name: &'static str, data: &[u8]) {
+    let path = with_bytes(name, data);
+    let Some(mesh) = checked(&path, read_mesh(&path, LengthUnit::Meters)) else {
+        return;
+    };
+    hold_to_a_mesh(&mesh);
+    let copy = beside(&path, "copy.ply");
+    write_ply(&copy, &mesh, LengthUnit::Meters).expect("a mesh that can be written");
+    let back = read_mesh(&copy, LengthUnit::Meters).expect("a mesh that was written");
+    assert_eq!(mesh.vertices(), back.vertices());
+    assert_eq!(mesh.triangles(), back.triangles());
+    assert!(
+        checked(&path, read_mesh(&path, LengthUnit::Millimeters))
+            .is_none_or(|m| m.triangles() == mesh.triangles())
+    );
+}
+
+fn hold_to_a_mesh(mesh: &TriMesh) {
+    let n = mesh.vertices().len();
+    assert!(
+        mesh.vertices()
+            .iter()
+            .all(|p| p.iter().all(|c| c.is_finite()))
+    );
+    assert!(mesh.triangles().iter().flatten().all(|i| (*i as usize) < n));
+    assert!(!mesh.triangles().is_empty());
+    let area = mesh.area();
+    assert!(area.is_finite() && area >= 0.0, "{area}");
+}
+
+pub(super) fn obj(data: &[u8]) {
+    mesh("a.obj", data);
+}
+
+pub(super) fn stl(data: &[u8]) {
+    mesh("a.stl", data);
+}
+
+/// As a mesh, and as a point cloud.
+pub(super) fn ply(data: &[u8]) {
+    mesh("a.ply", data);
+    let path = with_bytes("cloud.ply", data);
+    let _ = checked(&path, read_point_cloud_ply(&path, LengthUnit::Meters));
+}
+
+/// As depth, as a mask and as colour.
+pub(super) fn png(data: &[u8]) {
+    let path = with_bytes("a.png", data);
+    if let Some(depth) = checked(&path, read_depth_png(&path, 0.1)) {
+        assert!(depth.pixels().iter().all(|z| z.is_finite() && *z >= 0.0));
+    }
+    if let Some(mask) = checked(&path, read_mask_png(&path)) {
+        let copy = beside(&path, "copy.png");
+        write_mask_png(&copy, &mask).expect("a mask that can be written");
+        assert_eq!(read_mask_png(&copy).expect("a mask that was written"), mask);
+    }
+    if let Some((width, height, pixels)) = checked(&path, read_rgb_png(&path)) {
+        assert_eq!(pixels.len(), width as usize * height as usize * 3);
+    }
+}
+
+/// The first byte says which of BOP's files the others are.
+pub(super) fn bop_json(data: &[u8]) {
+    let (kind, json) = data.split_first().unwrap_or((&b'c', &[]));
+    match kind % 6 {
+        0 => scene(
+            "{\"0\":{\"cam_K\":[500,0,3,0,500,3,0,0,1]}}".as_bytes(),
+            b"{}",
+            json,
+        ),
+        1 => scene(
+            "{\"0\":{\"cam_K\":[500,0,3,0,500,3,0,0,1]}}".as_bytes(),
+            json,
+            b"{}",
+        ),
+        2 => scene(json, b"{}", b"{}"),
+        3 => {
+            let path = with_bytes("models_info.json", json);
+            let _ = checked(&path, read_models_info(&path));
+        }
+        4 => {
+            let path = with_bytes("targets.json", json);
+            let _ = checked(&path, read_targets(&path));
+        }
+        _ => {
+            let path = with_bytes("detections.json", json);
+            for detection in checked(&path, read_detections(&path)).unwrap_or_default() {
+                detection
+                    .segmentation
+                    .iter()
+                    .filter(|code| is_small(code))
+                    .for_each(hold_to_a_code);
+            }
+        }
+    }
+}
+
+fn scene(camera: &[u8], truth: &[u8], info: &[u8]) {
+    let path = with_bytes("scene_camera.json", camera);
+    with_bytes("scene_gt.json", truth);
+    with_bytes("scene_gt_info.json", info);
+    let scene = match Scene::open(beside(&path, "")) {
+        Ok(scene) => scene,
+        Err(error) => {
+            let message = error.to_string();
+            assert!(
+                message.contains(".json") && message.len() < 2000,
+                "{message}"
+            );
+            return;
+        }
+    };
+    let ids: Vec<u32> = scene.image_ids().collect();
+    for id in ids {
+        if let Ok(camera) = scene
+            .camera(id)
+            .expect("an image of the scene")
+            .pinhole(64, 48)
+        {
+            assert!(camera.fx().is_finite() && camera.fx() != 0.0);
+        }
+        for truth in scene.ground_truth(id).unwrap_or_default() {
+            assert!(se3::is_finite(&truth.camera_from_object));
+        }
+    }
+}
+
+pub(super) fn results_csv(data: &[u8]) {
+    let path = with_bytes("a.csv", data);
+    let Some(rows) = checked(&path, read_results(&path)) else {
+        return;
+    };
+    for row in &rows {
+        assert!(se3::is_finite(&row.camera_from_object()), "{row:?}");
+    }
+    let copy = beside(&path, "copy.csv");
+    write_results(&copy, &rows).expect("rows that can be written");
+    let back = read_results(&copy).expect("rows that were written");
+    assert_eq!(back, rows);
+}
+
+/// Two bytes of size, then COCO's text; also as plain counts.
+pub(super) fn rle(data: &[u8]) {
+    let [width, height, rest @ ..] = data else {
+        return;
+    };
+    let (width, height) = (u32::from(*width), u32::from(*height));
+    if let Ok(text) = std::str::from_utf8(rest)
+        && let Ok(code) = Rle::from_compressed(width, height, text)
+    {
+        hold_to_a_code(&code);
+        let back = Rle::from_compressed(width, height, &code.to_compressed());
+        assert_eq!(back.as_ref(), Ok(&code));
+    }
+    let counts = rest
+        .chunks_exact(4)
+        .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]));
+    if let Ok(code) = Rle::from_counts(width, height, counts.collect()) {
+        hold_to_a_code(&code);
+    }
+}
+
+fn is_small(code: &Rle) -> bool {
+    u64::from(code.width()) * u64::from(code.height()) < 1 << 16
+}
+
+fn hold_to_a_code(code: &Rle) {
+    let mask = code.to_mask();
+    assert_eq!((mask.width(), mask.height()), (code.width(), code.height()));
+    let set: u64 = code
+        .counts()
+        .iter()
+        .skip(1)
+        .step_by(2)
+        .map(|c| u64::from(*c))
+        .sum();
+    assert_eq!(mask.pixels().iter().filter(|on| **on).count() as u64, set);
+    assert_eq!(Rle::of_mask(&mask).to_mask(), mask);
+}
+
+/// Text that is read and built, not run.
+pub(super) fn pipeline_toml(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    let error = match PipelineFile::parse(text, "a.toml") {
+        Ok(file) => file.build().err(),
+        Err(error) => Some(error),
+    };
+    if let Some(error) = error {
+        let message = error.to_string();
+        assert!(
+            message.contains("a.toml"),
+            "{message:?} does not name a.toml"
+        );
+    }
+}
+
+pub(super) fn pose_json(data: &[u8]) {
+    let path = with_bytes("pose.json", data);
+    let Some(file) = checked(&path, read_pose_json(&path)) else {
+        return;
+    };
+    let pose = file.camera_from_object;
+    assert!(se3::is_finite(&pose), "{pose:?}");
+    let copy = beside(&path, "copy.json");
+    write_pose_json(&copy, &pose).expect("a pose that can be written");
+    let back = read_pose_json(&copy)
+        .expect("a pose that was written")
+        .camera_from_object;
+    let (angle, distance) = se3::pose_distance(&back, &pose);
+    assert!(
+        angle < 1e-6 && distance <= 1e-9 * (1.0 + pose.translation.vector.norm()),
+        "{pose:?} {back:?}"
+    );
+}
+
+pub(super) fn camera_json(data: &[u8]) {
+    let path = with_bytes("camera.json", data);
+    if let Some(file) = checked(&path, read_camera_json(&path, (64, 48))) {
+        let camera = file.camera;
+        assert_eq!((camera.width(), camera.height()), (64, 48));
+        assert!(
+            [camera.fx(), camera.fy(), camera.cx(), camera.cy()]
+                .iter()
+                .all(|v| v.is_finite())
+        );
+        assert!(
+            file.depth_scale
+                .is_none_or(|scale| scale.is_finite() && scale > 0.0)
+        );
+    }
+}

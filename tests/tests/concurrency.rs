@@ -1,0 +1,135 @@
+//! What may be shared between threads is, what may be sent is, and neither changes a bit.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::render;
+use hybrid_icp::fusion::{BoxedFuser, Fusion, PoseEstimate};
+use hybrid_icp::{
+    BoxedStage, DepthImage, Derived, Isometry3, Mask, Model, Observation, PinholeCamera,
+    PipelineFile, Preset, Rasterizer, Refinement, Refiner, SequentialEstimator, Symmetries,
+    TriMesh, Workspace,
+};
+
+/// Compiles only if the documentation is right: models and observations are shared by reference, workspaces are one per thread.
+#[test]
+fn data_are_send_and_sync_and_workspaces_are_send() {
+    fn shared<T: Send + Sync>() {}
+    fn sent<T: Send>() {}
+    shared::<Model>();
+    shared::<TriMesh>();
+    shared::<Symmetries>();
+    shared::<Observation>();
+    shared::<DepthImage>();
+    shared::<Mask>();
+    shared::<PinholeCamera>();
+    shared::<Derived>();
+    shared::<PipelineFile>();
+    shared::<Preset>();
+    shared::<PoseEstimate>();
+    shared::<Fusion>();
+    shared::<hybrid_icp::ModelPoints>();
+    shared::<hicp_io::bop::Dataset>();
+    shared::<hicp_io::bop::Scene>();
+    shared::<hicp_io::IoError>();
+    sent::<Refiner>();
+    sent::<Workspace>();
+    sent::<Rasterizer>();
+    sent::<BoxedStage>();
+    sent::<BoxedFuser>();
+    sent::<SequentialEstimator>();
+}
+
+/// An object in a small image, observed anew with every call: no search tree is there yet.
+struct View {
+    model: Model,
+    camera: PinholeCamera,
+    depth: DepthImage,
+    mask: Mask,
+    truth: Isometry3<f64>,
+}
+
+impl View {
+    fn new() -> Self {
+        let model = Household::Mug.model().unwrap();
+        let camera = PinholeCamera::new(95.0, 95.0, 39.5, 29.5, 80, 60).unwrap();
+        let truth = hicp_sim::object_pose(&mut rng(4), &model.center(), 0.45..0.5, 0.01);
+        let (depth, mask) = render(&model, &camera, &truth);
+        Self {
+            model,
+            camera,
+            depth,
+            mask,
+            truth,
+        }
+    }
+
+    fn observe(&self) -> Observation {
+        Observation::new(self.depth.clone(), self.mask.clone(), self.camera).unwrap()
+    }
+
+    /// Starts from good to bad, so that both branches of the switch run.
+    fn starts(&self, count: u32) -> Vec<Isometry3<f64>> {
+        let mut rng = rng(9);
+        (0..count)
+            .map(|i| {
+                let share = f64::from(i) / f64::from(count);
+                perturb(&mut rng, &self.truth, 0.06 * share, 0.8 * share)
+            })
+            .collect()
+    }
+}
+
+/// Refines from every start on some threads that share the model and the observation; each takes the next start.
+fn refine_all(
+    model: &Model,
+    observation: &Observation,
+    starts: &[Isometry3<f64>],
+    threads: usize,
+) -> Vec<Refinement> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut refiner = Refiner::preset(Preset::Hybrid);
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(start) = starts.get(index) else {
+                return done;
+            };
+            done.push((index, refiner.refine(model, observation, start)));
+        }
+    };
+    let mut done: Vec<(usize, Refinement)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        threads
+            .into_iter()
+            .flat_map(|t| t.join().unwrap())
+            .collect()
+    });
+    done.sort_by_key(|(index, _)| *index);
+    done.into_iter().map(|(_, refined)| refined).collect()
+}
+
+#[test]
+fn one_two_and_eight_threads_give_the_same_bits() {
+    let view = View::new();
+    let starts = view.starts(40);
+    let one = refine_all(&view.model, &view.observe(), &starts, 1);
+    for threads in [2, 8] {
+        let found = refine_all(&view.model, &view.observe(), &starts, threads);
+        assert_eq!(found, one, "{threads} threads");
+    }
+}
+
+#[test]
+fn a_thousand_refinements_share_one_observation() {
+    let view = View::new();
+    let starts = view.starts(1000);
+    // Sixteen threads meet where the search tree is not built yet.
+    let together = refine_all(&view.model, &view.observe(), &starts, 16);
+    let alone = refine_all(&view.model, &view.observe(), &starts, 1);
+    assert_eq!(together, alone);
+    assert!(alone.iter().any(|r| r.mve_initial < 0.4) && alone.iter().any(|r| r.mve_initial > 0.4));
+    let better = alone.iter().filter(|r| r.mve < r.mve_initial).count();
+    assert!(better > 500, "{better}");
+}
