@@ -113,17 +113,18 @@ fn a_search_turns_round_what_is_the_wrong_way_round() {
     );
 }
 
-/// Of a body of revolution no image tells the turn about its axis: any will do, and the symmetry-aware error says so.
+/// Of a body of revolution no image tells the turn about its axis, and the symmetry-aware error does not ask for it.
 #[test]
-fn of_a_symmetric_object_an_equivalent_pose_is_found() {
+fn a_symmetric_object_is_found_up_to_its_symmetry() {
     let scene = scene(Household::Bottle, 0.3, &mut rng(4));
     let samples: Vec<_> = scene.model.samples().iter().map(|s| s.point).collect();
-    let init = flipped(&scene, Vector3::new(0.6, 0.8, 0.0));
-    let refined = Refiner::preset(Preset::Search).refine(&scene.model, &scene.observation, &init);
-    let pose = refined.outcome.camera_from_object;
-    assert!(adi(&pose, &scene.truth, &samples) < 0.002);
-    let (turned, _) = se3::pose_distance(&pose, &scene.truth);
-    assert!(turned.to_degrees() > 5.0, "the true turn was found");
+    for axis in [Vector3::x(), Vector3::y()] {
+        let init = flipped(&scene, axis);
+        let refined =
+            Refiner::preset(Preset::Search).refine(&scene.model, &scene.observation, &init);
+        let pose = refined.outcome.camera_from_object;
+        assert!(adi(&pose, &scene.truth, &samples) < 0.002);
+    }
 }
 
 /// No time at all: the local pose, and an outcome that says why there was nothing more.
