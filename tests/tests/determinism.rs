@@ -116,7 +116,7 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
 #[test]
 fn the_functions_of_the_presets_are_what_their_names_build() {
     let cases = cases();
-    let functions: [(Preset, Refiner); 9] = [
+    let functions: [(Preset, Refiner); 13] = [
         (Preset::Hybrid, Refiner::new(presets::hybrid())),
         (
             Preset::ProjectivePointToPoint,
@@ -150,13 +150,25 @@ fn the_functions_of_the_presets_are_what_their_names_build() {
             Preset::NnCascadePlanePoint,
             Refiner::new(presets::nn_cascade_plane_point()),
         ),
+        (
+            Preset::HybridVisible,
+            Refiner::new(presets::hybrid_visible()),
+        ),
+        (Preset::Local, Refiner::new(presets::local())),
+        (Preset::Search, Refiner::new(presets::search())),
+        (Preset::Auto, Refiner::new(presets::auto())),
     ];
     assert_eq!(functions.each_ref().map(|(preset, _)| *preset), Preset::ALL);
     let mut results = Vec::new();
     for (preset, mut refiner) in functions {
         let found = run(&mut refiner, &cases);
         assert_eq!(found, run(&mut Refiner::preset(preset), &cases), "{preset}");
-        assert!(!results.contains(&found), "{preset} does what another does");
+        // `auto` is `local` where that ends well.
+        let own = preset != Preset::Auto;
+        assert!(
+            !own || !results.contains(&found),
+            "{preset} does what another does"
+        );
         results.push(found);
     }
     // The paper's stop rules are those of its stages.

@@ -98,7 +98,7 @@ fn promises_of_terabytes() {
     refused("a.ply", ply("ascii", "-3", "1", "uchar int"), &["line 3"]);
     refused(
         "a.off",
-        "OFF\n3 99999999999 0\n0 0 0\n",
+        "OFF\n3 99999999999 0\n0 0 0\n1 0 0\n0 1 0\n",
         &["line 2", "99999999999 faces"],
     );
     refused(
