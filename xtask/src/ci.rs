@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::{Findings, counts, instructions, tidy};
+use crate::{Findings, counts, instructions, python, tidy};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run(root: &Path) -> Findings {
@@ -53,6 +53,7 @@ pub(crate) fn run(root: &Path) -> Findings {
         ],
         &none,
     )?;
+    step("Python module", || python::check(root, &[]))?;
     examples(root)?;
     readme(root)
 }

@@ -7,9 +7,11 @@ mod deviations;
 mod instructions;
 mod peers;
 mod process;
+mod python;
 mod repro;
 mod scale;
 mod tidy;
+mod venv;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,10 +23,16 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   ci      everything that must pass before a change lands: formatting, clippy, tests, documentation,
-          benches in test mode, counts, instructions, tidy, and the README's commands
+          benches in test mode, counts, instructions, tidy, the Python module, and the README's commands
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
           crate documentation, nothing left open, docs/deviations.md up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
+
+  python [--ray] [--open3d] [PYTEST OPTIONS]
+          builds the Python module into an environment of its own and tests it: pytest, doctests, mypy, examples; wants
+          Python 3 and, the first time, a network; with --ray the runs on two Ray workers too, with --open3d (which wants the
+          system's libusb-1.0) the comparison with it
+  wheel   builds the Python wheel, states its size, and tries it in a fresh environment
 
   bench [--save NAME] [--against NAME] [FILTER]
           runs the benches whose id contains FILTER and prints a table; keeps it as a baseline, compares with one
@@ -56,6 +64,8 @@ fn main() -> ExitCode {
         ["instructions", "--bless"] => instructions::bless(&root()),
         ["peers", ref options @ ..] => peers::run(&root(), options),
         ["scale", ref options @ ..] => scale::run(&root(), options),
+        ["python", ref options @ ..] => python::check(&root(), options),
+        ["wheel"] => python::pack(&root()),
         ["repro", what] => repro::run(&root(), what, false),
         ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {
