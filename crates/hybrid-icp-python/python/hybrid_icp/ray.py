@@ -140,9 +140,8 @@ def refine(
             fn_constructor_args=[arguments],
             batch_size=1,
             compute=ray.data.ActorPoolStrategy(size=min(workers, len(items))),
+            # Ray Data's own defaults restart a dead actor and repeat its tasks without limit.
             num_cpus=num_cpus,
-            max_restarts=-1,
-            max_task_retries=-1,
         )
         for item in work.iter_rows():
             journal.append(int(item["place"]), json.loads(item["done"]))
