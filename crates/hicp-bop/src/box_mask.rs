@@ -1,62 +1,81 @@
-//! A mask where there is no segmentation: a box about the estimate, gated by depth.
+//! A mask where there is no segmentation: what was measured in a box about the estimate.
 
-use hybrid_icp::{DepthImage, Isometry3, Mask, Model, PixelRegion, RenderedView};
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, Vector3,
+};
 
 /// How a mask is made of an estimate alone.
 ///
-/// Set are the pixels that have a depth, lie in the box of the model's silhouette at the estimate, grown on every side by
-/// `margin` times its longer side, and whose depth differs from that of the model's centre at the estimate by at most
-/// `depth_gate` times the model's diameter. What lies beside, before or behind the object within the gate is in the mask, so
-/// this is for estimates that are near, of objects that stand free; a segmentation is better where there is one.
+/// Set are the pixels that lie in the box of the model's silhouette at the estimate, grown on every side by `margin` times its
+/// longer side, and whose measured point lies in the model's own bounding box at the estimate, grown on every side by `margin`
+/// times its diameter. Whatever else stands in that box is in the mask too, so this is for estimates that are near, of objects
+/// that stand free, and for projective pipelines; a segmentation is better where there is one (`docs/datasets.md` has figures).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
-    /// How much the box grows on every side, as a share of its longer side.
+    /// How much the boxes grow on every side.
     pub margin: f64,
-    /// Largest distance in depth from the model's centre, in diameters of the model.
-    pub depth_gate: f64,
 }
 
 impl Default for BoxMask {
-    /// A tenth of the box, half a diameter of depth.
+    /// A twentieth.
     fn default() -> Self {
-        Self {
-            margin: 0.1,
-            depth_gate: 0.5,
-        }
+        Self { margin: 0.05 }
     }
 }
 
 impl BoxMask {
     /// Makes the mask of an estimate, or returns `None` where no pixel is in it.
     ///
-    /// `view` is the render of the model at `camera_from_object`. Cost: O(image) to clear, then O(box).
+    /// `view` is the render of the model at `camera_from_object`; depth image and camera are of one size. Cost: O(image) to
+    /// clear, O(vertices), then O(box).
     #[must_use]
     pub fn mask(
         &self,
         view: &RenderedView,
-        depth: &DepthImage,
+        (depth, camera): (&DepthImage, &PinholeCamera),
         model: &Model,
         camera_from_object: &Isometry3<f64>,
     ) -> Option<Mask> {
         let region = self.grown(&silhouette_box(view)?, depth);
-        let center = camera_from_object * model.center();
-        let gate = self.depth_gate * model.diameter();
+        let (lowest, highest) = self.corners(model);
+        let object_from_camera = camera_from_object.inverse();
         let width = depth.width() as usize;
         let mut pixels = vec![false; depth.pixels().len()];
         let mut any = false;
         for v in region.v_min..region.v_max {
             let row = v as usize * width;
             let columns = row + region.u_min as usize..row + region.u_max as usize;
-            for (pixel, z) in pixels[columns.clone()]
-                .iter_mut()
-                .zip(&depth.pixels()[columns])
-            {
-                *pixel = *z > 0.0 && (f64::from(*z) - center.z).abs() <= gate;
-                any |= *pixel;
+            let measured = depth.pixels()[columns.clone()].iter();
+            let row = pixels[columns].iter_mut().zip(measured);
+            for (u, (pixel, z)) in (region.u_min..).zip(row) {
+                if *z > 0.0 {
+                    let seen = camera.unproject(f64::from(u), f64::from(v), f64::from(*z));
+                    let point = object_from_camera * seen;
+                    *pixel = lowest <= point && point <= highest;
+                    any |= *pixel;
+                }
             }
         }
         let mask = any.then(|| Mask::new(depth.width(), depth.height(), pixels));
         mask?.ok()
+    }
+
+    /// Returns two opposite corners of the model's grown bounding box, object frame.
+    fn corners(&self, model: &Model) -> (Point3<f64>, Point3<f64>) {
+        let by = (self.margin * model.diameter()).max(0.0);
+        let center = model.center();
+        let vertices = model
+            .mesh()
+            .vertices()
+            .iter()
+            .zip(model.mesh().used_vertices());
+        let offsets = vertices
+            .filter_map(|(vertex, used)| used.then(|| (vertex.cast::<f64>() - center).abs()));
+        let half = offsets.fold(Vector3::zeros(), |half: Vector3<f64>, offset| {
+            half.sup(&offset)
+        });
+        let half = half.add_scalar(by);
+        (center - half, center + half)
     }
 
     /// Grows a box, within the image.

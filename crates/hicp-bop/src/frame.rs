@@ -133,9 +133,10 @@ impl<'a> Frame<'a> {
     pub fn observation(&mut self, mask: usize) -> Result<&Observation, Fate> {
         self.read(mask)?;
         let seen = &mut self.masks[mask].seen;
-        if let Seen::Read(read) = std::mem::replace(seen, Seen::Unusable(Fate::Damaged)) {
-            let observed = Observation::new(self.image.depth.clone(), read, self.image.camera);
-            match observed {
+        if matches!(seen, Seen::Read(_))
+            && let Seen::Read(read) = std::mem::replace(seen, Seen::Unusable(Fate::Damaged))
+        {
+            match Observation::new(self.image.depth.clone(), read, self.image.camera) {
                 Ok(observation) => *seen = Seen::Observed(Box::new(observation)),
                 Err(error) => self.faults.push(Fault::damaged(error.to_string())),
             }
@@ -161,7 +162,7 @@ impl<'a> Frame<'a> {
     ) -> Result<Observation, Fate> {
         let Image { depth, camera, .. } = &self.image;
         let view = refiner.workspace_mut().view(model, camera, pose);
-        let mask = by.mask(view, depth, model, pose);
+        let mask = by.mask(view, (depth, camera), model, pose);
         let mask = mask.ok_or(Fate::NothingMeasured)?;
         // The mask has the size of the depth image, and so has the camera.
         Observation::new(depth.clone(), mask, *camera).map_err(|_| Fate::Damaged)

@@ -17,7 +17,7 @@ pub enum MaskSource {
     Visible,
     /// The segmentations of detections, by image ([`MaskSource::detections`]).
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
-    /// No segmentation: every row has a mask of its own, the measured part of a box about its pose.
+    /// No segmentation: every row has a mask of its own, what was measured in a box about its pose.
     Box(BoxMask),
 }
 

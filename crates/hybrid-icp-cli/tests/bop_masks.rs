@@ -90,6 +90,15 @@ fn rows_of_one_object_compete_for_its_masks() {
         found.sort_unstable();
         assert_eq!(found, [0, 1]);
     }
+
+    // Several estimates of one instance share its mask.
+    let hammer = world.truths[&(3, 40)][1].1;
+    let rows = [1, 2, 3].map(|seed| ResultRow::new(3, 40, HAMMER, nearby(&hammer, seed)));
+    let (run, refined) = world.refine(&rows, &["--no-time"]);
+    assert!(run.exits(0).out.contains("3  refined"));
+    for (before, after) in rows.iter().zip(&refined) {
+        world.assert_refined(before, after);
+    }
 }
 
 #[test]

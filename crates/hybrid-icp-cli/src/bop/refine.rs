@@ -91,8 +91,8 @@ pub(crate) struct Arguments {
 pub(super) enum MaskKind {
     /// The visible masks of the ground truth (mask_visib).
     Visible,
-    /// No segmentation. A row is refined in whatever was measured in the box of the model's silhouette at its pose, grown by a
-    /// tenth of its longer side on every side, and no further than half a diameter in depth from the model's centre.
+    /// No segmentation: a row is refined in whatever was measured inside the model's bounding box at its pose, grown by a
+    /// twentieth of the diameter. Best with a projective pipeline, such as projective-cascade-plane-point.
     None,
 }
 
