@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::{Findings, api, counts, deny, instructions, tidy, valgrind};
+use crate::{Findings, api, counts, deny, instructions, python, tidy, valgrind};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run(root: &Path) -> Findings {
@@ -56,6 +56,7 @@ pub(crate) fn run(root: &Path) -> Findings {
         ],
         &none,
     )?;
+    step("Python module", || python::check(root, &[]))?;
     examples(root)?;
     readme(root)
 }

@@ -12,10 +12,12 @@ mod miri;
 mod mutants;
 mod peers;
 mod process;
+mod python;
 mod repro;
 mod scale;
 mod tidy;
 mod valgrind;
+mod venv;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,11 +29,17 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   ci      everything that must pass before a change lands: formatting, clippy, tests, documentation,
-          benches in test mode, counts, instructions, tidy, api, deny, valgrind, and the
-          README's commands
+          benches in test mode, counts, instructions, tidy, api, deny, valgrind, the Python module,
+          and the README's commands
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
           crate documentation, nothing left open, docs/deviations.md up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
+
+  python [--ray] [--open3d] [PYTEST OPTIONS]
+          builds the Python module into an environment of its own and tests it: pytest, doctests, mypy, examples; wants
+          Python 3 and, the first time, a network; with --ray the runs on two Ray workers too, with --open3d (which wants the
+          system's libusb-1.0) the comparison with it
+  wheel   builds the Python wheel, states its size, and tries it in a fresh environment
 
   bench [--save NAME] [--against NAME] [FILTER]
           runs the benches whose id contains FILTER and prints a table; keeps it as a baseline, compares with one
@@ -79,6 +87,8 @@ fn main() -> ExitCode {
         ["mutants", ref options @ ..] => mutants::run(&root(), options),
         ["valgrind"] => valgrind::run(&root()),
         ["miri"] => miri::run(&root()),
+        ["python", ref options @ ..] => python::check(&root(), options),
+        ["wheel"] => python::pack(&root()),
         ["repro", what] => repro::run(&root(), what, false),
         ["repro", what, "--quick"] => repro::run(&root(), what, true),
         ["help" | "--help" | "-h"] => {

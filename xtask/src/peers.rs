@@ -1,9 +1,9 @@
 //! `cargo xtask peers`: other libraries and this one on the same arrays.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use crate::{Findings, process};
+use crate::{Findings, process, venv};
 
 /// The programs of ours that the script runs.
 const PROGRAMS: [&str; 2] = ["peers", "bop_frame"];
@@ -23,7 +23,8 @@ pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
     ))?;
 
     let target = process::target(root);
-    let python = environment(root, &target.join("peers/venv"))?;
+    let venv = target.join("peers/venv");
+    let python = venv::environment(root, &venv, &["benches/peers/requirements.txt"])?;
     let mut script = Command::new(python);
     script
         .arg(root.join("benches/peers/peers.py"))
@@ -32,25 +33,4 @@ pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
         .args(options)
         .current_dir(root);
     process::run(&mut script)
-}
-
-/// Makes the virtual environment, once per content of the requirements file, and returns its Python.
-fn environment(root: &Path, venv: &Path) -> Result<PathBuf, Vec<String>> {
-    let requirements = root.join("benches/peers/requirements.txt");
-    let wanted = std::fs::read_to_string(&requirements)
-        .map_err(|e| vec![format!("benches/peers/requirements.txt: {e}")])?;
-    let python = venv.join("bin/python");
-    let installed = venv.join("requirements.installed");
-    if std::fs::read_to_string(&installed).is_ok_and(|found| found == wanted) {
-        return Ok(python);
-    }
-    process::run(Command::new("python3").args(["-m", "venv"]).arg(venv))?;
-    process::run(
-        Command::new(&python)
-            .args(["-m", "pip", "install", "--quiet", "--requirement"])
-            .arg(&requirements),
-    )?;
-    std::fs::write(&installed, wanted)
-        .map_err(|e| vec![format!("{}: {e}", installed.display())])?;
-    Ok(python)
 }

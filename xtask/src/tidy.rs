@@ -21,6 +21,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-experiments", 5),
     ("hicp-bop", 5),
     ("hybrid-icp-cli", 6),
+    ("hybrid-icp-python", 6),
 ];
 
 /// Libraries that stay inside one crate.

@@ -20,7 +20,7 @@ pub use dataset::Dataset;
 pub use detections::{Detection, read_detections};
 pub use models_info::{ModelInfo, read_models_info};
 pub use result_file_name::ResultFileName;
-pub use results::{ResultRow, read_results, write_results};
+pub use results::{ResultRow, read_results, results_from_csv, write_results};
 pub use rle::{Rle, RleError};
 pub use scene::Scene;
 pub use targets::{Target, read_targets};

@@ -1,6 +1,6 @@
 //! Result files: estimated poses as comma-separated values.
 
-use std::io::{self, Write};
+use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use csv::StringRecord;
@@ -90,6 +90,15 @@ pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
     ReadLimits::DEFAULT.read_results(path)
 }
 
+/// Reads the content of a result file; messages name `path`.
+///
+/// # Errors
+///
+/// As [`read_results`], but for [`IoError::Read`].
+pub fn results_from_csv(content: &[u8], path: &Path) -> Result<Vec<ResultRow>, IoError> {
+    parse_within(&ReadLimits::DEFAULT, content, path)
+}
+
 impl ReadLimits {
     /// As [`read_results`], within these limits.
     ///
@@ -97,13 +106,17 @@ impl ReadLimits {
     ///
     /// As [`read_results`].
     pub fn read_results(&self, path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
-        read_within(self, path.as_ref())
+        let path = path.as_ref();
+        parse_within(self, &read_bytes(path, self.max_file_bytes)?, path)
     }
 }
 
-fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<ResultRow>, IoError> {
-    let content = read_bytes(path, limits.max_file_bytes)?;
-    let text = text_bytes(path, &content)?;
+fn parse_within(
+    limits: &ReadLimits,
+    content: &[u8],
+    path: &Path,
+) -> Result<Vec<ResultRow>, IoError> {
+    let text = text_bytes(path, content)?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
@@ -156,26 +169,41 @@ fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<ResultRow>, IoErr
 /// As [`write_atomically`].
 pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), IoError> {
     write_atomically(path, |writer| {
-        writeln!(writer, "{}", COLUMNS.join(","))?;
+        writeln!(writer, "{}", ResultRow::header())?;
         for row in rows {
-            write!(
-                writer,
-                "{},{},{},{},",
-                row.scene_id, row.im_id, row.obj_id, row.score
-            )?;
-            write_numbers(writer, &row.rotation)?;
-            write!(writer, ",")?;
-            write_numbers(writer, &row.translation_mm)?;
-            writeln!(writer, ",{}", row.time_s.unwrap_or(-1.0))?;
+            writeln!(writer, "{row}")?;
         }
         Ok(())
     })
 }
 
-fn write_numbers(writer: &mut dyn Write, numbers: &[f64]) -> io::Result<()> {
+impl ResultRow {
+    /// The first line of a result file, without its end.
+    #[must_use]
+    pub fn header() -> String {
+        COLUMNS.join(",")
+    }
+}
+
+/// The row's line in a result file, without its end.
+impl fmt::Display for ResultRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{},{},{},{},",
+            self.scene_id, self.im_id, self.obj_id, self.score
+        )?;
+        write_numbers(f, &self.rotation)?;
+        f.write_char(',')?;
+        write_numbers(f, &self.translation_mm)?;
+        write!(f, ",{}", self.time_s.unwrap_or(-1.0))
+    }
+}
+
+fn write_numbers(f: &mut fmt::Formatter<'_>, numbers: &[f64]) -> fmt::Result {
     for (index, number) in numbers.iter().enumerate() {
         let separator = if index == 0 { "" } else { " " };
-        write!(writer, "{separator}{number}")?;
+        write!(f, "{separator}{number}")?;
     }
     Ok(())
 }

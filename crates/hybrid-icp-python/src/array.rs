@@ -1,0 +1,197 @@
+//! NumPy arrays in and out: shapes and types checked, with messages that say what was passed.
+
+use hybrid_icp::{Isometry3, Matrix3, Point3, Translation3, rotation_from_matrix};
+use numpy::ndarray::{ArrayView, Dimension};
+use numpy::{
+    AllowTypeChange, Element, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+use crate::errors::InputError;
+
+/// Translations beyond this many metres are taken for millimetres: no depth camera sees as far.
+const MAX_TRANSLATION_METERS: f64 = 100.0;
+
+/// Says what a value is: its type, and for arrays dtype and shape.
+pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
+    if let Ok(array) = value.cast::<PyUntypedArray>() {
+        format!(
+            "an array of {} with shape {}",
+            array.dtype(),
+            shape(array.shape())
+        )
+    } else {
+        let name = value.get_type().name();
+        name.map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))
+    }
+}
+
+/// A shape as NumPy writes it.
+pub(crate) fn shape(lengths: &[usize]) -> String {
+    let numbers: Vec<String> = lengths.iter().map(ToString::to_string).collect();
+    match &numbers[..] {
+        [one] => format!("({one},)"),
+        _ => format!("({})", numbers.join(", ")),
+    }
+}
+
+/// Refuses a value, saying what it is and what was expected.
+pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
+    InputError::new_err(format!(
+        "{name} is {}, expected {expected}",
+        describe(value)
+    ))
+}
+
+/// Reads anything array-like into row-major numbers. `None` in `lengths` stands for any length.
+pub(crate) fn numbers<T: Element + Copy>(
+    value: &Bound<'_, PyAny>,
+    lengths: &[Option<usize>],
+    name: &str,
+    expected: &str,
+) -> PyResult<(Vec<T>, Vec<usize>)>
+where
+    for<'a, 'py> PyArrayLikeDyn<'py, T, AllowTypeChange>: FromPyObject<'a, 'py>,
+{
+    let array = value
+        .extract::<PyArrayLikeDyn<'_, T, AllowTypeChange>>()
+        .map_err(|_| unexpected(name, value, expected))?;
+    let found = array.shape();
+    let fits = found.len() == lengths.len()
+        && found
+            .iter()
+            .zip(lengths)
+            .all(|(found, length)| length.is_none_or(|length| length == *found));
+    if !fits {
+        let what = if value.cast::<PyUntypedArray>().is_ok() {
+            describe(value)
+        } else {
+            format!("{} of shape {}", describe(value), shape(found))
+        };
+        return Err(InputError::new_err(format!(
+            "{name} is {what}, expected {expected}"
+        )));
+    }
+    let numbers = row_major(&array.as_array());
+    Ok((numbers, found.to_vec()))
+}
+
+/// Copies an array in row-major order, in one piece where it lies so. (`PyReadonlyArray::as_slice` also takes column-major ones.)
+pub(crate) fn row_major<T: Copy, D: Dimension>(array: &ArrayView<'_, T, D>) -> Vec<T> {
+    match array.as_slice() {
+        Some(contiguous) => contiguous.to_vec(),
+        None => array.iter().copied().collect(),
+    }
+}
+
+/// Reads a 6×6 matrix.
+pub(crate) fn matrix6(value: &Bound<'_, PyAny>, name: &str) -> PyResult<hybrid_icp::Matrix6<f64>> {
+    let (numbers, _) = numbers::<f64>(value, &[Some(6), Some(6)], name, "a (6, 6) float64 matrix")?;
+    Ok(hybrid_icp::Matrix6::from_row_slice(&numbers))
+}
+
+/// Reads points of shape (N, 3), metres.
+pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point3<f32>>> {
+    let expected = "an (N, 3) array of finite float32";
+    let (numbers, _) = numbers::<f32>(value, &[None, Some(3)], name, expected)?;
+    if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
+        return Err(InputError::new_err(format!(
+            "{name}[{}, {}] is {}, expected finite numbers",
+            index / 3,
+            index % 3,
+            numbers[index]
+        )));
+    }
+    Ok(numbers
+        .chunks_exact(3)
+        .map(|p| Point3::new(p[0], p[1], p[2]))
+        .collect())
+}
+
+/// A rigid motion with the numbers that stated it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion {
+    pub(crate) isometry: Isometry3<f64>,
+    pub(crate) matrix: [f64; 16],
+}
+
+/// Reads a rigid motion from a 4×4 matrix, metres.
+pub(crate) fn motion(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Motion> {
+    let expected = "a (4, 4) float64 matrix [R t; 0 0 0 1], metres";
+    let (numbers, _) = numbers::<f64>(value, &[Some(4), Some(4)], name, expected)?;
+    rigid(&numbers, name)
+}
+
+/// Reads rigid motions from an array of shape (N, 4, 4), metres.
+pub(crate) fn motions(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Motion>> {
+    let expected = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], metres";
+    let (numbers, _) = numbers::<f64>(value, &[None, Some(4), Some(4)], name, expected)?;
+    (0..)
+        .zip(numbers.chunks_exact(16))
+        .map(|(index, matrix): (usize, _)| rigid(matrix, &format!("{name}[{index}]")))
+        .collect()
+}
+
+/// Reads a rigid motion from sixteen row-major numbers.
+pub(crate) fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
+    let mut matrix = [0.0; 16];
+    matrix.copy_from_slice(numbers);
+    for (column, expected) in [0.0, 0.0, 0.0, 1.0].into_iter().enumerate() {
+        let found = matrix[12 + column];
+        if found.is_nan() || (found - expected).abs() > 1e-9 {
+            return Err(InputError::new_err(format!(
+                "{name}[3, {column}] is {found}, expected {expected}: the last row of a pose is 0 0 0 1"
+            )));
+        }
+    }
+    let translation = [matrix[3], matrix[7], matrix[11]];
+    let [x, y, z] = translation;
+    if translation.iter().any(|t| !t.is_finite()) {
+        return Err(InputError::new_err(format!(
+            "{name} has the translation ({x}, {y}, {z}), expected finite numbers in metres"
+        )));
+    }
+    if translation.iter().any(|t| t.abs() > MAX_TRANSLATION_METERS) {
+        return Err(InputError::new_err(format!(
+            "{name} looks like millimetres: its translation is ({x}, {y}, {z}), expected metres within ±{MAX_TRANSLATION_METERS}"
+        )));
+    }
+    let entries = Matrix3::from_fn(|row, column| matrix[4 * row + column]);
+    let rotation = rotation_from_matrix(&entries)
+        .map_err(|error| InputError::new_err(format!("{name}: {error}")))?;
+    Ok(Motion {
+        isometry: Isometry3::from_parts(Translation3::new(x, y, z), rotation),
+        matrix,
+    })
+}
+
+/// A rigid motion as a row-major 4×4 matrix.
+pub(crate) fn to_matrix(motion: &Isometry3<f64>) -> [f64; 16] {
+    let rotation = motion.rotation.to_rotation_matrix().into_inner();
+    let translation = &motion.translation.vector;
+    std::array::from_fn(|i| match (i / 4, i % 4) {
+        (3, 3) => 1.0,
+        (3, _) => 0.0,
+        (row, 3) => translation[row],
+        (row, column) => rotation[(row, column)],
+    })
+}
+
+/// Makes a matrix of row-major numbers.
+pub(crate) fn matrix<'py, T: Element>(
+    py: Python<'py>,
+    columns: usize,
+    numbers: Vec<T>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = numbers.len() / columns.max(1);
+    PyArray1::from_vec(py, numbers).reshape([rows, columns])
+}
+
+/// Makes a 6×6 matrix.
+pub(crate) fn from_matrix6<'py>(
+    py: Python<'py>,
+    value: &hybrid_icp::Matrix6<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    matrix(py, 6, value.transpose().as_slice().to_vec())
+}

@@ -1,0 +1,164 @@
+//! `Camera`.
+
+use hybrid_icp::{Matrix3, PinholeCamera, PixelCenters};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::array;
+use crate::errors::{self, InputError};
+
+/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV frame).
+///
+/// A point (x, y, z) in metres is seen at u = fx·x/z + cx, v = fy·y/z + cy.
+///
+/// Parameters
+/// ----------
+/// fx, fy : float
+///     Focal lengths, pixels.
+/// cx, cy : float
+///     Principal point, pixels.
+/// width, height : int
+///     Size of the image, pixels.
+/// pixel_centers : {"integers", "halves"}, optional
+///     Where the calibration puts the centre of the first pixel: at (0, 0), as OpenCV and BOP do, or at (½, ½), as OpenGL and
+///     BlenderProc do.
+///
+/// Examples
+/// --------
+/// >>> from hybrid_icp import Camera
+/// >>> Camera(572.4, 573.6, 325.3, 242.0, 640, 480)
+/// Camera(fx=572.4, fy=573.6, cx=325.3, cy=242, width=640, height=480)
+#[pyclass(frozen, eq, module = "hybrid_icp", name = "Camera", from_py_object)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PyCamera(pub(crate) PinholeCamera);
+
+#[pymethods]
+impl PyCamera {
+    #[new]
+    #[pyo3(signature = (fx, fy, cx, cy, width, height, *, pixel_centers = "integers"))]
+    #[allow(clippy::too_many_arguments)] // A camera has six numbers.
+    fn new(
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
+        pixel_centers: &str,
+    ) -> PyResult<Self> {
+        let centers = match pixel_centers {
+            "integers" => PixelCenters::AtIntegers,
+            "halves" => PixelCenters::AtHalves,
+            other => {
+                return Err(InputError::new_err(format!(
+                    "pixel_centers is {other:?}, expected \"integers\" or \"halves\""
+                )));
+            }
+        };
+        PinholeCamera::with_pixel_centers(centers, fx, fy, cx, cy, width, height)
+            .map(Self)
+            .map_err(errors::input)
+    }
+
+    /// Makes a camera from a calibration matrix.
+    ///
+    /// Parameters
+    /// ----------
+    /// K : array_like, shape (3, 3)
+    ///     [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, pixel centres at integers.
+    /// size : (int, int)
+    ///     Width and height of the image, pixels.
+    ///
+    /// Returns
+    /// -------
+    /// Camera
+    ///
+    /// Examples
+    /// --------
+    /// >>> from hybrid_icp import Camera
+    /// >>> Camera.from_K([[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]], (640, 480)).fx
+    /// 600.0
+    #[staticmethod]
+    #[pyo3(name = "from_K")]
+    #[allow(non_snake_case)]
+    fn from_k(K: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Self> {
+        let expected = "a (3, 3) matrix [fx 0 cx; 0 fy cy; 0 0 1], pixels";
+        let (numbers, _) = array::numbers::<f64>(K, &[Some(3), Some(3)], "K", expected)?;
+        PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size.0, size.1)
+            .map(Self)
+            .map_err(errors::input)
+    }
+
+    /// Horizontal focal length, pixels.
+    #[getter]
+    fn fx(&self) -> f64 {
+        self.0.fx()
+    }
+
+    /// Vertical focal length, pixels.
+    #[getter]
+    fn fy(&self) -> f64 {
+        self.0.fy()
+    }
+
+    /// Column of the principal point, pixels, centres at integers.
+    #[getter]
+    fn cx(&self) -> f64 {
+        self.0.cx()
+    }
+
+    /// Row of the principal point, pixels, centres at integers.
+    #[getter]
+    fn cy(&self) -> f64 {
+        self.0.cy()
+    }
+
+    /// Image width, pixels.
+    #[getter]
+    fn width(&self) -> u32 {
+        self.0.width()
+    }
+
+    /// Image height, pixels.
+    #[getter]
+    fn height(&self) -> u32 {
+        self.0.height()
+    }
+
+    /// The calibration matrix, shape (3, 3), float64, pixels.
+    #[getter(K)]
+    fn matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let camera = &self.0;
+        let rows = [
+            [camera.fx(), 0.0, camera.cx()],
+            [0.0, camera.fy(), camera.cy()],
+            [0.0, 0.0, 1.0],
+        ];
+        array::matrix(py, 3, rows.concat())
+    }
+
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64, u32, u32) {
+        let camera = &self.0;
+        (
+            camera.fx(),
+            camera.fy(),
+            camera.cx(),
+            camera.cy(),
+            camera.width(),
+            camera.height(),
+        )
+    }
+
+    fn __repr__(&self) -> String {
+        let camera = &self.0;
+        format!(
+            "Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})",
+            camera.fx(),
+            camera.fy(),
+            camera.cx(),
+            camera.cy(),
+            camera.width(),
+            camera.height()
+        )
+    }
+}

@@ -1,0 +1,308 @@
+//! Fusing pose estimates.
+
+use std::sync::{Mutex, PoisonError};
+
+use hybrid_icp::fusion::{
+    BoxedFuser, CameraMotion, Fuser as _, FuserConfig, FusionLimits, FusionMethod, Gate, Gated,
+    PoseEstimate, SymmetryAware, Transport, UnitCovariance, Update,
+};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::array;
+use crate::errors::{self, InputError};
+use crate::model::PyModel;
+use crate::result::pose;
+
+/// An estimate of an object's pose with its covariance and, where known, its MVE.
+///
+/// Parameters
+/// ----------
+/// T_co : array_like, shape (4, 4)
+///     Camera from object, metres.
+/// covariance : array_like, shape (6, 6)
+///     Of ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera frame; may be singular.
+/// mve : float, optional
+///     Mean VSD estimate, 0 to 1.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from hybrid_icp import PoseEstimate
+/// >>> PoseEstimate(np.eye(4), np.eye(6) * 1e-4, mve=0.1).mve
+/// 0.1
+#[pyclass(frozen, module = "hybrid_icp", name = "PoseEstimate", from_py_object)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PyPoseEstimate(pub(crate) PoseEstimate);
+
+#[pymethods]
+#[allow(non_snake_case)]
+impl PyPoseEstimate {
+    #[new]
+    #[pyo3(signature = (T_co, covariance, *, mve = None))]
+    fn new(
+        T_co: &Bound<'_, PyAny>,
+        covariance: &Bound<'_, PyAny>,
+        mve: Option<f64>,
+    ) -> PyResult<Self> {
+        let motion = array::motion(T_co, "T_co")?.isometry;
+        let covariance = array::matrix6(covariance, "covariance")?;
+        let estimate = PoseEstimate::new(motion, covariance).map_err(errors::input)?;
+        let estimate = match mve {
+            Some(mve) => estimate.with_mve(mve).map_err(errors::input)?,
+            None => estimate,
+        };
+        Ok(Self(estimate))
+    }
+
+    /// The pose, camera from object, shape (4, 4), float64, metres.
+    #[getter]
+    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        pose(py, self.0.camera_from_object())
+    }
+
+    /// The covariance of ξ = [ρ; φ], shape (6, 6), float64, m², m·rad and rad².
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_matrix6(py, self.0.covariance())
+    }
+
+    /// The mean VSD estimate, where known.
+    #[getter]
+    fn mve(&self) -> Option<f64> {
+        self.0.mve()
+    }
+
+    /// Squared Mahalanobis distance of two independent estimates of one pose: χ² with 6 degrees of freedom if both covariances are
+    /// right and small.
+    ///
+    /// Parameters
+    /// ----------
+    /// other : PoseEstimate
+    ///
+    /// Returns
+    /// -------
+    /// float
+    fn mahalanobis_squared(&self, other: &Self) -> f64 {
+        self.0.mahalanobis_squared(&other.0)
+    }
+
+    fn __repr__(&self) -> String {
+        let t = &self.0.camera_from_object().translation.vector;
+        format!("PoseEstimate(t = ({:.4}, {:.4}, {:.4}) m)", t.x, t.y, t.z)
+    }
+}
+
+/// Fuses estimates of one pose, in one camera frame (Barfoot & Furgale 2014).
+///
+/// Parameters
+/// ----------
+/// estimates : sequence of PoseEstimate
+///     One or more.
+///
+/// Returns
+/// -------
+/// PoseEstimate
+///
+/// Examples
+/// --------
+/// Two cameras disagree by 2 mm; the second is half as sure (twice the standard deviation):
+///
+/// >>> import numpy as np
+/// >>> from hybrid_icp import PoseEstimate, fuse
+/// >>> other = np.eye(4); other[2, 3] = 0.002
+/// >>> fused = fuse([PoseEstimate(np.eye(4), np.eye(6) * 1e-6), PoseEstimate(other, np.eye(6) * 4e-6)])
+/// >>> round(float(fused.T_co[2, 3]), 9)
+/// 0.0004
+#[pyfunction]
+pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
+    let estimates: Vec<PoseEstimate> = estimates.iter().map(|estimate| estimate.0).collect();
+    let fused = hybrid_icp::fusion::fuse(&estimates, FusionLimits::default());
+    let fused = fused.map_err(errors::input)?;
+    PoseEstimate::new(fused.camera_from_object, fused.covariance)
+        .map(PyPoseEstimate)
+        .map_err(errors::input)
+}
+
+/// Turns the estimates that come in while the camera moves into one, in the current camera frame (§V of the paper).
+///
+/// Parameters
+/// ----------
+/// method : str
+///     One of `Fuser.methods()`.
+/// model : Model, optional
+///     With it one unit of uncertainty is the object's radius and 1 rad about its centre, and symmetric poses are brought
+///     together; without, it is 1 m and 1 rad about the camera.
+/// max_mve, max_mahalanobis_squared : float, optional
+///     Estimates beyond are left out.
+/// restart_after : int, optional
+///     Consecutive estimates too far from what is held after which that is forgotten.
+/// window : int, optional
+///     The most estimates that "average" and "weighted-average" hold, the newest.
+/// transport : {"adjoint", "kept"}, optional
+///     Whether covariances move along with the camera, or stay as they are.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from hybrid_icp import Fuser, PoseEstimate
+/// >>> fuser = Fuser("average")
+/// >>> fuser.update(PoseEstimate(np.eye(4), np.eye(6) * 1e-4))
+/// 'accepted'
+/// >>> advance = np.eye(4); advance[2, 3] = -0.1
+/// >>> fuser.propagate(advance)
+/// >>> float(fuser.estimate.T_co[2, 3])
+/// -0.1
+#[pyclass(frozen, module = "hybrid_icp", name = "Fuser")]
+pub(crate) struct PyFuser {
+    method: FusionMethod,
+    fuser: Mutex<BoxedFuser>,
+}
+
+#[pymethods]
+#[allow(non_snake_case)]
+impl PyFuser {
+    #[new]
+    #[pyo3(signature = (method, *, model = None, max_mve = None, max_mahalanobis_squared = None, restart_after = None, window = None, transport = "adjoint"))]
+    fn new(
+        method: &str,
+        model: Option<&Bound<'_, PyModel>>,
+        max_mve: Option<f64>,
+        max_mahalanobis_squared: Option<f64>,
+        restart_after: Option<usize>,
+        window: Option<usize>,
+        transport: &str,
+    ) -> PyResult<Self> {
+        let method: FusionMethod = method.parse().map_err(errors::input)?;
+        let model = model.map(|model| &model.get().model);
+        let config = FuserConfig {
+            transport: match transport {
+                "adjoint" => Transport::Adjoint,
+                "kept" => Transport::Kept,
+                other => {
+                    return Err(InputError::new_err(format!(
+                        "transport is {other:?}, expected \"adjoint\" or \"kept\""
+                    )));
+                }
+            },
+            unit: match model {
+                Some(model) => UnitCovariance::about_object(model.center(), model.radius())
+                    .map_err(errors::input)?,
+                None => UnitCovariance::Identity,
+            },
+            window,
+            ..FuserConfig::default()
+        };
+        let gate = Gate {
+            max_mve,
+            max_mahalanobis_squared,
+            restart_after,
+        };
+        let mut fuser = method.build(config);
+        if max_mve.is_some() || max_mahalanobis_squared.is_some() {
+            fuser = Box::new(Gated::new(fuser, gate).map_err(errors::input)?);
+        }
+        if let Some(model) = model {
+            let symmetries = model.symmetries().clone();
+            let aware = SymmetryAware::new(fuser, symmetries, model.center(), model.radius());
+            fuser = Box::new(aware.map_err(errors::input)?);
+        }
+        Ok(Self {
+            method,
+            fuser: Mutex::new(fuser),
+        })
+    }
+
+    /// Names of the methods, in the paper's order.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    #[staticmethod]
+    fn methods() -> Vec<&'static str> {
+        FusionMethod::ALL.map(FusionMethod::name).to_vec()
+    }
+
+    /// Takes what is held to the next camera frame.
+    ///
+    /// Parameters
+    /// ----------
+    /// T_nc : array_like, shape (4, 4)
+    ///     Next camera from camera, metres.
+    /// covariance : array_like, shape (6, 6), optional
+    ///     Of a left perturbation in the next camera frame, where the motion is not known exactly.
+    #[pyo3(signature = (T_nc, covariance = None))]
+    fn propagate(
+        &self,
+        T_nc: &Bound<'_, PyAny>,
+        covariance: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        self.locked().propagate(&motion(Some(T_nc), covariance)?);
+        Ok(())
+    }
+
+    /// Takes in an estimate in the current camera frame.
+    ///
+    /// Parameters
+    /// ----------
+    /// estimate : PoseEstimate
+    ///
+    /// Returns
+    /// -------
+    /// str
+    ///     "accepted"; "provisional" when it failed the gate but there is nothing else; "rejected"; or "restarted".
+    fn update(&self, estimate: &PyPoseEstimate) -> &'static str {
+        name(&self.locked().update(&estimate.0))
+    }
+
+    /// The fused estimate in the current camera frame; None before the first.
+    #[getter]
+    fn estimate(&self) -> Option<PyPoseEstimate> {
+        self.locked().estimate().map(PyPoseEstimate)
+    }
+
+    /// Forgets everything.
+    fn reset(&self) {
+        self.locked().reset();
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Fuser('{}')", self.method)
+    }
+}
+
+impl PyFuser {
+    fn locked(&self) -> std::sync::MutexGuard<'_, BoxedFuser> {
+        self.fuser.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Reads a motion of the camera; `None` is a camera that stands still.
+#[allow(non_snake_case)]
+pub(crate) fn motion(
+    T_nc: Option<&Bound<'_, PyAny>>,
+    covariance: Option<&Bound<'_, PyAny>>,
+) -> PyResult<CameraMotion> {
+    let motion = match T_nc {
+        Some(value) => CameraMotion::new(array::motion(value, "T_nc")?.isometry),
+        None => Ok(CameraMotion::none()),
+    };
+    let motion = motion.map_err(errors::input)?;
+    match covariance {
+        Some(value) => motion
+            .with_covariance(&array::matrix6(value, "covariance")?)
+            .map_err(errors::input),
+        None => Ok(motion),
+    }
+}
+
+/// Name of what became of an estimate.
+pub(crate) fn name(update: &Update) -> &'static str {
+    match update {
+        Update::Accepted(_) => "accepted",
+        Update::Provisional(..) => "provisional",
+        Update::Rejected(_) => "rejected",
+        Update::Restarted(..) => "restarted",
+        _ => "other",
+    }
+}

@@ -1,0 +1,65 @@
+//! The Python module `hybrid_icp`: refine 6D object poses in depth images from NumPy arrays.
+//!
+//! **Should you use this crate?** From Python, through the wheel that `cargo xtask wheel` builds. Rust programs depend on `hybrid-icp`,
+//! which this crate only translates: arrays are checked and read, the GIL is released, and results are the same bits.
+//!
+//! ```python
+//! from hybrid_icp import Camera, Model, Observation, Pipeline
+//!
+//! model = Model.from_file("mug.ply", unit="mm")
+//! observation = Observation(depth_m, mask, Camera.from_K(K, (640, 480)))
+//! result = Pipeline.preset("hybrid").refine(model, observation, T_co)
+//! ```
+//!
+//! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has the types, and a test holds the two together.
+//!
+//! Modules in reading order, by file: `errors`, `array` (numbers in and out), `camera`, `model`, `depth` and `observation`, `pipeline` (with
+//! `batch` and `observer`), `result` and `events`, `score`, `step`, `fusion`, `sequential`, `image`, `bop`.
+
+mod array;
+mod batch;
+mod bop;
+mod camera;
+mod depth;
+mod errors;
+mod events;
+mod fusion;
+mod image;
+mod model;
+mod observation;
+mod observer;
+mod pipeline;
+mod result;
+mod score;
+mod sequential;
+mod step;
+
+/// What Python imports; the package re-exports it.
+#[pyo3::pymodule]
+#[pyo3(name = "_native")]
+mod native {
+    #[pymodule_export]
+    use crate::bop::{PyDatasetRefiner, read_images, result_header};
+    #[pymodule_export]
+    use crate::camera::PyCamera;
+    #[pymodule_export]
+    use crate::events::{PyIterationEvent, PyRegimeEvent, PyStageEvent};
+    #[pymodule_export]
+    use crate::fusion::{PyFuser, PyPoseEstimate, fuse};
+    #[pymodule_export]
+    use crate::image::{read_depth_png, read_mask_png};
+    #[pymodule_export]
+    use crate::model::PyModel;
+    #[pymodule_export]
+    use crate::observation::PyObservation;
+    #[pymodule_export]
+    use crate::pipeline::PyPipeline;
+    #[pymodule_export]
+    use crate::result::PyResultOf;
+    #[pymodule_export]
+    use crate::score::{add, adi, mspd, mssd, mve, render_depth, vsd};
+    #[pymodule_export]
+    use crate::sequential::{PySequentialEstimator, PySequentialStep};
+    #[pymodule_export]
+    use crate::step::{point_to_plane_step, point_to_point_step};
+}

@@ -1,0 +1,398 @@
+//! `Pipeline`.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner};
+use pyo3::prelude::*;
+
+use crate::array::{self, Motion};
+use crate::batch;
+use crate::errors::{self, InputError};
+use crate::model::PyModel;
+use crate::observation::PyObservation;
+use crate::observer::Watch;
+use crate::result::PyResultOf;
+
+/// How many times nearer or further than the pose says the measured surface may be before it is doubted.
+const DEPTH_RATIO: f64 = 3.0;
+
+/// A refinement pipeline: Hybrid ICP, one of the classical variants that it was compared with, or your own from a TOML file.
+///
+/// Made by `Pipeline.preset` or `Pipeline.from_toml`. It keeps scratch memory from call to call and may be shared by threads.
+///
+/// Examples
+/// --------
+/// >>> from hybrid_icp import Pipeline
+/// >>> Pipeline.preset("hybrid")
+/// Pipeline('hybrid')
+/// >>> Pipeline.preset("hybrid", overrides=["times=1"]).name
+/// 'hybrid times=1'
+#[pyclass(frozen, module = "hybrid_icp", name = "Pipeline")]
+#[derive(Debug)]
+pub(crate) struct PyPipeline {
+    name: String,
+    origin: String,
+    made_of: MadeOf,
+    toml: String,
+    overrides: Vec<String>,
+    /// Those not in use, warm.
+    refiners: Mutex<Vec<Refiner>>,
+}
+
+/// What restores a pipeline, and what it takes: origin, text and overrides.
+type Pickled = (Py<PyAny>, (String, String, Vec<String>));
+
+#[derive(Clone, Debug)]
+enum MadeOf {
+    Preset(Preset),
+    File(PipelineFile),
+}
+
+#[pymethods]
+#[allow(non_snake_case)]
+impl PyPipeline {
+    /// Makes a pipeline by name.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     One of `Pipeline.presets()`; "hybrid" is Hybrid ICP.
+    /// overrides : sequence of str, optional
+    ///     Fields to set, such as "times=3" or "stage.switcher.alpha=0.5".
+    ///
+    /// Returns
+    /// -------
+    /// Pipeline
+    #[staticmethod]
+    #[pyo3(signature = (name, *, overrides = Vec::new()))]
+    fn preset(name: &str, overrides: Vec<String>) -> PyResult<Self> {
+        let preset: Preset = name.parse().map_err(errors::input)?;
+        if overrides.is_empty() {
+            let made_of = MadeOf::Preset(preset);
+            return Ok(Self::new(
+                name,
+                made_of,
+                preset.toml().to_owned(),
+                overrides,
+            ));
+        }
+        Self::parse(name, preset.toml().to_owned(), overrides)
+    }
+
+    /// Makes a pipeline from a TOML file or its text.
+    ///
+    /// Parameters
+    /// ----------
+    /// text_or_path : str or os.PathLike
+    ///     A path object, a string that ends with ".toml", or the text itself.
+    /// overrides : sequence of str, optional
+    ///     Fields to set, as for `preset`.
+    ///
+    /// Returns
+    /// -------
+    /// Pipeline
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     Naming the line and field, what is there, and what would be right.
+    /// FileError
+    ///     When the file cannot be read.
+    ///
+    /// Examples
+    /// --------
+    /// >>> from hybrid_icp import Pipeline
+    /// >>> Pipeline.from_toml('''
+    /// ... type = "icp"
+    /// ... selection = "visible-surface"
+    /// ... association = "projective"
+    /// ... metric = "point-to-plane"
+    /// ... ''')
+    /// Pipeline('text')
+    #[staticmethod]
+    #[pyo3(signature = (text_or_path, *, overrides = Vec::new()))]
+    fn from_toml(text_or_path: &Bound<'_, PyAny>, overrides: Vec<String>) -> PyResult<Self> {
+        let path = match text_or_path.extract::<String>() {
+            Ok(text) if !text.trim_end().ends_with(".toml") || text.contains('\n') => {
+                return Self::parse("text", text, overrides);
+            }
+            Ok(path) => PathBuf::from(path),
+            Err(_) => text_or_path.extract::<PathBuf>().map_err(|_| {
+                array::unexpected(
+                    "text_or_path",
+                    text_or_path,
+                    "the text of a pipeline file or its path",
+                )
+            })?,
+        };
+        let text = PipelineFile::read_text(&path).map_err(errors::file)?;
+        Self::parse(&path.to_string_lossy(), text, overrides)
+    }
+
+    /// Names of the pipelines that ship with the library, Hybrid ICP first.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    #[staticmethod]
+    fn presets() -> Vec<&'static str> {
+        Preset::ALL.map(Preset::name).to_vec()
+    }
+
+    /// Name in reports: that of the preset or file, and the overrides.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The pipeline as a file, before the overrides.
+    #[getter]
+    fn toml(&self) -> &str {
+        &self.toml
+    }
+
+    /// Refines a pose.
+    ///
+    /// Deterministic, and never fails on data: no overlap, degenerate geometry and the like end with a result that says so.
+    /// The GIL is released.
+    ///
+    /// Parameters
+    /// ----------
+    /// model : Model
+    ///     The object.
+    /// observation : Observation
+    ///     The image.
+    /// T_co : array_like, shape (4, 4)
+    ///     The rough pose, camera from object, metres.
+    /// observer : callable or object, optional
+    ///     A callable gets an `IterationEvent` per iteration; an object is told by those of its methods `on_iteration`, `on_regime`
+    ///     and `on_stage_end` that it has. `False` from any of them stops the run at the pose last evaluated; an exception stops it
+    ///     and is raised.
+    ///
+    /// Returns
+    /// -------
+    /// Result
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     When the pose is no rigid motion in metres.
+    ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     When pose and image do not go together: the object behind the camera, or at a third or three times of the depth measured.
+    ///
+    /// Examples
+    /// --------
+    /// A plate half a metre in front of the camera, and a detector that is four centimetres off:
+    ///
+    /// >>> import numpy as np
+    /// >>> from hybrid_icp import Camera, Model, Observation, Pipeline, render_depth
+    /// >>> model = Model([[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]], [[0, 2, 1], [0, 3, 2]])
+    /// >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
+    /// >>> true = np.eye(4); true[2, 3] = 0.5
+    /// >>> depth = render_depth(model, camera, true)
+    /// >>> observation = Observation(depth, depth > 0, camera)
+    /// >>> rough = np.eye(4); rough[2, 3] = 0.54
+    /// >>> result = Pipeline.preset("hybrid").refine(model, observation, rough)
+    /// >>> bool(abs(result.T_co[2, 3] - 0.5) < 1e-4)
+    /// True
+    #[pyo3(signature = (model, observation, T_co, observer = None))]
+    fn refine(
+        &self,
+        py: Python<'_>,
+        model: &Bound<'_, PyModel>,
+        observation: &Bound<'_, PyObservation>,
+        T_co: &Bound<'_, PyAny>,
+        observer: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyResultOf> {
+        let init = array::motion(T_co, "T_co")?;
+        let (model, observation) = (model.get(), observation.get());
+        doubt(py, model, observation, [&init].into_iter())?;
+        let mut watch = Watch::new(observer)?;
+        let mut refiner = self.take()?;
+        let refinement = py.detach(|| {
+            refiner.refine_observed(
+                &model.model,
+                &observation.observation,
+                &init.isometry,
+                &mut watch,
+            )
+        });
+        self.put_back([refiner]);
+        Ok(PyResultOf::new(&init, refinement, watch.finish()?.stages))
+    }
+
+    /// Refines many poses of one object in one image, on several threads.
+    ///
+    /// Same bits as `refine` for each, whatever the number of threads. The GIL is released; Ctrl-C ends it.
+    ///
+    /// Parameters
+    /// ----------
+    /// model : Model
+    /// observation : Observation
+    /// T_co : array_like, shape (N, 4, 4)
+    ///     The rough poses, camera from object, metres.
+    /// threads : int, optional
+    ///     Number of threads; as many as the machine runs at once if not given.
+    ///
+    /// Returns
+    /// -------
+    /// list of Result
+    ///     In the order of the poses.
+    ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     As `refine`, where it holds for every pose.
+    #[pyo3(signature = (model, observation, T_co, threads = None))]
+    fn refine_batch(
+        &self,
+        py: Python<'_>,
+        model: &Bound<'_, PyModel>,
+        observation: &Bound<'_, PyObservation>,
+        T_co: &Bound<'_, PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<Vec<PyResultOf>> {
+        let inits = array::motions(T_co, "T_co")?;
+        let threads = match threads {
+            Some(0) => return Err(InputError::new_err("threads is 0, expected 1 or more")),
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        };
+        let (model, observation) = (model.get(), observation.get());
+        doubt(py, model, observation, inits.iter())?;
+        let poses: Vec<Isometry3<f64>> = inits.iter().map(|init| init.isometry).collect();
+        let mut refiners = (0..threads.min(poses.len()))
+            .map(|_| self.take())
+            .collect::<PyResult<Vec<_>>>()?;
+        let refined = py.detach(|| {
+            batch::run(
+                &model.model,
+                &observation.observation,
+                &poses,
+                &mut refiners,
+            )
+        });
+        self.put_back(refiners);
+        let results = inits.iter().zip(refined?);
+        Ok(results
+            .map(|(init, (refinement, stages))| PyResultOf::new(init, refinement, stages))
+            .collect())
+    }
+
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Pickled> {
+        let this = slf.get();
+        let maker = slf.get_type().getattr("_restore")?.unbind();
+        Ok((
+            maker,
+            (
+                this.origin.clone(),
+                this.toml.clone(),
+                this.overrides.clone(),
+            ),
+        ))
+    }
+
+    /// Makes a pipeline again from what it was pickled as.
+    #[staticmethod]
+    fn _restore(origin: &str, toml: String, overrides: Vec<String>) -> PyResult<Self> {
+        match origin.parse::<Preset>() {
+            Ok(preset) if overrides.is_empty() && preset.toml() == toml => {
+                Self::preset(origin, overrides)
+            }
+            _ => Self::parse(origin, toml, overrides),
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Pipeline('{}')", self.name)
+    }
+}
+
+impl PyPipeline {
+    fn new(origin: &str, made_of: MadeOf, toml: String, overrides: Vec<String>) -> Self {
+        let words = std::iter::once(origin).chain(overrides.iter().map(String::as_str));
+        Self {
+            name: words.collect::<Vec<_>>().join(" "),
+            origin: origin.to_owned(),
+            made_of,
+            toml,
+            overrides,
+            refiners: Mutex::default(),
+        }
+    }
+
+    /// Parses a pipeline, applies the overrides, and makes sure that it builds.
+    fn parse(origin: &str, toml: String, overrides: Vec<String>) -> PyResult<Self> {
+        let mut file = PipelineFile::parse(&toml, origin).map_err(errors::input)?;
+        for assignment in &overrides {
+            file.set(assignment).map_err(errors::input)?;
+        }
+        file.build().map_err(errors::input)?;
+        Ok(Self::new(origin, MadeOf::File(file), toml, overrides))
+    }
+
+    /// Builds the pipeline anew.
+    pub(crate) fn build(&self) -> PyResult<hybrid_icp::BoxedStage> {
+        match &self.made_of {
+            MadeOf::Preset(preset) => Ok(preset.build()),
+            MadeOf::File(file) => file.build().map_err(errors::input),
+        }
+    }
+
+    /// Takes a refiner that is not in use, or makes one.
+    fn take(&self) -> PyResult<Refiner> {
+        let mut free = self.refiners.lock().unwrap_or_else(PoisonError::into_inner);
+        match free.pop() {
+            Some(refiner) => Ok(refiner),
+            None => self.build().map(Refiner::boxed),
+        }
+    }
+
+    fn put_back(&self, refiners: impl IntoIterator<Item = Refiner>) {
+        let mut free = self.refiners.lock().unwrap_or_else(PoisonError::into_inner);
+        free.extend(refiners);
+    }
+}
+
+/// Warns where no pose goes together with the image.
+fn doubt<'a>(
+    py: Python<'_>,
+    model: &PyModel,
+    observation: &PyObservation,
+    mut inits: impl Iterator<Item = &'a Motion>,
+) -> PyResult<()> {
+    let center = model.model.center();
+    let mut first = None;
+    let fits = |distance: f64| {
+        distance > 0.0
+            && observation.median_depth.is_none_or(|depth| {
+                (distance / DEPTH_RATIO..=distance * DEPTH_RATIO).contains(&depth)
+            })
+    };
+    let any = inits.any(|init| {
+        let distance = (init.isometry * center).z;
+        first.get_or_insert(distance);
+        fits(distance)
+    });
+    match (any, first, observation.median_depth) {
+        (false, Some(distance), _) if distance <= 0.0 => errors::warn(
+            py,
+            &format!(
+                "T_co puts the object's centre at z = {distance:.4} m, behind the camera, which looks along +z: expected camera \
+                 from object, not object from camera"
+            ),
+        ),
+        (false, Some(distance), Some(depth)) => errors::warn(
+            py,
+            &format!(
+                "T_co puts the object's centre at z = {distance:.4} m, but the median depth inside the mask is {depth:.4} m: \
+                 check the units of both, expected metres"
+            ),
+        ),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,239 @@
+//! Renders, scores and pose errors.
+
+use hybrid_icp::{
+    MeanVsd, Problem, Rasterizer, RenderedView, Renderer, Score, VISIBILITY_TOLERANCE_METERS,
+    Workspace,
+};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::array;
+use crate::camera::PyCamera;
+use crate::depth;
+use crate::errors;
+use crate::model::PyModel;
+use crate::observation::PyObservation;
+
+/// Renders the depth of a model at a pose.
+///
+/// Parameters
+/// ----------
+/// model : Model
+/// camera : Camera
+/// T_co : array_like, shape (4, 4)
+///     Camera from object, metres.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (H, W), float32
+///     Depth along the optical axis, metres; 0 = nothing.
+#[pyfunction]
+#[allow(non_snake_case)]
+pub(crate) fn render_depth<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyModel>,
+    camera: PyCamera,
+    T_co: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let pose = array::motion(T_co, "T_co")?.isometry;
+    let mesh = model.get().model.mesh();
+    let image = py.detach(|| hybrid_icp::render_depth_image(mesh, &camera.0, &pose));
+    depth::image(py, image.width(), image.pixels().to_vec())
+}
+
+/// Mean VSD estimate of a pose: 0 where it explains the image everywhere, 1 nowhere. Needs no ground truth.
+///
+/// Parameters
+/// ----------
+/// model : Model
+/// observation : Observation
+/// T_co : array_like, shape (4, 4)
+///     Camera from object, metres.
+/// occlusion_tolerance : float or None, optional
+///     Rendered pixels outside the mask that something hides by more than this many metres do not count; `None` is the paper's
+///     definition, in which everything rendered counts.
+///
+/// Returns
+/// -------
+/// float
+///     The mean over τ = 5 %, …, 50 % of the diameter.
+#[pyfunction]
+#[pyo3(signature = (model, observation, T_co, *, occlusion_tolerance = VISIBILITY_TOLERANCE_METERS))]
+#[allow(non_snake_case)]
+pub(crate) fn mve(
+    py: Python<'_>,
+    model: &Bound<'_, PyModel>,
+    observation: &Bound<'_, PyObservation>,
+    T_co: &Bound<'_, PyAny>,
+    occlusion_tolerance: Option<f64>,
+) -> PyResult<f64> {
+    let pose = array::motion(T_co, "T_co")?.isometry;
+    let (model, observation) = (&model.get().model, &observation.get().observation);
+    let mut score = MeanVsd {
+        occlusion_tolerance,
+    };
+    Ok(py.detach(|| {
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let problem = Problem::new(model, observation);
+        score.score(&mut workspace.context(&problem), &pose)
+    }))
+}
+
+/// Visible surface discrepancy of BOP'19 between an estimated and a true pose.
+///
+/// Parameters
+/// ----------
+/// model : Model
+/// observation : Observation
+///     Its depth image and camera count, its mask does not.
+/// T_est, T_gt : array_like, shape (4, 4)
+///     The estimated and the true pose, camera from object, metres.
+/// delta : float, optional
+///     Visibility tolerance, metres.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (10,), float64
+///     e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 where neither render shows a visible pixel.
+#[pyfunction]
+#[pyo3(signature = (model, observation, T_est, T_gt, *, delta = VISIBILITY_TOLERANCE_METERS))]
+#[allow(non_snake_case)]
+pub(crate) fn vsd<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyModel>,
+    observation: &Bound<'py, PyObservation>,
+    T_est: &Bound<'py, PyAny>,
+    T_gt: &Bound<'py, PyAny>,
+    delta: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let estimate = array::motion(T_est, "T_est")?.isometry;
+    let truth = array::motion(T_gt, "T_gt")?.isometry;
+    let (model, observation) = (&model.get().model, &observation.get().observation);
+    let camera = observation.camera();
+    let errors = py.detach(|| {
+        let mut renderer = Rasterizer::default();
+        let mut render = |pose| {
+            let mut view = RenderedView::default();
+            renderer.render(model.mesh(), camera, pose, &camera.region(), &mut view);
+            view
+        };
+        let (estimate, truth) = (render(&estimate), render(&truth));
+        hybrid_icp::bop_vsd(
+            observation.depth(),
+            camera,
+            &estimate,
+            &truth,
+            model.diameter(),
+            delta,
+        )
+    });
+    Ok(PyArray1::from_slice(py, &errors.map_err(errors::input)?))
+}
+
+/// ADD: mean distance between corresponding model points at two poses.
+///
+/// Parameters
+/// ----------
+/// T_est, T_gt : array_like, shape (4, 4)
+///     The estimated and the true pose, camera from object, metres.
+/// model : Model
+///     Its vertices count.
+///
+/// Returns
+/// -------
+/// float
+///     Metres.
+#[pyfunction]
+#[allow(non_snake_case)]
+pub(crate) fn add(
+    T_est: &Bound<'_, PyAny>,
+    T_gt: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyModel>,
+) -> PyResult<f64> {
+    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let points = model.get().points();
+    Ok(points.add(&estimate.isometry, &truth.isometry))
+}
+
+/// ADI (ADD-S): mean distance from a model point at the true pose to the closest model point at the estimate.
+///
+/// Parameters
+/// ----------
+/// T_est, T_gt : array_like, shape (4, 4)
+///     The estimated and the true pose, camera from object, metres.
+/// model : Model
+///     Its vertices count.
+///
+/// Returns
+/// -------
+/// float
+///     Metres.
+#[pyfunction]
+#[allow(non_snake_case)]
+pub(crate) fn adi(
+    py: Python<'_>,
+    T_est: &Bound<'_, PyAny>,
+    T_gt: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyModel>,
+) -> PyResult<f64> {
+    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let model = model.get();
+    Ok(py.detach(|| model.points().adi(&estimate.isometry, &truth.isometry)))
+}
+
+/// MSSD: maximum symmetry-aware surface distance of BOP.
+///
+/// Parameters
+/// ----------
+/// T_est, T_gt : array_like, shape (4, 4)
+///     The estimated and the true pose, camera from object, metres.
+/// model : Model
+///     Its vertices and declared symmetries count.
+///
+/// Returns
+/// -------
+/// float
+///     Metres.
+#[pyfunction]
+#[allow(non_snake_case)]
+pub(crate) fn mssd(
+    py: Python<'_>,
+    T_est: &Bound<'_, PyAny>,
+    T_gt: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyModel>,
+) -> PyResult<f64> {
+    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let model = model.get();
+    Ok(py.detach(|| model.points().mssd(&estimate.isometry, &truth.isometry)))
+}
+
+/// MSPD: maximum symmetry-aware projection distance of BOP.
+///
+/// Parameters
+/// ----------
+/// T_est, T_gt : array_like, shape (4, 4)
+///     The estimated and the true pose, camera from object, metres.
+/// model : Model
+///     Its vertices and declared symmetries count.
+/// camera : Camera
+///
+/// Returns
+/// -------
+/// float
+///     Pixels; infinite when a point is not in front of the camera.
+#[pyfunction]
+#[allow(non_snake_case)]
+pub(crate) fn mspd(
+    py: Python<'_>,
+    T_est: &Bound<'_, PyAny>,
+    T_gt: &Bound<'_, PyAny>,
+    model: &Bound<'_, PyModel>,
+    camera: PyCamera,
+) -> PyResult<f64> {
+    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let model = model.get();
+    Ok(py.detach(|| {
+        let (estimate, truth) = (&estimate.isometry, &truth.isometry);
+        model.points().mspd(estimate, truth, &camera.0)
+    }))
+}

@@ -1,0 +1,141 @@
+//! Single steps of the error metrics.
+
+use hybrid_icp::{
+    Correspondences, ErrorMetric, Isometry3, Pair, Point3, PointToPlane, PointToPoint, Step,
+    Surfel, UnitVector3, Vector3,
+};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::array;
+use crate::errors::InputError;
+use crate::result::pose;
+
+/// One step of point-to-point ICP on given pairs: the rigid motion that minimises Σ|T pᵢ − cᵢ|² (Kabsch).
+///
+/// Parameters
+/// ----------
+/// sources : array_like, shape (N, 3)
+///     Model points pᵢ, moved to the camera frame; read as float32, metres.
+/// targets : array_like, shape (N, 3)
+///     Their observed points cᵢ.
+///
+/// Returns
+/// -------
+/// increment : numpy.ndarray, shape (4, 4), float64
+///     T, which multiplies the pose from the left.
+/// mean_loss : float
+///     Mean of |pᵢ − cᵢ|² before the step, m².
+///
+/// Raises
+/// ------
+/// InputError
+///     When the pairs do not determine a step.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from hybrid_icp import point_to_point_step
+/// >>> corners = np.eye(3)
+/// >>> increment, loss = point_to_point_step(corners, corners + [0, 0, 0.5])
+/// >>> np.round(increment[:3, 3], 6) + 0.0
+/// array([0. , 0. , 0.5])
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(crate) fn point_to_point_step<'py>(
+    py: Python<'py>,
+    sources: &Bound<'py, PyAny>,
+    targets: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+    let pairs = pairs(sources, targets, None)?;
+    finish(py, PointToPoint.minimize(&pairs), pairs.len())
+}
+
+/// One step of point-to-plane ICP on given pairs: Gauss–Newton on Σ(nᵢ·(T pᵢ − cᵢ))².
+///
+/// Parameters
+/// ----------
+/// sources : array_like, shape (N, 3)
+///     Model points pᵢ, moved to the camera frame; read as float32, metres.
+/// targets : array_like, shape (N, 3)
+///     Their observed points cᵢ.
+/// normals : array_like, shape (N, 3)
+///     The observed normals nᵢ; brought to unit length.
+///
+/// Returns
+/// -------
+/// increment : numpy.ndarray, shape (4, 4), float64
+///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left.
+/// mean_loss : float
+///     Mean of (nᵢ·(pᵢ − cᵢ))² before the step, m².
+///
+/// Raises
+/// ------
+/// InputError
+///     When the pairs do not determine a step.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub(crate) fn point_to_plane_step<'py>(
+    py: Python<'py>,
+    sources: &Bound<'py, PyAny>,
+    targets: &Bound<'py, PyAny>,
+    normals: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+    let pairs = pairs(sources, targets, Some(normals))?;
+    finish(py, PointToPlane.minimize(&pairs), pairs.len())
+}
+
+#[allow(clippy::type_complexity)]
+fn finish<'py>(
+    py: Python<'py>,
+    step: Option<Step>,
+    count: usize,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+    let step = step
+        .ok_or_else(|| InputError::new_err(format!("the {count} pairs do not determine a step")))?;
+    Ok((pose(py, &step.increment)?, step.mean_loss))
+}
+
+fn pairs(
+    sources: &Bound<'_, PyAny>,
+    targets: &Bound<'_, PyAny>,
+    normals: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Correspondences> {
+    let points = array::points(sources, "sources")?;
+    let target_points = array::points(targets, "targets")?;
+    let normals = match normals {
+        Some(normals) => unit_normals(normals)?,
+        // Point-to-point does not look at them.
+        None => vec![-Vector3::z_axis(); points.len()],
+    };
+    for (name, count) in [("targets", target_points.len()), ("normals", normals.len())] {
+        if count != points.len() {
+            return Err(InputError::new_err(format!(
+                "{name} has {count} rows but sources {}, expected as many",
+                points.len()
+            )));
+        }
+    }
+    let mut pairs = Correspondences::new();
+    pairs.begin(&Isometry3::identity(), points.len());
+    let rows = points.into_iter().zip(target_points).zip(normals);
+    for (index, ((source, target), normal)) in (0_u32..).zip(rows) {
+        let surfel = |point: Point3<f32>| Surfel { point, normal };
+        pairs.push(Pair::new(index, surfel(source), index, surfel(target)));
+    }
+    Ok(pairs)
+}
+
+fn unit_normals(normals: &Bound<'_, PyAny>) -> PyResult<Vec<UnitVector3<f32>>> {
+    let vectors = array::points(normals, "normals")?;
+    (0..)
+        .zip(&vectors)
+        .map(|(row, vector): (usize, _)| {
+            UnitVector3::try_new(vector.coords, f32::MIN_POSITIVE).ok_or_else(|| {
+                InputError::new_err(format!(
+                    "normals[{row}] has no direction, expected a vector of non-zero length"
+                ))
+            })
+        })
+        .collect()
+}

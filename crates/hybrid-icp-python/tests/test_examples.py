@@ -1,0 +1,37 @@
+"""The examples run as they are, and do what they say."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[1] / "examples"
+
+
+def run(name, *arguments):
+    return subprocess.run([sys.executable, FOLDER / name, *arguments], check=True, capture_output=True, text=True).stdout
+
+
+def test_one_frame_is_refined():
+    assert "ADI 5.7" in run("01_refine_one_frame.py")
+
+
+def test_a_loop_of_ones_own_improves_a_dataset(dataset, tmp_path):
+    folder, results, _ = dataset
+    said = run("02_bop_loop.py", folder, results, tmp_path / "refined.csv")
+    improved, count = int(said.split()[0]), int(said.split()[2])
+    with open(tmp_path / "refined.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == count
+    assert improved > count / 2
+
+
+def test_meshes_of_other_libraries_are_taken():
+    said = run("03_after_a_detector.py")
+    assert "trimesh: Model(1106 vertices, 2208 faces" in said or "left out: No module named 'trimesh'" in said
+
+
+@pytest.mark.parametrize("readme", [FOLDER.parent / "README.md", FOLDER.parents[2] / "README.md"])
+def test_the_examples_of_the_readmes_improve_a_pose(readme):
+    assert "Result(refined" in run("smoke.py", readme)

@@ -1,0 +1,59 @@
+"""Fusion and the sequential estimator."""
+
+import numpy as np
+import pytest
+
+import hybrid_icp as hi
+from conftest import pose
+
+
+def at(x, variance, **options):
+    return hi.PoseEstimate(pose([0, 0, 0], [x, 0, 0.5]), np.eye(6) * variance, **options)
+
+
+def test_estimates_are_weighed_by_their_information():
+    fused = hi.fuse([at(0, 1e-6), at(0.004, 3e-6)])
+    assert np.isclose(fused.T_co[0, 3], 0.001, atol=1e-9)
+    assert np.isclose(fused.covariance[0, 0], 0.75e-6, rtol=1e-6)
+    assert np.isclose(at(0, 1e-6).mahalanobis_squared(at(0.004, 3e-6)), 4.0)
+
+
+@pytest.mark.parametrize("method", hi.Fuser.methods())
+def test_every_method_follows_the_camera(method):
+    fuser = hi.Fuser(method)
+    assert fuser.estimate is None
+    assert fuser.update(at(0, 1e-6)) == "accepted"
+    fuser.propagate(pose([0, 0, 0], [0, 0, -0.1]))
+    assert np.isclose(fuser.estimate.T_co[2, 3], 0.4)
+    fuser.reset()
+    assert fuser.estimate is None
+
+
+def test_a_gate_leaves_out_what_is_far_or_does_not_explain_its_image(scene):
+    fuser = hi.Fuser("average", model=scene.model, max_mve=0.4, max_mahalanobis_squared=20, restart_after=2)
+    assert fuser.update(at(0, 1e-6, mve=0.1)) == "accepted"
+    assert fuser.update(at(0, 1e-6, mve=0.9)) == "rejected"
+    assert fuser.update(at(0.3, 1e-6, mve=0.1)) == "rejected"
+    assert fuser.update(at(0.3, 1e-6, mve=0.1)) == "restarted"
+
+
+@pytest.mark.parametrize("paper", [False, True])
+def test_the_sequential_estimator_follows_a_moving_camera(scene, paper):
+    pipeline = hi.Pipeline.preset("hybrid")
+    estimator = hi.SequentialEstimator(pipeline, "weighted-average", scene.model, scene.rough, paper=paper)
+    assert np.allclose(estimator.T_co, scene.rough) and estimator.estimate is None
+    motion = pose([0.02, 0.01, 0.0], [0.005, 0.0, -0.01])
+    true, step = scene.true, None
+    for frame in range(3):
+        if frame:
+            true = motion @ true
+        depth = hi.render_depth(scene.model, scene.camera, true)
+        observation = hi.Observation(depth, depth > 0, scene.camera)
+        step = estimator.step(observation, motion if frame else None)
+    assert step.event == "accepted" and step.mve < 0.1
+    assert hi.add(step.T_co, true, scene.model) < 0.002
+    assert np.array_equal(step.T_co, estimator.T_co) and step.covariance.shape == (6, 6)
+    nothing = hi.Observation(np.zeros((240, 320), np.float32), None, scene.camera)
+    assert estimator.step(nothing).event == "no_estimate"
+    estimator.restart(scene.rough)
+    assert estimator.estimate is None

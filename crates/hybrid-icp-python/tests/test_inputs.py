@@ -1,0 +1,138 @@
+"""What is refused, and what it is told."""
+
+import numpy as np
+import pytest
+
+import hybrid_icp as hi
+from conftest import lumpy, pose
+
+CAMERA = hi.Camera(100, 100, 31.5, 23.5, 64, 48)
+WALL = np.full((48, 64), 0.8, np.float32)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "scale", "message"),
+    [
+        ((WALL * 1000, None, CAMERA), None, "depth looks like millimetres: median 800, expected metres"),
+        ((WALL / 1000, None, CAMERA), None, "depth looks too small for metres: median 8[.0-9]*e-4"),
+        ((WALL.astype(np.uint16), None, CAMERA), None, r"depth is an array of uint16 with shape \(48, 64\) without scale="),
+        ((WALL, None, CAMERA), 0.001, r"scale=0.001 was passed with depth as an array of float32"),
+        ((WALL.astype(np.uint16), None, CAMERA), -1.0, "scale is -1, expected metres per unit above 0"),
+        ((WALL.astype(np.int32), None, CAMERA), None, "depth is an array of int32 .* expected an .H, W. array of float32 metres"),
+        ((WALL[None], None, CAMERA), None, r"depth is an array of float32 with shape \(1, 48, 64\)"),
+        ((WALL.tolist(), None, CAMERA), None, "depth is a list, expected"),
+        ((WALL.T, None, CAMERA), None, r"camera is for 64x48 images but depth is .* shape \(64, 48\), expected shape \(48, 64\)"),
+        ((WALL, np.ones((64, 48), bool), CAMERA), None, r"mask is .* shape \(64, 48\), expected the shape of depth, \(48, 64\)"),
+        ((WALL, WALL, CAMERA), None, "mask is an array of float32 .* expected an .H, W. array of bool or uint8"),
+    ],
+)
+def test_observations_say_what_was_passed(arguments, scale, message):
+    with pytest.raises(hi.InputError, match=message):
+        hi.Observation(*arguments, scale=scale)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (np.eye(3), r"T_co is an array of float64 with shape \(3, 3\), expected a \(4, 4\) float64 matrix"),
+        ("pose", "T_co is a str, expected"),
+        ([[1, 2]], r"T_co is a list of shape \(1, 2\), expected"),
+        (np.eye(4) * 2, "last row of a pose is 0 0 0 1"),
+        (np.diag([1, 1, -1, 1.0]), "T_co: rotation has determinant -1"),
+        (np.diag([1, 1.1, 1, 1.0]), "T_co: rotation is not orthogonal"),
+        (pose([0, 0, 0], [3, 4, 800]), "T_co looks like millimetres: its translation is \\(3, 4, 800\\)"),
+        (pose([0, 0, 0], [np.nan, 0, 1]), "T_co has the translation \\(NaN, 0, 1\\)"),
+    ],
+)
+def test_poses_say_what_was_passed(scene, value, message):
+    with pytest.raises(hi.InputError, match=message):
+        hi.Pipeline.preset("hybrid").refine(scene.model, scene.observation, value)
+
+
+def test_a_batch_names_the_pose_that_is_wrong(scene):
+    poses = np.array([scene.rough, scene.rough * 2])
+    with pytest.raises(hi.InputError, match=r"T_co\[1\]\[3, 3\] is 2, expected 1"):
+        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, poses)
+    with pytest.raises(hi.InputError, match=r"shape \(4, 4\), expected an \(N, 4, 4\)"):
+        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, scene.rough)
+    with pytest.raises(hi.InputError, match="threads is 0"):
+        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, poses[:1], threads=0)
+
+
+def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
+    pipeline = hi.Pipeline.preset("hybrid")
+    with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
+        pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, -0.5]))
+    with pytest.warns(hi.InputWarning, match="at z = 5.0.* but the median depth inside the mask is 0.[45]"):
+        pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, 5]))
+    vertices, faces = lumpy()
+    with pytest.warns(hi.InputWarning, match='diameter is 1.*: check unit="m"'):
+        hi.Model(vertices, faces)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: hi.Model(np.zeros((3, 2)), [[0, 1, 2]]), r"vertices is .* shape \(3, 2\), expected a \(V, 3\) array"),
+        (lambda: hi.Model(np.eye(3), np.zeros((1, 3))), "faces is an array of float64 .* expected an .F, 3. array of integers"),
+        (lambda: hi.Model(np.eye(3), [[0, 1, -1]]), r"faces\[0\] holds -1, expected indices from 0"),
+        (lambda: hi.Model(np.eye(3), [[0, 1, 3]]), "triangle 0 uses vertex 3, but there are 3 vertices"),
+        (lambda: hi.Model(np.eye(3), [[0, 1, 2]], unit="inch"), 'unit is "inch", expected m, mm or cm'),
+        (lambda: hi.Model(np.eye(3), [[0, 1, 2]], diameter=-1), "diameter is -1, expected"),
+        (lambda: hi.Camera(0, 1, 0, 0, 4, 4), "focal length fx is 0, expected"),
+        (lambda: hi.Camera.from_K(np.eye(4), (4, 4)), r"K is an array of float64 with shape \(4, 4\)"),
+        (lambda: hi.Camera.from_K([[1, 5, 0], [0, 1, 0], [0, 0, 1]], (4, 4)), r"camera matrix entry \[0\]\[1\] is 5"),
+        (lambda: hi.Pipeline.preset("hybird"), 'no pipeline is named "hybird"; did you mean "hybrid"'),
+        (lambda: hi.Pipeline.from_toml('type = "icq"'), 'did you mean "icp"'),
+        (lambda: hi.Pipeline.from_toml(3), "text_or_path is a int, expected"),
+        (lambda: hi.Fuser("averag"), 'no fusion method is named "averag"'),
+        (lambda: hi.PoseEstimate(np.eye(4), -np.eye(6)), "covariance has the eigenvalue"),
+        (lambda: hi.fuse([]), "no estimate to fuse"),
+    ],
+)
+def test_everything_else_says_what_was_passed(make, message):
+    with pytest.raises(hi.InputError, match=message) as raised:
+        make()
+    assert isinstance(raised.value, ValueError) and isinstance(raised.value, hi.HybridIcpError)
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path):
+    broken = tmp_path / "broken.obj"
+    broken.write_text("v 0 0 zero\n")
+    for make, message in [
+        (lambda: hi.Model.from_file(tmp_path / "none.ply", unit="mm"), "cannot read .*none.ply"),
+        (lambda: hi.Model.from_file(broken, unit="mm"), "broken.obj"),
+        (lambda: hi.read_depth_png(tmp_path / "none.png", 0.001), "none.png"),
+        (lambda: hi.read_mask_png(tmp_path / "none.png"), "none.png"),
+        (lambda: hi.Pipeline.from_toml(tmp_path / "none.toml"), "none.toml"),
+    ]:
+        with pytest.raises(hi.FileError, match=message) as raised:
+            make()
+        assert isinstance(raised.value, OSError)
+
+
+def test_layouts_and_types_of_arrays_do_not_matter(scene):
+    def same(depth, mask, scale=None):
+        other = hi.Observation(depth, mask, scene.camera, scale=scale)
+        assert np.array_equal(other.depth, expected.depth) and np.array_equal(other.mask, expected.mask)
+        assert np.array_equal(other.surfels()[0], expected.surfels()[0])
+
+    expected = scene.observation
+    same(np.asfortranarray(scene.depth), np.asfortranarray(scene.mask))
+    transposed = np.asfortranarray(scene.rough)
+    results = [hi.Pipeline.preset("hybrid").refine(scene.model, expected, T_co).to_dict() for T_co in (scene.rough, transposed)]
+    assert results[0] == results[1]
+    same(np.repeat(scene.depth, 2, axis=1)[:, ::2], np.repeat(scene.mask, 2, axis=0)[::2])
+    same(scene.depth.astype(np.float64), scene.mask.astype(np.uint8) * 255)
+    units = np.round(scene.depth * 10000).astype(np.uint16)
+    expected = hi.Observation((units * 0.1 / 1000).astype(np.float32), scene.mask, scene.camera)
+    same(units, scene.mask, scale=0.0001)
+    before = expected.depth
+    expected.depth[:] = 0
+    assert np.array_equal(expected.depth, before)
+
+
+def test_pixel_centres_shift_the_principal_point():
+    camera = hi.Camera(100, 100, 32, 24, 64, 48, pixel_centers="halves")
+    assert (camera.cx, camera.cy) == (31.5, 23.5) and camera == CAMERA
+    assert np.array_equal(camera.K, [[100, 0, 31.5], [0, 100, 23.5], [0, 0, 1]])

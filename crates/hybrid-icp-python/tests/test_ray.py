@@ -1,0 +1,129 @@
+"""`hybrid_icp.ray` and `hybrid_icp.bop` against `hybrid-icp bop refine`, byte for byte, with a worker killed in the middle."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import uuid
+from pathlib import Path
+
+import pytest
+
+import hybrid_icp as hi
+from hybrid_icp import bop
+
+MARK = "HYBRID_ICP_RAY_TEST"
+
+
+@pytest.fixture(scope="module")
+def ray():
+    ray = pytest.importorskip("ray", reason="no Ray: cargo xtask python --ray installs it")
+    # Workers inherit the environment of the process that starts Ray: the mark tells ours from any others.
+    os.environ.update({MARK: uuid.uuid4().hex, "RAY_USAGE_STATS_ENABLED": "0"})
+    ray.init(num_cpus=2, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+    yield ray
+    ray.shutdown()
+
+
+def workers():
+    """Processes of our actors."""
+    found = []
+    for process in Path("/proc").iterdir():
+        try:
+            ours = f"{MARK}={os.environ[MARK]}".encode() in (process / "environ").read_bytes().split(b"\0")
+            if ours and b"ray::" in (process / "cmdline").read_bytes() and b"Worker" in (process / "cmdline").read_bytes():
+                found.append(int(process.name))
+        except (OSError, ValueError):
+            continue
+    return found
+
+
+def test_ray_is_not_imported_without_being_asked_for():
+    code = "import sys, hybrid_icp, hybrid_icp.bop; print(sorted(m for m in sys.modules if m.split('.')[0] in ('ray', 'pyarrow')))"
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
+    folder, results, expected = dataset
+    images = bop.read_images(results)
+    refiner = bop.DatasetRefiner(folder, "test", hi.Pipeline.preset("hybrid"), bop.object_ids(images))
+    assert refiner.missing_models == [] and refiner.broken_models == {}
+    lines = {}
+    for _, _, indices, rows in reversed(images):
+        refined, fates, faults = refiner.refine(rows)
+        assert len(fates) == len(indices) and not faults
+        lines.update(zip(indices, refined))
+    bop.write_results(tmp_path / "out.csv", (lines[i] for i in sorted(lines)))
+    assert (tmp_path / "out.csv").read_bytes() == expected
+    with pytest.raises(hi.InputError, match="rows are of 2 images, expected one"):
+        refiner.refine(images[0][3] + images[1][3].removeprefix(bop.result_header()))
+
+
+def test_a_killed_worker_changes_no_byte(dataset, ray, tmp_path):
+    import hybrid_icp.ray
+
+    folder, results, expected = dataset
+    killed, seen = [], []
+
+    def kill_one(done, total):
+        seen.append((done, total))
+        alive = workers()
+        if not killed and alive and done < total:
+            os.kill(alive[0], signal.SIGKILL)
+            killed.append(alive[0])
+
+    fates = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
+    assert killed, "no worker was found to kill"
+    assert (tmp_path / "out.csv").read_bytes() == expected
+    assert sum(fates.values()) == expected.count(b"\n") - 1 == seen[-1][0] == seen[-1][1]
+    assert not (tmp_path / "out.csv.journal").exists()
+
+
+def test_a_killed_driver_goes_on_from_its_journal(dataset, ray, tmp_path):
+    import hybrid_icp.ray
+
+    folder, results, expected = dataset
+
+    class Killed(Exception):
+        pass
+
+    def fail(done, total):
+        raise Killed
+
+    def run(progress=None, **options):
+        return hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, progress=progress, **options)
+
+    with pytest.raises(Killed):
+        run(fail)
+    journal = tmp_path / "out.csv.journal"
+    before = journal.read_text()
+    assert before.count("\n") >= 2
+    # The last line was cut off, and what it was for is done again.
+    journal.write_text(before + '{"place": 1, "done": {"li')
+    with pytest.raises(hi.InputError, match="journal of another input"):
+        run(rescore="mve")
+    done = []
+    run(lambda now, total: done.append((now, total)))
+    assert (tmp_path / "out.csv").read_bytes() == expected
+    assert len(done) < len(bop.read_images(results))
+
+
+def test_hypotheses_may_come_as_parquet(dataset, ray, tmp_path):
+    import csv
+
+    import pyarrow
+    import pyarrow.parquet
+
+    import hybrid_icp.ray
+
+    folder, results, expected = dataset
+    with open(results, newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        row.update({key: int(row[key]) for key in ("scene_id", "im_id", "obj_id")})
+        row.update({key: [float(x) for x in row[key].split()] for key in ("R", "t")})
+        row.update({key: float(row[key]) for key in ("score", "time")})
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows), tmp_path / "hypotheses.parquet")
+    hybrid_icp.ray.refine(folder, tmp_path / "hypotheses.parquet", tmp_path / "out.csv")
+    assert (tmp_path / "out.csv").read_bytes() == expected
