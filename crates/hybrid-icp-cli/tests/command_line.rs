@@ -27,7 +27,7 @@ fn help_teaches_within_80_columns() {
                 "cam_R_m2c",
                 "MM_PER_UNIT",
                 "kept_initial",
-                "OBJ, PLY or STL",
+                "OBJ, OFF, PLY or STL",
                 "m, mm or cm",
                 "cam_K",
             ],
@@ -44,6 +44,9 @@ fn help_teaches_within_80_columns() {
                 "Exit codes",
             ],
         ),
+        ("bop show --help", &["Example:", "--against"]),
+        ("bop sequence --help", &["Example:", "--fuser"]),
+        ("inspect --help", &["--unit", "--json"]),
         ("pipelines --help", &["Usage"]),
     ] {
         let help = run(folder.path(), command.split(' ')).exits(0).out;

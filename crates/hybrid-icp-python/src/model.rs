@@ -81,7 +81,7 @@ impl PyModel {
         options.model(py, mesh)
     }
 
-    /// Reads a mesh: OBJ, PLY or STL.
+    /// Reads a mesh: OBJ, OFF, PLY or STL.
     ///
     /// Parameters
     /// ----------
