@@ -65,8 +65,9 @@ pub(crate) struct Arguments {
 }
 
 const USAGE: &str = "\
-hybrid-icp bop show --dataset <DIR> [--split <NAME>] --scene <ID> --image <ID>
-           --results <A.csv> [--against <B.csv>] --out <FILE.png> [OPTIONS]";
+hybrid-icp bop show --dataset <DIR> [--split <NAME>] --scene <ID>
+           --image <ID> --results <A.csv> [--against <B.csv>]
+           --out <FILE.png> [OPTIONS]";
 
 const EXAMPLE: &str = "\
 Example:
