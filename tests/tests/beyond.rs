@@ -7,8 +7,8 @@ use std::time::Duration;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, scene};
 use hybrid_icp::{
-    Bound, Isometry3, Point3, Preset, Refiner, Rotations, SearchOptions, Termination,
-    UnitQuaternion, Vector3, Verdict, adi, presets, se3,
+    Bound, HypothesisSearch, Isometry3, MeanVsd, Point3, Preset, Refiner, Rotations, SampledMve,
+    SearchOptions, Termination, UnitQuaternion, Vector3, Verdict, adi, presets, se3,
 };
 use proptest::prelude::*;
 
@@ -160,4 +160,14 @@ fn without_need_nothing_is_searched() {
     let refined = refiner.refine(&scene.model, &scene.observation, &init);
     let local = Refiner::preset(Preset::Local).refine(&scene.model, &scene.observation, &init);
     assert_eq!(refined, local);
+    let parts = (presets::local(), presets::hybrid());
+    let search = HypothesisSearch::new(
+        parts.0,
+        parts.1,
+        SampledMve::new(200, 400),
+        MeanVsd::default(),
+        options,
+    );
+    let composed = Refiner::new(search).refine(&scene.model, &scene.observation, &init);
+    assert_eq!(composed, local);
 }

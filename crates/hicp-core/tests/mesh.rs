@@ -243,3 +243,19 @@ fn what_is_no_mesh_is_refused_and_named() {
         MeshError::NoArea { triangles: 1 }
     );
 }
+
+#[test]
+fn far_from_the_origin_coordinates_are_stated_coarsely() {
+    let at = |x: f32| {
+        let vertices = corners()
+            .iter()
+            .map(|p| Point3::new(p.x + x, p.y, p.z))
+            .collect();
+        TriMesh::new(vertices, vec![[0, 1, 2]])
+            .unwrap()
+            .coordinate_step()
+    };
+    assert!(at(0.0) < 1e-6);
+    // Between 2²⁰ and 2²¹ the 24 bits of a number end at an eighth.
+    assert_eq!(at(1.5e6), 0.125);
+}

@@ -137,3 +137,13 @@ mod tests {
         assert_eq!(table.csv(), b"a<b,n\n\"x|y & \"\"z\"\"\",1\n");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::escaped;
+
+    #[test]
+    fn names_do_not_become_tags() {
+        assert_eq!(escaped("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
+    }
+}

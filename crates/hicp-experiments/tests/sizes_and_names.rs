@@ -71,3 +71,21 @@ fn a_variant_from_a_file_is_called_like_it_and_must_be_a_pipeline() {
     assert!(Variant::read(&file).is_err());
     assert!(Variant::read(&folder.path().join("absent.toml")).is_err());
 }
+
+#[test]
+fn the_papers_are_told_from_what_goes_beyond_them() {
+    let of_paper = FusionRule::ALL.iter().filter(|rule| rule.is_of_paper());
+    assert_eq!(of_paper.count(), 6);
+    let beyond = Variant::beyond();
+    let names: BTreeSet<&str> = beyond.iter().map(|variant| variant.name.as_str()).collect();
+    assert_eq!(names.len(), beyond.len());
+    let paper: Vec<String> = Variant::paper()
+        .into_iter()
+        .map(|variant| variant.name)
+        .collect();
+    let new: Vec<&str> = names
+        .into_iter()
+        .filter(|name| !paper.iter().any(|p| p == name))
+        .collect();
+    assert_eq!(new, ["auto", "hybrid-visible", "local", "search"]);
+}

@@ -246,3 +246,25 @@ fn a_broken_initial_pose_passes_through_any_composition_untouched() {
     let outcome = run(&mut Cascade((stage(), stage())), &init);
     assert_eq!((outcome.verdict, outcome.iterations), (NO_PAIRS, 2));
 }
+
+#[test]
+fn what_ended_a_stage_is_told_in_words_of_its_own() {
+    let ends = [
+        Termination::Converged,
+        Termination::IterationLimit,
+        Termination::NoPairs,
+        Termination::PairsLost,
+        Termination::LossIncreased,
+        Termination::Degenerate,
+        Termination::OutOfBounds,
+        Termination::Deadline,
+    ];
+    for (index, end) in ends.iter().enumerate() {
+        assert!(!end.explain().is_empty());
+        assert!(
+            ends[..index]
+                .iter()
+                .all(|other| other.explain() != end.explain())
+        );
+    }
+}

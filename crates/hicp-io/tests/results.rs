@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::path::Path;
+
 use hicp_core::{Isometry3, RotationError, Vector6, se3};
 use hicp_io::IoError;
-use hicp_io::bop::{ResultRow, read_results, write_results};
+use hicp_io::bop::{ResultRow, read_results, results_from_csv, write_results};
 use proptest::prelude::*;
 
 const HEADER: &str = "scene_id,im_id,obj_id,score,R,t,time";
@@ -159,4 +161,19 @@ fn tables_that_are_not_results_are_refused() {
             ..
         })
     ));
+}
+
+#[test]
+fn the_content_of_a_file_is_read_like_the_file() {
+    let row = ResultRow::new(1, 2, 3, Isometry3::identity());
+    let text = format!("{}\n{row}\n", ResultRow::header());
+    assert_eq!(ResultRow::header(), HEADER);
+    let path = Path::new("rows of a message");
+    let rows = results_from_csv(text.as_bytes(), path).unwrap();
+    assert_eq!(rows, read(&text).unwrap());
+    assert_eq!(rows, [row]);
+    let error = results_from_csv(text.replace(",2,", ",two,").as_bytes(), path).unwrap_err();
+    for part in ["rows of a message", "2", "im_id", "two"] {
+        assert!(error.to_string().contains(part), "{error}");
+    }
 }

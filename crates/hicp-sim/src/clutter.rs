@@ -393,6 +393,18 @@ mod tests {
                 .iter()
                 .all(|turn| (turn - turns[0]).abs() < 1e-9 && *turn > 0.02)
         );
+        let measured = |pose: Isometry3<f64>| {
+            let mut rng = stream(5, &["sensor"], 1);
+            let view = clutter.view_from(&mut rng, pose, &models, &camera, &DepthSensor::default());
+            let view = view.unwrap();
+            view.objects
+                .iter()
+                .map(|object| object.camera_from_object)
+                .collect::<Vec<_>>()
+        };
+        for (there, object) in measured(path[8]).iter().zip(&clutter.objects) {
+            assert_eq!(*there, path[8] * object.world_from_object);
+        }
         assert!(
             clutter
                 .path(&mut stream(5, &["path"], 1), &camera, 0)

@@ -239,6 +239,7 @@ fn scores_and_switchers() {
     check_score(MeanVsd::default, share);
     check_score(MeanVsd::paper, share);
     check_score(SampledMve::default, share);
+    check_score(|| SampledMve::new(300, 150), share);
     let truth = scenes()[0].truth;
     check_score(
         || Vsd::new(truth),
