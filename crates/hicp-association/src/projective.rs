@@ -69,8 +69,8 @@ impl VectorLoop for Project<'_> {
             let points = self.mover.points(&points);
             let normals = self.mover.vectors(&normals);
             let pixels = grid.pixels(&self.projection, &points);
-            for (lane, pixel) in pixels.into_iter().take(block.len()).enumerate() {
-                let Some(target) = self.observation.surfel(pixel) else {
+            for lane in 0..block.len().min(LANES) {
+                let Some(target) = self.observation.surfel(pixels[lane]) else {
                     continue;
                 };
                 #[allow(clippy::cast_possible_truncation)] // Below LANES.
@@ -84,7 +84,7 @@ impl VectorLoop for Project<'_> {
                     )),
                 };
                 self.pairs
-                    .push(Pair::new(source_index, source, pixel, *target));
+                    .push(Pair::new(source_index, source, pixels[lane], *target));
             }
         }
     }

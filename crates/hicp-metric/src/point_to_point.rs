@@ -2,11 +2,13 @@
 
 use hicp_core::{
     Correspondences, Isometry3, Matrix3, Pair, Point3, Translation3, UnitQuaternion, Vector3,
+    VectorLoop, vectorized,
 };
 use nalgebra::{Matrix2, Quaternion, Rotation3, SymmetricEigen};
 
 use crate::metric::{ErrorMetric, Step};
 use crate::normal_equations::NormalEquations;
+use crate::pair_block::{BLOCK, Column, LANES, PairBlock, add_products};
 
 /// Fewer pairs leave the rotation open.
 const MIN_PAIRS: usize = 3;
@@ -45,32 +47,23 @@ impl ErrorMetric for PointToPoint {
         }
         let source_origin = first.source.point.cast::<f64>();
         let target_origin = first.target.point.cast::<f64>();
-        let (mut source_sum, mut target_sum) = (Vector3::zeros(), Vector3::zeros());
-        let mut products = Matrix3::zeros();
-        let (mut spread, mut loss, mut weight) = (0.0, 0.0, 0.0);
-        for pair in pairs {
-            let w = f64::from(pair.weight);
-            let source = pair.source.point.cast::<f64>();
-            let target = pair.target.point.cast::<f64>();
-            let (p, q) = (source - source_origin, target - target_origin);
-            source_sum += p * w;
-            target_sum += q * w;
-            products += (p * w) * q.transpose();
-            spread += w * (p.norm_squared() + q.norm_squared());
-            loss += w * (source - target).norm_squared();
-            weight += w;
-        }
-        if !(weight > 0.0 && spread.is_finite() && loss.is_finite()) {
+        let sums = vectorized(SumProducts {
+            pairs,
+            source_origin,
+            target_origin,
+        });
+        let weight = sums.weight;
+        if !(weight > 0.0 && sums.spread.is_finite() && sums.loss.is_finite()) {
             return None;
         }
-        let (source_mean, target_mean) = (source_sum / weight, target_sum / weight);
-        let covariance = products / weight - source_mean * target_mean.transpose();
+        let (source_mean, target_mean) = (sums.source / weight, sums.target / weight);
+        let covariance = sums.products / weight - source_mean * target_mean.transpose();
         let rotation = nearest_rotation(&covariance)?;
         let source_centroid = source_origin + source_mean;
         let target_centroid = target_origin + target_mean;
         Some(Step {
             increment: about(&source_centroid, &target_centroid, rotation),
-            mean_loss: loss / weight,
+            mean_loss: sums.loss / weight,
         })
     }
 
@@ -81,6 +74,98 @@ impl ErrorMetric for PointToPoint {
 
     fn name(&self) -> &'static str {
         "point-to-point"
+    }
+}
+
+/// Sums over the pairs, p and q being sources and targets relative to an origin each.
+struct Products {
+    /// Σ w p.
+    source: Vector3<f64>,
+    /// Σ w q.
+    target: Vector3<f64>,
+    /// Σ w p qᵀ.
+    products: Matrix3<f64>,
+    /// Σ w (p² + q²).
+    spread: f64,
+    /// Σ w of the squared distances.
+    loss: f64,
+    weight: f64,
+}
+
+struct SumProducts<'a> {
+    pairs: &'a [Pair],
+    source_origin: Point3<f64>,
+    target_origin: Point3<f64>,
+}
+
+impl VectorLoop for SumProducts<'_> {
+    type Output = Products;
+
+    #[inline(always)]
+    fn run(self) -> Products {
+        let zero = [0.0; LANES];
+        let (mut source, mut target, mut products) = ([zero; 3], [zero; 3], [[zero; 3]; 3]);
+        let (mut spread, mut loss, mut weight) = (zero, zero, zero);
+        let mut block = PairBlock::new();
+        let (mut p, mut q, mut d) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
+        let mut w = [0.0; BLOCK];
+        for pairs in self.pairs.chunks(BLOCK) {
+            block.fill(pairs);
+            for axis in 0..3 {
+                let origins = (self.source_origin[axis], self.target_origin[axis]);
+                for lane in 0..BLOCK {
+                    let source = f64::from(block.source[axis][lane]);
+                    let target = f64::from(block.target[axis][lane]);
+                    p[axis][lane] = source - origins.0;
+                    q[axis][lane] = target - origins.1;
+                    d[axis][lane] = source - target;
+                }
+            }
+            for (w, weight) in w.iter_mut().zip(&block.weight) {
+                *w = f64::from(*weight);
+            }
+            for axis in 0..3 {
+                let (wp, wq) = (product(&p[axis], &w), product(&q[axis], &w));
+                add(&mut source[axis], &wp);
+                add(&mut target[axis], &wq);
+                for (sum, q) in products[axis].iter_mut().zip(&q) {
+                    add_products(sum, &wp, q);
+                }
+                add_products(&mut spread, &wp, &p[axis]);
+                add_products(&mut spread, &wq, &q[axis]);
+                add_products(&mut loss, &product(&d[axis], &w), &d[axis]);
+            }
+            add(&mut weight, &w);
+        }
+        let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
+        Products {
+            source: source.map(total).into(),
+            target: target.map(total).into(),
+            products: Matrix3::from_fn(|row, column| total(products[row][column])),
+            spread: total(spread),
+            loss: total(loss),
+            weight: total(weight),
+        }
+    }
+}
+
+/// The product of two columns.
+#[inline(always)]
+fn product(a: &Column, b: &Column) -> Column {
+    let mut product = [0.0; BLOCK];
+    for lane in 0..BLOCK {
+        product[lane] = a[lane] * b[lane];
+    }
+    product
+}
+
+/// Adds a column to the lanes of a sum.
+#[inline(always)]
+fn add(sum: &mut [f64; LANES], column: &Column) {
+    for column in column.as_chunks::<LANES>().0 {
+        for lane in 0..LANES {
+            sum[lane] += column[lane];
+        }
     }
 }
 

@@ -4,12 +4,9 @@ use hicp_core::{Pair, Point3, Vector3, VectorLoop, vectorized};
 
 use crate::moments::Moments;
 use crate::normal_equations::NormalEquations;
+use crate::pair_block::{BLOCK, LANES, add_products};
 use crate::row_sums::RowSums;
 
-/// Pairs summed at a time: their rows stay in the innermost cache, and each sum is loaded once per block.
-const BLOCK: usize = 32;
-/// Partial sums of each sum.
-const LANES: usize = 4;
 /// Sums over the lower triangle of a aᵀ, a of seven numbers.
 const TRIANGLE: usize = 28;
 
@@ -75,14 +72,7 @@ impl<F: Fn(&Pair) -> Row> VectorLoop for SumBlocks<'_, F> {
                     weighted[lane] = weight[lane] * a[column][lane];
                 }
                 for line in &a[column..] {
-                    let sum = &mut sums[index];
-                    let (weighted, line) = (weighted.as_chunks().0, line.as_chunks().0);
-                    for (weighted, line) in weighted.iter().zip(line) {
-                        let (weighted, line): (&[f64; LANES], &[f64; LANES]) = (weighted, line);
-                        for lane in 0..LANES {
-                            sum[lane] += weighted[lane] * line[lane];
-                        }
-                    }
+                    add_products(&mut sums[index], &weighted, line);
                     index += 1;
                 }
             }

@@ -66,6 +66,11 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
                     observed[..n].copy_from_slice(&row.observed[first..]);
                     masked[..n].copy_from_slice(&row.masked[first..]);
                 }
+                if rendered == [0.0; LANES] {
+                    first += LANES;
+                    continue;
+                }
+                // What is true of a pixel is all bits, and not a truth value that it would take a branch to look at.
                 let mut relative = [0.0; LANES];
                 for lane in 0..LANES {
                     let (z, measured) = (f64::from(rendered[lane]), f64::from(observed[lane]));
@@ -73,16 +78,14 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
                     let x = (u - self.cx) * self.inverse_fx;
                     let distance_per_depth = (x * x + squared_y).sqrt();
                     let behind = (z - measured) * distance_per_depth;
-                    let seen = z > 0.0;
-                    let known = measured > 0.0;
-                    let counted = seen & known & masked[lane];
-                    let hidden = known & (behind > self.occlusion_tolerance);
-                    outside[lane] += u64::from(seen & !masked[lane] & !hidden);
-                    relative[lane] = if counted {
-                        behind.abs() * inverse_diameter
-                    } else {
-                        f64::INFINITY
-                    };
+                    let (seen, known) = (all_bits(z > 0.0), all_bits(measured > 0.0));
+                    let masked = all_bits(masked[lane]);
+                    let hidden = known & all_bits(behind > self.occlusion_tolerance);
+                    outside[lane] += 1 & seen & !masked & !hidden;
+                    // No number, where it does not count, and less than no limit.
+                    let nothing = !(seen & known & masked);
+                    relative[lane] =
+                        f64::from_bits((behind.abs() * inverse_diameter).to_bits() | nothing);
                 }
                 for (correct, limit) in correct.iter_mut().zip(limits) {
                     for lane in 0..LANES {
@@ -98,4 +101,10 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
             outside: sum(outside),
         }
     }
+}
+
+/// All bits or none.
+#[inline(always)]
+fn all_bits(condition: bool) -> u64 {
+    u64::from(condition).wrapping_neg()
 }

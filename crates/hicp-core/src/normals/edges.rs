@@ -1,6 +1,8 @@
 //! Depth edges: between which neighbours the surface is torn.
 
-use super::{DepthPatch, used};
+use std::ops::Range;
+
+use super::DepthPatch;
 use crate::region::PixelRegion;
 use crate::vectorized::{VectorLoop, vectorized};
 
@@ -16,25 +18,29 @@ pub(super) struct Edges {
 
 impl Edges {
     /// `None` when there is no edge at all. Neighbours without depth are no edges; nothing is fitted to them anyway.
-    pub(super) fn find(patch: &DepthPatch<'_>, edge_step: f32, radius: usize) -> Option<Self> {
-        let (width, height) = (patch.region.width(), patch.region.height());
-        let row = |v: usize| &patch.depth[v * width..(v + 1) * width];
+    ///
+    /// `spans` are the columns that each row uses.
+    pub(super) fn find(
+        patch: &DepthPatch<'_>,
+        spans: &[Range<usize>],
+        edge_step: f32,
+        radius: usize,
+    ) -> Option<Self> {
         let mut near = BitRows::new(&patch.region);
         let (mut right, mut below) = (BitRows::new(&patch.region), BitRows::new(&patch.region));
         let mut steps = Steps::default();
         let mut any = false;
-        for v in 0..height {
-            let span = used(row(v));
+        for (v, span) in spans.iter().enumerate() {
             if span.is_empty() {
                 continue;
             }
-            let here = &row(v)[span.clone()];
+            let here = &patch.row(v)[span.clone()];
             steps.judge(here, &here[1..], edge_step);
             right.set(v, span.start, &steps.joined);
             any |= near.set(v, span.start, &steps.edges);
             any |= near.set(v, span.start + 1, &steps.edges);
-            if v + 1 < height {
-                steps.judge(here, &row(v + 1)[span.clone()], edge_step);
+            if v + 1 < spans.len() {
+                steps.judge(here, &patch.row(v + 1)[span.clone()], edge_step);
                 below.set(v, span.start, &steps.joined);
                 any |= near.set(v, span.start, &steps.edges);
                 any |= near.set(v + 1, span.start, &steps.edges);

@@ -1,64 +1,146 @@
 //! Plane fits beside depth edges.
 
-use nalgebra::UnitVector3;
-
 use super::edges::Edges;
 use super::window::{Rays, WindowSums};
 use super::{DepthPatch, MIN_DEPTH_METERS};
+use crate::vectorized::VectorLoop;
 
 /// Half side of the gated window, pixels. Its rows must fit [`Joined`].
 const EDGE_RADIUS: usize = 3;
+/// Columns that are summed side by side: those of the window, and one that stays empty.
+const LANES: usize = 2 * EDGE_RADIUS + 2;
 
 /// A set of pixels of the gated window, one byte per row: bit `8 y + x`.
 type Joined = u64;
 
-/// Fits the neighbours that lie on the same side of the depth edges as the pixel itself: those that steps which are no
-/// edges lead to without leaving the window.
-pub(super) fn gated_normal(
-    patch: &DepthPatch<'_>,
-    edges: &Edges,
-    rays: &Rays,
-    (u, v): (usize, usize),
-    edge_step: f32,
-) -> Option<UnitVector3<f32>> {
-    let (width, height) = (patch.region.width(), patch.region.height());
-    let columns = u.saturating_sub(EDGE_RADIUS)..(u + EDGE_RADIUS + 1).min(width);
-    let rows = v.saturating_sub(EDGE_RADIUS)..(v + EDGE_RADIUS + 1).min(height);
+/// Fits the pixels of row `v` that lie beside depth edges, each to the neighbours on its own side.
+pub(super) struct FitGated<'a> {
+    pub(super) patch: &'a DepthPatch<'a>,
+    pub(super) edges: &'a Edges,
+    pub(super) rays: &'a Rays,
+    pub(super) edge_step: f32,
+    pub(super) v: usize,
+    /// The normals of the row from column `first` on; those of other pixels stay as they are.
+    pub(super) first: usize,
+    pub(super) normals: &'a mut [[f32; 3]],
+}
 
-    // Column 7 stays empty, so that shifts do not run from one row into the next.
-    let (mut right, mut below): (Joined, Joined) = (0, 0);
-    for (y, row) in rows.clone().enumerate() {
-        right |= edges.right.get(columns.start, row, columns.len() - 1) << (8 * y);
-        if row + 1 < rows.end {
-            below |= edges.below.get(columns.start, row, columns.len()) << (8 * y);
+impl VectorLoop for FitGated<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let width = self.patch.region.width();
+        for u in self.edges.near.columns(self.v, width) {
+            if self.patch.depth[self.v * width + u] >= MIN_DEPTH_METERS {
+                let window = Window::around(self.patch, u, self.v);
+                let sums = self.sums(&window, window.joined(self.edges));
+                let at = (u - window.left, self.v - window.top);
+                self.normals[u - self.first] = sums.normal(self.rays, (u, self.v), at);
+            }
         }
     }
-    let mut reached: Joined = 1 << (8 * (v - rows.start) + (u - columns.start));
-    loop {
-        let grown = reached
-            | (reached & right) << 1
-            | (reached >> 1) & right
-            | (reached & below) << 8
-            | (reached >> 8) & below;
-        if grown == reached {
-            break;
+}
+
+impl FitGated<'_> {
+    /// Sums up the pixels of a set that lie in the gate: a way around an edge's end may lead to its other side, and a slope
+    /// just short of an edge may add up.
+    #[inline(always)]
+    fn sums(&self, window: &Window, joined: Joined) -> WindowSums {
+        let width = self.patch.region.width();
+        let depth = self.patch.depth;
+        let center = depth[window.v * width + window.u];
+        let mut across = [0.0_f32; LANES];
+        for (lane, across) in across.iter_mut().enumerate() {
+            *across = (window.left + lane).abs_diff(window.u) as f32;
         }
-        reached = grown;
+        // Per column: how many pixels, their rows and the squares of those; inverse depths and their products with the row.
+        let (mut n, mut y, mut yy) = ([0_u32; LANES], [0_u32; LANES], [0_u32; LANES]);
+        let (mut w, mut yw) = ([0.0_f64; LANES], [0.0_f64; LANES]);
+        for row in 0..window.rows {
+            let v = window.top + row;
+            let mut z = [0.0; LANES];
+            let pixels = &depth[v * width + window.left..];
+            // What follows the row's end is no member of the set.
+            if let Some(pixels) = pixels.first_chunk() {
+                z = *pixels;
+            } else {
+                z[..pixels.len()].copy_from_slice(pixels);
+            }
+            #[allow(clippy::cast_possible_truncation)] // A byte, and a row of the window.
+            let (bits, line) = ((joined >> (8 * row)) as u32 & 0xff, row as u32);
+            let away = (v.abs_diff(window.v).max(1)) as f32;
+            for lane in 0..LANES {
+                let reach = if across[lane] > away {
+                    across[lane]
+                } else {
+                    away
+                };
+                let gate = self.edge_step * center * (0.5 + 0.5 * reach);
+                let used = (bits >> lane & 1 != 0)
+                    & (z[lane] >= MIN_DEPTH_METERS)
+                    & ((z[lane] - center).abs() <= gate);
+                let one = u32::from(used);
+                n[lane] += one;
+                y[lane] += one * line;
+                yy[lane] += one * (line * line);
+                let inverse = 1.0 / f64::from(if used { z[lane] } else { f32::INFINITY });
+                w[lane] += inverse;
+                yw[lane] += inverse * f64::from(line);
+            }
+        }
+        WindowSums::of_columns(&n, &y, &yy, &w, &yw)
+    }
+}
+
+/// The gated window around a pixel, cut at the borders.
+struct Window {
+    u: usize,
+    v: usize,
+    left: usize,
+    top: usize,
+    columns: usize,
+    rows: usize,
+}
+
+impl Window {
+    #[inline(always)]
+    fn around(patch: &DepthPatch<'_>, u: usize, v: usize) -> Self {
+        let (width, height) = (patch.region.width(), patch.region.height());
+        let (left, top) = (u.saturating_sub(EDGE_RADIUS), v.saturating_sub(EDGE_RADIUS));
+        Self {
+            u,
+            v,
+            left,
+            top,
+            columns: (u + EDGE_RADIUS + 1).min(width) - left,
+            rows: (v + EDGE_RADIUS + 1).min(height) - top,
+        }
     }
 
-    let center = patch.depth[v * width + u];
-    let mut sums = WindowSums::default();
-    while reached != 0 {
-        let bit = reached.trailing_zeros() as usize;
-        reached &= reached - 1;
-        let (column, row) = (columns.start + bit % 8, rows.start + bit / 8);
-        let z = patch.depth[row * width + column];
-        // A way around an edge's end may lead to its other side, and a slope just short of an edge may add up.
-        let reach = column.abs_diff(u).max(row.abs_diff(v)).max(1) as f32;
-        let gate = edge_step * center * (0.5 + 0.5 * reach);
-        if z >= MIN_DEPTH_METERS && (z - center).abs() <= gate {
-            sums.add_pixel(column as f64, row as f64, 1.0 / f64::from(z));
+    /// The pixels that steps which are no edges lead to from the window's own without leaving it.
+    #[inline(always)]
+    fn joined(&self, edges: &Edges) -> Joined {
+        // Column 7 stays empty, so that shifts do not run from one row into the next.
+        let (mut right, mut below): (Joined, Joined) = (0, 0);
+        for row in 0..self.rows {
+            let v = self.top + row;
+            right |= edges.right.get(self.left, v, self.columns - 1) << (8 * row);
+            below |= edges.below.get(self.left, v, self.columns) << (8 * row);
+        }
+        // The last row's pixels are joined to some outside.
+        below &= !(0xff << (8 * (self.rows - 1)));
+        let mut reached: Joined = 1 << (8 * (self.v - self.top) + (self.u - self.left));
+        loop {
+            let grown = reached
+                | (reached & right) << 1
+                | (reached >> 1) & right
+                | (reached & below) << 8
+                | (reached >> 8) & below;
+            if grown == reached {
+                return reached;
+            }
+            reached = grown;
         }
     }
-    sums.normal(rays, u, v)
 }

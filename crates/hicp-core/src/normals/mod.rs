@@ -14,11 +14,12 @@ mod window;
 use std::ops::Range;
 
 use edges::Edges;
-use gated::gated_normal;
+use gated::FitGated;
 use window::{ColumnSums, Rays, RowFits};
 
 use crate::camera::PinholeCamera;
 use crate::region::PixelRegion;
+use crate::vectorized::vectorized;
 
 /// The window is chosen so that the standard error of the slope (tangent of the tilt) stays below this, if it can be.
 const SLOPE_ERROR: f64 = 0.1;
@@ -40,6 +41,14 @@ pub(crate) struct DepthPatch<'a> {
     pub(crate) depth: &'a [f32],
 }
 
+impl DepthPatch<'_> {
+    /// The pixels of a row, which is one of the region's.
+    fn row(&self, v: usize) -> &[f32] {
+        let width = self.region.width();
+        &self.depth[v * width..(v + 1) * width]
+    }
+}
+
 /// Calls `found(row, first_column, normals)` for every row, from its first used pixel to its last; normals are in the camera frame
 /// and face the camera, and are zero where there is none.
 ///
@@ -53,34 +62,37 @@ pub(crate) fn estimate_normals(
     if width == 0 || height == 0 {
         return;
     }
+    let spans: Vec<_> = (0..height).map(|v| used(patch.row(v))).collect();
     let noise = relative_noise(patch);
     let focal = patch.camera.fx().min(patch.camera.fy());
     let radius = window_radius(focal * noise);
     #[allow(clippy::cast_possible_truncation)] // A relative step; f32 is the precision of depth.
     let edge_step = (EDGE_TILT_DEGREES.to_radians().tan() / focal)
         .max(EDGE_SIGMAS * std::f64::consts::SQRT_2 * noise) as f32;
-    let edges = Edges::find(patch, edge_step, radius);
+    let edges = Edges::find(patch, &spans, edge_step, radius);
     let rays = Rays::new(patch);
 
-    let row = |v: usize| patch.depth.get(v * width..(v + 1) * width);
     let mut columns = ColumnSums::new(width, radius);
+    let slide = |columns: &mut ColumnSums, v: usize| {
+        columns.slide(v, spans.get(v).map(|span| (span, patch.row(v))));
+    };
     for v in 0..radius.min(height) {
-        columns.slide(v, row(v));
+        slide(&mut columns, v);
     }
     let mut fits = RowFits::default();
-    for v in 0..height {
-        columns.slide(v + radius, row(v + radius));
-        let depth = row(v).unwrap_or_default();
-        let span = used(depth);
-        fits.fit(&columns, &rays, v, span.clone(), depth);
+    for (v, span) in spans.iter().enumerate() {
+        slide(&mut columns, v + radius);
+        fits.fit(&columns, &rays, v, span.clone(), patch.row(v));
         if let Some(edges) = &edges {
-            for u in edges.near.columns(v, width) {
-                if depth[u] >= MIN_DEPTH_METERS {
-                    let normal = gated_normal(patch, edges, &rays, (u, v), edge_step);
-                    fits.normals[u - span.start] =
-                        normal.map_or([0.0; 3], |normal| normal.into_inner().into());
-                }
-            }
+            vectorized(FitGated {
+                patch,
+                edges,
+                rays: &rays,
+                edge_step,
+                v,
+                first: span.start,
+                normals: &mut fits.normals,
+            });
         }
         found(v, span.start, &fits.normals);
     }

@@ -5,10 +5,8 @@
 
 use std::ops::Range;
 
-use nalgebra::{UnitVector3, Vector3};
-
 use super::lanes::Lanes;
-use super::{DepthPatch, MIN_DEPTH_METERS, used};
+use super::{DepthPatch, MIN_DEPTH_METERS};
 use crate::vectorized::{VectorLoop, vectorized};
 
 /// Fewest pixels that a plane is fitted to.
@@ -52,7 +50,9 @@ impl ColumnSums {
     }
 
     /// Takes the next row in (`None` below the patch) and the one that it pushes out of the window out.
-    pub(super) fn slide(&mut self, entering: usize, depth: Option<&[f32]>) {
+    ///
+    /// A row comes with the columns that it uses.
+    pub(super) fn slide(&mut self, entering: usize, row: Option<(&Range<usize>, &[f32])>) {
         let slot = entering % self.spans.len();
         let leaving = std::mem::replace(&mut self.spans[slot], 0..0);
         if !leaving.is_empty() {
@@ -60,11 +60,10 @@ impl ColumnSums {
             let (inverse, sums) = self.columns(slot, &leaving);
             vectorized(SlideOut { inverse, sums, v });
         }
-        let Some(depth) = depth else { return };
-        let span = used(depth);
+        let Some((span, depth)) = row else { return };
         if !span.is_empty() {
             let depth = &depth[span.clone()];
-            let (inverse, sums) = self.columns(slot, &span);
+            let (inverse, sums) = self.columns(slot, span);
             vectorized(SlideIn {
                 depth,
                 inverse,
@@ -72,7 +71,7 @@ impl ColumnSums {
                 v: entering as f64,
             });
         }
-        self.spans[slot] = span;
+        self.spans[slot] = span.clone();
     }
 
     /// A kept row's inverse depths and the sums n, v, vv, w, vw in some of its columns.
@@ -337,25 +336,55 @@ fn plane_fit<const N: usize>(
     normal
 }
 
-/// The sums of one window, in the order of [`Sums`].
-#[derive(Clone, Copy, Default)]
+/// The sums of one window, in the order of [`Sums`], with columns and rows counted from its corner.
+#[derive(Clone, Copy)]
 pub(super) struct WindowSums([f64; 9]);
 
 impl WindowSums {
-    pub(super) fn add_pixel(&mut self, u: f64, v: f64, w: f64) {
-        let pixel = [1.0, u, v, u * u, u * v, v * v, w, u * w, v * w];
-        for (sum, pixel) in self.0.iter_mut().zip(pixel) {
-            *sum += pixel;
+    /// Sums up columns, given by n, Σv, Σv², Σw and Σvw of each.
+    #[inline(always)]
+    pub(super) fn of_columns<const N: usize>(
+        n: &[u32; N],
+        v: &[u32; N],
+        vv: &[u32; N],
+        w: &[f64; N],
+        vw: &[f64; N],
+    ) -> Self {
+        let (mut counts, mut sums) = ([0_u32; 6], [0.0; 3]);
+        for (u, column) in (0_u32..).zip(0..N) {
+            let terms = [
+                n[column],
+                u * n[column],
+                v[column],
+                u * u * n[column],
+                u * v[column],
+                vv[column],
+            ];
+            for (sum, term) in counts.iter_mut().zip(terms) {
+                *sum += term;
+            }
+            let terms = [w[column], f64::from(u) * w[column], vw[column]];
+            for (sum, term) in sums.iter_mut().zip(terms) {
+                *sum += term;
+            }
         }
+        let [n, u, v, uu, uv, vv] = counts.map(f64::from);
+        let [w, uw, vw] = sums;
+        Self([n, u, v, uu, uv, vv, w, uw, vw])
     }
 
-    /// Returns the normal at pixel (u, v), facing the camera.
-    pub(super) fn normal(self, rays: &Rays, u: usize, v: usize) -> Option<UnitVector3<f32>> {
+    /// Returns the normal at the pixel (u, v), which lies at `at` in the window; it faces the camera, and is zero if there is none.
+    #[inline(always)]
+    pub(super) fn normal(
+        self,
+        rays: &Rays,
+        (u, v): (usize, usize),
+        at: (usize, usize),
+    ) -> [f32; 3] {
         let (x, y) = (Lanes([rays.x[u]]), rays.y[v]);
         let sums = self.0.map(|sum| Lanes([sum]));
-        let fit = plane_fit(sums, rays, Lanes([u as f64]), v as f64, x, y);
-        let normal = fit.map(|component| component.single()[0]);
-        (normal != [0.0; 3]).then(|| UnitVector3::new_unchecked(Vector3::from(normal)))
+        let fit = plane_fit(sums, rays, Lanes([at.0 as f64]), at.1 as f64, x, y);
+        fit.map(|component| component.single()[0])
     }
 }
 

@@ -1,0 +1,56 @@
+//! Some pairs side by side, for loops over the lanes of vectors.
+
+use hicp_core::Pair;
+
+/// Pairs of a block: what is made of them stays in the innermost cache, and each sum is loaded once per block.
+pub(crate) const BLOCK: usize = 32;
+/// Partial sums of each sum.
+pub(crate) const LANES: usize = 4;
+
+/// One number per pair of a block.
+pub(crate) type Column = [f64; BLOCK];
+
+/// The coordinates of up to [`BLOCK`] pairs, an array each. What is not filled has no weight.
+#[derive(Clone, Copy)]
+pub(crate) struct PairBlock {
+    pub(crate) source: [[f32; BLOCK]; 3],
+    pub(crate) target: [[f32; BLOCK]; 3],
+    pub(crate) weight: [f32; BLOCK],
+}
+
+impl PairBlock {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self {
+            source: [[0.0; BLOCK]; 3],
+            target: [[0.0; BLOCK]; 3],
+            weight: [0.0; BLOCK],
+        }
+    }
+
+    /// Takes at most [`BLOCK`] pairs in the place of those before.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, pairs: &[Pair]) {
+        for (lane, pair) in pairs.iter().take(BLOCK).enumerate() {
+            for axis in 0..3 {
+                self.source[axis][lane] = pair.source.point[axis];
+                self.target[axis][lane] = pair.target.point[axis];
+            }
+            self.weight[lane] = pair.weight;
+        }
+        for weight in self.weight.iter_mut().skip(pairs.len()) {
+            *weight = 0.0;
+        }
+    }
+}
+
+/// Σ a b over a block, added to the lanes of a sum.
+#[inline(always)]
+pub(crate) fn add_products(sum: &mut [f64; LANES], a: &Column, b: &Column) {
+    let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..LANES {
+            sum[lane] += a[lane] * b[lane];
+        }
+    }
+}
