@@ -247,13 +247,10 @@ fn what_is_no_mesh_is_refused_and_named() {
 #[test]
 fn far_from_the_origin_coordinates_are_stated_coarsely() {
     let at = |x: f32| {
-        let vertices = corners()
-            .iter()
-            .map(|p| Point3::new(p.x + x, p.y, p.z))
-            .collect();
-        TriMesh::new(vertices, vec![[0, 1, 2]])
-            .unwrap()
-            .coordinate_step()
+        let corner = |x, y| Point3::new(x, y, 0.0);
+        let vertices = vec![corner(x, 0.0), corner(x + 1.0, 0.0), corner(x, 1.0)];
+        let mesh = TriMesh::new(vertices, vec![[0, 1, 2]]).unwrap();
+        mesh.coordinate_step()
     };
     assert!(at(0.0) < 1e-6);
     // Between 2²⁰ and 2²¹ the 24 bits of a number end at an eighth.

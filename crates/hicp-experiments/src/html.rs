@@ -136,11 +136,6 @@ mod tests {
         assert!(page.contains("<p>body</p>") && page.ends_with("</html>\n"));
         assert_eq!(table.csv(), b"a<b,n\n\"x|y & \"\"z\"\"\",1\n");
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::escaped;
 
     #[test]
     fn names_do_not_become_tags() {

@@ -397,7 +397,7 @@ mod tests {
             let mut rng = stream(5, &["sensor"], 1);
             let view = clutter.view_from(&mut rng, pose, &models, &camera, &DepthSensor::default());
             let view = view.unwrap();
-            view.objects
+            view.instances
                 .iter()
                 .map(|object| object.camera_from_object)
                 .collect::<Vec<_>>()
