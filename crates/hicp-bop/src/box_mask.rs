@@ -9,7 +9,7 @@ use hybrid_icp::{
 /// Set are the pixels that lie in the box of the model's silhouette at the estimate, grown on every side by `margin` times its
 /// longer side, and whose measured point lies in the model's own bounding box at the estimate, grown on every side by `margin`
 /// times its diameter. Whatever else stands in that box is in the mask too, so this is for estimates that are near, of objects
-/// that stand free, and for projective pipelines; a segmentation is better where there is one (`docs/datasets.md` has figures).
+/// that stand free, and for projective pipelines; a segmentation is better where there is one (`docs/bop.md` has figures).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
     /// How much the boxes grow on every side.
