@@ -160,10 +160,9 @@ fn without_need_nothing_is_searched() {
     let refined = refiner.refine(&scene.model, &scene.observation, &init);
     let local = Refiner::preset(Preset::Local).refine(&scene.model, &scene.observation, &init);
     assert_eq!(refined, local);
-    let parts = (presets::local(), presets::hybrid());
     let search = HypothesisSearch::new(
-        parts.0,
-        parts.1,
+        presets::local(),
+        presets::hybrid(),
         SampledMve::new(200, 400),
         MeanVsd::default(),
         options,

@@ -124,12 +124,15 @@ impl<'a> Hypotheses<'a> {
     /// Places a rotation so that the centroid of what it shows is that of what was observed, and within the bound; `None` where
     /// the rotation is outside.
     fn place(&self, rotation: &UnitQuaternion<f64>) -> Option<Isometry3<f64>> {
-        let mut translation = self.centroid - rotation * self.shown(rotation);
+        // Before the rotation is placed: most of a bounded search's grid ends here.
         if let Some(bound) = self.bound {
             let away = rotation * self.init.rotation.inverse();
             if so3::angle(&away).to_degrees() > bound.rotation_degrees {
                 return None;
             }
+        }
+        let mut translation = self.centroid - rotation * self.shown(rotation);
+        if let Some(bound) = self.bound {
             let initial = self.init.translation.vector;
             let step = translation - initial;
             let limit = bound.translation_meters;

@@ -11,7 +11,7 @@ use crate::tolerances::{AgreementCounts, mean};
 /// An estimate of the MVE at low resolution, for ranking many poses: points of the model's surface are splatted into a coarse
 /// depth buffer, which is compared with the observation as [`crate::MeanVsd`] compares a render.
 ///
-/// It costs a few microseconds whatever the mesh, and is no substitute for the MVE where a pose is accepted or reported:
+/// It costs some ten microseconds whatever the mesh, and is no substitute for the MVE where a pose is accepted or reported:
 /// pixels that no sample hits count as not rendered, and thin parts come and go. Samples of a closed mesh that face away from
 /// the camera are passed over. Occlusion is recognised with BOP's tolerance, as [`crate::MeanVsd::default`] does.
 ///
