@@ -28,21 +28,6 @@ pub enum Fate {
     Kept(Termination),
 }
 
-/// Every way to end, for [`Fate::parse`].
-const TERMINATIONS: [Termination; 11] = [
-    Termination::Converged,
-    Termination::IterationLimit,
-    Termination::NoPairs,
-    Termination::PairsLost,
-    Termination::LossIncreased,
-    Termination::Degenerate,
-    Termination::Oscillating,
-    Termination::OutOfBounds,
-    Termination::Deadline,
-    Termination::Stopped,
-    Termination::ScoreNotImproved,
-];
-
 impl Fate {
     /// Returns the fate that is written so by its `Display`, or `None` for any other text.
     #[must_use]
@@ -56,7 +41,7 @@ impl Fate {
             Self::NothingMeasured,
             Self::Damaged,
         ];
-        let kept = TERMINATIONS.map(Self::Kept);
+        let kept = Termination::ALL.map(Self::Kept);
         let mut all = fates.into_iter().chain(kept);
         all.find(|fate| fate.to_string() == text)
     }
@@ -125,7 +110,7 @@ mod tests {
 
     #[test]
     fn every_fate_is_read_as_it_is_written() {
-        for fate in TERMINATIONS
+        for fate in Termination::ALL
             .map(Fate::Kept)
             .into_iter()
             .chain([Fate::Refined, Fate::NothingMeasured])

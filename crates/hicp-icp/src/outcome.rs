@@ -32,6 +32,21 @@ pub enum Termination {
 }
 
 impl Termination {
+    /// Every way to end.
+    pub const ALL: [Self; 11] = [
+        Self::Converged,
+        Self::IterationLimit,
+        Self::NoPairs,
+        Self::PairsLost,
+        Self::LossIncreased,
+        Self::Degenerate,
+        Self::Oscillating,
+        Self::OutOfBounds,
+        Self::Deadline,
+        Self::Stopped,
+        Self::ScoreNotImproved,
+    ];
+
     /// Returns whether the last candidate was rejected, so that an earlier pose was returned.
     #[must_use]
     pub fn is_rollback(self) -> bool {

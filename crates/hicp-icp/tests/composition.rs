@@ -249,16 +249,7 @@ fn a_broken_initial_pose_passes_through_any_composition_untouched() {
 
 #[test]
 fn what_ended_a_stage_is_told_in_words_of_its_own() {
-    let ends = [
-        Termination::Converged,
-        Termination::IterationLimit,
-        Termination::NoPairs,
-        Termination::PairsLost,
-        Termination::LossIncreased,
-        Termination::Degenerate,
-        Termination::OutOfBounds,
-        Termination::Deadline,
-    ];
+    let ends = Termination::ALL;
     for (index, end) in ends.iter().enumerate() {
         assert!(!end.explain().is_empty());
         assert!(
