@@ -1,13 +1,10 @@
 //! Depth of covered pixels.
 
 use glam::DVec3;
-use hicp_core::{PixelRegion, RenderedView};
+use hicp_core::{PixelRegion, RenderedView, VectorLoop, vectorized};
 
 use crate::edge::{Coverage, Edge};
 use crate::projection::ProjectedVertex;
-
-/// Up to this many columns every pixel of the bounding box is tried; in wider ones the ends of each row are computed.
-const NARROW_COLUMNS: i64 = 12;
 
 /// The plane of a triangle as the image sees it: 1/z is affine in the pixel.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +18,7 @@ pub(crate) struct InverseDepth {
 
 impl InverseDepth {
     /// Makes the plane through three vertices, none of them to be clipped.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn through(a: &ProjectedVertex, b: &ProjectedVertex, c: &ProjectedVertex) -> Self {
         let (u1, v1, w1) = (b.u - a.u, b.v - a.v, b.inverse_depth - a.inverse_depth);
         let (u2, v2, w2) = (c.u - a.u, c.v - a.v, c.inverse_depth - a.inverse_depth);
@@ -54,13 +51,13 @@ impl InverseDepth {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn at_row(&self, v: f64) -> f64 {
         self.at_origin + self.per_v * v
     }
 
     /// Returns the depth in metres at column `u` of a row, never outside the triangle's own range.
-    #[inline]
+    #[inline(always)]
     #[allow(
         clippy::cast_possible_truncation,
         reason = "depth is handed out as f32"
@@ -70,15 +67,25 @@ impl InverseDepth {
         let inverse = lesser(greater(row + self.per_u * u, self.low), self.high);
         (1.0 / inverse) as f32
     }
+
+    /// Returns the depths at some columns of a row.
+    #[inline(always)]
+    fn depths<const N: usize>(&self, row: f64, us: &[f64; N]) -> [f32; N] {
+        let mut depths = [0.0; N];
+        for (depth, u) in depths.iter_mut().zip(us) {
+            *depth = self.depth(row, *u);
+        }
+        depths
+    }
 }
 
 /// Returns `b` unless `a` is greater: one instruction, where `f64::max` has to look after NaN in both.
-#[inline]
+#[inline(always)]
 fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-#[inline]
+#[inline(always)]
 fn lesser(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
@@ -107,46 +114,82 @@ impl<'a> Target<'a> {
     /// Writes the pixels of a triangle where it is nearer than what is there.
     #[inline(always)]
     pub(crate) fn fill(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
-        if coverage.columns <= NARROW_COLUMNS {
-            self.fill_narrow(coverage, plane, triangle);
-        } else {
-            self.fill_wide(coverage, plane, triangle);
+        // Rows that fit a few vectors are tried whole.
+        match coverage.columns {
+            ..5 => self.fill_narrow::<4>(coverage, plane, triangle),
+            5..9 => self.fill_narrow::<8>(coverage, plane, triangle),
+            9..17 => self.fill_narrow::<16>(coverage, plane, triangle),
+            _ => self.fill_wide(coverage, plane, triangle),
         }
     }
 
+    /// Tries `N` columns of each row at a time, at least those of the bounding box.
     #[inline(always)]
-    fn fill_narrow(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
-        let [e0, e1, e2] = &coverage.edges;
-        let mut row_values = [e0.value, e1.value, e2.value];
+    fn fill_narrow<const N: usize>(
+        &mut self,
+        coverage: &Coverage,
+        plane: &InverseDepth,
+        triangle: u32,
+    ) {
         let mut start = self.index(coverage.u, coverage.v);
-        let columns = index(coverage.columns);
+        let end = start + index(coverage.rows - 1) * self.width + N;
+        let Some(mut edges) = LaneEdges::<N>::new(coverage).filter(|_| end <= self.depth.len())
+        else {
+            return self.fill_wide(coverage, plane, triangle);
+        };
         let (first_u, mut v) = (to_f64(coverage.u), to_f64(coverage.v));
+        let us = columns_from::<N>(first_u);
         for _ in 0..coverage.rows {
-            let row = plane.at_row(v);
-            let [mut w0, mut w1, mut w2] = row_values;
-            let mut u = first_u;
-            let depths = &mut self.depth[start..start + columns];
-            let triangles = &mut self.triangles[start..start + columns];
-            for (depth, id) in depths.iter_mut().zip(triangles) {
-                if (w0 | w1 | w2) >= 0 {
-                    keep_nearer(depth, id, plane.depth(row, u), triangle);
-                }
-                w0 += e0.per_u;
-                w1 += e1.per_u;
-                w2 += e2.per_u;
-                u += 1.0;
+            let outside = edges.outside();
+            let candidates = plane.depths(plane.at_row(v), &us);
+            let row = start..start + N;
+            if let (Some(depths), Some(ids)) = (
+                self.depth[row.clone()].first_chunk_mut::<N>(),
+                self.triangles[row].first_chunk_mut::<N>(),
+            ) {
+                keep_nearer(depths, ids, &candidates, &outside, triangle);
             }
-            row_values[0] += e0.per_v;
-            row_values[1] += e1.per_v;
-            row_values[2] += e2.per_v;
+            edges.next_row();
             start += self.width;
             v += 1.0;
         }
     }
 
+    /// Computes the ends of each row.
     fn fill_wide(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
+        vectorized(FillWide {
+            target: self,
+            coverage,
+            plane,
+            triangle,
+        });
+    }
+
+    #[inline(always)]
+    fn index(&self, u: i64, v: i64) -> usize {
+        index(v - i64::from(self.region.v_min)) * self.width
+            + index(u - i64::from(self.region.u_min))
+    }
+}
+
+/// Pixels of a long row that are written at a time.
+const LANES: usize = 8;
+
+struct FillWide<'a, 'view> {
+    target: &'a mut Target<'view>,
+    coverage: &'a Coverage,
+    plane: &'a InverseDepth,
+    triangle: u32,
+}
+
+impl VectorLoop for FillWide<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (coverage, plane) = (self.coverage, self.plane);
         let mut edges = coverage.edges;
-        let mut start = self.index(coverage.u, coverage.v);
+        let mut start = self.target.index(coverage.u, coverage.v);
         let (first_u, mut v) = (to_f64(coverage.u), to_f64(coverage.v));
         for _ in 0..coverage.rows {
             let (first, end) = inside_columns(&edges, coverage.columns);
@@ -154,25 +197,106 @@ impl<'a> Target<'a> {
                 let row = plane.at_row(v);
                 let mut u = first_u + to_f64(first);
                 let span = start + index(first)..start + index(end);
-                let depths = &mut self.depth[span.clone()];
-                let triangles = &mut self.triangles[span];
-                for (depth, id) in depths.iter_mut().zip(triangles) {
-                    keep_nearer(depth, id, plane.depth(row, u), triangle);
+                let (depths, last_depths) =
+                    self.target.depth[span.clone()].as_chunks_mut::<LANES>();
+                let (ids, last_ids) = self.target.triangles[span].as_chunks_mut::<LANES>();
+                for (depths, ids) in depths.iter_mut().zip(ids) {
+                    let candidates = plane.depths(row, &columns_from::<LANES>(u));
+                    keep_nearer(depths, ids, &candidates, &[0; LANES], self.triangle);
+                    u += LANES as f64;
+                }
+                for (depth, id) in last_depths.iter_mut().zip(last_ids) {
+                    let candidate = plane.depth(row, u);
+                    let (depth, id) = (std::array::from_mut(depth), std::array::from_mut(id));
+                    keep_nearer(depth, id, &[candidate], &[0], self.triangle);
                     u += 1.0;
                 }
             }
             for edge in &mut edges {
                 edge.value += edge.per_v;
             }
-            start += self.width;
+            start += self.target.width;
             v += 1.0;
         }
     }
+}
 
-    #[inline]
-    fn index(&self, u: i64, v: i64) -> usize {
-        index(v - i64::from(self.region.v_min)) * self.width
-            + index(u - i64::from(self.region.u_min))
+/// The largest edge function in 32 bits.
+const MOST: u64 = i32::MAX.unsigned_abs() as u64;
+
+/// Some columns, the first and those after it.
+#[inline(always)]
+fn columns_from<const N: usize>(first: f64) -> [f64; N] {
+    let mut columns = [0.0; N];
+    for (lane, column) in columns.iter_mut().enumerate() {
+        *column = first + lane as f64;
+    }
+    columns
+}
+
+/// The three edge functions at `N` neighbouring pixels, in 32 bits.
+struct LaneEdges<const N: usize> {
+    values: [[i32; N]; 3],
+    per_v: [i32; 3],
+    /// Negative beyond the columns of the bounding box, which may be cut at the border of the view.
+    beyond: [i32; N],
+}
+
+impl<const N: usize> LaneEdges<N> {
+    /// `None` where a value that is needed is out of range.
+    #[inline(always)]
+    fn new(coverage: &Coverage) -> Option<Self> {
+        let mut lanes = Self {
+            values: [[0; N]; 3],
+            per_v: [0; 3],
+            beyond: [0; N],
+        };
+        for (index, edge) in coverage.edges.iter().enumerate() {
+            // The largest magnitude at any of the pixels tried.
+            let reach = edge.value.unsigned_abs()
+                + edge.per_u.unsigned_abs() * N as u64
+                + edge.per_v.unsigned_abs() * coverage.rows.unsigned_abs();
+            let (Ok(value), true) = (i32::try_from(edge.value), reach <= MOST) else {
+                return None;
+            };
+            #[allow(clippy::cast_possible_truncation, reason = "within reach")]
+            let (per_u, per_v) = (edge.per_u as i32, edge.per_v as i32);
+            let mut lane_value = value;
+            for lane in &mut lanes.values[index] {
+                *lane = lane_value;
+                lane_value = lane_value.wrapping_add(per_u);
+            }
+            lanes.per_v[index] = per_v;
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "a few columns")]
+        let mut left = coverage.columns as i32 - 1;
+        for beyond in &mut lanes.beyond {
+            *beyond = left;
+            left -= 1;
+        }
+        Some(lanes)
+    }
+
+    /// Negative where a pixel is outside.
+    #[inline(always)]
+    fn outside(&self) -> [i32; N] {
+        let mut outside = self.beyond;
+        for values in &self.values {
+            for (outside, value) in outside.iter_mut().zip(values) {
+                *outside |= value;
+            }
+        }
+        outside
+    }
+
+    #[inline(always)]
+    fn next_row(&mut self) {
+        for (values, per_v) in self.values.iter_mut().zip(self.per_v) {
+            for value in values {
+                // The row after the last may be out of range.
+                *value = value.wrapping_add(per_v);
+            }
+        }
     }
 }
 
@@ -196,12 +320,34 @@ fn inside_columns(edges: &[Edge; 3], columns: i64) -> (i64, i64) {
     (first, end)
 }
 
-/// The nearer depth wins, and of equal ones the first. 0 is no depth.
-#[inline]
-fn keep_nearer(depth: &mut f32, id: &mut u32, candidate: f32, triangle: u32) {
-    if *depth == 0.0 || candidate < *depth {
-        *depth = candidate;
-        *id = triangle;
+/// The nearer depth wins, and of equal ones the first. 0 is no depth; what is outside (negative) stays as it is.
+#[inline(always)]
+fn keep_nearer<const N: usize>(
+    depths: &mut [f32; N],
+    ids: &mut [u32; N],
+    candidates: &[f32; N],
+    outside: &[i32; N],
+    triangle: u32,
+) {
+    // All bits or none, lane by lane: what reads like a choice here becomes a branch per lane.
+    let mut taken = [0_u32; N];
+    for lane in 0..N {
+        taken[lane] = !(outside[lane] >> 31).cast_unsigned();
+    }
+    let mut nearer = [0_u32; N];
+    for lane in 0..N {
+        let (old, candidate) = (depths[lane], candidates[lane]);
+        nearer[lane] = u32::from((old == 0.0) | (candidate < old)).wrapping_neg();
+    }
+    for lane in 0..N {
+        taken[lane] &= nearer[lane];
+    }
+    for lane in 0..N {
+        let (old, candidate) = (depths[lane].to_bits(), candidates[lane].to_bits());
+        depths[lane] = f32::from_bits((candidate & taken[lane]) | (old & !taken[lane]));
+    }
+    for lane in 0..N {
+        ids[lane] = (triangle & taken[lane]) | (ids[lane] & !taken[lane]);
     }
 }
 
@@ -210,13 +356,13 @@ fn keep_nearer(depth: &mut f32, id: &mut u32, candidate: f32, triangle: u32) {
     clippy::cast_sign_loss,
     reason = "offsets within a region, not negative and below 2^15"
 )]
-#[inline]
+#[inline(always)]
 fn index(offset: i64) -> usize {
     offset as usize
 }
 
 /// Pixel indices are below 2¹⁵ and exact.
-#[inline]
+#[inline(always)]
 fn to_f64(pixel: i64) -> f64 {
     pixel as f64
 }

@@ -1,6 +1,9 @@
 //! The rasterizer: configuration, scratch and the triangle loop.
 
-use hicp_core::{Facing, Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
+use hicp_core::{
+    Facing, Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh, VectorLoop,
+    vectorized,
+};
 
 use crate::clip::Clipper;
 use crate::edge::{Coverage, Keep};
@@ -153,24 +156,45 @@ impl Renderer for Rasterizer {
         }
 
         let keep = self.keep(mesh, &bounds);
-        let mut target = Target::new(view);
-        for (id, &[a, b, c]) in (0_u32..).zip(mesh.triangles()) {
+        vectorized(Draw {
+            mesh,
+            vertices: &self.vertices,
+            projection,
+            near,
+            keep,
+            clipper: &mut self.clipper,
+            target: Target::new(view),
+        });
+    }
+}
+
+/// The triangles of a mesh, drawn one after the other.
+struct Draw<'a> {
+    mesh: &'a TriMesh,
+    vertices: &'a [ProjectedVertex],
+    projection: Projection,
+    near: f64,
+    keep: Keep,
+    clipper: &'a mut Clipper,
+    target: Target<'a>,
+}
+
+impl VectorLoop for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        for (id, &[a, b, c]) in (0_u32..).zip(self.mesh.triangles()) {
             let [a, b, c] = [a, b, c].map(|i| &self.vertices[i as usize]);
             if a.inverse_depth > 0.0 && b.inverse_depth > 0.0 && c.inverse_depth > 0.0 {
-                let coverage = Coverage::new(a.fixed, b.fixed, c.fixed, keep, &target.region);
+                let region = &self.target.region;
+                let coverage = Coverage::new(a.fixed, b.fixed, c.fixed, self.keep, region);
                 if let Some(coverage) = coverage {
-                    target.fill(&coverage, &InverseDepth::through(a, b, c), id);
+                    let plane = InverseDepth::through(a, b, c);
+                    self.target.fill(&coverage, &plane, id);
                 }
             } else {
-                draw_clipped(
-                    mesh,
-                    id,
-                    &projection,
-                    near,
-                    keep,
-                    &mut self.clipper,
-                    &mut target,
-                );
+                draw_clipped(&mut self, id);
             }
         }
     }
@@ -178,19 +202,12 @@ impl Renderer for Rasterizer {
 
 /// Draws what the near plane and the guard band leave of a triangle.
 #[cold]
-fn draw_clipped(
-    mesh: &TriMesh,
-    id: u32,
-    projection: &Projection,
-    near: f64,
-    keep: Keep,
-    clipper: &mut Clipper,
-    target: &mut Target<'_>,
-) {
+fn draw_clipped(draw: &mut Draw<'_>, id: u32) {
+    let (mesh, projection) = (draw.mesh, &draw.projection);
     let triangle = mesh
         .corners(id as usize)
         .map(|corner| projection.homogeneous(&corner));
-    let polygon = clipper.clip(triangle, near);
+    let polygon = draw.clipper.clip(triangle, draw.near);
     // Beyond the range of `f64` there are no pixels: infinities of both signs have met in clipping.
     if !polygon.iter().all(|h| h.is_finite()) {
         return;
@@ -213,8 +230,8 @@ fn draw_clipped(
     };
     for second in 1..polygon.len().saturating_sub(1) {
         let (a, b, c) = (fixed(0), fixed(second), fixed(second + 1));
-        if let Some(coverage) = Coverage::new(a, b, c, keep, &target.region) {
-            target.fill(&coverage, &plane, id);
+        if let Some(coverage) = Coverage::new(a, b, c, draw.keep, &draw.target.region) {
+            draw.target.fill(&coverage, &plane, id);
         }
     }
 }
