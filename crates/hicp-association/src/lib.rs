@@ -21,7 +21,7 @@
 //!
 //! | selections | associations | filters | weights |
 //! |---|---|---|---|
-//! | [`AllSamples`] | `NearestNeighbor`, [`WarmNearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
+//! | [`AllSamples`] | `NearestNeighbor`, [`WarmNearestNeighbor`], [`OrganizedNearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
 //! | [`VisibleSurface`] | [`KNearest`] | [`MaxNormalAngle`] | [`DistanceWeight`] |
 //! | [`ObservedSurface`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
 //! | [`WithoutBoundary`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
@@ -39,10 +39,10 @@
 //! - `selection` (trait), `all_samples`, `visible_surface`, `observed_surface`, `stride`; of another selection
 //!   `uniform_count`, `random_sample`, `voxel_grid`, `normal_space`, `stable_sampling`, `without_boundary`;
 //! - `association` (trait), `projective`, `projective_search`, `projective_interpolated`; `nearest_neighbor` (feature `kiddo`, on
-//!   by default), `warm_nearest_neighbor`, `k_nearest`, `normal_compatible`, `normal_shooting`, `reciprocal`; from the observation `observation_to_model`, `closest_point_on_mesh`;
+//!   by default), `warm_nearest_neighbor`, `organized_nearest_neighbor`, `k_nearest`, `normal_compatible`, `normal_shooting`, `reciprocal`; from the observation `observation_to_model`, `closest_point_on_mesh`;
 //! - `filter` (trait), `max_distance`, `max_normal_angle`, `median_distance`, `mad_distance`, `trimmed`, `var_trimmed`, `one_to_one`,
 //!   `boundary_targets`, `min_pairs`, `schedule`; `constant_weight`, `distance_weight`, `normal_weight`, `sensor_noise_weight`;
-//! - what they share: `length`, `wide_tree`, `box_tree` with `point_tree`, `observed_points` and `triangle`, `pixel_projection`, `boundary`, `distances`, `keep`, `scratch`.
+//! - what they share: `length`, `wide_tree`, `point_grid`, `box_tree` with `point_tree`, `observed_points` and `triangle`, `pixel_projection`, `boundary`, `distances`, `keep`, `scratch`.
 
 // Image sizes and counts become floating point numbers; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
@@ -75,7 +75,9 @@ mod observation_to_model;
 mod observed_points;
 mod observed_surface;
 mod one_to_one;
+mod organized_nearest_neighbor;
 mod pixel_projection;
+mod point_grid;
 mod point_tree;
 mod projective;
 mod projective_interpolated;
@@ -121,6 +123,7 @@ pub use normal_weight::NormalWeight;
 pub use observation_to_model::ObservationToModel;
 pub use observed_surface::ObservedSurface;
 pub use one_to_one::OneToOne;
+pub use organized_nearest_neighbor::OrganizedNearestNeighbor;
 pub use projective::Projective;
 pub use projective_interpolated::ProjectiveInterpolated;
 pub use projective_search::ProjectiveSearch;

@@ -15,11 +15,11 @@ use hybrid_icp::{
     KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
     MeanVsd, MedianDistance, MetricSchedule, MinPairs, Motion, NearestNeighbor, NormalCompatible,
     NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
-    Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
-    Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
-    Regime, Robust, SampledMve, Scale, Schedule, SensorNoiseWeight, StableSampling, Symmetric,
-    Threshold, Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid,
-    Vsd, WarmNearestNeighbor, WeightedSum, WithoutBoundary,
+    OrganizedNearestNeighbor, Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Preset, Prior, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
+    Rasterizer, Reciprocal, Regime, Robust, SampledMve, Scale, Schedule, SensorNoiseWeight,
+    StableSampling, Symmetric, Threshold, Thresholds, TimeLimit, Trimmed, UniformCount, VarTrimmed,
+    VisibleSurface, VoxelGrid, Vsd, WarmNearestNeighbor, WeightedSum, WithoutBoundary,
 };
 
 #[test]
@@ -41,6 +41,7 @@ fn associations() {
     let strict = AssociationLaws::default();
     check_association(NearestNeighbor::default, strict);
     check_association(WarmNearestNeighbor::default, strict);
+    check_association(OrganizedNearestNeighbor::default, strict);
     check_association(KNearest::default, strict);
     check_association(NormalCompatible::default, strict);
     check_association(NormalShooting::default, strict);

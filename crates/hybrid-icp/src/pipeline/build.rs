@@ -4,10 +4,10 @@ use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
     MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
-    ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SensorNoise,
-    SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed, VisibleSurface,
-    VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
+    ObservationToModel, ObservedSurface, OneToOne, OrganizedNearestNeighbor, OutlierFilter,
+    PointSelection, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal,
+    Schedule, SensorNoise, SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount,
+    VarTrimmed, VisibleSurface, VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
 };
 use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard,
@@ -177,6 +177,7 @@ fn association(part: &Reader<'_>) -> Result<Association, PipelineError> {
             targets: stride(part)?,
         }),
         "warm-nearest-neighbor" => Box::new(WarmNearestNeighbor::new(stride(part)?)),
+        "organized-nearest-neighbor" => Box::new(OrganizedNearestNeighbor::new(stride(part)?)),
         "projective" => Box::new(Projective),
         "k-nearest" => Box::new(KNearest::new(part.count("k")? as usize, stride(part)?)),
         "normal-compatible" => Box::new(NormalCompatible::new(

@@ -2,7 +2,8 @@
 
 use super::super::catalog::{Part, PartKind};
 use super::parameter::{
-    ASKING, INFINITE, LENGTH_UNITS, POSITIVE, SEARCHED, SPACING, count, flag, number, part, word,
+    ASKING, EVERY_PIXEL, INFINITE, LENGTH_UNITS, POSITIVE, SEARCHED, SPACING, count, flag, number,
+    part, word,
 };
 
 pub(super) const PARTS: &[Part] = &[
@@ -23,6 +24,15 @@ pub(super) const PARTS: &[Part] = &[
         source: "§III-A.1; Besl & McKay 1992, Greenspan & Godin 2001",
         cost: "O(n log m), and O(m log m) once per observation",
         parameters: &[SEARCHED, SPACING],
+    },
+    Part {
+        kind: PartKind::Association,
+        name: "organized-nearest-neighbor",
+        rust: "OrganizedNearestNeighbor",
+        summary: "the closest observed point, searched in the image about where it can be seen: the same pairs, faster for visible points",
+        source: "§III-A.1; Besl & McKay 1992",
+        cost: "O(n (f d / z)²), and O(pixels of the box) once per observation",
+        parameters: &[SEARCHED, EVERY_PIXEL],
     },
     Part {
         kind: PartKind::Association,

@@ -124,3 +124,10 @@ pub(super) const SPACING: Parameter = count(
     0,
     Some(0),
 );
+/// The same for what looks at every pixel unless told otherwise.
+pub(super) const EVERY_PIXEL: Parameter = count(
+    "pixels",
+    "the spacing of the grid; 0 leaves it to `points`",
+    0,
+    Some(1),
+);
