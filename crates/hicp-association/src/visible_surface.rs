@@ -36,7 +36,7 @@ impl PointSelection for VisibleSurface {
         let (mesh, camera) = (problem.model.mesh(), problem.observation.camera());
         let view = context.view(camera_from_object);
         let region = view.region();
-        let rendered = view.depth().iter().filter(|z| **z > 0.0).count();
+        let rendered = view.n_rendered();
         if rendered == 0 {
             return;
         }

@@ -173,28 +173,53 @@ impl Mask {
             return region;
         }
         for (row, v) in self.pixels().chunks_exact(width).zip(0_u32..) {
-            let Some(first) = (0_u32..).zip(row).find(|(_, set)| **set).map(|(u, _)| u) else {
-                continue;
-            };
-            let last = (0..self.width())
-                .rev()
-                .find(|u| row[*u as usize])
-                .unwrap_or(first);
             if region.is_empty() {
-                region = PixelRegion {
-                    u_min: first,
-                    v_min: v,
-                    u_max: last + 1,
-                    v_max: v + 1,
-                };
-            } else {
-                region.u_min = region.u_min.min(first);
-                region.u_max = region.u_max.max(last + 1);
+                if let (Some(first), Some(last)) = (first_set(row), last_set(row)) {
+                    region = PixelRegion {
+                        u_min: first,
+                        v_min: v,
+                        u_max: last + 1,
+                        v_max: v + 1,
+                    };
+                }
+                continue;
+            }
+            // Only what lies beside the columns known so far can widen them.
+            let (left, inside) = row.split_at(region.u_min as usize);
+            let (inside, right) = inside.split_at((region.u_max - region.u_min) as usize);
+            let (first, last) = (first_set(left), last_set(right));
+            if first.is_some() || last.is_some() || first_set(inside).is_some() {
                 region.v_max = v + 1;
             }
+            region.u_min = first.unwrap_or(region.u_min);
+            region.u_max = last.map_or(region.u_max, |last| region.u_max + last + 1);
         }
         region
     }
+}
+
+/// Pixels that are looked at together: an empty mask is read as fast as memory is.
+const SPAN: usize = 64;
+
+/// The first set pixel of a row.
+fn first_set(row: &[bool]) -> Option<u32> {
+    let mut spans = row.chunks(SPAN).zip((0_u32..).step_by(SPAN));
+    let (span, start) = spans.find(|(span, _)| any_set(span))?;
+    let offset = (0_u32..).zip(span).find(|(_, set)| **set)?.0;
+    Some(start + offset)
+}
+
+/// The last set pixel of a row.
+fn last_set(row: &[bool]) -> Option<u32> {
+    let span = row.rchunks(SPAN).position(any_set)?;
+    let rest = row.len() - span * SPAN;
+    let last = row[..rest].iter().rposition(|set| *set)?;
+    u32::try_from(last).ok()
+}
+
+/// Looks at all of them: a loop that ends early has a branch per pixel.
+fn any_set(pixels: &[bool]) -> bool {
+    pixels.iter().fold(false, |any, set| any | set)
 }
 
 /// Refuses two things of different size, naming both.

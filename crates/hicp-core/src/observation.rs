@@ -76,7 +76,8 @@ impl Observation {
                     .map(|(z, masked)| if *masked { *z } else { 0.0 }),
             );
         }
-        let n_measured = patch.iter().filter(|z| **z > 0.0).count();
+        // Below 2³⁰ in any accepted image; counted in 32 bits, of which a vector holds more.
+        let n_measured = patch.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>() as usize;
 
         let width = region.width();
         let (xs, ys) = (

@@ -63,6 +63,17 @@ impl RenderedView {
         (&mut self.depth, &mut self.triangles)
     }
 
+    /// Number of pixels that show the surface.
+    #[must_use]
+    pub fn n_rendered(&self) -> usize {
+        // Few enough at a time for 32 bits, of which a vector holds twice as many.
+        let count = |depths: &[f32]| depths.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>();
+        self.depth
+            .chunks(1 << 16)
+            .map(|depths| count(depths) as usize)
+            .sum()
+    }
+
     /// Returns the depth at an image pixel: 0 where nothing was rendered, and outside the region.
     #[must_use]
     pub fn depth_at(&self, u: u32, v: u32) -> f32 {
