@@ -44,7 +44,7 @@
 //! [`NormalEquations::information`] and [`NormalEquations::covariance`].
 //!
 //! Modules in reading order: `metric` (trait); `point_to_point`, `point_to_plane`, `plane_to_point`, `symmetric`, `generalized`,
-//! `weighted_sum`; `normal_equations` over `row_sums`, `row_blocks`, `pair_block` and `moments`, and what they are asked: `degeneracy` (solving), `freedom` (held components),
+//! `weighted_sum`; `normal_equations` over `row_sums`, `row_blocks`, `point_blocks`, `pair_block` and `moments`, and what they are asked: `degeneracy` (solving), `freedom` (held components),
 //! `observability`, `covariance`; the decorators `kernel` and `robust`, `pose_prior`, `conditioned`, `frozen`, `moved` with
 //! `gauss_newton` and `levenberg_marquardt`, `metric_schedule`.
 
@@ -65,6 +65,7 @@ mod normal_equations;
 mod observability;
 mod pair_block;
 mod plane_to_point;
+mod point_blocks;
 mod point_to_plane;
 mod point_to_point;
 mod pose_prior;

@@ -54,3 +54,23 @@ pub(crate) fn add_products(sum: &mut [f64; LANES], a: &Column, b: &Column) {
         }
     }
 }
+
+/// The product of two columns.
+#[inline(always)]
+pub(crate) fn product(a: &Column, b: &Column) -> Column {
+    let mut product = [0.0; BLOCK];
+    for lane in 0..BLOCK {
+        product[lane] = a[lane] * b[lane];
+    }
+    product
+}
+
+/// Adds a column to the lanes of a sum.
+#[inline(always)]
+pub(crate) fn add(sum: &mut [f64; LANES], column: &Column) {
+    for column in column.as_chunks::<LANES>().0 {
+        for lane in 0..LANES {
+            sum[lane] += column[lane];
+        }
+    }
+}

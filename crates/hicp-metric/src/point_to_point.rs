@@ -8,7 +8,8 @@ use nalgebra::{Matrix2, Quaternion, Rotation3, SymmetricEigen};
 
 use crate::metric::{ErrorMetric, Step};
 use crate::normal_equations::NormalEquations;
-use crate::pair_block::{BLOCK, Column, LANES, PairBlock, add_products};
+use crate::pair_block::{BLOCK, LANES, PairBlock, add, add_products, product};
+use crate::point_blocks::system_of_points;
 
 /// Fewer pairs leave the rotation open.
 const MIN_PAIRS: usize = 3;
@@ -34,6 +35,10 @@ impl ErrorMetric for PointToPoint {
         system.add_row(&point, &Vector3::x(), difference.x, weight);
         system.add_row(&point, &Vector3::y(), difference.y, weight);
         system.add_row(&point, &Vector3::z(), difference.z, weight);
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        system_of_points(pairs.as_slice())
     }
 
     fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
@@ -145,26 +150,6 @@ impl VectorLoop for SumProducts<'_> {
             spread: total(spread),
             loss: total(loss),
             weight: total(weight),
-        }
-    }
-}
-
-/// The product of two columns.
-#[inline(always)]
-fn product(a: &Column, b: &Column) -> Column {
-    let mut product = [0.0; BLOCK];
-    for lane in 0..BLOCK {
-        product[lane] = a[lane] * b[lane];
-    }
-    product
-}
-
-/// Adds a column to the lanes of a sum.
-#[inline(always)]
-fn add(sum: &mut [f64; LANES], column: &Column) {
-    for column in column.as_chunks::<LANES>().0 {
-        for lane in 0..LANES {
-            sum[lane] += column[lane];
         }
     }
 }

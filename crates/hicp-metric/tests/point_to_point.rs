@@ -73,6 +73,36 @@ fn exact_pairs_are_aligned_in_one_step_to_the_rounding_of_their_points() {
     }
 }
 
+/// Its sums over points are the sums over its rows, weights of all kinds included.
+#[test]
+fn the_system_is_that_of_its_rows() {
+    let mut numbers = Numbers(117);
+    for count in [1, 2, 31, 32, 33, 500] {
+        let motion = numbers.pose(0.02);
+        let mut pairs = images(&cloud(&mut numbers, count, [0.05, 0.03, 0.04]), &motion);
+        noisy(&mut numbers, &mut pairs, 0.002);
+        for (index, pair) in pairs.as_mut_slice().iter_mut().enumerate() {
+            pair.source.point.z += 0.7;
+            pair.target.point.z += 0.7;
+            pair.weight = [1.0, 0.25, 3.0, 0.0][index % 4];
+        }
+        let (found, expected) = (PointToPoint.system(&pairs), Iterative.system(&pairs));
+        let (found, expected) = (found.unwrap(), expected.unwrap());
+        assert_eq!(found.rows(), expected.rows());
+        assert!((found.pivot() - expected.pivot()).norm() < 1e-13);
+        assert!((found.length() - expected.length()).abs() < 1e-13);
+        assert!((found.loss() - expected.loss()).abs() <= 1e-12 * expected.loss());
+        let (ours, theirs) = (found.information(), expected.information());
+        assert!((ours - theirs).amax() <= 1e-12 * theirs.amax());
+        let (ours, theirs) = (found.solve(), expected.solve());
+        assert_eq!(ours.is_some(), theirs.is_some());
+        if let (Some(ours), Some(theirs)) = (ours, theirs) {
+            let difference = ours.to_homogeneous() - theirs.to_homogeneous();
+            assert!(difference.amax() < 1e-10, "{count}: {difference}");
+        }
+    }
+}
+
 #[test]
 fn random_motions_are_recovered() {
     let mut numbers = Numbers(102);
