@@ -5,8 +5,8 @@
 //!
 //! - `regimes`: switches that took the aligned branch / the other;
 //! - `stages`, `iterations` (evaluations of a pose, the rejected included), `selected` points, `pairs` that the metrics saw;
-//! - `queries`: points that asked for their nearest neighbour;
-//! - `renders` made, `pixels` of their views, those `filled`, `triangles` given to the renderer;
+//! - `queries`: points that asked for their nearest neighbour, and the `nodes` of trees that were looked at for them;
+//! - `renders` made, `pixels` of their views, those `filled` in the end and those `tested` against triangles, `triangles` given to the renderer;
 //! - `cold`, `warm`: heap allocations of the first run (model and observation new, scratch memory empty) and of the next.
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use hicp_benches::work::{CountingRenderer, StageWork};
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::{Counting, allocations};
-use hybrid_icp::{Isometry3, Preset, Problem, Session, Workspace};
+use hybrid_icp::{Isometry3, Preset, Problem, Session, Work, Workspace};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -26,7 +26,7 @@ const STARTS: [(&str, f64, f64); 2] = [("aligned", 0.003, 3.0), ("misaligned", 0
 
 fn main() {
     let mut table = vec![
-        "object noise start preset regimes stages iterations selected pairs queries renders pixels filled triangles cold warm"
+        "object noise start preset regimes stages iterations selected pairs queries nodes renders pixels filled tested triangles cold warm"
             .split(' ')
             .map(str::to_owned)
             .collect(),
@@ -65,7 +65,9 @@ fn line(
         stage.run(&problem, init, &mut Session::new(&mut workspace, &mut work));
         (work, allocations() - before)
     };
+    let _ = (Work::NodesVisited.take(), Work::PixelsTested.take());
     let (work, cold) = run(&init);
+    let (nodes, tested) = (Work::NodesVisited.take(), Work::PixelsTested.take());
     let rendered = renderer.take();
     let (_, warm) = run(&init);
 
@@ -82,9 +84,11 @@ fn line(
         work.selected,
         work.pairs,
         work.queries,
+        nodes,
         rendered.renders,
         rendered.pixels,
         rendered.filled,
+        tested,
         rendered.triangles,
         cold,
         warm,

@@ -1,6 +1,6 @@
 //! A tree of axis-aligned boxes for exact nearest-element queries.
 
-use hicp_core::Point3;
+use hicp_core::{Point3, Work};
 
 /// Elements per leaf: small enough to prune, large enough that a leaf is a short scan.
 const LEAF_SIZE: usize = 8;
@@ -211,12 +211,14 @@ impl BoxTree {
         let mut bound = f32::INFINITY;
         let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH];
         let mut depth = 1;
+        let mut visited = 0;
         while depth > 0 {
             depth -= 1;
             let (index, distance) = stack[depth];
             if distance * PRUNING_SLACK > bound {
                 continue;
             }
+            visited += 1;
             let node = &self.nodes[index as usize];
             if node.count > 0 {
                 let from = node.first as usize;
@@ -248,5 +250,6 @@ impl BoxTree {
             stack[depth + 1] = near;
             depth += 2;
         }
+        Work::NodesVisited.count(visited);
     }
 }

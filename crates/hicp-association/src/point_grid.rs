@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Observation, VectorLoop, vectorized};
+use hicp_core::{Observation, VectorLoop, Work, vectorized};
 
 use crate::stride::Stride;
 use crate::wide_tree::Nearest;
@@ -175,6 +175,7 @@ impl PointGrid {
     /// Returns the nearest point of a window, of equally near ones the first; its element is its slot. Points beside the window may be found.
     #[inline(always)]
     pub(crate) fn nearest(&self, query: &[f32; 3], window: &Window) -> Option<Nearest> {
+        Work::NodesVisited.count(Self::blocks_in(window));
         let mut best = LaneBest::new();
         let [first, last] = window.columns.map(|column| column / WIDTH);
         for row in window.rows[0]..=window.rows[1] {
@@ -228,6 +229,7 @@ impl VectorLoop for TileSearch<'_> {
         let (grid, query) = (self.grid, self.query);
         let [first, last] = self.window.columns.map(|column| column / (WIDTH * WIDTH));
         let [top, bottom] = self.window.rows.map(|row| row / TILE_ROWS);
+        Work::NodesVisited.count(2 * (last - first + 1) * (bottom - top + 1));
         let tiles = |row: usize| row * grid.tiles_per_row + first..=row * grid.tiles_per_row + last;
 
         // What the tile with the nearest box holds bounds what is worth a look.
@@ -269,6 +271,7 @@ impl PointGrid {
     fn look_into(&self, number: usize, lane: usize, query: &[f32; 3], best: &mut LaneBest) {
         let (row, column) = (number / self.tiles_per_row, number % self.tiles_per_row);
         let column = column * WIDTH + lane;
+        Work::NodesVisited.count(TILE_ROWS);
         for row in (row * TILE_ROWS..self.rows).take(TILE_ROWS) {
             let number = row * self.blocks_per_row + column;
             best.look::<true>(&self.blocks[number], number, query);

@@ -1,6 +1,6 @@
 //! Exact nearest points, eight at a time.
 
-use hicp_core::Point3;
+use hicp_core::{Point3, Work};
 
 /// Children of a node.
 const WIDTH: usize = 8;
@@ -170,12 +170,14 @@ impl WideTree {
         }
         let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH * WIDTH];
         let mut depth = 1;
+        let mut visited = 0;
         while depth > 0 {
             depth -= 1;
             let (index, distance) = stack[depth];
             if distance * PRUNING_SLACK > best.distance_squared {
                 continue;
             }
+            visited += 1;
             if index & LEAF != 0 {
                 self.leaves[(index & !LEAF) as usize].nearest(&query, &mut best);
                 continue;
@@ -209,6 +211,7 @@ impl WideTree {
                 depth += 1;
             }
         }
+        Work::NodesVisited.count(visited);
         (best.element != u32::MAX && best.distance_squared < f32::INFINITY).then_some(best)
     }
 }

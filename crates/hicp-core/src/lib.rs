@@ -51,6 +51,7 @@ pub mod so3;
 mod surfel;
 mod symmetry;
 mod vectorized;
+mod work;
 
 pub use camera::{MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
 pub use correspondences::{Correspondences, Mover, Pair};
@@ -77,3 +78,4 @@ pub use sampling::sample_surface;
 pub use surfel::Surfel;
 pub use symmetry::{CONTINUOUS_STEPS, Symmetries, SymmetryAxis};
 pub use vectorized::{VectorLoop, vectorized};
+pub use work::Work;

@@ -1,7 +1,7 @@
 //! Depth of covered pixels.
 
 use glam::DVec3;
-use hicp_core::{PixelRegion, RenderedView, VectorLoop, vectorized};
+use hicp_core::{PixelRegion, RenderedView, VectorLoop, Work, vectorized};
 
 use crate::edge::{Coverage, Edge};
 use crate::projection::ProjectedVertex;
@@ -139,6 +139,7 @@ impl<'a> Target<'a> {
         };
         let (first_u, mut v) = (to_f64(coverage.u), to_f64(coverage.v));
         let us = columns_from::<N>(first_u);
+        Work::PixelsTested.count(N * index(coverage.rows));
         for _ in 0..coverage.rows {
             let outside = edges.outside();
             let candidates = plane.depths(plane.at_row(v), &us);
@@ -197,6 +198,7 @@ impl VectorLoop for FillWide<'_, '_> {
                 let row = plane.at_row(v);
                 let mut u = first_u + to_f64(first);
                 let span = start + index(first)..start + index(end);
+                Work::PixelsTested.count(span.len());
                 let (depths, last_depths) =
                     self.target.depth[span.clone()].as_chunks_mut::<LANES>();
                 let (ids, last_ids) = self.target.triangles[span].as_chunks_mut::<LANES>();

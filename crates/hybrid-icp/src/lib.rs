@@ -66,7 +66,7 @@ pub use hicp_core::{
     Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2,
     Point3, Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries,
     SymmetryAxis, SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
-    Vector6, rotation_from_matrix, rotation_grid, se3, so3,
+    Vector6, Work, rotation_from_matrix, rotation_grid, se3, so3,
 };
 pub use hicp_fusion as fusion;
 pub use hicp_icp::{
