@@ -203,22 +203,24 @@ const SPAN: usize = 64;
 
 /// The first set pixel of a row.
 fn first_set(row: &[bool]) -> Option<u32> {
-    let mut spans = row.chunks(SPAN).zip((0_u32..).step_by(SPAN));
-    let (span, start) = spans.find(|(span, _)| any_set(span))?;
-    let offset = (0_u32..).zip(span).find(|(_, set)| **set)?.0;
-    Some(start + offset)
+    let (spans, rest) = row.as_chunks::<SPAN>();
+    let span = spans.iter().position(any_set).unwrap_or(spans.len());
+    let first = span * SPAN;
+    let rest = spans.get(span).map_or(rest, |span| span);
+    u32::try_from(first + rest.iter().position(|set| *set)?).ok()
 }
 
 /// The last set pixel of a row.
 fn last_set(row: &[bool]) -> Option<u32> {
-    let span = row.rchunks(SPAN).position(any_set)?;
-    let rest = row.len() - span * SPAN;
-    let last = row[..rest].iter().rposition(|set| *set)?;
-    u32::try_from(last).ok()
+    let (rest, spans) = row.as_rchunks::<SPAN>();
+    let (first, span) = spans.iter().rposition(any_set).map_or((0, rest), |span| {
+        (rest.len() + span * SPAN, spans[span].as_slice())
+    });
+    u32::try_from(first + span.iter().rposition(|set| *set)?).ok()
 }
 
 /// Looks at all of them: a loop that ends early has a branch per pixel.
-fn any_set(pixels: &[bool]) -> bool {
+fn any_set(pixels: &[bool; SPAN]) -> bool {
     pixels.iter().fold(false, |any, set| any | set)
 }
 
