@@ -86,11 +86,25 @@ impl DepthImage {
     /// [`ImageError::PixelCount`] when `meters` does not hold `width * height` values.
     pub fn from_meters(width: u32, height: u32, mut meters: Vec<f32>) -> Result<Self, ImageError> {
         for z in &mut meters {
-            if !(MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(z) {
-                *z = 0.0;
-            }
+            *z = measured(*z);
         }
         Raster::new(width, height, meters).map(Self)
+    }
+
+    /// Makes a depth image of metres that come one by one, row by row, in a single pass: what [`DepthImage::from_meters`] makes of them.
+    ///
+    /// For depths that have to be copied or converted anyway.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when there are not `width * height` values.
+    pub fn collect(
+        width: u32,
+        height: u32,
+        meters: impl IntoIterator<Item = f32>,
+    ) -> Result<Self, ImageError> {
+        let pixels = meters.into_iter().map(measured).collect();
+        Raster::new(width, height, pixels).map(Self)
     }
 
     image_accessors!(f32);
@@ -119,6 +133,15 @@ impl DepthImage {
     }
 }
 
+/// Returns a depth that counts as measured, or 0.
+fn measured(z: f32) -> f32 {
+    if (MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(&z) {
+        z
+    } else {
+        0.0
+    }
+}
+
 /// Distance from the camera centre (range), in metres unless its maker says otherwise; 0 where there is nothing.
 ///
 /// VSD and MVE compare distances, not depths (§III-B).
@@ -139,62 +162,76 @@ impl DistanceImage {
 }
 
 /// Which pixels belong to the object.
+///
+/// Its bounding box is found once, when it is made.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mask(Raster<bool>);
+pub struct Mask(Raster<bool>, PixelRegion);
 
 impl Mask {
-    /// Makes a mask.
+    /// Makes a mask. Cost: a look at every pixel, for the bounding box.
     ///
     /// # Errors
     ///
     /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
     pub fn new(width: u32, height: u32, pixels: Vec<bool>) -> Result<Self, ImageError> {
-        Raster::new(width, height, pixels).map(Self)
+        let raster = Raster::new(width, height, pixels)?;
+        let region = bounding_region(&raster);
+        Ok(Self(raster, region))
     }
 
     /// Makes a mask in which every pixel belongs to the object.
     #[must_use]
     pub fn full(width: u32, height: u32) -> Self {
-        Self(Raster {
+        let pixels = vec![true; width as usize * height as usize];
+        let region = if pixels.is_empty() {
+            PixelRegion::default()
+        } else {
+            PixelRegion::of_image(width, height)
+        };
+        let raster = Raster {
             width,
             height,
-            pixels: vec![true; width as usize * height as usize],
-        })
+            pixels,
+        };
+        Self(raster, region)
     }
 
     image_accessors!(bool);
 
-    /// Returns the smallest region that holds every set pixel; empty when none is.
+    /// Returns the smallest region that holds every set pixel; empty when none is. Cost: none, it was found when the mask was made.
     #[must_use]
     pub fn bounding_region(&self) -> PixelRegion {
-        let width = self.width() as usize;
-        let mut region = PixelRegion::default();
-        if width == 0 {
-            return region;
-        }
-        for (row, v) in self.pixels().chunks_exact(width).zip(0_u32..) {
-            let Some(first) = (0_u32..).zip(row).find(|(_, set)| **set).map(|(u, _)| u) else {
-                continue;
-            };
-            let last = (0..self.width())
-                .rev()
-                .find(|u| row[*u as usize])
-                .unwrap_or(first);
-            if region.is_empty() {
-                region = PixelRegion {
-                    u_min: first,
-                    v_min: v,
-                    u_max: last + 1,
-                    v_max: v + 1,
-                };
-            } else {
-                region.u_min = region.u_min.min(first);
-                region.u_max = region.u_max.max(last + 1);
-                region.v_max = v + 1;
-            }
-        }
-        region
+        self.1
     }
+}
+
+fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
+    let mut region = PixelRegion::default();
+    if mask.width == 0 {
+        return region;
+    }
+    for (row, v) in mask.pixels.chunks_exact(mask.width as usize).zip(0_u32..) {
+        // Most rows are empty: without a way out the compiler looks at many pixels at once.
+        if !row.iter().fold(false, |any, set| any | set) {
+            continue;
+        }
+        let set = |u: &u32| row[*u as usize];
+        let first = (0..mask.width).find(set).unwrap_or(0);
+        let last = (0..mask.width).rfind(set).unwrap_or(first);
+        if region.is_empty() {
+            region = PixelRegion {
+                u_min: first,
+                v_min: v,
+                u_max: last + 1,
+                v_max: v + 1,
+            };
+        } else {
+            region.u_min = region.u_min.min(first);
+            region.u_max = region.u_max.max(last + 1);
+            region.v_max = v + 1;
+        }
+    }
+    region
 }
 
 /// Refuses two things of different size, naming both.
