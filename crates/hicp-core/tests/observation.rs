@@ -88,7 +88,12 @@ fn depths_that_no_camera_measures_are_missing() {
     assert!(depth.pixels()[3].is_sign_positive());
     assert_eq!(collected, depth);
     let short = DepthImage::collect(8, 1, [0.5; 7]).unwrap_err();
-    assert_eq!(short.to_string(), DepthImage::from_meters(8, 1, vec![0.5; 7]).unwrap_err().to_string());
+    assert_eq!(
+        short.to_string(),
+        DepthImage::from_meters(8, 1, vec![0.5; 7])
+            .unwrap_err()
+            .to_string()
+    );
 }
 
 #[test]
@@ -98,9 +103,8 @@ fn observations_of_one_image_share_its_depth() {
         let mask = (0..32 * 24).map(|i| (i % 32 < 16) == left).collect();
         Mask::new(32, 24, mask).unwrap()
     };
-    let seen = [true, false].map(|left| {
-        Observation::new(Arc::clone(&depth), half(left), camera(32, 24)).unwrap()
-    });
+    let seen = [true, false]
+        .map(|left| Observation::new(Arc::clone(&depth), half(left), camera(32, 24)).unwrap());
     let apart = Observation::new((*depth).clone(), half(true), camera(32, 24)).unwrap();
     for observation in &seen {
         assert!(Arc::ptr_eq(observation.shared_depth(), &depth));
