@@ -12,7 +12,7 @@ pub(crate) const PACKAGE: &str = "crates/hybrid-icp-python";
 const EXTRAS: [&str; 2] = ["--ray", "--open3d"];
 
 /// Seconds after which a test is taken to hang: Ray waits for ever for processes that its surroundings do not let it start.
-const HANGS: &str = "300";
+const HANGS: &str = "900";
 
 /// Tests the module as [`check`] does, with all [`EXTRAS`], or without them, aloud, where they cannot be installed.
 pub(crate) fn check_all(root: &Path) -> Findings {
