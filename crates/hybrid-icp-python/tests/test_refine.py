@@ -156,8 +156,11 @@ def test_control_c_ends_a_batch(tmp_path):
     program.write_text(
         textwrap.dedent(
             """
+            import signal
             import numpy as np
             import hybrid_icp as hi
+            # A parent in the background may have had it ignored.
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             model = hi.Model([[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, .02], [-.1, .1, 0]], [[0, 2, 1], [0, 3, 2]])
             camera = hi.Camera(600, 600, 319.5, 239.5, 640, 480)
             pose = np.eye(4); pose[2, 3] = 0.5
@@ -173,10 +176,13 @@ def test_control_c_ends_a_batch(tmp_path):
         )
     )
     with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "ready\n"
-        with pytest.raises(subprocess.TimeoutExpired):
-            process.wait(0.5)
-        process.send_signal(signal.SIGINT)
-        # A million refinements take many minutes.
-        assert process.communicate(timeout=60)[0] == "interrupted\n"
-        assert process.returncode == 0
+        try:
+            assert process.stdout.readline() == "ready\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(0.5)
+            process.send_signal(signal.SIGINT)
+            # A million refinements take many minutes.
+            assert process.communicate(timeout=60)[0] == "interrupted\n"
+            assert process.returncode == 0
+        finally:
+            process.kill()
