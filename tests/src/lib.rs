@@ -7,6 +7,8 @@ pub mod room;
 pub mod starts;
 pub mod ycbv;
 
+use std::sync::Arc;
+
 use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
 use hybrid_icp::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
@@ -43,7 +45,7 @@ impl Scene {
     pub fn observe_anew(&self) -> Observation {
         let observation = &self.observation;
         Observation::new(
-            observation.depth().clone(),
+            Arc::clone(observation.shared_depth()),
             observation.mask().clone(),
             *observation.camera(),
         )

@@ -30,7 +30,7 @@ pub struct Instance {
     pub model: Arc<Model>,
     /// The true pose, camera from object.
     pub truth: Isometry3<f64>,
-    depth: DepthImage,
+    depth: Arc<DepthImage>,
     mask: Mask,
     camera: PinholeCamera,
 }
@@ -38,7 +38,8 @@ pub struct Instance {
 impl Instance {
     /// Makes the observation anew.
     pub fn observe(&self) -> Observation {
-        Observation::new(self.depth.clone(), self.mask.clone(), self.camera).expect("sizes agree")
+        let depth = Arc::clone(&self.depth);
+        Observation::new(depth, self.mask.clone(), self.camera).expect("sizes agree")
     }
 }
 
@@ -50,7 +51,7 @@ pub fn instances(dataset: &Dataset) -> Vec<Instance> {
     for scene_id in dataset.scene_ids("test").expect("the split is there") {
         let scene = dataset.scene("test", scene_id).expect("the scene opens");
         for im_id in scene.image_ids() {
-            let depth = scene.read_depth(im_id).expect("the depth image reads");
+            let depth = Arc::new(scene.read_depth(im_id).expect("the depth image reads"));
             let camera = scene
                 .camera(im_id)
                 .expect("the camera is there")
@@ -72,7 +73,7 @@ pub fn instances(dataset: &Dataset) -> Vec<Instance> {
                     key: (scene_id, im_id, truth.obj_id),
                     model: Arc::clone(model),
                     truth: truth.camera_from_object,
-                    depth: depth.clone(),
+                    depth: Arc::clone(&depth),
                     mask: scene
                         .read_visible_mask(im_id, index)
                         .expect("the mask reads"),

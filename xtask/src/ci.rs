@@ -63,7 +63,9 @@ pub(crate) fn run(root: &Path) -> Findings {
         ],
         &none,
     )?;
-    step("Python module", || python::check(root, &[]))?;
+    step("Python module, with Ray and Open3D", || {
+        python::check_all(root)
+    })?;
     examples(root)?;
     readme(root)
 }

@@ -15,6 +15,7 @@ mod process;
 mod python;
 mod repro;
 mod scale;
+mod scale_ray;
 mod tidy;
 mod valgrind;
 mod venv;
@@ -38,7 +39,7 @@ cargo xtask COMMAND
   python [--ray] [--open3d] [PYTEST OPTIONS]
           builds the Python module into an environment of its own and tests it: pytest, doctests, mypy, examples; wants
           Python 3 and, the first time, a network; with --ray the runs on two Ray workers too, with --open3d (which wants the
-          system's libusb-1.0) the comparison with it
+          system's libusb-1.0) the comparison with it; ci does both
   wheel   builds the Python wheel, states its size, and tries it in a fresh environment
 
   bench [--save NAME] [--against NAME] [FILTER]
@@ -51,9 +52,10 @@ cargo xtask COMMAND
   peers [--instances N]
           small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
           first time, a network
-  scale [--rows N] [--threads N]
-          20,000 rows over generated images through `bop refine`: throughput, peak memory, kill and resume, shards;
-          fails where the bytes differ
+  scale [--rows N] [--threads N] [--ray]
+          20,000 rows over generated images through `bop refine`: throughput, on N threads against one, peak memory, kill and
+          resume, shards; with --ray instead the same rows on N Ray workers, and once more with one of them killed; fails
+          where the bytes differ
   api     public functions that no test and no example names
   deny    licences, sources and duplicates of what is linked, against deny.toml; runs cargo-deny as well where it is
   fuzz [--minutes N] [--target T]

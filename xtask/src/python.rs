@@ -6,10 +6,28 @@ use std::process::Command;
 use crate::{Findings, process, venv};
 
 /// The module's package.
-const PACKAGE: &str = "crates/hybrid-icp-python";
+pub(crate) const PACKAGE: &str = "crates/hybrid-icp-python";
 
 /// What is installed when asked for, because it is large; the tests that want it skip aloud otherwise.
 const EXTRAS: [&str; 2] = ["--ray", "--open3d"];
+
+/// Seconds after which a test is taken to hang: Ray waits for ever for processes that its surroundings do not let it start.
+const HANGS: &str = "900";
+
+/// Tests the module as [`check`] does, with all [`EXTRAS`], or without them, aloud, where they cannot be installed.
+pub(crate) fn check_all(root: &Path) -> Findings {
+    let extras = match process::is_there(venv::PYTHON).then(|| tools(root, &EXTRAS)) {
+        Some(Err(findings)) => {
+            println!(
+                "xtask python: SKIPPED the tests with Ray and Open3D, which could not be installed: {}",
+                findings.join("; ")
+            );
+            &[][..]
+        }
+        _ => &EXTRAS[..],
+    };
+    check(root, extras)
+}
 
 /// Tests the module: pytest with the doctests and examples, mypy on the stubs and the examples.
 ///
@@ -26,13 +44,7 @@ pub(crate) fn check(root: &Path, options: &[&str]) -> Findings {
         .filter(|o| EXTRAS.contains(o))
         .collect();
     let options = options.iter().filter(|option| !EXTRAS.contains(option));
-    let python = tools(root, &extras)?;
-    let wheel = wheel(root, &python, "dev")?;
-    process::run(
-        venv::pip(&python)
-            .args(["--force-reinstall", "--no-deps"])
-            .arg(wheel),
-    )?;
+    let python = with_module(root, &extras, "dev")?;
     process::run(&mut process::cargo(
         root,
         &["build", "--quiet", "--package", "hybrid-icp-cli"],
@@ -47,6 +59,7 @@ pub(crate) fn check(root: &Path, options: &[&str]) -> Findings {
                 .current_dir(&package),
         )
     };
+    let hangs = format!("faulthandler_timeout={HANGS}");
     let mut pytest = vec![
         "-m",
         "pytest",
@@ -54,6 +67,10 @@ pub(crate) fn check(root: &Path, options: &[&str]) -> Findings {
         "-rs",
         "-p",
         "no:cacheprovider",
+        "-o",
+        &hangs,
+        "-o",
+        "faulthandler_exit_on_timeout=true",
         "tests",
     ];
     pytest.extend(options.copied());
@@ -105,6 +122,22 @@ pub(crate) fn pack(root: &Path) -> Findings {
         size.len() as f64 / 1e6
     );
     Ok(())
+}
+
+/// The environment with the tools and the extras, and the module built with a profile.
+pub(crate) fn with_module(
+    root: &Path,
+    extras: &[&str],
+    profile: &str,
+) -> Result<PathBuf, Vec<String>> {
+    let python = tools(root, extras)?;
+    let wheel = wheel(root, &python, profile)?;
+    process::run(
+        venv::pip(&python)
+            .args(["--force-reinstall", "--no-deps"])
+            .arg(wheel),
+    )?;
+    Ok(python)
 }
 
 /// The environment with maturin, pytest and mypy, and the extras.

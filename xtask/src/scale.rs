@@ -1,11 +1,12 @@
-//! `cargo xtask scale`: a result file of many rows over generated images, refined whole, killed and resumed, and in shards.
+//! `cargo xtask scale`: a result file of many rows over generated images, refined whole, on one thread, killed and resumed, and in
+//! shards; or on Ray.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{Findings, process};
+use crate::{Findings, process, scale_ray};
 
 /// Images are 20 scenes of 10; with six objects each, and this many starts per object, somewhat more than 20,000 rows.
 const GENERATED: &str = "--scenes 20 --images 10 --instances 6 --starts 20 --seed 7";
@@ -13,7 +14,9 @@ const ROWS: u32 = 20_000;
 
 /// Runs it; the figures go to the terminal.
 pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
-    let (rows, threads) = read(options)?;
+    let on_ray = options.contains(&"--ray");
+    let others: Vec<&str> = options.iter().copied().filter(|o| *o != "--ray").collect();
+    let (rows, threads) = read(&others)?;
     let mut build = process::cargo(root, &["build", "--release", "-p", "hybrid-icp-cli"]);
     process::run(&mut build)?;
     let target = process::target(root);
@@ -24,7 +27,12 @@ pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
         threads,
     };
     scale.generate()?;
-    scale.figures()
+    if on_ray {
+        let whole = scale.whole()?;
+        scale_ray::run(root, &scale, whole.seconds)
+    } else {
+        scale.figures()
+    }
 }
 
 /// Reads `--rows N` and `--threads N`.
@@ -37,7 +45,7 @@ fn read(options: &[&str]) -> Result<(u32, u32), Vec<String>> {
             ("--threads", Some(n)) if n > 0 => threads = n,
             (option, _) => {
                 return Err(vec![format!(
-                    "scale: {option}: expected --rows N or --threads N, with N from 1"
+                    "scale: {option}: expected --rows N or --threads N, with N from 1, or --ray"
                 )]);
             }
         }
@@ -45,11 +53,13 @@ fn read(options: &[&str]) -> Result<(u32, u32), Vec<String>> {
     Ok((rows, threads))
 }
 
-struct Scale {
+/// What is run.
+pub(crate) struct Scale {
     program: PathBuf,
-    folder: PathBuf,
-    rows: u32,
-    threads: u32,
+    /// Where it runs; the dataset is in `data`, what [`Scale::whole`] leaves in `whole.csv`.
+    pub(crate) folder: PathBuf,
+    pub(crate) rows: u32,
+    pub(crate) threads: u32,
 }
 
 /// What a run cost.
@@ -81,7 +91,8 @@ impl Scale {
         fs::write(&made, GENERATED).map_err(|e| vec![format!("{}: {e}", made.display())])
     }
 
-    fn figures(&self) -> Findings {
+    /// Refines all rows in one go.
+    fn whole(&self) -> Result<Cost, Vec<String>> {
         let whole = self.refine("whole.csv", &[])?;
         println!(
             "{} rows whole, {} threads: {:.1} s, {:.1} rows/s, peak memory {}",
@@ -91,11 +102,35 @@ impl Scale {
             f64::from(self.rows) / whole.seconds,
             whole.peak(),
         );
+        Ok(whole)
+    }
+
+    fn figures(&self) -> Findings {
+        let whole = self.whole()?;
+        let expected = self.bytes("whole.csv")?;
+        let mut alone = expected.clone();
+        if self.threads > 1 {
+            let single = Self {
+                program: self.program.clone(),
+                folder: self.folder.clone(),
+                threads: 1,
+                ..*self
+            };
+            let cost = single.refine("single.csv", &[])?;
+            alone = self.bytes("single.csv")?;
+            println!(
+                "one thread: {:.1} s, {:.1} rows/s, {}; {} threads are {:.2} times as fast",
+                cost.seconds,
+                f64::from(self.rows) / cost.seconds,
+                same(&alone, &expected),
+                self.threads,
+                cost.seconds / whole.seconds,
+            );
+        }
         let quarter = (self.rows / 4).max(1).to_string();
         let cost = self.refine("quarter.csv", &["--limit", &quarter])?;
         println!("{quarter} rows: peak memory {}", cost.peak());
 
-        let expected = self.bytes("whole.csv")?;
         let held = self.killed()?;
         self.refine("killed.csv", &["--resume"])?;
         let resumed = self.bytes("killed.csv")?;
@@ -119,7 +154,10 @@ impl Scale {
             "two shards one after the other: {}",
             same(&joined, &expected)
         );
-        if resumed == expected && joined == expected {
+        if [alone, resumed, joined]
+            .iter()
+            .all(|bytes| *bytes == expected)
+        {
             Ok(())
         } else {
             Err(vec!["scale: the outputs differ".to_owned()])
@@ -140,6 +178,8 @@ impl Scale {
                 "--no-time",
                 "--rescore",
                 "mve",
+                "--pipeline",
+                "hybrid",
             ])
             .args([
                 "--results",

@@ -1,5 +1,7 @@
 //! The masks of an image, and what each cuts out of it.
 
+use std::sync::Arc;
+
 use hicp_io::bop::{Detection, Rle};
 use hybrid_icp::{Isometry3, Mask, Model, Observation, Refiner};
 
@@ -9,7 +11,7 @@ use crate::fate::Fate;
 use crate::fault::Fault;
 use crate::scenes::Image;
 
-/// An image while its rows are refined: its depth read once, a mask read when a row of its object asks for it, an observation
+/// An image while its rows are refined: its depth read once and shared by its observations, a mask read when a row of its object asks for it, an observation
 /// made when a row is refined in it.
 #[derive(Debug)]
 pub struct Frame<'a> {
@@ -136,7 +138,7 @@ impl<'a> Frame<'a> {
         if matches!(seen, Seen::Read(_))
             && let Seen::Read(read) = std::mem::replace(seen, Seen::Unusable(Fate::Damaged))
         {
-            match Observation::new(self.image.depth.clone(), read, self.image.camera) {
+            match Observation::new(Arc::clone(&self.image.depth), read, self.image.camera) {
                 Ok(observation) => *seen = Seen::Observed(Box::new(observation)),
                 Err(error) => self.faults.push(Fault::damaged(error.to_string())),
             }
@@ -165,7 +167,7 @@ impl<'a> Frame<'a> {
         let mask = by.mask(view, (depth, camera), model, pose);
         let mask = mask.ok_or(Fate::NothingMeasured)?;
         // The mask has the size of the depth image, and so has the camera.
-        Observation::new(depth.clone(), mask, *camera).map_err(|_| Fate::Damaged)
+        Observation::new(Arc::clone(depth), mask, *camera).map_err(|_| Fate::Damaged)
     }
 
     /// Makes sure that a mask is read.

@@ -31,8 +31,8 @@ pub struct Image {
     pub im_id: u32,
     /// Its camera.
     pub camera: PinholeCamera,
-    /// Its depth, metres.
-    pub depth: DepthImage,
+    /// Its depth, metres; the observations of all its masks share it.
+    pub depth: Arc<DepthImage>,
 }
 
 impl Scenes {
@@ -109,7 +109,7 @@ impl Scenes {
             scene,
             im_id,
             camera,
-            depth,
+            depth: Arc::new(depth),
         })
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 use hicp_bop::{
     BoxMask, DatasetRefiner, Fate, Fault, Frame, Image, MaskSource, ModelFolder, Models, Rescore,
@@ -245,4 +246,22 @@ fn limits_and_errors_are_told_as_faults() {
     assert!(scene.with_limits(ReadLimits::DEFAULT).read_depth(4).is_ok());
     let missing: IoError = dataset.scene("test", 2).unwrap_err();
     assert!(Fault::of(&missing).missing);
+}
+
+#[test]
+fn the_observations_of_an_image_share_its_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(folder.path());
+    let image = image(&dataset);
+    let depth = Arc::clone(&image.depth);
+    let read = models(&dataset, &[BLOCK]);
+    let model = &read.by_id[&BLOCK];
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+
+    let mut frame = Frame::with_visible_masks(image);
+    let chosen = frame.choose(&mut refiner, model, BLOCK, &[estimate()]);
+    let observation = frame.observation(*chosen[0].as_ref().unwrap()).unwrap();
+    assert!(Arc::ptr_eq(observation.shared_depth(), &depth));
+    let boxed = frame.observe_box(&mut refiner, model, &estimate(), &BoxMask::default());
+    assert!(Arc::ptr_eq(boxed.unwrap().shared_depth(), &depth));
 }

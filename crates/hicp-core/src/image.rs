@@ -86,11 +86,25 @@ impl DepthImage {
     /// [`ImageError::PixelCount`] when `meters` does not hold `width * height` values.
     pub fn from_meters(width: u32, height: u32, mut meters: Vec<f32>) -> Result<Self, ImageError> {
         for z in &mut meters {
-            if !(MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(z) {
-                *z = 0.0;
-            }
+            *z = measured(*z);
         }
         Raster::new(width, height, meters).map(Self)
+    }
+
+    /// Makes a depth image of metres that come one by one, row by row, in a single pass: what [`DepthImage::from_meters`] makes of them.
+    ///
+    /// For depths that have to be copied or converted anyway.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when there are not `width * height` values.
+    pub fn collect(
+        width: u32,
+        height: u32,
+        meters: impl IntoIterator<Item = f32>,
+    ) -> Result<Self, ImageError> {
+        let pixels = meters.into_iter().map(measured).collect();
+        Raster::new(width, height, pixels).map(Self)
     }
 
     image_accessors!(f32);
@@ -119,6 +133,15 @@ impl DepthImage {
     }
 }
 
+/// Returns a depth that counts as measured, or 0.
+fn measured(z: f32) -> f32 {
+    if (MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(&z) {
+        z
+    } else {
+        0.0
+    }
+}
+
 /// Distance from the camera centre (range), in metres unless its maker says otherwise; 0 where there is nothing.
 ///
 /// VSD and MVE compare distances, not depths (§III-B).
@@ -139,89 +162,76 @@ impl DistanceImage {
 }
 
 /// Which pixels belong to the object.
+///
+/// Its bounding box is found once, when it is made.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mask(Raster<bool>);
+pub struct Mask(Raster<bool>, PixelRegion);
 
 impl Mask {
-    /// Makes a mask.
+    /// Makes a mask. Cost: a look at every pixel, for the bounding box.
     ///
     /// # Errors
     ///
     /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
     pub fn new(width: u32, height: u32, pixels: Vec<bool>) -> Result<Self, ImageError> {
-        Raster::new(width, height, pixels).map(Self)
+        let raster = Raster::new(width, height, pixels)?;
+        let region = bounding_region(&raster);
+        Ok(Self(raster, region))
     }
 
     /// Makes a mask in which every pixel belongs to the object.
     #[must_use]
     pub fn full(width: u32, height: u32) -> Self {
-        Self(Raster {
+        let pixels = vec![true; width as usize * height as usize];
+        let region = if pixels.is_empty() {
+            PixelRegion::default()
+        } else {
+            PixelRegion::of_image(width, height)
+        };
+        let raster = Raster {
             width,
             height,
-            pixels: vec![true; width as usize * height as usize],
-        })
+            pixels,
+        };
+        Self(raster, region)
     }
 
     image_accessors!(bool);
 
-    /// Returns the smallest region that holds every set pixel; empty when none is.
+    /// Returns the smallest region that holds every set pixel; empty when none is. Cost: none, it was found when the mask was made.
     #[must_use]
     pub fn bounding_region(&self) -> PixelRegion {
-        let width = self.width() as usize;
-        let mut region = PixelRegion::default();
-        if width == 0 {
-            return region;
-        }
-        for (row, v) in self.pixels().chunks_exact(width).zip(0_u32..) {
-            if region.is_empty() {
-                if let (Some(first), Some(last)) = (first_set(row), last_set(row)) {
-                    region = PixelRegion {
-                        u_min: first,
-                        v_min: v,
-                        u_max: last + 1,
-                        v_max: v + 1,
-                    };
-                }
-                continue;
-            }
-            // Only what lies beside the columns known so far can widen them.
-            let (left, inside) = row.split_at(region.u_min as usize);
-            let (inside, right) = inside.split_at((region.u_max - region.u_min) as usize);
-            let (first, last) = (first_set(left), last_set(right));
-            if first.is_some() || last.is_some() || first_set(inside).is_some() {
-                region.v_max = v + 1;
-            }
-            region.u_min = first.unwrap_or(region.u_min);
-            region.u_max = last.map_or(region.u_max, |last| region.u_max + last + 1);
-        }
-        region
+        self.1
     }
 }
 
-/// Pixels that are looked at together: an empty mask is read as fast as memory is.
-const SPAN: usize = 64;
-
-/// The first set pixel of a row.
-fn first_set(row: &[bool]) -> Option<u32> {
-    let (spans, rest) = row.as_chunks::<SPAN>();
-    let span = spans.iter().position(any_set).unwrap_or(spans.len());
-    let first = span * SPAN;
-    let rest = spans.get(span).map_or(rest, |span| span);
-    u32::try_from(first + rest.iter().position(|set| *set)?).ok()
-}
-
-/// The last set pixel of a row.
-fn last_set(row: &[bool]) -> Option<u32> {
-    let (rest, spans) = row.as_rchunks::<SPAN>();
-    let (first, span) = spans.iter().rposition(any_set).map_or((0, rest), |span| {
-        (rest.len() + span * SPAN, spans[span].as_slice())
-    });
-    u32::try_from(first + span.iter().rposition(|set| *set)?).ok()
-}
-
-/// Looks at all of them: a loop that ends early has a branch per pixel.
-fn any_set(pixels: &[bool; SPAN]) -> bool {
-    pixels.iter().fold(false, |any, set| any | set)
+fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
+    let mut region = PixelRegion::default();
+    if mask.width == 0 {
+        return region;
+    }
+    for (row, v) in mask.pixels.chunks_exact(mask.width as usize).zip(0_u32..) {
+        // Most rows are empty: without a way out the compiler looks at many pixels at once.
+        if !row.iter().fold(false, |any, set| any | set) {
+            continue;
+        }
+        let set = |u: &u32| row[*u as usize];
+        let first = (0..mask.width).find(set).unwrap_or(0);
+        let last = (0..mask.width).rfind(set).unwrap_or(first);
+        if region.is_empty() {
+            region = PixelRegion {
+                u_min: first,
+                v_min: v,
+                u_max: last + 1,
+                v_max: v + 1,
+            };
+        } else {
+            region.u_min = region.u_min.min(first);
+            region.u_max = region.u_max.max(last + 1);
+            region.v_max = v + 1;
+        }
+    }
+    region
 }
 
 /// Refuses two things of different size, naming both.

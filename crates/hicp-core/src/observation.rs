@@ -21,8 +21,9 @@ use crate::surfel::Surfel;
 ///
 /// An empty mask or a depth image of zeros makes an observation without surfels; refining against it ends with "no pairs".
 ///
-/// Building one costs O(image) for the mask's box and 15 to 30 ns for every pixel inside it, the more the more depth edges there are. Share it between threads and
-/// hypotheses: search trees and the like are built once per observation, see [`Observation::derived`].
+/// Building one costs 15 to 30 ns for every pixel inside the mask's box, the more the more depth edges there are, and nothing for the
+/// others: the observations of one image share its depth (an `Arc`). Share an observation between threads and hypotheses: search
+/// trees and the like are built once per observation, see [`Observation::derived`].
 ///
 /// ```
 /// use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
@@ -39,7 +40,7 @@ use crate::surfel::Surfel;
 pub struct Observation {
     id: Id,
     camera: PinholeCamera,
-    depth: DepthImage,
+    depth: Arc<DepthImage>,
     mask: Mask,
     region: PixelRegion,
     surfels: Vec<Surfel>,
@@ -51,10 +52,24 @@ pub struct Observation {
 impl Observation {
     /// Makes an observation.
     ///
+    /// `depth` is a [`DepthImage`], or an `Arc` of one that observations with other masks share; it is not copied.
+    ///
     /// # Errors
     ///
     /// [`ImageError::SizeMismatch`] when depth image, mask and camera are not of one size.
-    pub fn new(depth: DepthImage, mask: Mask, camera: PinholeCamera) -> Result<Self, ImageError> {
+    pub fn new(
+        depth: impl Into<Arc<DepthImage>>,
+        mask: Mask,
+        camera: PinholeCamera,
+    ) -> Result<Self, ImageError> {
+        Self::of_shared(depth.into(), mask, camera)
+    }
+
+    fn of_shared(
+        depth: Arc<DepthImage>,
+        mask: Mask,
+        camera: PinholeCamera,
+    ) -> Result<Self, ImageError> {
         let size = (depth.width(), depth.height());
         check_size("mask", (mask.width(), mask.height()), "depth image", size)?;
         check_size(
@@ -142,6 +157,24 @@ impl Observation {
     /// The whole depth image, metres, 0 where nothing was measured.
     #[must_use]
     pub fn depth(&self) -> &DepthImage {
+        &self.depth
+    }
+
+    /// The same, to make observations of other masks with: they share it.
+    ///
+    /// ```
+    /// use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let camera = PinholeCamera::new(50.0, 50.0, 15.5, 15.5, 32, 32)?;
+    /// # let wall = DepthImage::from_meters(32, 32, vec![0.8; 32 * 32])?;
+    /// let one = Observation::new(wall, Mask::full(32, 32), camera)?;
+    /// let left = (0..32 * 32).map(|pixel| pixel % 32 < 16).collect();
+    /// let other = Observation::new(one.shared_depth().clone(), Mask::new(32, 32, left)?, camera)?;
+    /// assert!(std::ptr::eq(one.depth(), other.depth()));
+    /// # Ok(()) }
+    /// ```
+    #[must_use]
+    pub fn shared_depth(&self) -> &Arc<DepthImage> {
         &self.depth
     }
 
@@ -301,7 +334,7 @@ impl Observation {
             (Ok(depth), Ok(mask)) => Self {
                 id: Id::next(),
                 camera,
-                depth,
+                depth: Arc::new(depth),
                 mask,
                 region,
                 n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),

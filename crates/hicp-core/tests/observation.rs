@@ -4,6 +4,8 @@
 
 mod support;
 
+use std::sync::Arc;
+
 use hicp_core::{
     DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, Mask, Observation, PinholeCamera,
     PixelRegion,
@@ -77,12 +79,52 @@ fn depths_that_no_camera_measures_are_missing() {
         MAX_DEPTH_METERS,
         0.25,
     ];
+    let collected = DepthImage::collect(8, 1, given.iter().copied()).unwrap();
     let depth = DepthImage::from_meters(8, 1, given).unwrap();
     assert_eq!(
         depth.pixels(),
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, MAX_DEPTH_METERS, 0.25]
     );
     assert!(depth.pixels()[3].is_sign_positive());
+    assert_eq!(collected, depth);
+    let short = DepthImage::collect(8, 1, [0.5; 7]).unwrap_err();
+    assert_eq!(
+        short.to_string(),
+        DepthImage::from_meters(8, 1, vec![0.5; 7])
+            .unwrap_err()
+            .to_string()
+    );
+}
+
+#[test]
+fn observations_of_one_image_share_its_depth() {
+    let depth = Arc::new(DepthImage::from_meters(32, 24, vec![0.5; 32 * 24]).unwrap());
+    let half = |left: bool| {
+        let mask = (0..32 * 24).map(|i| (i % 32 < 16) == left).collect();
+        Mask::new(32, 24, mask).unwrap()
+    };
+    let seen = [true, false]
+        .map(|left| Observation::new(Arc::clone(&depth), half(left), camera(32, 24)).unwrap());
+    let apart = Observation::new((*depth).clone(), half(true), camera(32, 24)).unwrap();
+    for observation in &seen {
+        assert!(Arc::ptr_eq(observation.shared_depth(), &depth));
+        assert!(std::ptr::eq(observation.depth(), &raw const *depth));
+    }
+    // A clone shares it too, and the maps are those of an observation with a depth of its own.
+    assert_eq!(Arc::strong_count(&depth), 3);
+    assert!(Arc::ptr_eq(seen[0].clone().shared_depth(), &depth));
+    assert!(seen[0].surfels(1).eq(apart.surfels(1)));
+    assert_eq!(seen[1].region().u_min, 16);
+}
+
+#[test]
+fn the_box_of_a_full_mask_is_the_image_and_that_of_no_pixels_is_empty() {
+    for (width, height) in [(5, 4), (1, 1), (0, 0), (0, 3), (3, 0)] {
+        let area = (width * height) as usize;
+        let full = Mask::full(width, height);
+        assert_eq!(full, Mask::new(width, height, vec![true; area]).unwrap());
+        assert_eq!(full.bounding_region().area(), area);
+    }
 }
 
 #[test]

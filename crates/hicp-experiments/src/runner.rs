@@ -1,6 +1,6 @@
 //! One case, looked at under every condition, by every variant.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use hicp_core::{Isometry3, Model, Observation, Point3, Problem};
 use hicp_score::{add, adi};
@@ -124,6 +124,7 @@ impl<'a> Runner<'a> {
                 let looked = corruption(&condition)
                     .apply(case)
                     .map_err(|e| e.to_string())?;
+                let looked = (Arc::new(looked.0), looked.1);
                 let believed = self.reconstructions.model(
                     self.config,
                     self.subjects,
@@ -137,7 +138,7 @@ impl<'a> Runner<'a> {
                     Ok((case, (depth, mask), believed)) => {
                         // Each variant observes anew: normals and search trees are part of everyone's time.
                         match self.measure(object, level, variant, case, believed, || {
-                            Observation::new(depth.clone(), mask.clone(), case.camera)
+                            Observation::new(Arc::clone(depth), mask.clone(), case.camera)
                         }) {
                             Ok(measured) => (case.bin, Some(measured), String::new()),
                             Err(error) => (case.bin, None, error.to_string()),

@@ -172,7 +172,7 @@ fn the_mve_is_its_definition_at_any_pose() {
     let mask =
         (0..64 * 48).map(|i| observation.mask().pixels()[i] && !(20..=27).contains(&(i % 64)));
     let mask = Mask::new(64, 48, mask.collect()).unwrap();
-    let scene = Observation::new(scene.depth().clone(), mask, camera()).unwrap();
+    let scene = Observation::new(scene.shared_depth().clone(), mask, camera()).unwrap();
     let mut numbers = Numbers(301);
     let mut between = 0;
     for _ in 0..40 {
@@ -204,7 +204,7 @@ fn what_stands_in_front_of_the_object_is_forgiven_if_asked_for() {
             .map(|i| whole.mask().pixels()[i] && i % 64 >= 30)
             .collect();
         Observation::new(
-            scene.depth().clone(),
+            scene.shared_depth().clone(),
             Mask::new(64, 48, mask).unwrap(),
             camera(),
         )

@@ -1,11 +1,11 @@
 //! The inputs that components are tried on: two small scenes, and what can go wrong with them.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
-    Translation3, UnitQuaternion, Vector3, Workspace, render_depth_image,
+    Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer, Translation3,
+    UnitQuaternion, Vector3, Workspace, render_depth_image,
 };
 
 /// A model seen in a small depth image, and where it truly is.
@@ -43,12 +43,13 @@ impl Scene {
         let truth = object_pose(&mut rng, &model.center(), 0.35..0.45, 0.02);
         let clean = render_depth_image(model.mesh(), &camera, &truth);
         let seen: Vec<bool> = clean.pixels().iter().map(|z| *z > 0.0).collect();
-        let depth: DepthImage = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean);
+        let depth = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean);
+        let depth = Arc::new(depth);
         let middle = seen.iter().position(|s| *s).unwrap_or(0);
         let one = (0..seen.len()).map(|i| i == middle).collect();
         let observe = |mask: Vec<bool>| {
             let mask = Mask::new(160, 120, mask).expect("sizes agree");
-            Observation::new(depth.clone(), mask, camera).expect("sizes agree")
+            Observation::new(Arc::clone(&depth), mask, camera).expect("sizes agree")
         };
         Self {
             name,

@@ -1,5 +1,7 @@
 //! A picture of an image, with the outlines of models drawn on it.
 
+use std::sync::Arc;
+
 use hybrid_icp::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Refiner, RenderedView,
 };
@@ -88,11 +90,11 @@ impl Picture {
 
     /// Shows depth as [`Picture::of_depth`] does, darker where the surface turns away from the camera.
     pub(crate) fn shaded(
-        depth: &DepthImage,
+        depth: &Arc<DepthImage>,
         camera: &PinholeCamera,
     ) -> Result<Self, hybrid_icp::ImageError> {
         let mask = Mask::full(depth.width(), depth.height());
-        let observation = Observation::new(depth.clone(), mask, *camera)?;
+        let observation = Observation::new(Arc::clone(depth), mask, *camera)?;
         let mut picture = Self::of_depth(depth);
         for (index, surfel) in observation.surfels(1) {
             let (u, v) = observation.pixel(index);

@@ -54,8 +54,8 @@ def main() -> None:
     if not options.model:
         before, after = (adi(pose, frame.true, model) for pose in (rough, result.T_co))
         print(f"ADI {before * 1000:.2f} mm -> {after * 1000:.2f} mm")
-        if after > 0.5 * before:
-            raise SystemExit("the pose did not get better")
+        if after > 0.001:
+            raise SystemExit("the pose is not within a millimetre")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid_icp import Camera, Model, Observation, Pipeline, read_depth_png, read_mask_png
+from hybrid_icp import Camera, DepthImage, Model, Observation, Pipeline, read_mask_png
 
 
 def main(dataset: Path, results: Path, refined: Path) -> None:
@@ -34,8 +34,9 @@ def main(dataset: Path, results: Path, refined: Path) -> None:
         calibration, truths = (
             json.loads((folder / f"{name}.json").read_text())[str(image)] for name in ("scene_camera", "scene_gt")
         )
-        depth = read_depth_png(folder / "depth" / f"{image:06}.png", calibration["depth_scale"] / 1000)
-        camera = Camera.from_K(np.reshape(calibration["cam_K"], (3, 3)), (depth.shape[1], depth.shape[0]))
+        # Read once, whatever the number of masks.
+        depth = DepthImage.from_png(folder / "depth" / f"{image:06}.png", calibration["depth_scale"] / 1000)
+        camera = Camera.from_K(np.reshape(calibration["cam_K"], (3, 3)), (depth.width, depth.height))
         for row in of_image:
             object_id = int(row["obj_id"])
             if object_id not in models:

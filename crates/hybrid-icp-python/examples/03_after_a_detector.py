@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scene import Array, lumpy, scene
+from scene import Array, bracket, scene
 
 from hybrid_icp import Camera, Model, Observation, Pipeline, adi
 
@@ -33,14 +33,14 @@ def refine(model: Model, camera: Camera, depth: npt.NDArray[np.float32]) -> Arra
 def from_trimesh() -> Model:
     import trimesh
 
-    mesh = trimesh.Trimesh(*lumpy())
+    mesh = trimesh.Trimesh(*bracket())
     return Model(mesh.vertices, mesh.faces, unit="mm")
 
 
 def from_open3d() -> tuple[Model, Camera]:
     import open3d
 
-    vertices, faces = lumpy()
+    vertices, faces = bracket()
     mesh = open3d.geometry.TriangleMesh(open3d.utility.Vector3dVector(vertices), open3d.utility.Vector3iVector(faces.astype(np.int32)))
     intrinsic = open3d.camera.PinholeCameraIntrinsic(640, 480, 600, 600, 319.5, 239.5)
     model = Model(np.asarray(mesh.vertices), np.asarray(mesh.triangles), unit="mm")

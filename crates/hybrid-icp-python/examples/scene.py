@@ -1,4 +1,4 @@
-"""The frame that the examples generate: a lumpy object without symmetry, half a metre away, and a pose that is a centimetre off."""
+"""The frame that the examples generate: an angle bracket 42 cm away, noise-free, and a pose that is a centimetre and five degrees off."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from hybrid_icp import Camera, Model, Observation, render_depth
 Array = npt.NDArray[np.float64]
 
 
-def lumpy(rings: int = 24, sectors: int = 48) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Vertices (V, 3) in millimetres and faces (F, 3) of a closed surface of about 12 cm."""
-    polar, around = np.meshgrid(np.linspace(0, np.pi, rings + 1)[1:-1], np.arange(sectors) * 2 * np.pi / sectors, indexing="ij")
-    radius = 45 + 12 * np.cos(3 * around) * np.sin(polar) ** 2 + 9 * np.sin(around + 2 * polar) + 10 * np.cos(polar)
-    rim = radius[..., None] * np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], -1)
-    vertices = np.concatenate([rim.reshape(-1, 3), [[0, 0, 55], [0, 0, -35]]])
-    top, bottom = len(vertices) - 2, len(vertices) - 1
+def bracket() -> tuple[Array, npt.NDArray[np.int64]]:
+    """Vertices (V, 3) in millimetres and faces (F, 3) of an angle bracket of about 9 cm, narrower at one end: no two of its poses look the same."""
+    profile = np.array([[-12, -8], [58, -8], [58, 10], [10, 14], [6, 62], [-12, 62.0]])
+    vertices = np.concatenate([np.insert(profile, 1, -40, axis=1), np.insert(0.7 * profile, 1, 50, axis=1)])
+    corners = len(profile)
     faces = []
-    for sector in range(sectors):
-        beside = (sector + 1) % sectors
-        faces.append((top, sector, beside))
-        for ring in range(0, (rings - 2) * sectors, sectors):
-            a, b, c, d = ring + sector, ring + beside, ring + sectors + beside, ring + sectors + sector
-            faces += [(a, d, c), (a, c, b)]
-        last = (rings - 2) * sectors
-        faces.append((bottom, last + beside, last + sector))
+    for a in range(corners):
+        b = (a + 1) % corners
+        faces += [(a, b + corners, b), (a, a + corners, b + corners)]
+    # The inner corner sees all of either end.
+    inner = 3
+    for step in range(1, corners - 1):
+        a, b = (inner + step) % corners, (inner + step + 1) % corners
+        faces += [(inner, a, b), (inner + corners, b + corners, a + corners)]
     return vertices, np.array(faces)
 
 
@@ -60,9 +58,9 @@ class Scene:
 
 def scene(camera: Camera | None = None) -> Scene:
     """Makes the frame, 640x480 unless a camera is given."""
-    model = Model(*lumpy(), unit="mm")
+    model = Model(*bracket(), unit="mm")
     camera = camera or Camera(600, 600, 319.5, 239.5, 640, 480)
-    true = pose([2.2, 0.6, 0.3], [0.02, -0.01, 0.5])
+    true = pose([0.9, -0.5, 0.3], [0.02, -0.01, 0.42])
     depth = render_depth(model, camera, true)
     mask = depth > 0
     depth[~mask] = 0.7

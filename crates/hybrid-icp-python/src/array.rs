@@ -15,12 +15,16 @@ const MAX_TRANSLATION_METERS: f64 = 100.0;
 
 /// Says what a value is: its type, and for arrays dtype and shape.
 pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
+    match value.cast::<PyUntypedArray>() {
+        Ok(array) => format!("{} with shape {}", kind(value), shape(array.shape())),
+        Err(_) => kind(value),
+    }
+}
+
+/// Says of which type a value is, and for arrays of which dtype.
+pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
-        format!(
-            "an array of {} with shape {}",
-            array.dtype(),
-            shape(array.shape())
-        )
+        format!("an array of {}", array.dtype())
     } else {
         let name = value.get_type().name();
         name.map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))

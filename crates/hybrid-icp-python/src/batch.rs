@@ -1,8 +1,9 @@
 //! Many hypotheses on several threads, with Ctrl-C.
 
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hybrid_icp::{Isometry3, Model, Observation, Refinement, Refiner, StageRecord, Trace};
 use pyo3::prelude::*;
@@ -15,7 +16,10 @@ pub(crate) type Refined = (Refinement, Vec<StageRecord>);
 
 /// Refines every hypothesis, one refiner per thread; results are in the order of the hypotheses, with the bits of single calls.
 ///
-/// Called without the GIL. An exception of a signal handler, such as `KeyboardInterrupt`, ends it after the hypotheses in hand.
+/// Called without the GIL. The threads take one hypothesis after the other from a counter and keep their results to themselves; the
+/// caller sleeps meanwhile, but for a look at the signals now and then. An exception of a signal handler, such as
+/// `KeyboardInterrupt`, ends it after the hypotheses in hand. Threads are started anew for every batch: a pool would be lost,
+/// and waited for in vain, in a process that was forked.
 pub(crate) fn run(
     model: &Model,
     observation: &Observation,
@@ -24,43 +28,45 @@ pub(crate) fn run(
 ) -> PyResult<Vec<Refined>> {
     let (cancelled, next) = (AtomicBool::new(false), AtomicUsize::new(0));
     let (cancelled, next) = (&cancelled, &next);
+    let mut ordered: Vec<Option<Refined>> = inits.iter().map(|_| None).collect();
     std::thread::scope(|scope| {
-        let (sender, results) = mpsc::channel();
-        for refiner in refiners {
-            let sender = sender.clone();
-            scope.spawn(move || {
-                while !cancelled.load(Ordering::Relaxed) {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(init) = inits.get(index) else { break };
-                    let mut trace = Trace::new();
-                    let refined = refiner.refine_observed(model, observation, init, &mut trace);
-                    if sender.send((index, (refined, trace.stages))).is_err() {
-                        break;
+        // Nothing is sent: that the last thread has dropped its end is the message.
+        let (at_work, ended) = mpsc::channel::<()>();
+        let threads: Vec<_> = refiners
+            .iter_mut()
+            .map(|refiner| {
+                let at_work = at_work.clone();
+                scope.spawn(move || {
+                    let mut results = Vec::with_capacity(inits.len());
+                    while !cancelled.load(Ordering::Relaxed) {
+                        let index = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(init) = inits.get(index) else { break };
+                        let mut trace = Trace::new();
+                        let refined = refiner.refine_observed(model, observation, init, &mut trace);
+                        results.push((index, (refined, trace.stages)));
                     }
-                }
-            });
-        }
-        drop(sender);
-        let collected = collect(&results, inits.len());
+                    drop(at_work);
+                    results
+                })
+            })
+            .collect();
+        drop(at_work);
+        let waited = wait(&ended);
         cancelled.store(true, Ordering::Relaxed);
-        collected
-    })
+        for thread in threads {
+            for (index, refined) in thread.join().unwrap_or_else(|panic| resume_unwind(panic)) {
+                ordered[index] = Some(refined);
+            }
+        }
+        waited
+    })?;
+    Ok(ordered.into_iter().flatten().collect())
 }
 
-/// Puts results in order until there are no more, and looks for signals meanwhile.
-fn collect(results: &Receiver<(usize, Refined)>, count: usize) -> PyResult<Vec<Refined>> {
-    let mut ordered: Vec<Option<Refined>> = (0..count).map(|_| None).collect();
-    let mut looked = Instant::now();
-    loop {
-        match results.recv_timeout(SIGNALS) {
-            Ok((index, refined)) => ordered[index] = Some(refined),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => break,
-        }
-        if looked.elapsed() >= SIGNALS {
-            Python::attach(|py| py.check_signals())?;
-            looked = Instant::now();
-        }
+/// Waits until the other end is dropped, and looks for signals meanwhile.
+fn wait(ended: &Receiver<()>) -> PyResult<()> {
+    while ended.recv_timeout(SIGNALS) == Err(RecvTimeoutError::Timeout) {
+        Python::attach(|py| py.check_signals())?;
     }
-    Ok(ordered.into_iter().flatten().collect())
+    Ok(())
 }

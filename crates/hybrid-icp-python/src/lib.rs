@@ -43,6 +43,8 @@ mod native {
     #[pymodule_export]
     use crate::camera::PyCamera;
     #[pymodule_export]
+    use crate::depth::PyDepthImage;
+    #[pymodule_export]
     use crate::events::{PyIterationEvent, PyRegimeEvent, PyStageEvent};
     #[pymodule_export]
     use crate::fusion::{PyFuser, PyPoseEstimate, fuse};

@@ -1,22 +1,26 @@
 //! `Observation`.
 
-use hybrid_icp::Observation;
+use std::sync::Arc;
+
+use hybrid_icp::{DepthImage, Mask, Observation, PinholeCamera};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
 use crate::array;
 use crate::camera::PyCamera;
-use crate::depth;
+use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
 
 /// A segmented depth image: what poses are refined against. Immutable; share it between hypotheses and threads.
 ///
-/// Arrays are read where they are and copied once, in one piece where they are C-contiguous; changing them afterwards changes nothing.
+/// Arrays are copied, each once; changing them afterwards changes nothing. Several objects of one image share its depth: make a
+/// `DepthImage`, and an observation of it for each mask.
 ///
 /// Parameters
 /// ----------
-/// depth : numpy.ndarray, shape (H, W)
+/// depth : DepthImage or numpy.ndarray, shape (H, W)
 ///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0, negative or NaN where nothing was measured.
+///     A `DepthImage` is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W), or None
 ///     Not zero on the object; `None` for every pixel.
 /// camera : Camera
@@ -60,15 +64,17 @@ impl PyObservation {
         camera: PyCamera,
         scale: Option<f64>,
     ) -> PyResult<Self> {
-        let image = depth::depth(depth, scale)?;
+        let image = depth::shared(depth, scale)?;
         let mask = depth::mask(mask, &image)?;
         let camera = camera.0;
         if (camera.width(), camera.height()) != (image.width(), image.height()) {
             return Err(InputError::new_err(format!(
-                "camera is for {}x{} images but depth is {}, expected shape ({}, {})",
+                "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape ({}, {})",
                 camera.width(),
                 camera.height(),
-                array::describe(depth),
+                array::kind(depth),
+                image.height(),
+                image.width(),
                 camera.height(),
                 camera.width()
             )));
@@ -87,6 +93,12 @@ impl PyObservation {
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image = self.observation.depth();
         depth::image(py, image.width(), image.pixels().to_vec())
+    }
+
+    /// The depth image, to make observations of other masks with: a `DepthImage`, (H, W) metres, shared and not copied.
+    #[getter]
+    fn image(&self) -> PyDepthImage {
+        PyDepthImage(Arc::clone(self.observation.shared_depth()))
     }
 
     /// A copy of the mask, shape (H, W), bool.
@@ -145,29 +157,31 @@ impl PyObservation {
 }
 
 impl PyObservation {
-    fn make(
-        depth: hybrid_icp::DepthImage,
-        mask: hybrid_icp::Mask,
-        camera: hybrid_icp::PinholeCamera,
-    ) -> PyResult<Self> {
+    fn make(depth: Arc<DepthImage>, mask: Mask, camera: PinholeCamera) -> PyResult<Self> {
         let observation = Observation::new(depth, mask, camera).map_err(errors::input)?;
         let region = observation.region();
-        let width = observation.depth().width() as usize;
-        let depths = (region.v_min..region.v_max).flat_map(|v| {
-            let row = v as usize * width;
-            let columns = row + region.u_min as usize..row + region.u_max as usize;
-            let mask = &observation.mask().pixels()[columns.clone()];
-            let depth = &observation.depth().pixels()[columns];
-            depth
-                .iter()
-                .zip(mask)
-                .filter(|(_, set)| **set)
-                .map(|(z, _)| *z)
-        });
-        let median_depth = depth::median(depths).map(f64::from);
+        let (down, right) = depth::strides(region.height(), region.width());
+        let median_depth = masked_median(&observation, down, right)
+            .or_else(|| masked_median(&observation, 1, 1))
+            .map(f64::from);
         Ok(Self {
             observation,
             median_depth,
         })
     }
+}
+
+/// The median depth of masked pixels at these strides; `None` where none of them was measured.
+fn masked_median(observation: &Observation, down: usize, right: usize) -> Option<f32> {
+    let region = observation.region();
+    let (depth, mask) = (observation.depth(), observation.mask());
+    let pixels = (region.v_min..region.v_max)
+        .skip(down / 2)
+        .step_by(down)
+        .flat_map(|v| {
+            let columns = (region.u_min..region.u_max).skip(right / 2).step_by(right);
+            columns.map(move |u| (u, v))
+        });
+    let masked = pixels.filter(|(u, v)| mask.get(*u, *v) == Some(true));
+    depth::median(masked.filter_map(|(u, v)| depth.get(u, v)))
 }

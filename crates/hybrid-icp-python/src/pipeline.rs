@@ -57,7 +57,8 @@ impl PyPipeline {
     /// Parameters
     /// ----------
     /// name : str
-    ///     One of `Pipeline.presets()`; "hybrid" is Hybrid ICP.
+    ///     One of `Pipeline.presets()`: "hybrid" is Hybrid ICP; "hybrid-visible" and "local" refine better than it, "search" and
+    ///     "auto" also find the object where refinement fails, and take longer.
     /// overrides : sequence of str, optional
     ///     Fields to set, such as "times=3" or "stage.switcher.alpha=0.5".
     ///

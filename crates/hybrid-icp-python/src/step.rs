@@ -18,12 +18,12 @@ use crate::result::pose;
 /// sources : array_like, shape (N, 3)
 ///     Model points pᵢ, moved to the camera frame; read as float32, metres.
 /// targets : array_like, shape (N, 3)
-///     Their observed points cᵢ.
+///     Their observed points cᵢ, metres.
 ///
 /// Returns
 /// -------
 /// increment : numpy.ndarray, shape (4, 4), float64
-///     T, which multiplies the pose from the left.
+///     T, which multiplies the pose from the left; metres.
 /// mean_loss : float
 ///     Mean of |pᵢ − cᵢ|² before the step, m².
 ///
@@ -58,14 +58,14 @@ pub(crate) fn point_to_point_step<'py>(
 /// sources : array_like, shape (N, 3)
 ///     Model points pᵢ, moved to the camera frame; read as float32, metres.
 /// targets : array_like, shape (N, 3)
-///     Their observed points cᵢ.
+///     Their observed points cᵢ, metres.
 /// normals : array_like, shape (N, 3)
 ///     The observed normals nᵢ; brought to unit length.
 ///
 /// Returns
 /// -------
 /// increment : numpy.ndarray, shape (4, 4), float64
-///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left.
+///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left; metres.
 /// mean_loss : float
 ///     Mean of (nᵢ·(pᵢ − cᵢ))² before the step, m².
 ///

@@ -1,8 +1,10 @@
 """One generated scene for all tests, that of the examples, smaller."""
 
 import os
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests" / "agreement"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 
-from scene import lumpy, pose  # noqa: E402, F401
+from scene import bracket, pose  # noqa: E402, F401
 from scene import scene as generated  # noqa: E402
 
 
@@ -29,6 +31,18 @@ def many(scene, count):
     random = np.random.default_rng(7)
     motions = [pose(random.normal(0, 0.06, 3), random.normal(0, 0.006, 3)) for _ in range(count)]
     return np.array([motion @ scene.true for motion in motions])
+
+
+def write_png(path, pixels):
+    """Writes a grey PNG of 8 or 16 bits."""
+    height, width = pixels.shape
+    raw = b"".join(b"\0" + row.astype(pixels.dtype.newbyteorder(">")).tobytes() for row in pixels)
+
+    def chunk(tag, data):
+        return struct.pack(">I", len(data)) + tag + data + struct.pack(">I", zlib.crc32(tag + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.dtype.itemsize, 0, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
 
 
 @pytest.fixture(scope="session")
@@ -57,7 +71,7 @@ def dataset(program, tmp_path_factory):
     subprocess.run([program, "bop", "generate", "--scenes", "2", "--out", folder / "synthetic"], check=True, capture_output=True)
     results, expected = folder / "synthetic" / "initial_synthetic-test.csv", folder / "expected.csv"
     subprocess.run(
-        [program, "bop", "refine", "--dataset", folder / "synthetic", "--results", results, "--output", expected, "--no-time"],
+        [program, "bop", "refine", "--dataset", folder / "synthetic", "--results", results, "--output", expected, "--no-time", "--pipeline", "hybrid"],
         check=True, capture_output=True,
     )
     return folder / "synthetic", results, expected.read_bytes()

@@ -1,10 +1,12 @@
 """What is refused, and what it is told."""
 
+import os
+
 import numpy as np
 import pytest
 
 import hybrid_icp as hi
-from conftest import lumpy, pose
+from conftest import bracket, pose, write_png
 
 CAMERA = hi.Camera(100, 100, 31.5, 23.5, 64, 48)
 WALL = np.full((48, 64), 0.8, np.float32)
@@ -23,12 +25,25 @@ WALL = np.full((48, 64), 0.8, np.float32)
         ((WALL.tolist(), None, CAMERA), None, "depth is a list, expected"),
         ((WALL.T, None, CAMERA), None, r"camera is for 64x48 images but depth is .* shape \(64, 48\), expected shape \(48, 64\)"),
         ((WALL, np.ones((64, 48), bool), CAMERA), None, r"mask is .* shape \(64, 48\), expected the shape of depth, \(48, 64\)"),
+        ((hi.DepthImage(WALL.T), None, CAMERA), None, r"depth is a DepthImage with shape \(64, 48\), expected shape \(48, 64\)"),
+        ((hi.DepthImage(WALL), None, CAMERA), 0.001, "scale= was passed with depth as a DepthImage, expected it when"),
+        ((hi.DepthImage(WALL), np.ones((64, 48), bool), CAMERA), None, r"mask is .* expected the shape of depth, \(48, 64\)"),
         ((WALL, WALL, CAMERA), None, "mask is an array of float32 .* expected an .H, W. array of bool or uint8"),
     ],
 )
 def test_observations_say_what_was_passed(arguments, scale, message):
     with pytest.raises(hi.InputError, match=message):
         hi.Observation(*arguments, scale=scale)
+
+
+def test_units_are_told_where_few_pixels_were_measured():
+    # Two pixels, off the grid by which images are judged first.
+    sparse = np.zeros((480, 640), np.float32)
+    sparse[[1, 300], [2, 401]] = 823
+    with pytest.raises(hi.InputError, match="depth looks like millimetres: median 823"):
+        hi.DepthImage(sparse)
+    assert hi.DepthImage(sparse / 1000).to_numpy().sum() == np.float32(0.823) * 2
+    assert not hi.DepthImage(np.full((48, 64), np.nan, np.float32)).to_numpy().any()
 
 
 @pytest.mark.parametrize(
@@ -65,7 +80,7 @@ def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
         pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, -0.5]))
     with pytest.warns(hi.InputWarning, match="at z = 5.0.* but the median depth inside the mask is 0.[45]"):
         pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, 5]))
-    vertices, faces = lumpy()
+    vertices, faces = bracket()
     with pytest.warns(hi.InputWarning, match='diameter is 1.*: check unit="m"'):
         hi.Model(vertices, faces)
 
@@ -130,6 +145,48 @@ def test_layouts_and_types_of_arrays_do_not_matter(scene):
     before = expected.depth
     expected.depth[:] = 0
     assert np.array_equal(expected.depth, before)
+
+
+def test_observations_of_one_image_share_its_depth(scene):
+    image = hi.DepthImage(scene.depth)
+    left = scene.mask & (np.arange(320) < 160)
+    for mask in (scene.mask, left, None):
+        apart, shared = (hi.Observation(depth, mask, scene.camera) for depth in (scene.depth, image))
+        assert all(map(np.array_equal, apart.surfels(), shared.surfels()))
+        assert np.array_equal(shared.depth, image.to_numpy()) and shared.image == image
+    again = hi.Observation(shared.image, left, scene.camera)
+    assert again.n_measured == left.sum()
+    assert (image.width, image.height) == (320, 240) and repr(image) == "DepthImage(320x240)"
+    assert image != hi.DepthImage(scene.depth * 2)
+
+
+def test_masks_of_a_shared_image_take_no_memory_for_depth():
+    camera = hi.Camera(1000, 1000, 999.5, 749.5, 2000, 1500)
+    image = hi.DepthImage(np.full((1500, 2000), 0.8, np.float32))
+    masks = [np.zeros((1500, 2000), bool) for _ in range(20)]
+    for index, mask in enumerate(masks):
+        mask[10 * index : 10 * index + 8, :8] = True
+
+    def resident():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+    if not os.path.exists("/proc/self/statm"):
+        pytest.skip("no /proc to read this process's memory from")
+    before = resident()
+    observations = [hi.Observation(image, mask, camera) for mask in masks]
+    grown = resident() - before
+    # A byte per pixel for each mask, 60 MB in all; a depth for each would be 240 MB more.
+    assert grown < 120e6 and sum(o.n_measured for o in observations) == 20 * 64
+
+
+def test_an_image_read_from_a_file_is_the_array_read_from_it(tmp_path):
+    write_png(tmp_path / "depth.png", np.arange(48 * 64, dtype=np.uint16).reshape(48, 64))
+    image = hi.DepthImage.from_png(tmp_path / "depth.png", 0.0001)
+    array = hi.read_depth_png(tmp_path / "depth.png", 0.0001)
+    assert np.array_equal(image.to_numpy(), array) and image == hi.DepthImage(array)
+    with pytest.raises(hi.FileError, match="none.png"):
+        hi.DepthImage.from_png(tmp_path / "none.png", 0.0001)
 
 
 def test_pixel_centres_shift_the_principal_point():

@@ -5,38 +5,23 @@ import os
 import signal
 import subprocess
 import sys
-import uuid
-from pathlib import Path
 
 import pytest
 
 import hybrid_icp as hi
 from hybrid_icp import bop
-
-MARK = "HYBRID_ICP_RAY_TEST"
+from ray_processes import start, workers
 
 
 @pytest.fixture(scope="module")
 def ray():
-    ray = pytest.importorskip("ray", reason="no Ray: cargo xtask python --ray installs it")
-    # Workers inherit the environment of the process that starts Ray: the mark tells ours from any others.
-    os.environ.update({MARK: uuid.uuid4().hex, "RAY_USAGE_STATS_ENABLED": "0"})
-    ray.init(num_cpus=2, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+    try:
+        import ray
+    except (ImportError, OSError) as error:
+        pytest.skip(f"no Ray: {error}; cargo xtask python --ray installs it")
+    start(cpus=2)
     yield ray
     ray.shutdown()
-
-
-def workers():
-    """Processes of our actors."""
-    found = []
-    for process in Path("/proc").iterdir():
-        try:
-            ours = f"{MARK}={os.environ[MARK]}".encode() in (process / "environ").read_bytes().split(b"\0")
-            if ours and b"ray::" in (process / "cmdline").read_bytes() and b"Worker" in (process / "cmdline").read_bytes():
-                found.append(int(process.name))
-        except (OSError, ValueError):
-            continue
-    return found
 
 
 def test_ray_is_not_imported_without_being_asked_for():
@@ -107,6 +92,16 @@ def test_a_killed_driver_goes_on_from_its_journal(dataset, ray, tmp_path):
     run(lambda now, total: done.append((now, total)))
     assert (tmp_path / "out.csv").read_bytes() == expected
     assert len(done) < len(bop.read_images(results))
+
+
+def test_what_ray_takes_is_documented(ray):
+    import inspect
+
+    import hybrid_icp.ray
+
+    text = inspect.getdoc(hybrid_icp.ray.refine)
+    for parameter in inspect.signature(hybrid_icp.ray.refine).parameters:
+        assert f"\n{parameter} : " in text, parameter
 
 
 def test_hypotheses_may_come_as_parquet(dataset, ray, tmp_path):

@@ -1,28 +1,13 @@
 """The module gives the bits of the program `hybrid-icp refine`, which is the Rust API, through its JSON."""
 
 import json
-import struct
 import subprocess
-import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hybrid_icp as hi
-from conftest import lumpy, many
-
-
-def write_png(path, pixels):
-    """Writes a grey PNG of 8 or 16 bits."""
-    height, width = pixels.shape
-    raw = b"".join(b"\0" + row.astype(pixels.dtype.newbyteorder(">")).tobytes() for row in pixels)
-
-    def chunk(tag, data):
-        return struct.pack(">I", len(data)) + tag + data + struct.pack(">I", zlib.crc32(tag + data))
-
-    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.dtype.itemsize, 0, 0, 0, 0)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
+from conftest import bracket, many, write_png
 
 
 def compare(program, folder, pipeline, model, depth, scale_mm, mask, camera, rotation, translation_mm):
@@ -59,7 +44,7 @@ def compare(program, folder, pipeline, model, depth, scale_mm, mask, camera, rot
 
 @pytest.mark.parametrize("pipeline", ["hybrid", "nn-point-to-plane"])
 def test_a_generated_frame_has_the_bits_of_the_program(program, tmp_path, scene, pipeline):
-    vertices, faces = lumpy()
+    vertices, faces = bracket()
     lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
     (tmp_path / "model.obj").write_text("\n".join(lines))
     write_png(tmp_path / "depth.png", np.round(scene.depth * 10000).astype(np.uint16))

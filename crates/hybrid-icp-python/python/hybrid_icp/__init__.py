@@ -29,6 +29,7 @@ A plate half a metre in front of the camera, and a detector that is four centime
 from ._errors import FileError, HybridIcpError, InputError, InputWarning
 from ._native import (
     Camera,
+    DepthImage,
     Fuser,
     IterationEvent,
     Model,
@@ -56,6 +57,7 @@ from ._native import (
 
 __all__ = [
     "Camera",
+    "DepthImage",
     "FileError",
     "Fuser",
     "HybridIcpError",

@@ -10,6 +10,7 @@ import numpy.typing as npt
 __all__ = [
     "Camera",
     "DatasetRefiner",
+    "DepthImage",
     "Fuser",
     "IterationEvent",
     "Model",
@@ -87,6 +88,21 @@ class Camera:
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
 
+_Depth = Union[npt.NDArray[np.float32], npt.NDArray[np.float64], npt.NDArray[np.uint16]]
+
+@final
+class DepthImage:
+    def __new__(cls, depth: _Depth, *, scale: float | None = None) -> DepthImage: ...
+    @staticmethod
+    def from_png(path: _Path, scale: float) -> DepthImage: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    def to_numpy(self) -> npt.NDArray[np.float32]: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+
 @final
 class Model:
     def __new__(
@@ -125,7 +141,7 @@ class Model:
 class Observation:
     def __new__(
         cls,
-        depth: npt.NDArray[np.float32] | npt.NDArray[np.float64] | npt.NDArray[np.uint16],
+        depth: DepthImage | _Depth,
         mask: npt.NDArray[np.bool_] | npt.NDArray[np.uint8] | None,
         camera: Camera,
         *,
@@ -135,6 +151,8 @@ class Observation:
     def camera(self) -> Camera: ...
     @property
     def depth(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def image(self) -> DepthImage: ...
     @property
     def mask(self) -> npt.NDArray[np.bool_]: ...
     @property
