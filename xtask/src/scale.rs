@@ -140,6 +140,8 @@ impl Scale {
                 "--no-time",
                 "--rescore",
                 "mve",
+                "--pipeline",
+                "hybrid",
             ])
             .args([
                 "--results",
