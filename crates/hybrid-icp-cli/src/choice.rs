@@ -9,9 +9,11 @@ use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
 /// The options that choose a pipeline.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PipelineArguments {
-    /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file. `auto` refines locally and searches where the
-    /// MVE stays above 0.2: it may then end far from the initial pose, within what `--set max_rotation_degrees=30` and `--set
-    /// max_translation_meters=0.05` allow. `local` never searches, `hybrid` is the paper's method.
+    /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
+    ///
+    /// `auto` refines locally and searches where the MVE stays above 0.2: it may then end far from the initial pose, within
+    /// what `--set max_rotation_degrees=30` and `--set max_translation_meters=0.05` allow. `local` never searches, `hybrid` is
+    /// the paper's method.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "auto")]
     pipeline: Source,
     /// Overrides a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be given several times.

@@ -78,7 +78,7 @@ pub(crate) struct Arguments {
 fn follows(pipeline: Arg) -> Arg {
     let help = "The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file. Covariances are calibrated for `hybrid`; \
         `auto` and `search` may leap from one image to the next";
-    pipeline.default_value("hybrid").help(help).long_help(help)
+    pipeline.default_value("hybrid").long_help(help)
 }
 
 /// What an estimate's covariance is made of.
