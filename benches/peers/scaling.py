@@ -21,7 +21,7 @@ def generate(programs, folder, frames, objects, hypotheses):
 def start(programs, folder, threads):
     command = [
         programs / "hybrid-icp", "bop", "refine", "--dataset", folder, "--results", folder / "starts_synthetic-test.csv",
-        "--output", folder / OUTPUT, "--threads", str(threads),
+        "--output", folder / OUTPUT, "--threads", str(threads), "--pipeline", "hybrid",
     ]  # fmt: skip
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 

@@ -1,11 +1,13 @@
 //! A warm run makes no heap allocation, whatever the preset.
 
+use std::collections::BTreeMap;
+
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::{Counting, allocations};
 use hicp_tests::scene;
 use hybrid_icp::fusion::{CameraMotion, FusionMethod};
 use hybrid_icp::pipeline::{PARTS, Part, PartKind};
-use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator};
+use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator, Vector3};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -14,11 +16,14 @@ static COUNTING: Counting = Counting;
 fn a_warm_run_allocates_nothing() {
     let mut rng = rng(3);
     let scene = scene(Household::Mug, 1.0, &mut rng);
-    // One start that is nearly right and one that is far off, so that `hybrid` takes both of its branches.
+    // One start that is nearly right and one that is far off, so that `hybrid` takes both of its branches; and one upside down,
+    // so that there is something to search for.
     let starts = [
         perturb(&mut rng, &scene.truth, 0.004, 0.08),
         perturb(&mut rng, &scene.truth, 0.08, 0.6),
+        scene.truth * Isometry3::rotation(Vector3::x() * std::f64::consts::PI),
     ];
+    let mut evaluations = BTreeMap::new();
     for preset in Preset::ALL {
         let mut refiner = Refiner::preset(preset);
         for init in &starts {
@@ -29,7 +34,14 @@ fn a_warm_run_allocates_nothing() {
             let refined = refiner.refine(&scene.model, &scene.observation, init);
             let count = allocations() - before;
             assert_eq!(count, 0, "{preset}: {refined:?}");
+            *evaluations.entry(preset.name()).or_insert(0) += refined.outcome.iterations;
         }
+    }
+    for global in ["search", "auto"] {
+        assert!(
+            evaluations[global] > evaluations["local"],
+            "{global} never searched"
+        );
     }
     counter_works();
 }

@@ -36,6 +36,11 @@ pub enum Metric {
 impl Metric {
     const ALL: [Self; 4] = [Self::Vsd, Self::Failure, Self::CpuMs, Self::Worse];
 
+    /// Whether its mean is the share of rows of which something holds.
+    fn is_share(self) -> bool {
+        matches!(self, Self::Failure | Self::Worse)
+    }
+
     fn of(self, measured: &Measured) -> Option<f64> {
         match self {
             Self::Vsd => Some(measured.vsd_final),
@@ -48,7 +53,8 @@ impl Metric {
     }
 }
 
-/// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap.
+/// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap; of a share on which no bootstrap sample
+/// differs, what [`never_seen`] leaves possible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The estimate from all rows.
@@ -70,6 +76,12 @@ pub struct Group {
     pub bins: Option<std::ops::Range<usize>>,
     /// Whether it is one level or bin, a point of the figure, rather than a range of them.
     pub single: bool,
+}
+
+impl Group {
+    fn holds(&self, bin: usize) -> bool {
+        self.bins.as_ref().is_none_or(|bins| bins.contains(&bin))
+    }
 }
 
 /// Figures of a variant in a group, without intervals.
@@ -210,11 +222,33 @@ impl Analysis {
             .filter(|x| x.is_finite())
             .collect();
         drawn.sort_by(f64::total_cmp);
-        Some(Interval {
+        let mut interval = Interval {
             estimate,
             low: quantile(&drawn, 0.025).unwrap_or(estimate),
             high: quantile(&drawn, 0.975).unwrap_or(estimate),
-        })
+        };
+        if metric.is_share() && interval.low >= interval.high {
+            let cases = terms.iter().map(|(g, v, _)| self.cases(*g, *v)).min();
+            let unseen = never_seen(cases.unwrap_or(0));
+            // No share is below 0 or above 1.
+            let bound =
+                |sign: f64| -> f64 { terms.iter().map(|t| t.2).filter(|f| f * sign > 0.0).sum() };
+            interval.low = (estimate - unseen).max(bound(-1.0));
+            interval.high = (estimate + unseen).min(bound(1.0));
+        }
+        Some(interval)
+    }
+
+    /// Number of cases of which a variant has rows in a group. The rows of one case, under several conditions, are no
+    /// independent ones.
+    fn cases(&self, group: usize, variant: usize) -> usize {
+        let group = &self.groups[group];
+        let seen = |unit: &&Unit| {
+            let mut levels = group.levels.iter();
+            group.holds(unit.bin)
+                && levels.any(|l| unit.measured[l * self.variants.len() + variant].is_some())
+        };
+        self.units.iter().filter(seen).count()
     }
 
     /// Figures of a variant in a group; `None` where there is no row.
@@ -224,12 +258,7 @@ impl Analysis {
         let rows: Vec<(&Unit, &Measured)> = self
             .units
             .iter()
-            .filter(|unit| {
-                group
-                    .bins
-                    .as_ref()
-                    .is_none_or(|bins| bins.contains(&unit.bin))
-            })
+            .filter(|unit| group.holds(unit.bin))
             .flat_map(|unit| group.levels.iter().map(move |level| (unit, *level)))
             .filter_map(|(unit, level)| {
                 let measured = unit.measured[level * self.variants.len() + variant].as_ref()?;
@@ -451,6 +480,13 @@ pub const NOISY_MODEL: &str = "model noise";
 pub const FAULTY_MASK: &str = "imperfect masks";
 /// Label of the group of all rows.
 pub const ALL: &str = "all";
+
+/// The largest share of which it is not unlikely (5 %) that none of so many independent cases shows it: 1 − 0.05^(1/n), the exact
+/// (Clopper–Pearson) one-sided bound, about 3/n. A bootstrap over cases that are all alike knows no interval.
+#[must_use]
+pub fn never_seen(cases: usize) -> f64 {
+    1.0 - 0.05_f64.powf(1.0 / cases as f64)
+}
 
 /// Returns a quantile of sorted values, between neighbours in proportion; `None` without any.
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {

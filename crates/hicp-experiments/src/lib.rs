@@ -57,7 +57,7 @@ mod variant;
 
 pub use analysis::{
     ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, FAULTY_MASK, Group, HIGH, Interval, LOW, Metric,
-    NOISY, NOISY_DEPTH, NOISY_MODEL, REPLICATES, WORSE_VSD,
+    NOISY, NOISY_DEPTH, NOISY_MODEL, REPLICATES, WORSE_VSD, never_seen,
 };
 pub use claims::{Claim, TABLE_I, Verdict, claims};
 pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};

@@ -3,7 +3,7 @@
 
 use hicp_experiments::{
     Analysis, Config, Experiment, Figure, HIGH, LOW, Measured, Metric, NOISY, Report, Row, Study,
-    Subject, Variant, Verdict, claims,
+    Subject, Variant, Verdict, claims, never_seen,
 };
 use hicp_sim::Household;
 
@@ -349,4 +349,42 @@ fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
     }
     let timing = Analysis::of(&study(Experiment::Timing, 4, as_in_the_paper, |_| 2.0));
     assert!(Figure::of([&timing]).is_empty());
+}
+
+/// A bootstrap over cases that are all alike is a point; what none of them shows may still happen.
+#[test]
+fn a_share_that_no_case_shows_keeps_an_interval() {
+    let wrong = |name: &str| f64::from(u8::from(name.starts_with("nn-")));
+    let study = study(
+        Experiment::DepthNoise,
+        5,
+        |name, _, _| 0.9 * wrong(name),
+        |_| 1.0,
+    );
+    let analysis = Analysis::of(&study);
+    let all = analysis.overall();
+    let of = |name: &str| (all, analysis.variant(name).unwrap());
+    let failing = |terms: &[(&str, f64)]| {
+        let terms: Vec<_> = terms
+            .iter()
+            .map(|(name, f)| (of(name).0, of(name).1, *f))
+            .collect();
+        let found = analysis.contrast(Metric::Failure, &terms).unwrap();
+        (found.estimate, found.low, found.high)
+    };
+    // Five cases of four objects, however many conditions each was seen under.
+    let unseen = never_seen(20);
+    assert!((unseen - (1.0 - 0.05_f64.powf(0.05))).abs() < 1e-12);
+    assert_eq!(failing(&[("hybrid", 1.0)]), (0.0, 0.0, unseen));
+    assert_eq!(
+        failing(&[("nn-point-to-point", 1.0)]),
+        (1.0, 1.0 - unseen, 1.0)
+    );
+    let neither = [("hybrid", 1.0), ("projective-point-to-plane", -1.0)];
+    assert_eq!(failing(&neither), (0.0, -unseen, unseen));
+    let one = [("hybrid", 1.0), ("nn-point-to-point", -1.0)];
+    assert_eq!(failing(&one), (-1.0, -1.0, unseen - 1.0));
+    // The rule of three; and nothing is known of nothing.
+    assert!((never_seen(1000) - 0.003).abs() < 1e-4);
+    assert_eq!(never_seen(0), 1.0);
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use hicp_core::{Isometry3, Problem, se3};
+use hicp_core::{Isometry3, Problem, se3, so3};
 use hicp_score::Score;
 
 use crate::hypotheses::{Hypotheses, Rotations};
@@ -28,6 +28,9 @@ pub struct SearchOptions {
     pub hypotheses: usize,
     /// How many of the best ranked are refined.
     pub refined: usize,
+    /// How far apart the rotations of those are at least, degrees: of two that are nearer the better ranked is kept. 0 drops
+    /// what is there twice alone.
+    pub spacing_degrees: f64,
     /// How far from the initial pose the result may be; `None` for anywhere.
     pub bound: Option<Bound>,
     /// How long a run may take; the best pose so far is returned with [`Termination::Deadline`]. Results then depend on the
@@ -37,7 +40,8 @@ pub struct SearchOptions {
 }
 
 impl Default for SearchOptions {
-    /// 256 rotations of SO(3), 8 refined, above a score of 0.15, without bound; a hypothesis must be better by 0.03.
+    /// 256 rotations of SO(3), 12 refined that are at least 20° apart, above a score of 0.15, without bound; a hypothesis must be
+    /// better by 0.03.
     fn default() -> Self {
         Self {
             threshold: 0.15,
@@ -45,7 +49,8 @@ impl Default for SearchOptions {
             min_gain: 0.03,
             rotations: Rotations::Even,
             hypotheses: 256,
-            refined: 8,
+            refined: 12,
+            spacing_degrees: 20.0,
             bound: None,
             time_limit: None,
         }
@@ -59,10 +64,11 @@ impl Default for SearchOptions {
 /// same from several sides it can land on an equivalent pose.
 ///
 /// Hypotheses are rotations from [`SearchOptions::rotations`] and neighbours of the initial and the local pose, each placed so
-/// that what it shows lies about the centroid of what was observed.
+/// that what it shows lies about the centroid of what was observed. None is refined that lies near a better ranked one.
 ///
-/// **Contract**: the score of the returned pose is never above that of the initial one, nor, without a bound, of the local
-/// stage's. With a bound no pose outside of it is returned; the initial one is kept where there is no other.
+/// **Contract**: the score of the returned pose is never above that of the local stage's: whether that is better than the initial one
+/// is the local stage's to know, see [`crate::Guard`]. With a bound no pose outside of it is returned; where the local stage's is,
+/// the initial one stands in for it.
 ///
 /// Cost: the local stage; where its score stays above the threshold, `hypotheses` × the ranking score, `refined` × the exploring
 /// stage, and the local stage once more.
@@ -94,6 +100,34 @@ impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
             options,
             ranked: Vec::new(),
         }
+    }
+
+    /// Puts a hypothesis into the list of the best, unless it is too near to a better one; one that is too near and not better
+    /// leaves the list for it.
+    fn list(&mut self, score: f64, pose: Isometry3<f64>) {
+        let SearchOptions {
+            refined,
+            spacing_degrees,
+            ..
+        } = self.options;
+        let place = self.ranked.partition_point(|(other, _)| *other <= score);
+        if place >= refined.min(MAX_REFINED) {
+            return;
+        }
+        let near = |other: &(f64, Isometry3<f64>)| {
+            let turn = other.1.rotation * pose.rotation.inverse();
+            other.1.rotation == pose.rotation || so3::angle(&turn).to_degrees() < spacing_degrees
+        };
+        if self.ranked[..place].iter().any(near) {
+            return;
+        }
+        let mut index = 0;
+        self.ranked.retain(|other| {
+            index += 1;
+            index <= place || !near(other)
+        });
+        self.ranked.insert(place, (score, pose));
+        self.ranked.truncate(refined.min(MAX_REFINED));
     }
 }
 
@@ -148,11 +182,7 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
             }
             let mut context = session.workspace.context(problem);
             let score = self.ranking.score(&mut context, &pose);
-            let place = self.ranked.partition_point(|(other, _)| *other <= score);
-            if place < options.refined.min(MAX_REFINED) {
-                self.ranked.insert(place, (score, pose));
-                self.ranked.truncate(options.refined.min(MAX_REFINED));
-            }
+            self.list(score, pose);
         }
     }
 
@@ -229,18 +259,20 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
         if !se3::is_finite(init) || problem.observation.n_surfels() == 0 {
             return local;
         }
+        let stopped = local.termination == Termination::Stopped;
         let mut iterations = local.iterations;
-        let mut context = session.workspace.context(problem);
-        let mut score = self.score.score(&mut context, init);
-        match self.found(problem, init, local, session) {
-            Some(found) if found.score <= score => score = found.score,
-            Some(_) => local = Outcome::kept(init, Termination::ScoreNotImproved),
-            None if local.verdict == Verdict::Refined => {
-                local = Outcome::kept(init, Termination::OutOfBounds);
-            }
-            None => {}
+        let found = self.found(problem, init, local, session);
+        if found.is_none() && local.verdict == Verdict::Refined {
+            local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        if score > self.options.threshold && local.termination != Termination::Stopped {
+        let score = found.map_or_else(
+            || {
+                let mut context = session.workspace.context(problem);
+                self.score.score(&mut context, init)
+            },
+            |found| found.score,
+        );
+        if score > self.options.threshold && !stopped {
             let start = local.camera_from_object;
             self.rank(problem, init, &start, &clock, session);
             let (found, spent) = self.explore(problem, init, &clock, session);
@@ -261,5 +293,61 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
             iterations,
             ..local
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hicp_core::Vector3;
+
+    use super::*;
+
+    /// The scores and angles of what is refined, of hypotheses that are turned about one axis.
+    fn listed(spacing_degrees: f64, hypotheses: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        let options = SearchOptions {
+            refined: 3,
+            spacing_degrees,
+            ..SearchOptions::default()
+        };
+        let mut search = HypothesisSearch::new((), (), (), (), options);
+        for (score, degrees) in hypotheses {
+            search.list(
+                *score,
+                Isometry3::rotation(Vector3::z() * degrees.to_radians()),
+            );
+        }
+        let turned = |pose: &Isometry3<f64>| pose.rotation.angle().to_degrees().round();
+        search
+            .ranked
+            .iter()
+            .map(|(score, pose)| (*score, turned(pose)))
+            .collect()
+    }
+
+    #[test]
+    fn what_is_there_twice_takes_one_place() {
+        let neighbors = [(0.5, 0.0), (0.6, 5.0), (0.7, 90.0)];
+        let both = [neighbors, neighbors].concat();
+        assert_eq!(listed(0.0, &both), neighbors);
+        assert_eq!(listed(20.0, &both), [(0.5, 0.0), (0.7, 90.0)]);
+    }
+
+    #[test]
+    fn of_two_that_are_near_the_better_stays() {
+        let hypotheses = [
+            (0.5, 0.0),
+            (0.6, 50.0),
+            (0.4, 10.0),
+            (0.45, 100.0),
+            (0.3, 150.0),
+        ];
+        assert_eq!(
+            listed(20.0, &hypotheses),
+            [(0.3, 150.0), (0.4, 10.0), (0.45, 100.0)]
+        );
+        assert_eq!(
+            listed(20.0, &[(0.5, 0.0), (0.6, 15.0), (0.4, 30.0)]),
+            [(0.4, 30.0), (0.5, 0.0)]
+        );
     }
 }

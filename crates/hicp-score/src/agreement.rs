@@ -26,7 +26,7 @@ pub(crate) struct Agreement<R> {
     pub(crate) cx: f64,
     pub(crate) inverse_fx: f64,
     pub(crate) diameter: f64,
-    /// See [`crate::MeanVsd::occlusion_tolerance`]; infinite for none.
+    /// See [`crate::MeanVsd::occlusion_tolerance`], below 0 too; infinite for none.
     pub(crate) occlusion_tolerance: f64,
 }
 

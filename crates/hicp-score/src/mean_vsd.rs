@@ -19,6 +19,10 @@ use crate::tolerances::{N_TOLERANCES, errors, mean};
 pub struct MeanVsd {
     /// When set, rendered pixels outside the mask that something observed hides by more than this many metres are not
     /// counted against the pose (BOP's δ is 0.015). `None` is the paper's definition: everything rendered counts.
+    ///
+    /// Below 0 it is lenient with the mask: what was observed may also lie that far *behind* the rendered surface, as it does where
+    /// the mask has missed a part of the object. Outside the mask only what the camera sees through by more than that, or did
+    /// not measure, counts against the pose then.
     pub occlusion_tolerance: Option<f64>,
 }
 
@@ -32,6 +36,14 @@ impl MeanVsd {
     pub fn paper() -> Self {
         Self {
             occlusion_tolerance: None,
+        }
+    }
+
+    /// Lenient with masks that miss a part of the object: BOP's tolerance, below 0.
+    #[must_use]
+    pub fn lenient() -> Self {
+        Self {
+            occlusion_tolerance: Some(-VISIBILITY_TOLERANCE_METERS),
         }
     }
 

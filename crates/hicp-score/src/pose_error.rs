@@ -24,7 +24,9 @@ pub fn add(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f
 
 /// Returns ADI (also ADD-S): the mean distance from a model point at the true pose to the *closest* model point at the estimate, metres.
 ///
-/// ADI = mean over x of min over y |T_est y − T_gt x|; 0 without points. Never above ADD, and blind to symmetries.
+/// ADI = mean over x of min over y |T_est y − T_gt x|; 0 without points. Never above ADD, and blind to symmetries, as far as the
+/// points are symmetric: of points sampled on the surface, an equivalent pose maps each between others, and ADI stays at about
+/// half their spacing. [`mssd`] over the symmetries has no such floor.
 /// Cost: O(n log n) for the search tree over the points and for the search; [`crate::ModelPoints::adi`] builds the tree once.
 #[must_use]
 pub fn adi(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f32>]) -> f64 {

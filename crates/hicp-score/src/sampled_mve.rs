@@ -13,7 +13,8 @@ use crate::tolerances::{AgreementCounts, mean};
 ///
 /// It costs some ten microseconds whatever the mesh, and is no substitute for the MVE where a pose is accepted or reported:
 /// pixels that no sample hits count as not rendered, and thin parts come and go. Samples of a closed mesh that face away from
-/// the camera are passed over. Occlusion is recognised with BOP's tolerance, as [`crate::MeanVsd::default`] does.
+/// the camera are passed over. Occlusion is recognised with BOP's tolerance, as [`crate::MeanVsd::default`] does, unless told
+/// otherwise.
 ///
 /// Cost: O(samples) per pose; the sampling is made once per model and shared, and so is the coarse observation.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,8 @@ pub struct SampledMve {
     pub samples: usize,
     /// About how many pixels of the mask are looked at.
     pub pixels: usize,
+    /// As [`crate::MeanVsd::occlusion_tolerance`], metres; infinite for none.
+    pub occlusion_tolerance: f64,
     /// The depth buffer of the coarse image, empty (0) between two poses.
     buffer: Vec<f32>,
     /// The pixels of the buffer that were written.
@@ -35,8 +38,18 @@ impl SampledMve {
         Self {
             samples,
             pixels,
+            occlusion_tolerance: VISIBILITY_TOLERANCE_METERS,
             buffer: Vec::new(),
             touched: Vec::new(),
+        }
+    }
+
+    /// The default, lenient with masks that miss a part of the object, as [`crate::MeanVsd::lenient`] is.
+    #[must_use]
+    pub fn lenient() -> Self {
+        Self {
+            occlusion_tolerance: -VISIBILITY_TOLERANCE_METERS,
+            ..Self::default()
         }
     }
 
@@ -113,7 +126,7 @@ impl SampledMve {
                 if known {
                     correct.add(behind.abs());
                 }
-            } else if !(known && behind > VISIBILITY_TOLERANCE_METERS) {
+            } else if !(known && behind > self.occlusion_tolerance) {
                 outside += 1;
             }
         }

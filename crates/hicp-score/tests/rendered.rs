@@ -12,7 +12,9 @@ mod support;
 use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
 };
-use hicp_score::{MeanVsd, N_TOLERANCES, Score, VISIBILITY_TOLERANCE_METERS, Vsd, tolerances, vsd};
+use hicp_score::{
+    MeanVsd, N_TOLERANCES, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, Vsd, tolerances, vsd,
+};
 use support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
 
 fn camera() -> PinholeCamera {
@@ -178,7 +180,7 @@ fn the_mve_is_its_definition_at_any_pose() {
     for _ in 0..40 {
         let nudge = Isometry3::new(numbers.vector() * 0.01, numbers.vector() * 0.2);
         let here = at() * nudge;
-        for mean_vsd in BOTH {
+        for mean_vsd in [BOTH[0], BOTH[1], MeanVsd::lenient()] {
             for observation in [&observation, &scene] {
                 let found = mve(mean_vsd, &model, observation, &here);
                 let expected = by_definition(mean_vsd, &model, observation, &here);
@@ -218,6 +220,47 @@ fn what_stands_in_front_of_the_object_is_forgiven_if_asked_for() {
     // The paper's definition counts every rendered pixel outside the mask, and so does an occluder within the tolerance.
     assert!((mve(MeanVsd::paper(), &model, &near, &at()) - share).abs() < 1e-14);
     assert!((mve(MeanVsd::default(), &model, &touching, &at()) - share).abs() < 1e-14);
+}
+
+/// The left part of the object is missing from the mask, and the image as it is.
+#[test]
+fn what_the_mask_misses_is_forgiven_if_asked_for() {
+    let model = Model::new(wedge());
+    let whole = observe(&model, &camera(), &at());
+    let mask = (0..64 * 48).map(|i| whole.mask().pixels()[i] && i % 64 >= 30);
+    let mask = Mask::new(64, 48, mask.collect()).unwrap();
+    let seen = |behind: f32| {
+        let scene = with_depth(&whole, |i, z| match i % 64 {
+            0..30 if z > 0.0 => z + behind,
+            _ => z,
+        });
+        Observation::new(scene.depth().clone(), mask.clone(), camera()).unwrap()
+    };
+    let count = |mask: &Mask| mask.pixels().iter().filter(|on| **on).count() as f64;
+    let missing = 1.0 - count(&mask) / count(whole.mask());
+    assert!(missing > 0.1);
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    for mean_vsd in BOTH {
+        assert!(near(mve(mean_vsd, &model, &seen(0.0), &at()), missing));
+    }
+    let lenient = |observation: &Observation| mve(MeanVsd::lenient(), &model, observation, &at());
+    assert_eq!(lenient(&seen(0.0)), 0.0);
+    assert_eq!(lenient(&seen(0.01)), 0.0);
+    // The camera looks through the object, or measured nothing.
+    assert!(near(lenient(&seen(0.03)), missing));
+    let holes = with_depth(&seen(0.0), |i, z| if i % 64 < 30 { 0.0 } else { z });
+    assert!(near(lenient(&holes), missing));
+
+    // The estimate from samples agrees, as far as its few pixels do.
+    let sampled = |mut sampled: SampledMve, observation: &Observation| {
+        score(&mut sampled, &model, observation, &at())
+    };
+    let (strict, forgiving) = (SampledMve::default, SampledMve::lenient);
+    assert!(sampled(strict(), &seen(0.0)) > sampled(forgiving(), &seen(0.0)) + 0.5 * missing);
+    assert!(near(
+        sampled(strict(), &seen(0.03)),
+        sampled(forgiving(), &seen(0.03))
+    ));
 }
 
 #[test]

@@ -10,9 +10,13 @@ use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PipelineArguments {
     /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE.toml", default_value = "hybrid")]
+    ///
+    /// `auto` refines locally and searches where the MVE stays above 0.2: it may then end far from the initial pose, within
+    /// what `--set max_rotation_degrees=30` and `--set max_translation_meters=0.05` allow. `local` never searches, `hybrid` is
+    /// the paper's method.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "auto")]
     pipeline: Source,
-    /// Overrides a field of the pipeline, such as times=3 or stage.switcher.alpha=0.5; may be given several times.
+    /// Overrides a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     overrides: Vec<String>,
 }

@@ -32,7 +32,7 @@ def test_ray_is_not_imported_without_being_asked_for():
 def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
     folder, results, expected = dataset
     images = bop.read_images(results)
-    refiner = bop.DatasetRefiner(folder, "test", hi.Pipeline.preset("hybrid"), bop.object_ids(images))
+    refiner = bop.DatasetRefiner(folder, "test", hi.Pipeline.preset("auto"), bop.object_ids(images))
     assert refiner.missing_models == [] and refiner.broken_models == {}
     lines = {}
     for _, _, indices, rows in reversed(images):

@@ -128,7 +128,7 @@ impl Preset {
                 "global: local, and above an MVE of 0.15 a search over 256 rotations; may end at an equivalent pose"
             }
             Self::Auto => {
-                "global where needed: local, and above an MVE of 0.3 a search over 128 rotations"
+                "global where needed: local, and above an MVE of 0.2 a search over 128 rotations"
             }
         }
     }

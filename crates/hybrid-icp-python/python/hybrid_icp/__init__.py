@@ -1,7 +1,8 @@
 """Refine 6D object poses in depth images.
 
 A detector gives a segmentation mask and a rough pose; `Pipeline.refine` makes it a better one and says how well it explains the
-image. The default pipeline is Hybrid ICP (Dreczkowski & Johns), which looks at the image to decide how to register.
+image. `Pipeline.preset("hybrid")` is Hybrid ICP (Dreczkowski & Johns), which looks at the image to decide how to register; ``"auto"``,
+the default of the program and of `hybrid_icp.ray`, also searches for the object where refinement fails.
 
 Conventions: metres and radians; poses are 4x4 float64 matrices ``T_co`` that take object coordinates to the camera's; cameras look
 along +z with x right and y down; images are indexed [v, u] with pixel centres at integers; depth is along the optical axis, 0 where

@@ -81,7 +81,7 @@ def refine(
     split : str, optional
         The split's folder.
     pipeline : Pipeline, optional
-        Hybrid ICP if not given.
+        `auto` if not given, as in the program.
     detections : str or os.PathLike, optional
         Take the masks from a detections file instead of mask_visib.
     rescore : {"keep", "mve"}, optional
@@ -110,7 +110,7 @@ def refine(
     InputError
         When a file of the dataset is damaged; the output is written all the same, with the rows that need it unchanged.
     """
-    pipeline = pipeline or Pipeline.preset("hybrid")
+    pipeline = pipeline or Pipeline.preset("auto")
     path = Path(results)
     if path.suffix == ".parquet":
         path = _csv_of(path, Path(output))

@@ -408,10 +408,12 @@ fn stop(part: &Reader<'_>) -> Result<Stop, PipelineError> {
 
 fn score(part: &Reader<'_>) -> Result<BoxedScore, PipelineError> {
     Ok(match part.name() {
-        "sampled-mve" => Box::new(SampledMve::new(
-            part.count("samples")? as usize,
-            part.count("pixels")? as usize,
-        )),
+        "sampled-mve" => {
+            let (samples, pixels) = (part.count("samples")?, part.count("pixels")?);
+            let mut sampled = SampledMve::new(samples as usize, pixels as usize);
+            sampled.occlusion_tolerance = part.number("occlusion_tolerance")?;
+            Box::new(sampled)
+        }
         "mve" => {
             let tolerance = part.number("occlusion_tolerance")?;
             Box::new(MeanVsd {

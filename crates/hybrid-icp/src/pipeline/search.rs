@@ -26,6 +26,7 @@ pub(super) fn search_options(part: &Reader<'_>) -> Result<SearchOptions, Pipelin
         },
         hypotheses: part.count("hypotheses")? as usize,
         refined: part.count("refined")? as usize,
+        spacing_degrees: part.number("spacing_degrees")?,
         bound: bounded.then_some(bound),
         // A time too long to be told is no limit.
         time_limit: Duration::try_from_secs_f64(seconds).ok(),

@@ -112,9 +112,9 @@ pub fn hybrid_visible() -> impl Stage + Send + Clone {
 
 /// `local`: local refinement that never returns a pose with a higher MVE than the initial one.
 ///
-/// Up to six steps by [`Alternate`] until the MVE stalls, the best pose by it kept: the projective cascade where the estimate
-/// agrees with the image, else observed points matched to the model, point-to-point and then the symmetric metric. A polish
-/// of twice as many points follows, which is accepted only if the MVE improves.
+/// Up to six steps by [`Alternate`] until the MVE stalls or is at most 0.1, the best pose by it kept: the projective cascade where
+/// the estimate agrees with the image, else observed points matched to the model, point-to-point and then the symmetric metric. A
+/// polish of twice as many points follows, which is accepted only if the MVE improves.
 #[must_use]
 pub fn local() -> impl Stage + Send + Clone {
     let far = (300, 5000);
@@ -129,7 +129,7 @@ pub fn local() -> impl Stage + Send + Clone {
             )),
             max_steps: 6,
             min_gain: 0.01,
-            good_enough: 0.02,
+            good_enough: 0.1,
         },
         Guard {
             stage: projective(Symmetric, 4000, 5),
@@ -151,7 +151,8 @@ fn explore() -> impl Stage + Send + Clone {
     }
 }
 
-/// [`local`], and a search where its MVE stays above a threshold. To change the options, such as to set a bound:
+/// [`local`], and a search where its MVE stays above a threshold. The search judges by an MVE that is lenient with masks that
+/// miss a part of the object ([`MeanVsd::lenient`]). To change the options, such as to set a bound:
 ///
 /// ```
 /// use hybrid_icp::{Bound, Refiner, SearchOptions, presets};
@@ -165,13 +166,13 @@ pub fn search_with(options: SearchOptions) -> impl Stage + Send + Clone {
     HypothesisSearch::new(
         local(),
         explore(),
-        SampledMve::default(),
-        MeanVsd::default(),
+        SampledMve::lenient(),
+        MeanVsd::lenient(),
         options,
     )
 }
 
-/// `search`: [`local`], and where its MVE stays above 0.15 a search over 256 rotations, of which 8 are refined.
+/// `search`: [`local`], and where its MVE stays above 0.15 a search over 256 rotations, of which 12 are refined.
 ///
 /// Not local refinement: it can end anywhere, also at a pose that is equivalent by symmetry.
 #[must_use]
@@ -179,18 +180,17 @@ pub fn search() -> impl Stage + Send + Clone {
     search_with(SearchOptions::default())
 }
 
-/// `auto`: [`local`], and where its MVE stays above 0.3, which is where a pose is not to be trusted, a search over 128 rotations,
-/// of which 4 are refined.
+/// `auto`: [`local`], and where its MVE stays above 0.2 a search over 128 rotations, of which 6 are refined.
 ///
 /// A hypothesis must beat the local pose by 0.05. Where that happens it is no local refinement any more.
 #[must_use]
 pub fn auto() -> impl Stage + Send + Clone {
     search_with(SearchOptions {
-        threshold: 0.3,
+        threshold: 0.2,
         good_enough: 0.15,
         min_gain: 0.05,
         hypotheses: 128,
-        refined: 4,
+        refined: 6,
         ..SearchOptions::default()
     })
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, bail};
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, ResultRow, Scene, write_results};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
@@ -37,6 +37,7 @@ use crate::terminal::{complain, say};
 /// and what became of it.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
+#[command(mut_arg("pipeline", follows))]
 pub(crate) struct Arguments {
     /// The dataset's folder, with models/ and the split's folder.
     #[arg(long, value_name = "DIR")]
@@ -71,6 +72,13 @@ pub(crate) struct Arguments {
     uncertainty: Uncertainty,
     #[command(flatten)]
     pipeline: PipelineArguments,
+}
+
+/// What is followed is refined, not searched for: covariances and gate were fitted to `hybrid`.
+fn follows(pipeline: Arg) -> Arg {
+    let help = "The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file. Covariances are calibrated for `hybrid`; \
+        `auto` and `search` may leap from one image to the next";
+    pipeline.default_value("hybrid").long_help(help)
 }
 
 /// What an estimate's covariance is made of.

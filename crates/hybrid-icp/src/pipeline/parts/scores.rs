@@ -1,7 +1,13 @@
 //! The scores of the catalogue.
 
 use super::super::catalog::{Part, PartKind};
-use super::parameter::{POSITIVE, count, number};
+use super::parameter::{INFINITE, count, number};
+
+/// What an occlusion tolerance means.
+const HIDES: &str = "what something outside the mask must stand in front of the object to hide it; below 0 it may also lie that far behind, where \
+    the mask misses a part; inf is the paper's definition";
+/// Any; a metre behind the object is nowhere near it.
+const TOLERANCES: (f64, f64) = (-1.0, INFINITE);
 
 pub(super) const PARTS: &[Part] = &[
     Part {
@@ -14,8 +20,8 @@ pub(super) const PARTS: &[Part] = &[
         parameters: &[number(
             "occlusion_tolerance",
             "m",
-            "what something must stand in front of the object to hide it; inf is the paper's definition",
-            POSITIVE,
+            HIDES,
+            TOLERANCES,
             Some(0.015),
         )],
     },
@@ -34,6 +40,7 @@ pub(super) const PARTS: &[Part] = &[
                 1,
                 Some(200),
             ),
+            number("occlusion_tolerance", "m", HIDES, TOLERANCES, Some(0.015)),
         ],
     },
 ];

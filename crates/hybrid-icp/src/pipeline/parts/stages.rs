@@ -217,7 +217,14 @@ pub(super) const PARTS: &[Part] = &[
                 "refined",
                 "how many of the best ranked are refined",
                 0,
-                Some(8),
+                Some(12),
+            ),
+            number(
+                "spacing_degrees",
+                "degrees",
+                "how far apart the rotations of those are at least; of two that are nearer the better ranked is refined",
+                POSITIVE,
+                Some(20.0),
             ),
             number(
                 "max_translation_meters",
