@@ -291,7 +291,7 @@ impl Bench {
             &mut self.view,
         );
         let elapsed = nanoseconds(start);
-        let filled = self.view.depth().iter().filter(|z| **z > 0.0).count();
+        let filled = self.view.n_rendered();
         let region = self.view.region();
         json!({
             "ns": elapsed,

@@ -55,7 +55,7 @@ impl Renderer for CountingRenderer {
     ) {
         self.rasterizer
             .render(mesh, camera, camera_from_object, region, view);
-        let filled = view.depth().iter().filter(|z| **z > 0.0).count();
+        let filled = view.n_rendered();
         let counted = [1, view.depth().len(), filled, mesh.triangles().len()];
         for (count, more) in self.counts.iter().zip(counted) {
             count.fetch_add(more as u64, Ordering::Relaxed);

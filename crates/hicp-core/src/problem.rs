@@ -31,7 +31,7 @@ impl<'a> Problem<'a> {
 /// ```
 /// use hicp_core::{Context, Isometry3};
 /// fn visible_pixels(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> usize {
-///     context.view(camera_from_object).depth().iter().filter(|z| **z > 0.0).count()
+///     context.view(camera_from_object).n_rendered()
 /// }
 /// ```
 #[derive(Debug)]

@@ -114,6 +114,8 @@ fn pixels_without_depth_have_no_triangle_and_the_others_one() {
             assert_eq!(depth == 0.0, triangle == NO_TRIANGLE);
             assert!(depth == 0.0 || (triangle as usize) < mesh.triangles().len());
         }
+        let shown = view.depth().iter().filter(|z| **z > 0.0).count();
+        assert_eq!(view.n_rendered(), shown);
     }
 }
 
