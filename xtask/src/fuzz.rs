@@ -5,8 +5,9 @@ use std::process::Command;
 
 use crate::{Findings, process};
 
-/// Beyond this a run counts as hanging, seconds; the slowest takes one or two, and a busy machine some times that.
-const HANG_SECONDS: u32 = 60;
+/// Beyond this a run counts as hanging, seconds. By the clock, which is what libFuzzer looks at: the slowest take some seconds of a
+/// processor, and a fuzzer that waits for one behind other programs twenty times that.
+const HANG_SECONDS: u32 = 300;
 /// More resident memory than this is a finding, MiB.
 const MEMORY_MIB: u32 = 2048;
 /// Longest input, bytes.
