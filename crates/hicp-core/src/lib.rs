@@ -52,7 +52,7 @@ mod surfel;
 mod symmetry;
 mod vectorized;
 
-pub use camera::{MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
+pub use camera::{MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
 pub use correspondences::{Correspondences, Mover, Pair};
 pub use derived::Derived;
 pub use diameter::diameter;
