@@ -415,3 +415,13 @@ fn a_fuser_without_a_name_has_that_of_its_type() {
     let boxed: Box<dyn Fuser> = Box::new(Deaf);
     assert_eq!(boxed.name(), "Deaf");
 }
+
+#[test]
+fn what_stands_around_a_fuser_says_its_name() {
+    let inner = || BatchFuser::average(FuserConfig::default());
+    assert_eq!(average(Gate::default()).name(), "gated");
+    assert_eq!(aware(Symmetries::default()).name(), "symmetry-aware");
+    let unit = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
+    let shared = SharedError::new(inner(), unit, 0.02).unwrap();
+    assert_eq!(shared.name(), "shared-error");
+}

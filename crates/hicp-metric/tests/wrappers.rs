@@ -9,8 +9,8 @@ use std::rc::Rc;
 use hicp_core::{Isometry3, Pair};
 use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, MetricSchedule, NormalEquations, PointToPlane, PointToPoint, PosePrior,
-    Prior, Robust, Scale, Symmetric, WeightedSum,
+    LevenbergMarquardt, MetricSchedule, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Prior, Robust, Scale, Symmetric, WeightedSum,
 };
 use scenes::{Numbers, center, messy};
 
@@ -220,4 +220,18 @@ fn a_schedule_takes_the_metric_of_its_iteration_and_stays_at_the_last() {
     assert_eq!(empty.squared_error(pair), 0.0);
     assert_eq!(empty.mean_loss(&pairs), None);
     assert!(empty.minimize(&pairs).is_none() && empty.system(&pairs).is_none());
+}
+
+#[test]
+fn metrics_say_their_names() {
+    let metrics: [(&str, Box<dyn ErrorMetric>); 5] = [
+        ("point-to-point", Box::new(PointToPoint)),
+        ("point-to-plane", Box::new(PointToPlane)),
+        ("plane-to-point", Box::new(PlaneToPoint)),
+        ("symmetric", Box::new(Symmetric)),
+        ("generalized", Box::new(Generalized::default())),
+    ];
+    for (name, metric) in metrics {
+        assert_eq!(metric.name(), name);
+    }
 }
