@@ -106,4 +106,21 @@ mod tests {
         assert!(fixed.build(None).is_ok());
         assert!(fixed.build(Some(0.25)).is_err());
     }
+
+    #[test]
+    fn files_that_ask_for_too_much_are_refused_when_they_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mine.toml");
+        let hybrid = Preset::Hybrid.toml();
+        let long = hybrid.replace("times = 2", "times = 2000000000");
+        assert_ne!(long, hybrid);
+        std::fs::write(&path, long).unwrap();
+        assert!(matches!(
+            Variant::read(&path),
+            Err(ExperimentError::Pipeline(_))
+        ));
+        let variant = Variant::read_within(&PipelineLimits::NONE, &path).unwrap();
+        assert_eq!(variant.name, "mine");
+        assert!(variant.build(Some(0.3)).is_ok());
+    }
 }
