@@ -67,7 +67,9 @@ pub(crate) fn run(root: &Path, arguments: &[&str]) -> Findings {
 }
 
 /// The crates, and which samples of each: `None` for all mutants.
-fn parse<'a>(arguments: &[&'a str]) -> Result<(Vec<&'a str>, Vec<Option<&'a str>>), Vec<String>> {
+type Wanted<'a> = (Vec<&'a str>, Vec<Option<&'a str>>);
+
+fn parse<'a>(arguments: &[&'a str]) -> Result<Wanted<'a>, Vec<String>> {
     let is_sample = |word: &&str| {
         let numbers = word
             .split_once('/')
