@@ -1,11 +1,13 @@
-//! `cargo xtask fuzz`: every fuzz target in turn, for some minutes each.
+//! `cargo xtask fuzz`: every fuzz target in turn, for some minutes each, and a table of what was done.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::{Findings, process};
 
-/// Beyond this a run counts as hanging, seconds; the slowest takes one or two, and a busy machine some times that.
-const HANG_SECONDS: u32 = 60;
+/// Beyond this a run counts as hanging, seconds. By the clock, which is what libFuzzer looks at: the slowest take some seconds of a
+/// processor, and a fuzzer that waits for one behind other programs twenty times that.
+const HANG_SECONDS: u32 = 300;
 /// More resident memory than this is a finding, MiB.
 const MEMORY_MIB: u32 = 2048;
 /// Longest input, bytes.
@@ -15,7 +17,21 @@ const LONGEST: u32 = 4096;
 #[derive(Debug, PartialEq)]
 struct Options {
     minutes: f64,
-    target: Option<String>,
+    /// Those that are named; all if none is.
+    targets: Vec<String>,
+}
+
+/// What one fuzzer did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Done {
+    /// Runs of the target.
+    executions: u64,
+    /// Edges of the control flow that were taken.
+    edges: u64,
+    /// By the clock.
+    minutes: f64,
+    /// Of a processor, where `/proc` tells: fewer than by the clock on a machine that does other things.
+    processor_minutes: Option<f64>,
 }
 
 /// Runs `cargo xtask fuzz [--minutes N] [--target T]`.
@@ -27,33 +43,50 @@ pub(crate) fn run(root: &Path, arguments: &[&str]) -> Findings {
         ]);
     }
     let names = target_names(root)?;
-    if let Some(wanted) = &options.target
-        && !names.contains(wanted)
-    {
+    if let Some(wanted) = options.targets.iter().find(|t| !names.contains(t)) {
         return Err(vec![format!(
             "fuzz: no target is called {wanted:?}, expected one of {}",
             names.join(", ")
         )]);
     }
-    cargo_fuzz(root, &["build", "--sanitizer", "none"])?;
+    process::run(&mut cargo_fuzz(root, &["build", "--sanitizer", "none"]))?;
     let mut findings = Vec::new();
-    for name in names
-        .iter()
-        .filter(|name| options.target.as_ref().is_none_or(|t| t == *name))
-    {
+    let mut table = vec![
+        "| target | minutes | of a processor | executions | edges covered | findings |".to_owned(),
+        "|---|---|---|---|---|---|".to_owned(),
+    ];
+    let chosen = |name: &&String| options.targets.is_empty() || options.targets.contains(name);
+    for name in names.iter().filter(chosen) {
         println!("xtask fuzz: {name}, {} minutes", options.minutes);
-        if let Err(found) = fuzz(root, name, options.minutes) {
+        let (done, found) = fuzz(root, name, options.minutes)?;
+        table.push(row(name, &done, found.is_err()));
+        if let Err(found) = found {
             findings.extend(found);
             findings.push(format!(
                 "{name}: see fuzz/artifacts/{name}; when it is mended, keep it as fuzz/regressions/{name}/WHAT-IT-IS"
             ));
         }
     }
+    println!("{}", table.join("\n"));
     if findings.is_empty() {
         Ok(())
     } else {
         Err(findings)
     }
+}
+
+/// A line of the table.
+fn row(name: &str, done: &Done, found: bool) -> String {
+    let processor = done
+        .processor_minutes
+        .map_or_else(|| "not known".to_owned(), |minutes| format!("{minutes:.1}"));
+    format!(
+        "| `{name}` | {:.1} | {processor} | {} | {} | {} |",
+        done.minutes,
+        done.executions,
+        done.edges,
+        if found { "one" } else { "none" }
+    )
 }
 
 /// The programs of `fuzz/fuzz_targets`.
@@ -69,17 +102,22 @@ fn target_names(root: &Path) -> Result<Vec<String>, Vec<String>> {
     Ok(names)
 }
 
-fn fuzz(root: &Path, name: &str, minutes: f64) -> Findings {
+/// Runs a fuzzer until its time is over or it finds something; what it says goes to `target/fuzz/logs/NAME.log`.
+fn fuzz(root: &Path, name: &str, minutes: f64) -> Result<(Done, Findings), Vec<String>> {
     let corpus = PathBuf::from("fuzz/corpus").join(name);
-    std::fs::create_dir_all(root.join(&corpus))
-        .map_err(|e| vec![format!("{}: {e}", corpus.display())])?;
+    let logs = target(root).join("logs");
+    for folder in [&root.join(&corpus), &logs] {
+        std::fs::create_dir_all(folder).map_err(|e| vec![format!("{}: {e}", folder.display())])?;
+    }
+    let log = logs.join(name).with_extension("log");
+    let cannot = |e: std::io::Error| vec![format!("{}: {e}", log.display())];
     let corpus = corpus.to_string_lossy().into_owned();
     let seeds = format!("fuzz/seeds/{name}");
     let total = format!("-max_total_time={:.0}", (minutes * 60.0).max(1.0));
     let hang = format!("-timeout={HANG_SECONDS}");
     let memory = format!("-rss_limit_mb={MEMORY_MIB}");
     let longest = format!("-max_len={LONGEST}");
-    cargo_fuzz(
+    let mut command = cargo_fuzz(
         root,
         &[
             "run",
@@ -95,11 +133,72 @@ fn fuzz(root: &Path, name: &str, minutes: f64) -> Findings {
             &longest,
             "-print_final_stats=1",
         ],
-    )
+    );
+    command.stderr(std::fs::File::create(&log).map_err(cannot)?);
+    let (begun, before) = (std::time::Instant::now(), processor_seconds());
+    let found = process::run(&mut command).map_err(|mut findings| {
+        findings.push(format!("{name}: its last words are in {}", log.display()));
+        findings
+    });
+    let minutes = begun.elapsed().as_secs_f64() / 60.0;
+    let said = std::fs::read(&log).map_err(cannot)?;
+    let (executions, edges) = counts(&String::from_utf8_lossy(&said));
+    let processor_minutes = processor_seconds()
+        .zip(before)
+        .map(|(after, before)| (after - before) / 60.0);
+    let done = Done {
+        executions,
+        edges,
+        minutes,
+        processor_minutes,
+    };
+    Ok((done, found))
+}
+
+/// Executions and covered edges, out of what libFuzzer says: its statistics at the end, or the last line of one that was stopped.
+fn counts(said: &str) -> (u64, u64) {
+    let number = |word: &str| -> Option<u64> {
+        let digits = word.trim_start_matches('#');
+        digits
+            .split(|c: char| !c.is_ascii_digit())
+            .next()?
+            .parse()
+            .ok()
+    };
+    let (mut executions, mut edges) = (0, 0);
+    for line in said.lines() {
+        if let Some((_, n)) = line.split_once("number_of_executed_units:") {
+            executions = number(n.trim()).unwrap_or(executions);
+        } else if let Some((n, rest)) = line.split_once(" cov: ")
+            && line.starts_with('#')
+        {
+            executions = number(n.trim()).unwrap_or(executions);
+            edges = number(rest).unwrap_or(edges);
+        }
+    }
+    (executions, edges)
+}
+
+/// What the programs that this one has waited for took of a processor, where there is a `/proc`.
+fn processor_seconds() -> Option<f64> {
+    children_seconds(&std::fs::read_to_string("/proc/self/stat").ok()?)
+}
+
+/// The sixteenth and seventeenth field of `/proc/PID/stat`, in hundredths of a second; names may hold spaces and brackets.
+fn children_seconds(stat: &str) -> Option<f64> {
+    let (_, fields) = stat.rsplit_once(')')?;
+    let mut fields = fields.split_whitespace().skip(13);
+    let mut next = || fields.next()?.parse::<f64>().ok();
+    Some((next()? + next()?) / 100.0)
+}
+
+/// Where fuzzers are built: counters are compiled in, and a folder of its own spares the workspace's.
+fn target(root: &Path) -> PathBuf {
+    process::target(root).join("fuzz")
 }
 
 /// cargo-fuzz in the workspace; temporary files go to memory where there is such a folder.
-fn cargo_fuzz(root: &Path, arguments: &[&str]) -> Findings {
+fn cargo_fuzz(root: &Path, arguments: &[&str]) -> Command {
     let (subcommand, rest) = arguments.split_at(1);
     let mut command = process::cargo(root, &["fuzz"]);
     command
@@ -110,15 +209,14 @@ fn cargo_fuzz(root: &Path, arguments: &[&str]) -> Findings {
     if memory.is_dir() {
         command.env("TMPDIR", memory);
     }
-    // Counters are compiled in: a target folder of its own spares the workspace's.
-    command.env("CARGO_TARGET_DIR", process::target(root).join("fuzz"));
-    process::run(&mut command)
+    command.env("CARGO_TARGET_DIR", target(root));
+    command
 }
 
 fn parse(arguments: &[&str]) -> Result<Options, Vec<String>> {
     let mut options = Options {
         minutes: 5.0,
-        target: None,
+        targets: Vec::new(),
     };
     let mut words = arguments.iter();
     while let Some(word) = words.next() {
@@ -135,7 +233,7 @@ fn parse(arguments: &[&str]) -> Result<Options, Vec<String>> {
                         )]
                     })?;
             }
-            ("--target", Some(value)) => options.target = Some(value.to_owned()),
+            ("--target", Some(value)) => options.targets.push(value.to_owned()),
             _ => {
                 return Err(vec![format!(
                     "fuzz: cannot read {word:?}, expected --minutes N or --target NAME"
@@ -152,8 +250,10 @@ mod tests {
 
     #[test]
     fn options_are_read() {
-        let read = parse(&["--minutes", "0.5", "--target", "obj"]).unwrap();
-        assert_eq!((read.minutes, read.target.as_deref()), (0.5, Some("obj")));
+        let read = parse(&["--minutes", "0.5", "--target", "obj", "--target", "ply"]).unwrap();
+        assert_eq!(read.minutes, 0.5);
+        assert_eq!(read.targets, ["obj", "ply"]);
+        assert_eq!(parse(&[]).unwrap().targets, Vec::<String>::new());
         for wrong in [
             &["--minutes"][..],
             &["--minutes", "0"],
@@ -162,5 +262,23 @@ mod tests {
         ] {
             assert!(parse(wrong).is_err(), "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn what_a_fuzzer_says_is_counted() {
+        let line =
+            "#4096\tpulse  cov: 812 ft: 2210 corp: 38/1204b lim: 43 exec/s: 2048 rss: 48Mb\n";
+        assert_eq!(counts(line), (4096, 812));
+        let end =
+            format!("{line}stat::number_of_executed_units: 5310\nstat::average_exec_per_sec: 7\n");
+        assert_eq!(counts(&end), (5310, 812));
+        assert_eq!(counts("INFO: nothing yet"), (0, 0));
+    }
+
+    #[test]
+    fn the_processors_time_is_that_of_the_children() {
+        let stat = "7 (a ) b) S 1 2 3 4 5 6 7 8 9 10 11 12 150 250 20 0 1 0\n";
+        assert_eq!(children_seconds(stat), Some(4.0));
+        assert_eq!(children_seconds("7 (a) S 1"), None);
     }
 }

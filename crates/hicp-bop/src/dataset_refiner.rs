@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict};
+use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict, doubts};
 
 use crate::fate::Fate;
 use crate::frame::Frame;
@@ -47,8 +47,8 @@ impl DatasetRefiner {
                 let unrefined = indices.iter().map(|i| RowResult::unrefined(*i, fate));
                 return FrameResult {
                     rows: unrefined.collect(),
-                    seconds: None,
                     faults: vec![fault],
+                    ..FrameResult::default()
                 };
             }
         };
@@ -104,10 +104,15 @@ impl Work<'_, '_> {
     fn in_masks(&mut self, model: &Model, obj_id: u32, rows: &[(usize, Isometry3<f64>)]) {
         let poses: Vec<Isometry3<f64>> = rows.iter().map(|(_, init)| *init).collect();
         let mut start = Instant::now();
+        let mut looked = false;
         let chosen = self.frame.choose(self.refiner, model, obj_id, &poses);
         for ((index, init), mask) in rows.iter().zip(chosen) {
             match mask.and_then(|mask| self.frame.observation(mask)) {
                 Ok(observation) => {
+                    if !std::mem::replace(&mut looked, true) {
+                        let doubts = doubts(model, observation, init).into_iter();
+                        self.result.doubts.extend(doubts.map(|d| (obj_id, d)));
+                    }
                     let row = refine(self.refiner, model, observation, (*index, init));
                     self.done(start, row);
                     // The choice is counted once, with the first row that it is for.

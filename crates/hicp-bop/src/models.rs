@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use hicp_io::bop::{Dataset, ModelInfo, read_models_info};
+use hicp_io::bop::{Dataset, ModelInfo};
 use hicp_io::{IoError, LengthUnit, ReadLimits};
 use hybrid_icp::{Model, ModelConfig};
 
@@ -22,27 +22,25 @@ impl ModelFolder {
     ///
     /// # Errors
     ///
-    /// As [`read_models_info`].
+    /// As [`ReadLimits::read_models_info`].
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
+        Self::open_within(ReadLimits::DEFAULT, dir)
+    }
+
+    /// Opens a folder as [`ModelFolder::open`] does; sizes and models are read within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`ReadLimits::read_models_info`].
+    pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         let info = dir.join("models_info.json");
         let infos = if info.is_file() {
-            read_models_info(info)?
+            limits.read_models_info(info)?
         } else {
             BTreeMap::new()
         };
-        Ok(Self {
-            dir,
-            infos,
-            limits: ReadLimits::DEFAULT,
-        })
-    }
-
-    /// Reads models within other limits than [`ReadLimits::DEFAULT`].
-    #[must_use]
-    pub fn with_limits(mut self, limits: ReadLimits) -> Self {
-        self.limits = limits;
-        self
+        Ok(Self { dir, infos, limits })
     }
 
     /// Reads the model of an object, metres; `None` if there is none.

@@ -1,7 +1,7 @@
 //! What a refinement of rows returns, and how it is entered into the file's rows.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::Isometry3;
+use hybrid_icp::{Doubt, Isometry3};
 
 use crate::fate::Fate;
 use crate::fault::Fault;
@@ -41,6 +41,8 @@ pub struct FrameResult {
     pub seconds: Option<f64>,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
+    /// What looks wrong about the inputs ([`hybrid_icp::doubts`]), by object: of the first row of each that got as far as a mask.
+    pub doubts: Vec<(u32, Doubt)>,
 }
 
 /// What becomes the score of a row.

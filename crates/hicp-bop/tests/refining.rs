@@ -233,7 +233,8 @@ fn limits_and_errors_are_told_as_faults() {
     let dataset = dataset(dir.path()).with_limits(limits);
     let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
     assert!(folder.read(BLOCK).unwrap().is_some());
-    let error = folder.with_limits(limits).read(BLOCK).unwrap_err();
+    let folder = ModelFolder::open_within(limits, dataset.models_dir().unwrap()).unwrap();
+    let error = folder.read(BLOCK).unwrap_err();
     let fault = Fault::of(&error);
     assert!(
         !fault.missing && fault.text.contains("obj_000005.ply"),

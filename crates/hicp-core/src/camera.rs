@@ -43,13 +43,17 @@ pub struct PinholeCamera {
 /// The largest image side accepted, in pixels.
 pub const MAX_IMAGE_SIDE: u32 = 32_768;
 
+/// The longest focal length accepted, and the furthest principal point from the first pixel, in pixels: a thousand times those of
+/// any lens, and small enough that no pixel of a mesh that can be read is beyond the range of numbers.
+pub const MAX_FOCAL_LENGTH: f64 = 1e9;
+
 impl PinholeCamera {
     /// Makes a camera whose pixel centres are at integers.
     ///
     /// # Errors
     ///
-    /// [`CameraError`] when a focal length is not finite and positive, the principal point is not finite, or a side of
-    /// the image is zero or above [`MAX_IMAGE_SIDE`].
+    /// [`CameraError`] when a focal length is not above 0 and at most [`MAX_FOCAL_LENGTH`], the principal point is further away
+    /// than that or not a number, or a side of the image is zero or above [`MAX_IMAGE_SIDE`].
     pub fn new(
         fx: f64,
         fy: f64,
@@ -59,12 +63,12 @@ impl PinholeCamera {
         height: u32,
     ) -> Result<Self, CameraError> {
         for (name, value) in [("fx", fx), ("fy", fy)] {
-            if !(value.is_finite() && value > 0.0) {
+            if !(value > 0.0 && value <= MAX_FOCAL_LENGTH) {
                 return Err(CameraError::FocalLength { name, value });
             }
         }
         for (name, value) in [("cx", cx), ("cy", cy)] {
-            if !value.is_finite() {
+            if value.is_nan() || value.abs() > MAX_FOCAL_LENGTH {
                 return Err(CameraError::PrincipalPoint { name, value });
             }
         }

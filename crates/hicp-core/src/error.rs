@@ -6,16 +6,22 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// A focal length that is not finite and positive.
-    #[error("focal length {name} is {value}, expected a finite number of pixels above 0")]
+    /// A focal length that is not positive or that no lens has.
+    #[error(
+        "focal length {name} is {value}, expected a number of pixels above 0 and at most {}",
+        crate::camera::MAX_FOCAL_LENGTH
+    )]
     FocalLength {
         /// `fx` or `fy`.
         name: &'static str,
         /// The value given.
         value: f64,
     },
-    /// A principal point that is not finite.
-    #[error("principal point {name} is {value}, expected a finite number of pixels")]
+    /// A principal point that is nowhere near the image.
+    #[error(
+        "principal point {name} is {value}, expected a number of pixels between -{0} and {0}",
+        crate::camera::MAX_FOCAL_LENGTH
+    )]
     PrincipalPoint {
         /// `cx` or `cy`.
         name: &'static str,

@@ -53,7 +53,7 @@ mod symmetry;
 mod vectorized;
 mod work;
 
-pub use camera::{MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
+pub use camera::{MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, PinholeCamera, PixelCenters};
 pub use correspondences::{Correspondences, Mover, Pair};
 pub use derived::Derived;
 pub use diameter::diameter;

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
 
 use hicp_core::{
-    CameraError, DepthImage, ImageError, MAX_IMAGE_SIDE, Matrix3, PinholeCamera, PixelCenters,
-    Point3,
+    CameraError, DepthImage, ImageError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, Matrix3, PinholeCamera,
+    PixelCenters, Point3,
 };
 
 fn camera() -> PinholeCamera {
@@ -71,7 +71,8 @@ fn centers_at_halves_shift_the_principal_point_by_half_a_pixel() {
 
 #[test]
 fn impossible_focal_lengths_and_centers_are_named() {
-    for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    let beyond = MAX_FOCAL_LENGTH * (1.0 + f64::EPSILON);
+    for value in [0.0, -1.0, beyond, f64::MAX, f64::NAN, f64::INFINITY] {
         for name in ["fx", "fy"] {
             let (fx, fy) = if name == "fx" {
                 (value, 1.0)
@@ -86,7 +87,7 @@ fn impossible_focal_lengths_and_centers_are_named() {
             assert_eq!((n, v.to_bits()), (name, value.to_bits()));
         }
     }
-    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+    for value in [beyond, -beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for name in ["cx", "cy"] {
             let (cx, cy) = if name == "cx" {
                 (value, 1.0)
@@ -101,6 +102,26 @@ fn impossible_focal_lengths_and_centers_are_named() {
             assert_eq!((n, v.to_bits()), (name, value.to_bits()));
         }
     }
+}
+
+#[test]
+fn the_longest_focal_length_is_accepted_and_the_message_states_it() {
+    let far = MAX_FOCAL_LENGTH;
+    for (cx, cy) in [(far, -far), (-far, far)] {
+        assert!(PinholeCamera::new(far, far, cx, cy, 1, 1).is_ok());
+    }
+    let told = |fx, cx| {
+        let refused = PinholeCamera::new(fx, 1.0, cx, 0.0, 1, 1);
+        refused.unwrap_err().to_string()
+    };
+    assert_eq!(
+        told(2e9, 0.0),
+        "focal length fx is 2000000000, expected a number of pixels above 0 and at most 1000000000"
+    );
+    assert_eq!(
+        told(1.0, -2e9),
+        "principal point cx is -2000000000, expected a number of pixels between -1000000000 and 1000000000"
+    );
 }
 
 #[test]

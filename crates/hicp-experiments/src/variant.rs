@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hybrid_icp::{BoxedStage, PipelineFile, Preset};
+use hybrid_icp::{BoxedStage, PipelineFile, PipelineLimits, Preset};
 
 use crate::error::ExperimentError;
 
@@ -55,28 +55,42 @@ impl Variant {
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Pipeline`] when the file cannot be read or is no pipeline.
+    /// [`ExperimentError::Pipeline`] when the file cannot be read, is no pipeline, or asks for more work than
+    /// [`PipelineLimits::DEFAULT`] let it.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        Self::read_within(&PipelineLimits::DEFAULT, path)
+    }
+
+    /// Reads a variant from a pipeline file, within limits of one's own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Variant::read`].
+    pub fn read_within(limits: &PipelineLimits, path: &Path) -> Result<Self, ExperimentError> {
         let stem = path.file_stem().unwrap_or_default();
         let variant = Self {
             name: stem.to_string_lossy().into_owned(),
             toml: PipelineFile::read_text(path)?,
         };
-        variant.build(None)?;
+        variant.parse(None)?.build_within(limits)?;
         Ok(variant)
     }
 
-    /// Builds the pipeline, with another threshold α if one is given.
+    /// Builds the pipeline, with another threshold α if one is given. How much work it asks for was looked at when it was read.
     ///
     /// # Errors
     ///
     /// [`ExperimentError::Pipeline`] when the text is no pipeline, or α is given and the pipeline does not switch.
     pub fn build(&self, alpha: Option<f64>) -> Result<BoxedStage, ExperimentError> {
+        Ok(self.parse(alpha)?.build_within(&PipelineLimits::NONE)?)
+    }
+
+    fn parse(&self, alpha: Option<f64>) -> Result<PipelineFile, ExperimentError> {
         let mut file = PipelineFile::parse(&self.toml, &self.name)?;
         if let Some(alpha) = alpha {
             file.set(&format!("{ALPHA_FIELD}={alpha:?}"))?;
         }
-        Ok(file.build()?)
+        Ok(file)
     }
 }
 
@@ -91,5 +105,22 @@ mod tests {
         let fixed = Variant::preset(Preset::NnPointToPoint);
         assert!(fixed.build(None).is_ok());
         assert!(fixed.build(Some(0.25)).is_err());
+    }
+
+    #[test]
+    fn files_that_ask_for_too_much_are_refused_when_they_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mine.toml");
+        let hybrid = Preset::Hybrid.toml();
+        let long = hybrid.replace("times = 2", "times = 2000000000");
+        assert_ne!(long, hybrid);
+        std::fs::write(&path, long).unwrap();
+        assert!(matches!(
+            Variant::read(&path),
+            Err(ExperimentError::Pipeline(_))
+        ));
+        let variant = Variant::read_within(&PipelineLimits::NONE, &path).unwrap();
+        assert_eq!(variant.name, "mine");
+        assert!(variant.build(Some(0.3)).is_ok());
     }
 }

@@ -376,3 +376,52 @@ fn a_shared_error_is_stated_but_moves_nothing() {
     shared.reset();
     assert_eq!(shared.estimate(), None);
 }
+
+/// Of poses that are equally near, the one that is there stays, bit for bit.
+#[test]
+fn a_tie_changes_nothing() {
+    let fuser = aware(Symmetries {
+        discrete: vec![Isometry3::rotation(Vector3::z() * PI)],
+        continuous: vec![],
+    });
+    for turns in [-0.5, 0.5, 1.5] {
+        let pose = turned(Vector3::z(), 0.3);
+        let reference = pose * Isometry3::rotation(Vector3::z() * PI * turns);
+        assert_eq!(fuser.representative(&pose, &reference), pose);
+        // A little beyond, and it is the other.
+        let beyond = pose * Isometry3::rotation(Vector3::z() * (FRAC_PI_2 + 1e-6));
+        assert_ne!(fuser.representative(&pose, &beyond), pose);
+    }
+}
+
+/// A fuser that does not say its name is called after its type.
+#[test]
+fn a_fuser_without_a_name_has_that_of_its_type() {
+    struct Deaf;
+    impl Fuser for Deaf {
+        fn propagate(&mut self, _: &CameraMotion) {}
+        fn update(&mut self, _: &PoseEstimate) -> Update {
+            Update::Rejected(Failure::Mve {
+                found: 1.0,
+                limit: 0.5,
+            })
+        }
+        fn estimate(&self) -> Option<PoseEstimate> {
+            None
+        }
+        fn reset(&mut self) {}
+    }
+    assert_eq!(Deaf.name(), "Deaf");
+    let boxed: Box<dyn Fuser> = Box::new(Deaf);
+    assert_eq!(boxed.name(), "Deaf");
+}
+
+#[test]
+fn what_stands_around_a_fuser_says_its_name() {
+    let inner = || BatchFuser::average(FuserConfig::default());
+    assert_eq!(average(Gate::default()).name(), "gated");
+    assert_eq!(aware(Symmetries::default()).name(), "symmetry-aware");
+    let unit = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
+    let shared = SharedError::new(inner(), unit, 0.02).unwrap();
+    assert_eq!(shared.name(), "shared-error");
+}

@@ -398,3 +398,23 @@ fn what_is_no_estimate_is_refused() {
         assert!(matches!(estimate, Err(FusionError::Mve { .. })));
     }
 }
+
+/// Covariances that are regular are used as they are, however small; only what is singular to working precision is raised.
+#[test]
+fn small_regular_covariances_weigh_by_what_they_say() {
+    // Far below the floor of singular ones: standard deviations of 1e-8 and 2e-8.
+    let covariance = |deviation: f64| Matrix6::identity() * (deviation * deviation);
+    let offset = Vector6::new(1e-9, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let estimates = [
+        estimate(Isometry3::identity(), covariance(1e-8)),
+        estimate(se3::exp(&offset), covariance(2e-8)),
+    ];
+    let both = fusion(&estimates, EXACT)
+        .solve(&Isometry3::identity())
+        .unwrap();
+    // A fifth of the way: the weights are as four to one.
+    let x = both.camera_from_object.translation.x;
+    assert!((x - 0.2e-9).abs() < 1e-14, "{x}");
+    let expected = covariance(1e-8) * 0.8;
+    assert!(relative(&both.covariance, &expected) < 1e-6);
+}

@@ -7,6 +7,7 @@ use hicp_core::{CameraError, Matrix3, PinholeCamera};
 use crate::camera_model::{CameraModel, camera_model};
 use crate::error::IoError;
 use crate::json::{Document, Node};
+use crate::limits::ReadLimits;
 
 /// A camera file: the camera, and what its depth images count in where the file says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,13 +31,31 @@ pub struct CameraFile {
 ///
 /// # Errors
 ///
-/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::CameraSize`] naming both sizes, or
-/// [`IoError::Camera`].
+/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::CameraSize`] naming both sizes,
+/// [`IoError::Camera`], or [`IoError::Limit`].
 pub fn read_camera_json(
     path: impl AsRef<Path>,
     image_size: (u32, u32),
 ) -> Result<CameraFile, IoError> {
-    let document = Document::read(path.as_ref())?;
+    ReadLimits::DEFAULT.read_camera_json(path, image_size)
+}
+
+impl ReadLimits {
+    /// Reads a camera as [`read_camera_json`] does, from a file of at most `max_small_json_bytes`.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_camera_json`].
+    pub fn read_camera_json(
+        &self,
+        path: impl AsRef<Path>,
+        image_size: (u32, u32),
+    ) -> Result<CameraFile, IoError> {
+        camera_of(&Document::read_small(self, path.as_ref())?, image_size)
+    }
+}
+
+fn camera_of(document: &Document, image_size: (u32, u32)) -> Result<CameraFile, IoError> {
     let root = document.root();
     let is_camera = |node: &Node<'_>| {
         ["cam_K", "cam_model", "fx"]

@@ -16,14 +16,18 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Reads a JSON file whole. Numbers keep every digit of an `f64`.
-    pub(crate) fn read(path: &Path) -> Result<Self, IoError> {
-        Self::read_within(&ReadLimits::DEFAULT, path)
+    /// Reads a JSON file whole, within limits. Numbers keep every digit of an `f64`.
+    pub(crate) fn read(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
+        Self::parse(path, Limited::JsonBytes, limits.max_json_bytes)
     }
 
-    /// Reads a JSON file whole, within limits.
-    pub(crate) fn read_within(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
-        let content = Source::open(path)?.read(Limited::JsonBytes, limits.max_json_bytes)?;
+    /// Reads a JSON file that states one thing.
+    pub(crate) fn read_small(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
+        Self::parse(path, Limited::SmallJsonBytes, limits.max_small_json_bytes)
+    }
+
+    fn parse(path: &Path, what: Limited, limit: u64) -> Result<Self, IoError> {
+        let content = Source::open(path)?.read(what, limit)?;
         let value = serde_json::from_slice(text_bytes(path, &content)?).map_err(|error| {
             IoError::JsonSyntax {
                 path: path.to_owned(),
@@ -186,7 +190,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         std::fs::write(&path, text).unwrap();
-        Document::read(&path)
+        Document::read(&ReadLimits::DEFAULT, &path)
     }
 
     #[test]

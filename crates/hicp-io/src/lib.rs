@@ -26,7 +26,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `error` (what can go wrong), `limits` (how much is read), `source` (whole files into memory, within limits), `atomic`
+//! Modules in reading order: `error` (what can go wrong), `limits` (how much is read), `source` (whole files into memory, within limits), `atomic` and `atomic_folder`
 //! (writing), `unit`, `mesh` (OBJ, OFF, PLY, STL), `point_cloud`, `image` (PNG), `json` (values with their key path),
 //! `pose`, `camera`, and [`bop`] (datasets, detections, results).
 
@@ -38,7 +38,9 @@ pub use limits::ReadLimits;
 mod source;
 
 mod atomic;
+mod atomic_folder;
 pub use atomic::{check_writable, write_atomically};
+pub use atomic_folder::NewFolder;
 pub use error::{IoError, Place};
 
 mod unit;

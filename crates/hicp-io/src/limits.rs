@@ -28,6 +28,8 @@ pub struct ReadLimits {
     pub max_file_bytes: u64,
     /// Bytes of a JSON file: 256 MiB.
     pub max_json_bytes: u64,
+    /// Bytes of a JSON file that states one pose or one camera: 16 MiB.
+    pub max_small_json_bytes: u64,
     /// Vertices of a mesh or a point cloud: 10 million. `hicp_core::MAX_MESH_ELEMENTS` holds for meshes whatever stands here.
     pub max_vertices: u64,
     /// Triangles of a mesh: 10 million, after polygons are cut. `hicp_core::MAX_MESH_ELEMENTS` holds whatever stands here.
@@ -43,6 +45,7 @@ impl ReadLimits {
     pub const DEFAULT: Self = Self {
         max_file_bytes: 1 << 30,
         max_json_bytes: 1 << 28,
+        max_small_json_bytes: 1 << 24,
         max_vertices: 10_000_000,
         max_triangles: 10_000_000,
         max_pixels: 1 << 27,
@@ -53,6 +56,7 @@ impl ReadLimits {
     pub const NONE: Self = Self {
         max_file_bytes: u64::MAX,
         max_json_bytes: u64::MAX,
+        max_small_json_bytes: u64::MAX,
         max_vertices: u64::MAX,
         max_triangles: u64::MAX,
         max_pixels: u64::MAX,

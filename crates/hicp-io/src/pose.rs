@@ -7,6 +7,7 @@ use hicp_core::{Isometry3, Matrix3, RotationError, Translation3, rotation_from_m
 use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::json::{Document, Node};
+use crate::limits::ReadLimits;
 
 /// Returns the pose of a row-major rotation and a translation in millimetres; the pose is in metres.
 ///
@@ -59,13 +60,21 @@ pub struct PoseFile {
 ///
 /// # Errors
 ///
-/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, or [`IoError::Rotation`].
+/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::Rotation`], or [`IoError::Limit`].
 pub fn read_pose_json(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
-    pose_of(
-        &Document::read(path.as_ref())?.root(),
-        "cam_R_m2c",
-        "cam_t_m2c",
-    )
+    ReadLimits::DEFAULT.read_pose_json(path)
+}
+
+impl ReadLimits {
+    /// Reads a pose as [`read_pose_json`] does, from a file of at most `max_small_json_bytes`.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_pose_json`].
+    pub fn read_pose_json(&self, path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
+        let document = Document::read_small(self, path.as_ref())?;
+        pose_of(&document.root(), "cam_R_m2c", "cam_t_m2c")
+    }
 }
 
 /// Writes a pose (metres) as [`read_pose_json`] reads it, with every digit.

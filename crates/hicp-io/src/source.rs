@@ -128,6 +128,7 @@ impl ReadLimits {
 pub(crate) enum Limited {
     FileBytes,
     JsonBytes,
+    SmallJsonBytes,
     Vertices,
     Triangles,
     Rows,
@@ -148,6 +149,7 @@ impl Limited {
         let (what, field) = match self {
             Self::FileBytes => ("bytes", "max_file_bytes"),
             Self::JsonBytes => ("bytes", "max_json_bytes"),
+            Self::SmallJsonBytes => ("bytes", "max_small_json_bytes"),
             Self::Vertices => ("vertices", "max_vertices"),
             Self::Triangles => ("triangles", "max_triangles"),
             Self::Rows => ("rows", "max_rows"),

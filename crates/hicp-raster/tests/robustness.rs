@@ -5,7 +5,8 @@ mod common;
 
 use common::*;
 use hicp_core::{
-    Isometry3, NO_TRIANGLE, PinholeCamera, PixelRegion, Point3, RenderedView, Renderer, TriMesh,
+    Isometry3, MAX_FOCAL_LENGTH, NO_TRIANGLE, PinholeCamera, PixelRegion, Point3, RenderedView,
+    Renderer, TriMesh,
 };
 use hicp_raster::{Culling, RasterConfig, Rasterizer, render_depth_image};
 
@@ -372,13 +373,13 @@ fn a_warm_view_keeps_its_buffers() {
     );
 }
 
-/// Calibrations that no camera has take pixels beyond the range of `f64`, where infinities of both signs meet in clipping.
+/// Calibrations that no camera has, up to the last that is accepted; beyond it pixels would leave the range of `f64`, and
+/// infinities of both signs meet in clipping.
 #[test]
-fn pixels_beyond_the_range_of_numbers_are_survived() {
-    // Seen with a focal length near the largest number, an edge overflows while another corner stays in the image.
+fn the_longest_focal_lengths_are_survived() {
     let corners = [[-0.57, -0.57, 0.125], [0.5, 0.5, 0.42], [0.0, 0.0, -0.1]].map(Point3::from);
     let long = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
-    for huge in [1e12, 1e290, 1e305, f64::MAX] {
+    for huge in [1e6, 1e8, MAX_FOCAL_LENGTH] {
         let cameras = [
             (huge, 500.0, 16.0, 12.0),
             (500.0, huge, 16.0, 12.0),

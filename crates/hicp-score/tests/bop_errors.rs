@@ -141,6 +141,7 @@ fn symmetric_model() -> Model {
 #[test]
 fn a_symmetric_equivalent_is_no_error_for_mssd_mspd_and_adi() {
     let points = ModelPoints::new(&symmetric_model());
+    assert_eq!(points.points(), symmetric_model().mesh().vertices());
     assert!(points.is_symmetric() && points.symmetries().len() == 2);
     let truth = pose(0.01, -0.02, 0.5, 0.4, -0.3, 0.2);
     let flipped = truth * half_turn();

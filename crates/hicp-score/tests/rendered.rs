@@ -330,3 +330,9 @@ fn a_score_renders_a_pose_once_and_boxes_change_nothing() {
     assert_eq!(boxed.map(f64::to_bits), expected.map(f64::to_bits));
     assert_eq!(scores.map(|s| Score::name(&s)), ["mve", "vsd"]);
 }
+
+#[test]
+fn scores_say_their_names() {
+    let truth = Vsd::new(at()).name();
+    assert_eq!((MeanVsd::default().name(), truth), ("mve", "vsd"));
+}

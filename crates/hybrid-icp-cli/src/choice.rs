@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use crate::limits::pipeline_limits;
 use clap::Args;
 use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
 
@@ -114,7 +115,7 @@ impl Pipeline {
         for assignment in overrides {
             file.set(assignment)?;
         }
-        file.build()?;
+        file.build_within(&pipeline_limits())?;
         let name = std::iter::once(origin.to_owned())
             .chain(overrides.iter().cloned())
             .collect::<Vec<_>>()
@@ -162,7 +163,7 @@ impl Pipeline {
     pub(crate) fn stage(&self) -> BoxedStage {
         match &self.made_of {
             MadeOf::Preset(preset) => preset.build(),
-            MadeOf::File(file) => match file.build() {
+            MadeOf::File(file) => match file.build_within(&pipeline_limits()) {
                 Ok(stage) => stage,
                 // It was built once, and building is pure.
                 Err(error) => unreachable!("{error}"),

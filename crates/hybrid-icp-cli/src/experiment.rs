@@ -13,6 +13,7 @@ use hybrid_icp::{Preset, UnknownPreset};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::interrupt;
+use crate::limits::pipeline_limits;
 use crate::terminal::say;
 
 /// Rerun the paper's studies, on its kind of objects or on any meshes.
@@ -190,7 +191,7 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
         match choice {
             Choice::All => variants.extend(Variant::paper()),
             Choice::Preset(preset) => variants.push(Variant::preset(*preset)),
-            Choice::File(path) => variants.push(Variant::read(path)?),
+            Choice::File(path) => variants.push(Variant::read_within(&pipeline_limits(), path)?),
         }
     }
     Ok(variants)

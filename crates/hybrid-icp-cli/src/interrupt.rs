@@ -1,7 +1,8 @@
 //! Ctrl-C and SIGTERM: the program ends within a second, with what is done saved.
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -18,8 +19,12 @@ const GRACE: Duration = Duration::from_millis(700);
 /// How often the flag is looked at.
 const PERIOD: Duration = Duration::from_millis(20);
 
+/// How often the program tries to remove what is unfinished.
+const REMOVALS: usize = 20;
+
 static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static SAVING: AtomicBool = AtomicBool::new(false);
+static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// Listens from now on.
 ///
@@ -45,6 +50,12 @@ pub(crate) fn listen() {
         if SAVING.load(Ordering::Relaxed) {
             std::thread::sleep(GRACE);
         }
+        // A second signal need not wait for this.
+        if let Some(unfinished) = UNFINISHED.lock().ok().and_then(|mut path| path.take()) {
+            // Others may be writing into it meanwhile.
+            let mut tries = 0..REMOVALS;
+            while tries.next().is_some() && std::fs::remove_dir_all(&unfinished).is_err() {}
+        }
         complain("interrupted");
         std::process::exit(i32::from(EXIT_CODE));
     });
@@ -53,6 +64,13 @@ pub(crate) fn listen() {
 /// Says that what the command does from now on looks at [`asked`] and can be resumed.
 pub(crate) fn can_resume() {
     SAVING.store(true, Ordering::Relaxed);
+}
+
+/// Says that a folder in the making goes when somebody asks the program to stop.
+pub(crate) fn remove_when_asked(folder: &Path) {
+    if let Ok(mut unfinished) = UNFINISHED.lock() {
+        *unfinished = Some(folder.to_owned());
+    }
 }
 
 /// Whether somebody asked the program to stop.

@@ -110,7 +110,7 @@ impl Inputs {
         Ok(Read {
             depth: limits.read_depth_png(&self.depth, depth_scale)?,
             mask: limits.read_mask_png(&self.mask)?,
-            init: hicp_io::read_pose_json(&self.init)?,
+            init: limits.read_pose_json(&self.init)?,
             model: Model::new(limits.read_mesh(&self.model, self.model_unit)?),
             camera: camera_file.camera,
             depth_scale,
@@ -245,7 +245,7 @@ fn read_camera(arguments: &Inputs) -> anyhow::Result<(CameraFile, f64)> {
             size.1
         );
     }
-    let camera_file = match hicp_io::read_camera_json(&arguments.camera, size) {
+    let camera_file = match limits().read_camera_json(&arguments.camera, size) {
         Err(IoError::CameraSize {
             path,
             found_width,

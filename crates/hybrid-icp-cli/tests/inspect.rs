@@ -130,6 +130,11 @@ fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
         .exits(1)
         .complains(&["extension"]);
     run(folder.path(), ["inspect", "cube.obj", "--unit", "inch"]).exits(2);
+    let scene = Scene::new().with("--max-small-json-bytes", "9");
+    scene
+        .run()
+        .exits(1)
+        .complains(&["camera.json", "at most 9", "--max-small-json-bytes"]);
     // Wherever a limit stands, it is one.
     let scene = Scene::new().with("--max-pixels", "1000");
     scene

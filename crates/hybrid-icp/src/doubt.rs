@@ -82,7 +82,7 @@ pub enum Doubt {
 /// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, metres.
 ///
 /// Nothing is refused for it: a caller with a person to tell tells them, a robot cell counts them. Cost: one look at the
-/// pixels of the mask.
+/// pixels of the mask's box.
 ///
 /// ```
 /// use hybrid_icp::*;
@@ -99,24 +99,16 @@ pub enum Doubt {
 /// ```
 #[must_use]
 pub fn doubts(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Doubt> {
-    let mut doubts = Vec::new();
+    let mut doubts = doubts_of_model(model);
     let diameter = model.diameter();
-    if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
-        doubts.push(Doubt::Diameter { diameter });
-    }
-    let step = model.mesh().coordinate_step();
-    if step > COARSE * diameter {
-        doubts.push(Doubt::CoarseCoordinates { step, diameter });
-    }
     let distance = (init * model.center()).z;
     if distance.is_nan() || distance <= 0.0 {
         doubts.push(Doubt::BehindCamera { z: distance });
         return doubts;
     }
-    let pixels = observation.mask().pixels().iter();
-    let pixels = pixels.filter(|set| **set).count();
+    let (pixels, median) = inside_mask(observation);
     let plausible = distance / DEPTH_RATIO..=distance * DEPTH_RATIO;
-    match median_depth(observation) {
+    match median {
         None if pixels > 0 => doubts.push(Doubt::NoDepth),
         Some(measured) if !plausible.contains(&measured) => doubts.push(Doubt::Depth {
             measured,
@@ -140,6 +132,31 @@ pub fn doubts(model: &Model, observation: &Observation, init: &Isometry3<f64>) -
     doubts
 }
 
+/// Returns what looks wrong about a model by itself: those of [`doubts`] that no image is needed for.
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A mesh of 80 mm that was read as metres.
+/// let corners = [[0., 0., 0.], [80., 0., 0.], [0., 80., 0.]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// assert!(matches!(doubts_of_model(&model)[..], [Doubt::Diameter { .. }]));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn doubts_of_model(model: &Model) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    let diameter = model.diameter();
+    if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
+        doubts.push(Doubt::Diameter { diameter });
+    }
+    let step = model.mesh().coordinate_step();
+    if step > COARSE * diameter {
+        doubts.push(Doubt::CoarseCoordinates { step, diameter });
+    }
+    doubts
+}
+
 /// A length as people write it, however large or small.
 struct Meters(f64);
 
@@ -153,15 +170,23 @@ impl std::fmt::Display for Meters {
     }
 }
 
-fn median_depth(observation: &Observation) -> Option<f64> {
-    let depth = observation.depth().pixels();
-    let mask = observation.mask().pixels();
-    let mut inside: Vec<f32> = depth
-        .iter()
-        .zip(mask)
-        .filter(|(z, set)| **set && **z > 0.0)
-        .map(|(z, _)| *z)
-        .collect();
+/// The pixels of the mask, and the median of the depth that was measured in them, metres.
+fn inside_mask(observation: &Observation) -> (usize, Option<f64>) {
+    let width = observation.camera().width() as usize;
+    let region = observation.region();
+    let columns = region.u_min as usize..region.u_max as usize;
+    let mut pixels = 0;
+    let mut inside: Vec<f32> = Vec::new();
+    for v in region.v_min as usize..region.v_max as usize {
+        let row = v * width + columns.start..v * width + columns.end;
+        let depth = &observation.depth().pixels()[row.clone()];
+        let mask = &observation.mask().pixels()[row];
+        for (z, _) in depth.iter().zip(mask).filter(|(_, set)| **set) {
+            pixels += 1;
+            inside.extend(Some(*z).filter(|z| *z > 0.0));
+        }
+    }
     inside.sort_by(f32::total_cmp);
-    inside.get(inside.len() / 2).copied().map(f64::from)
+    let median = inside.get(inside.len() / 2).copied();
+    (pixels, median.map(f64::from))
 }

@@ -50,7 +50,7 @@ mod suggest;
 mod trace;
 
 pub use calibration::Calibration;
-pub use doubt::{Doubt, doubts};
+pub use doubt::{Doubt, doubts, doubts_of_model};
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
@@ -92,7 +92,7 @@ pub use hicp_score::{
 pub use hicp_switch::{
     Alternate, PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds,
 };
-pub use pipeline::{PipelineError, PipelineFile};
+pub use pipeline::{PipelineError, PipelineFile, PipelineLimits};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::{SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep};

@@ -56,7 +56,7 @@ fn must_be_given(parameter: &Parameter) -> bool {
 fn value(bytes: &mut Bytes<'_>, accepts: &Accepts, depth: usize) -> String {
     match *accepts {
         Accepts::Number { min, max, .. } => number(bytes, min, max),
-        Accepts::Count { min, .. } => (min as usize + bytes.below(4)).to_string(),
+        Accepts::Count { min, .. } => count(bytes, min).to_string(),
         Accepts::Flag { .. } => bytes.one_in(2).to_string(),
         Accepts::Word { words, .. } => format!("\"{}\"", bytes.pick(words)),
         Accepts::NumberList => list(bytes, |b| number(b, 0.0, f64::INFINITY)),
@@ -77,6 +77,16 @@ fn inline(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> String {
 fn list(bytes: &mut Bytes<'_>, mut item: impl FnMut(&mut Bytes<'_>) -> String) -> String {
     let items: Vec<String> = (0..=bytes.below(3)).map(|_| item(bytes)).collect();
     format!("[{}]", items.join(", "))
+}
+
+/// A small count, and now and then one that is refused or must be bounded by what there is.
+fn count(bytes: &mut Bytes<'_>, min: u32) -> u32 {
+    match bytes.byte() {
+        255 => u32::MAX,
+        254 => 1_000_000,
+        253 => 10_000,
+        byte => min + u32::from(byte % 4),
+    }
 }
 
 /// The ends of the range, a value near where things usually are, or one within it.

@@ -2,7 +2,8 @@
 
 use hybrid_icp::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, PipelineFile,
-    Point3, Preset, Refinement, Refiner, Symmetries, SymmetryAxis, TriMesh, Vector3, Verdict, se3,
+    PipelineLimits, Point3, Preset, Refinement, Refiner, Symmetries, SymmetryAxis, TriMesh,
+    Vector3, Verdict, se3,
 };
 
 use super::bytes::Bytes;
@@ -48,13 +49,21 @@ fn bits(refined: &Refinement) -> ([u64; 7], u64, u64) {
     )
 }
 
+/// As much work as a fuzzer has time for.
+const LIMITS: PipelineLimits = PipelineLimits {
+    max_iterations: 2000,
+    max_hypotheses: 500,
+    max_samples: 20_000,
+    max_neighbors: 100,
+};
+
 fn refiner(bytes: &mut Bytes<'_>) -> Option<Refiner> {
     if !bytes.one_in(2) {
         return Some(Refiner::preset(bytes.pick(&Preset::ALL)));
     }
     let text = parts::pipeline(bytes);
     let file = PipelineFile::parse(&text, "a.toml").unwrap_or_else(|e| panic!("{e}: {text}"));
-    file.build().ok().map(Refiner::boxed)
+    file.build_within(&LIMITS).ok().map(Refiner::boxed)
 }
 
 fn scene(bytes: &mut Bytes<'_>) -> Option<(Model, Observation, Isometry3<f64>)> {

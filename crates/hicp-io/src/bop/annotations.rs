@@ -8,6 +8,7 @@ use hicp_core::{CameraError, Isometry3, Matrix3, PinholeCamera};
 use crate::camera::{calibration, depth_scale};
 use crate::error::IoError;
 use crate::json::{Document, Node};
+use crate::limits::ReadLimits;
 use crate::pose::pose_of;
 
 /// The camera of an image.
@@ -57,28 +58,38 @@ impl SceneCamera {
 }
 
 /// Reads a `scene_camera.json`.
-pub(super) fn read_cameras(path: &Path) -> Result<BTreeMap<u32, SceneCamera>, IoError> {
-    by_image(path, scene_camera)
+pub(super) fn read_cameras(
+    limits: &ReadLimits,
+    path: &Path,
+) -> Result<BTreeMap<u32, SceneCamera>, IoError> {
+    by_image(limits, path, scene_camera)
 }
 
 /// Instances by image, in the order of the file.
 type Instances<T> = BTreeMap<u32, Vec<T>>;
 
 /// Reads a `scene_gt.json`, or returns `None` when there is none.
-pub(super) fn read_ground_truth(path: &Path) -> Result<Option<Instances<GroundTruth>>, IoError> {
-    instances(path, ground_truth)
+pub(super) fn read_ground_truth(
+    limits: &ReadLimits,
+    path: &Path,
+) -> Result<Option<Instances<GroundTruth>>, IoError> {
+    instances(limits, path, ground_truth)
 }
 
 /// Reads a `scene_gt_info.json`, or returns `None` when there is none.
-pub(super) fn read_info(path: &Path) -> Result<Option<Instances<GroundTruthInfo>>, IoError> {
-    instances(path, ground_truth_info)
+pub(super) fn read_info(
+    limits: &ReadLimits,
+    path: &Path,
+) -> Result<Option<Instances<GroundTruthInfo>>, IoError> {
+    instances(limits, path, ground_truth_info)
 }
 
 fn by_image<T>(
+    limits: &ReadLimits,
     path: &Path,
     read: impl Fn(&Node<'_>) -> Result<T, IoError>,
 ) -> Result<BTreeMap<u32, T>, IoError> {
-    Document::read(path)?
+    Document::read(limits, path)?
         .root()
         .numbered()?
         .into_iter()
@@ -88,13 +99,17 @@ fn by_image<T>(
 
 /// Reads a list per image, or `None` when there is no such file.
 fn instances<T>(
+    limits: &ReadLimits,
     path: &Path,
     read: impl Fn(&Node<'_>) -> Result<T, IoError>,
 ) -> Result<Option<Instances<T>>, IoError> {
     if !path.is_file() {
         return Ok(None);
     }
-    by_image(path, |node| node.items()?.iter().map(&read).collect()).map(Some)
+    by_image(limits, path, |node| {
+        node.items()?.iter().map(&read).collect()
+    })
+    .map(Some)
 }
 
 fn scene_camera(node: &Node<'_>) -> Result<SceneCamera, IoError> {

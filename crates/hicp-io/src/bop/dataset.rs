@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use hicp_core::TriMesh;
 
-use super::models_info::{ModelInfo, read_models_info};
+use super::models_info::ModelInfo;
 use super::scene::Scene;
-use super::targets::{Target, read_targets};
+use super::targets::Target;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 use crate::unit::LengthUnit;
@@ -48,7 +48,7 @@ impl Dataset {
         }
     }
 
-    /// Reads models and images within other limits than [`ReadLimits::DEFAULT`].
+    /// Reads models, images and annotations within other limits than [`ReadLimits::DEFAULT`].
     #[must_use]
     pub fn with_limits(mut self, limits: ReadLimits) -> Self {
         self.limits = limits;
@@ -116,18 +116,20 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// As [`Dataset::models_dir`] and [`read_models_info`].
+    /// As [`Dataset::models_dir`] and [`read_models_info`](super::read_models_info).
     pub fn read_models_info(&self) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
-        read_models_info(self.models_dir()?.join("models_info.json"))
+        let path = self.models_dir()?.join("models_info.json");
+        self.limits.read_models_info(path)
     }
 
     /// Reads the targets of the benchmark from `test_targets_bop19.json`.
     ///
     /// # Errors
     ///
-    /// As [`read_targets`].
+    /// As [`read_targets`](super::read_targets).
     pub fn read_targets(&self) -> Result<Vec<Target>, IoError> {
-        read_targets(self.root.join("test_targets_bop19.json"))
+        self.limits
+            .read_targets(self.root.join("test_targets_bop19.json"))
     }
 
     /// Returns the ids of the scenes of a split (the name of its folder, such as `test`), ascending.
@@ -159,7 +161,7 @@ impl Dataset {
     /// [`IoError::Missing`] when the split or the scene does not exist, otherwise as [`Scene::open`].
     pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
         let folder = self.split_dir(split)?.join(format!("{scene_id:06}"));
-        Ok(Scene::open(folder)?.with_limits(self.limits))
+        Scene::open_within(self.limits, folder)
     }
 
     fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {

@@ -51,7 +51,7 @@ impl ReadLimits {
 }
 
 fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<Detection>, IoError> {
-    Document::read_within(limits, path)?
+    Document::read(limits, path)?
         .root()
         .items()?
         .iter()

@@ -7,6 +7,7 @@ use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, SymmetryError, Vect
 
 use crate::error::IoError;
 use crate::json::{Document, Node};
+use crate::limits::ReadLimits;
 use crate::pose::pose_from_bop;
 
 /// What a dataset states about an object besides its mesh.
@@ -24,12 +25,26 @@ pub struct ModelInfo {
 ///
 /// What [`IoError`] says of JSON files, [`IoError::Rotation`] and [`IoError::Symmetry`] for symmetries that are none.
 pub fn read_models_info(path: impl AsRef<Path>) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
-    Document::read(path.as_ref())?
-        .root()
-        .numbered()?
-        .into_iter()
-        .map(|(obj_id, node)| Ok((obj_id, model_info(&node)?)))
-        .collect()
+    ReadLimits::DEFAULT.read_models_info(path)
+}
+
+impl ReadLimits {
+    /// As [`read_models_info`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_models_info`].
+    pub fn read_models_info(
+        &self,
+        path: impl AsRef<Path>,
+    ) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
+        Document::read(self, path.as_ref())?
+            .root()
+            .numbered()?
+            .into_iter()
+            .map(|(obj_id, node)| Ok((obj_id, model_info(&node)?)))
+            .collect()
+    }
 }
 
 fn model_info(node: &Node<'_>) -> Result<ModelInfo, IoError> {

@@ -29,6 +29,15 @@ impl Scene {
     ///
     /// [`IoError::Missing`] without the folder or its cameras, otherwise what [`IoError`] says of JSON files.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
+        Self::open_within(ReadLimits::DEFAULT, dir)
+    }
+
+    /// Opens the scene in a folder as [`Scene::open`] does; its JSON files and its images are read within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::open`].
+    pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         if !dir.is_dir() {
             return Err(missing(dir, "scene"));
@@ -38,11 +47,11 @@ impl Scene {
             return Err(missing(cameras, "file of cameras"));
         }
         Ok(Self {
-            cameras: read_cameras(&cameras)?,
-            ground_truth: read_ground_truth(&dir.join("scene_gt.json"))?,
-            info: read_info(&dir.join("scene_gt_info.json"))?,
+            cameras: read_cameras(&limits, &cameras)?,
+            ground_truth: read_ground_truth(&limits, &dir.join("scene_gt.json"))?,
+            info: read_info(&limits, &dir.join("scene_gt_info.json"))?,
             dir,
-            limits: ReadLimits::DEFAULT,
+            limits,
         })
     }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::error::IoError;
 use crate::json::Document;
+use crate::limits::ReadLimits;
 
 /// Instances of one object in one image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +25,21 @@ pub struct Target {
 ///
 /// What [`IoError`] says of JSON files. Targets of the later detection tasks, which state no objects, are refused.
 pub fn read_targets(path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
-    let document = Document::read(path.as_ref())?;
+    ReadLimits::DEFAULT.read_targets(path)
+}
+
+impl ReadLimits {
+    /// As [`read_targets`], within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_targets`].
+    pub fn read_targets(&self, path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
+        targets_of(&Document::read(self, path.as_ref())?)
+    }
+}
+
+fn targets_of(document: &Document) -> Result<Vec<Target>, IoError> {
     let mut targets = Vec::new();
     for node in document.root().items()? {
         let value = |key: &str| node.get(key)?.unsigned();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::bop::{self, GroundTruth, GroundTruthInfo, ModelInfo, ResultRow, SceneCamera, Target};
-use hicp_io::{LengthUnit, write_depth_png, write_mask_png, write_ply};
+use hicp_io::{LengthUnit, NewFolder, write_depth_png, write_mask_png, write_ply};
 use hicp_sim::{
     AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout,
     MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, SeenObject, perturb, stream,
@@ -18,6 +18,7 @@ use serde_json::json;
 
 use super::objects::Objects;
 use super::{progress_bar, thread_pool};
+use crate::interrupt;
 use crate::terminal::say;
 
 /// Make a dataset of cluttered scenes, to try everything without one.
@@ -28,7 +29,7 @@ use crate::terminal::say;
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
-    /// The folder to write to: new or empty.
+    /// The folder to write to: new or empty. It is made beside, and there when it is whole.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// A folder of meshes (PLY, OBJ, STL), or of BOP models (models_info.json with obj_000001.ply, …); the twenty household
@@ -96,12 +97,15 @@ struct ImageRecord {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let out = &arguments.out;
     let objects = match &arguments.objects {
         Some(dir) => Objects::read(dir, arguments.objects_unit)?,
         None => Objects::household()?,
     };
-    make_folder(out)?;
+    check_folder(&arguments.out)?;
+    // Whoever sees the dataset sees all of it.
+    let made = NewFolder::begin(&arguments.out)?;
+    interrupt::remove_when_asked(made.path());
+    let out = made.path();
     write_models(out, &objects)?;
     let camera = PinholeCamera::new(570.0, 570.0, 319.5, 239.5, 640, 480)?;
     write_camera(out, &camera)?;
@@ -116,15 +120,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .collect();
     let generator = Generator {
         arguments,
+        out,
         ids: objects.models.iter().map(|(id, _)| *id).collect(),
         models,
         camera,
         sensor: sensor(),
     };
+    make_folder(&out.join("test"))?;
     for scene in 1..=arguments.scenes {
-        for folder in ["depth", "mask", "mask_visib"] {
-            let folder = generator.scene_dir(scene).join(folder);
-            std::fs::create_dir_all(&folder).with_context(|| cannot_make(&folder))?;
+        for folder in ["", "depth", "mask", "mask_visib"] {
+            make_folder(&generator.scene_dir(scene).join(folder))?;
         }
     }
     let pool = thread_pool(arguments.threads, images.len())?;
@@ -144,9 +149,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let initial: Vec<ResultRow> = records.iter().flat_map(|r| r.initial.clone()).collect();
     bop::write_results(out.join("initial_synthetic-test.csv"), &initial)?;
     bop::write_results(out.join("truth_synthetic-test.csv"), &truth(&records))?;
+    made.finish()?;
     say(format_args!(
         "{}: {} images of {} scenes, {} targets, {} rows in initial_synthetic-test.csv",
-        out.display(),
+        arguments.out.display(),
         records.len(),
         arguments.scenes,
         targets(&records).len(),
@@ -166,13 +172,23 @@ fn sensor() -> DepthSensor {
     }
 }
 
+/// Makes a folder in one that is there: whoever removes what is unfinished does not meet it again.
+fn make_folder(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(folder).with_context(|| cannot_make(folder))
+}
+
 fn cannot_make(folder: &Path) -> String {
     format!("cannot make the folder {}", folder.display())
 }
 
-/// Makes the folder, and refuses one that has something in it.
-fn make_folder(out: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(out).with_context(|| cannot_make(out))?;
+/// Refuses a folder that has something in it, and makes those that it is to be in.
+fn check_folder(out: &Path) -> anyhow::Result<()> {
+    if !out.exists() {
+        if let Some(parent) = out.parent().filter(|p| !p.as_os_str().is_empty()) {
+            std::fs::create_dir_all(parent).with_context(|| cannot_make(parent))?;
+        }
+        return Ok(());
+    }
     let entries =
         std::fs::read_dir(out).with_context(|| format!("cannot list {}", out.display()))?;
     match entries.count() {
@@ -186,7 +202,7 @@ fn make_folder(out: &Path) -> anyhow::Result<()> {
 
 fn write_models(out: &Path, objects: &Objects) -> anyhow::Result<()> {
     let dir = out.join("models");
-    std::fs::create_dir_all(&dir).with_context(|| cannot_make(&dir))?;
+    make_folder(&dir)?;
     let mut infos = BTreeMap::new();
     for (id, model) in &objects.models {
         let path = bop::Dataset::model_path_in(&dir, *id);
@@ -214,6 +230,8 @@ fn write_camera(out: &Path, camera: &PinholeCamera) -> anyhow::Result<()> {
 
 struct Generator<'a> {
     arguments: &'a Arguments,
+    /// Where the dataset is made.
+    out: &'a Path,
     ids: Vec<u32>,
     models: Vec<Model>,
     camera: PinholeCamera,
@@ -222,7 +240,7 @@ struct Generator<'a> {
 
 impl Generator<'_> {
     fn scene_dir(&self, scene: u32) -> PathBuf {
-        self.arguments.out.join(format!("test/{scene:06}"))
+        self.out.join(format!("test/{scene:06}"))
     }
 
     /// Makes an image and writes its files. Every image is drawn from streams of its own, so their order means nothing.
@@ -394,7 +412,7 @@ fn write_annotations(generator: &Generator<'_>, records: &[ImageRecord]) -> anyh
         let infos = of_scene.iter().map(|r| (r.im_id, r.infos.clone()));
         bop::write_scene_gt_info(dir.join("scene_gt_info.json"), &infos.collect())?;
     }
-    let path = generator.arguments.out.join("test_targets_bop19.json");
+    let path = generator.out.join("test_targets_bop19.json");
     bop::write_targets(path, &targets(records))?;
     Ok(())
 }

@@ -171,6 +171,8 @@ fn read_entry(line: &[u8]) -> Option<(usize, FrameResult)> {
         faults: problems
             .map(|(missing, text)| Fault { missing, text })
             .collect(),
+        // They are told by the run that looked.
+        doubts: Vec::new(),
     };
     Some((entry.frame, result))
 }
@@ -224,6 +226,7 @@ mod tests {
             ],
             seconds: Some(0.7 / 3.0),
             faults: vec![Fault::damaged("a\n\"b\"".to_owned())],
+            doubts: Vec::new(),
         }
     }
 

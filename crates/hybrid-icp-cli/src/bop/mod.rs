@@ -13,6 +13,7 @@ mod models;
 mod objects;
 mod problem;
 mod refine;
+mod refine_doubts;
 mod refine_settings;
 mod refine_summary;
 mod sequence;

@@ -12,7 +12,7 @@ use crate::limits::limits;
 
 /// Reads the models of some objects from a folder, on all threads.
 pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoError> {
-    let folder = ModelFolder::open(dir)?.with_limits(limits());
+    let folder = ModelFolder::open_within(limits(), dir)?;
     let objects: Vec<u32> = objects.iter().copied().collect();
     let read: Vec<_> = objects
         .par_iter()

@@ -9,6 +9,7 @@ use hicp_sim::Household;
 use hybrid_icp::Model;
 
 use super::models;
+use crate::limits::limits;
 
 /// Models with their ids, ascending.
 #[derive(Debug)]
@@ -33,7 +34,7 @@ impl Objects {
     pub(crate) fn read(dir: &Path, unit: LengthUnit) -> anyhow::Result<Self> {
         let info = dir.join("models_info.json");
         let models = if info.is_file() {
-            let ids: BTreeSet<u32> = hicp_io::bop::read_models_info(&info)?.into_keys().collect();
+            let ids: BTreeSet<u32> = limits().read_models_info(&info)?.into_keys().collect();
             let read = models::read(dir, &ids)?;
             if let Some(broken) = read.broken.values().next() {
                 bail!("{broken}");

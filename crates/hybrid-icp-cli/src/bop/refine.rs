@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::journal::Journal;
 use super::refine_summary::{Told, mean_seconds, report_faults};
-use super::{models, progress_bar, refine_settings, targets, thread_pool};
+use super::{models, progress_bar, refine_doubts, refine_settings, targets, thread_pool};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
 use crate::terminal::{say, warn};
@@ -140,6 +140,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let objects = rows.iter().map(|row| row.obj_id).collect();
     let models_dir = dataset.models_dir()?;
     let models = pool.install(|| models::read(&models_dir, &objects))?;
+    refine_doubts::about_models(&models, &models_dir);
     let shared = DatasetRefiner {
         models,
         scenes: Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1),
@@ -173,6 +174,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
         resumed,
     };
     say(told.summary(&results, &shared.models))?;
+    refine_doubts::about_images(&results, &rows);
     let images = arguments.dataset.join(&arguments.split);
     let files = (
         arguments.results.as_path(),

@@ -5,8 +5,9 @@ use std::path::Path;
 use anyhow::bail;
 use hicp_bop::Targets;
 use hicp_io::IoError;
-use hicp_io::bop::{Dataset, Target, read_targets};
+use hicp_io::bop::{Dataset, Target};
 
+use crate::limits::limits;
 use crate::terminal::warn;
 
 /// Name of the benchmark's own file.
@@ -44,7 +45,7 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
         im_id,
         obj_id,
         inst_count,
-    } in read_targets(path)?
+    } in limits().read_targets(path)?
     {
         let of_frame = targets.entry((scene_id, im_id)).or_default();
         if of_frame.insert(obj_id, inst_count).is_some() {

@@ -91,6 +91,21 @@ pub enum PipelineError {
         /// What should be there.
         expected: String,
     },
+    /// More work than [`PipelineLimits`](super::PipelineLimits) let a file ask for.
+    #[error(
+        "{place}: found {found}, expected at most {limit}: raise the limit (--{} N, PipelineLimits::{field}) if that is meant",
+        field.replace('_', "-")
+    )]
+    Limit {
+        /// The field that takes it above the limit.
+        place: Place,
+        /// What is there, and how much that is.
+        found: String,
+        /// How much is accepted.
+        limit: u64,
+        /// The field of [`PipelineLimits`](super::PipelineLimits) that raises the limit.
+        field: &'static str,
+    },
     /// An override that is not of the form `path=value`, or whose path leads nowhere.
     #[error("override {assignment:?}: {problem}")]
     Override {

@@ -30,6 +30,7 @@
 mod build;
 mod catalog;
 mod error;
+mod limits;
 mod page;
 mod parts;
 mod reader;
@@ -40,6 +41,7 @@ use std::path::Path;
 
 pub use catalog::{Accepts, Parameter, Part, PartKind};
 pub use error::{PipelineError, Place};
+pub use limits::PipelineLimits;
 pub use page::catalogue;
 pub use parts::PARTS;
 
@@ -103,16 +105,30 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineError`] naming the line and field, what is there, and what would be right.
+    /// [`PipelineError`] naming the line and field, what is there, and what would be right; [`PipelineError::Limit`] above
+    /// [`PipelineLimits::DEFAULT`].
     pub fn build(&self) -> Result<BoxedStage, PipelineError> {
+        self.build_within(&PipelineLimits::DEFAULT)
+    }
+
+    /// Builds the pipeline within limits of one's own.
+    ///
+    /// # Errors
+    ///
+    /// As [`PipelineFile::build`].
+    pub fn build_within(&self, limits: &PipelineLimits) -> Result<BoxedStage, PipelineError> {
         let place = Place {
             origin: self.origin.clone(),
             line: None,
             field: String::new(),
         };
-        build::stage(&Reader::new(&self.tree, PartKind::Stage, place)?)
+        let root = Reader::new(&self.tree, PartKind::Stage, place)?;
+        let stage = build::stage(&root)?;
+        limits.check(&root)?;
+        Ok(stage)
     }
 }
+
 /// Largest file that is read.
 const MAX_PIPELINE_BYTES: u64 = 1 << 20;
 

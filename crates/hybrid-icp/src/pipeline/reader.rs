@@ -96,6 +96,24 @@ impl<'a> Reader<'a> {
         self.part.name
     }
 
+    /// Whether the part has a field of this name, given or not.
+    pub(crate) fn has(&self, field: &str) -> bool {
+        self.part.parameters.iter().any(|p| p.name == field)
+    }
+
+    /// The parts that it is made of, those that are there by default included.
+    pub(crate) fn held(&self) -> Result<Vec<Reader<'a>>, PipelineError> {
+        let mut held = Vec::new();
+        for parameter in self.part.parameters {
+            match parameter.accepts {
+                Accepts::Part { .. } => held.push(self.part(parameter.name)?),
+                Accepts::Parts { .. } => held.extend(self.parts(parameter.name)?),
+                _ => {}
+            }
+        }
+        Ok(held)
+    }
+
     /// The error of a part that is in the catalogue but that nobody builds; a test holds that there is none.
     pub(crate) fn unknown(&self, kind: PartKind) -> PipelineError {
         PipelineError::UnknownPart {
@@ -267,6 +285,33 @@ impl<'a> Reader<'a> {
         match self.node.and_then(|node| node.get(field)) {
             Some(node) => self.wrong(field, node, expected),
             None => self.missing(field, expected),
+        }
+    }
+
+    /// The error of a field that asks for more work than a limit: `most` is how much that is, `limit_field` what raises the limit.
+    pub(crate) fn above(
+        &self,
+        field: &str,
+        most: String,
+        limit: u64,
+        limit_field: &'static str,
+    ) -> PipelineError {
+        let given = self.node.and_then(|node| node.get(field));
+        let found = match given {
+            Some(Node {
+                value: value @ Value::Integer(_),
+                ..
+            }) => format!("{}, {most}", value.describe()),
+            _ => most,
+        };
+        PipelineError::Limit {
+            place: given.map_or_else(
+                || self.at(field),
+                |node| inside(&self.place, field, node.line),
+            ),
+            found,
+            limit,
+            field: limit_field,
         }
     }
 

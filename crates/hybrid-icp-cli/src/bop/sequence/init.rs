@@ -11,7 +11,9 @@ use crate::limits::limits;
 /// Reads a pose file, or the row with the highest score for a scene, image and object of a result file (`.csv`).
 pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isometry3<f64>> {
     if path.extension().is_none_or(|extension| extension != "csv") {
-        let pose = hicp_io::read_pose_json(path).context("cannot read --init")?;
+        let pose = limits()
+            .read_pose_json(path)
+            .context("cannot read --init")?;
         return Ok(pose.camera_from_object);
     }
     let (scene_id, im_id, obj_id) = place;

@@ -223,7 +223,7 @@ fn check_object(scene: &Scene, path: &CameraPath, object: u32) -> anyhow::Result
 
 /// Reads the object's model, with its size and symmetries where the dataset states them.
 fn read_model(dir: &Path, object: u32) -> anyhow::Result<Model> {
-    let model = ModelFolder::open(dir)?.with_limits(limits()).read(object)?;
+    let model = ModelFolder::open_within(limits(), dir)?.read(object)?;
     model.with_context(|| {
         format!(
             "model of object {object} is missing: {} does not exist",
