@@ -173,11 +173,11 @@ fn describe(value: &Value) -> String {
         Value::String(text) => format!("the text {}", quote(text)),
         Value::Array(items) => format!("an array of {}", items.len()),
         Value::Object(members) => {
-            let mut names: Vec<&str> = members.keys().take(12).map(String::as_str).collect();
+            let mut names: Vec<String> = members.keys().take(12).map(|key| quote(key)).collect();
             if members.len() > names.len() {
-                names.push("...");
+                names.push("...".to_owned());
             }
-            format!("an object with the keys {names:?}")
+            format!("an object with the keys {}", names.join(", "))
         }
     }
 }

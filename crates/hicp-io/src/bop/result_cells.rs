@@ -27,7 +27,7 @@ pub(super) fn find_columns(path: &Path, header: &StringRecord) -> Result<[usize;
                     path: path.to_owned(),
                     column,
                     times: others + usize::from(first.is_some()),
-                    found: header.iter().collect::<Vec<_>>().join(","),
+                    found: shortened(&header.iter().collect::<Vec<_>>().join(",")),
                 });
             }
         }
@@ -134,10 +134,15 @@ impl Cells<'_> {
             path: self.path.to_owned(),
             line: self.line(),
             column: COLUMNS[column],
-            found: self.cell(column).chars().take(60).collect(),
+            found: shortened(self.cell(column)),
             expected,
         }
     }
+}
+
+/// What an error shows of a text that it quotes: a broken file must not fill the screen.
+fn shortened(text: &str) -> String {
+    text.chars().take(90).collect()
 }
 
 fn parse_finite(text: &str) -> Option<f64> {
