@@ -18,8 +18,10 @@ fn pipelines_that_ask_for_years_are_refused_and_the_limits_can_be_raised() {
     assert!(!scene.path("out.json").exists());
     // Three times two stages of 50: as much as it asks for at worst, and one less.
     let limited = |limit: &str| {
-        let scene = Scene::new().with("--set", "times=3");
-        scene.with("--max-iterations", limit)
+        Scene::new()
+            .with("--pipeline", "hybrid")
+            .with("--set", "times=3")
+            .with("--max-iterations", limit)
     };
     limited("299")
         .run()
