@@ -71,7 +71,7 @@ def dataset(program, tmp_path_factory):
     subprocess.run([program, "bop", "generate", "--scenes", "2", "--out", folder / "synthetic"], check=True, capture_output=True)
     results, expected = folder / "synthetic" / "initial_synthetic-test.csv", folder / "expected.csv"
     subprocess.run(
-        [program, "bop", "refine", "--dataset", folder / "synthetic", "--results", results, "--output", expected, "--no-time", "--pipeline", "hybrid"],
+        [program, "bop", "refine", "--dataset", folder / "synthetic", "--results", results, "--output", expected, "--no-time"],
         check=True, capture_output=True,
     )
     return folder / "synthetic", results, expected.read_bytes()
