@@ -177,7 +177,10 @@ fn describe(value: &Value) -> String {
             if members.len() > names.len() {
                 names.push("...".to_owned());
             }
-            format!("an object with the keys {}", names.join(", "))
+            let names = names.join(", ");
+            let shown: String = names.chars().take(200).collect();
+            let rest = if shown.len() < names.len() { "..." } else { "" };
+            format!("an object with the keys {shown}{rest}")
         }
     }
 }

@@ -46,6 +46,7 @@ pub(super) fn read(
 
     let header = decoder.read_header_info().map_err(failed)?;
     let (width, height) = header.size();
+    let indexed = header.color_type == ColorType::Indexed;
     accept(header.color_type, header.bit_depth).map_err(|expected| IoError::PixelType {
         path: path.to_owned(),
         found: describe(header.color_type, header.bit_depth),
@@ -74,6 +75,20 @@ pub(super) fn read(
     }
 
     let mut reader = decoder.read_info().map_err(failed)?;
+    // The decoder takes a palette on trust, and panics over one that is cut short or has more opacities than colours.
+    if let Some(palette) = &reader.info().palette {
+        let opacities = reader.info().trns.as_ref().map_or(0, |trns| trns.len());
+        if palette.len() % 3 != 0 || (indexed && opacities > palette.len() / 3) {
+            return Err(IoError::PixelType {
+                path: path.to_owned(),
+                found: format!(
+                    "palette ({} bytes of colours, {opacities} opacities)",
+                    palette.len()
+                ),
+                expected: "three bytes per colour, and at most one opacity for each",
+            });
+        }
+    }
     let size = reader
         .output_buffer_size()
         .ok_or(DecodingError::LimitsExceeded)
