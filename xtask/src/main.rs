@@ -59,7 +59,7 @@ cargo xtask COMMAND
   api     public functions that no test and no example names
   deny    licences, sources and duplicates of what is linked, against deny.toml; runs cargo-deny as well where it is
   fuzz [--minutes N] [--target T]...
-          every fuzz target, or those that are named, for N minutes each (5), and a table of executions;
+          every fuzz target, or those that are named, for N minutes of a processor each (5), and a table of executions;
           wants cargo-fuzz and a C++ compiler
   mutants [CRATE [K/N]...]
           changes to the numerical crates that no test notices, and the share that is; samples of every N-th from the K-th on;
