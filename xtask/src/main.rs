@@ -61,9 +61,9 @@ cargo xtask COMMAND
   fuzz [--minutes N] [--target T]...
           every fuzz target, or those that are named, for N minutes of a processor each (5), and a table of executions;
           wants cargo-fuzz and a C++ compiler
-  mutants [CRATE [K/N]...]
-          changes to the numerical crates that no test notices, and the share that is; samples of every N-th from the K-th on;
-          wants cargo-mutants
+  mutants [CRATE [--only WORD]... [--again] [--jobs N]]
+          changes to the numerical crates that no test notices, and the share that is: every mutant that cargo-mutants lists, in one
+          build per crate; those whose name holds a word; those that the last run missed; wants cargo-mutants, and git
   valgrind
           the vectorised loops under memcheck; wants valgrind
   miri    unit tests under miri; wants a nightly toolchain that has it
