@@ -85,8 +85,9 @@ fn fates(copy: &Copy, mutants: &[Mutant], jobs: usize) -> Result<BTreeMap<usize,
         tests.len()
     );
     fates.extend(trial::try_woven(copy, &tests, &reached, &woven, jobs)?);
+    let usual = trial::programs_seconds(&tests, &reached);
     for (place, &id) in singles.iter().enumerate() {
-        let fate = viability::alone(copy, &mutants[id])?;
+        let fate = viability::alone(copy, &mutants[id], &usual)?;
         eprintln!(
             "mutation: alone, {} of {}: {fate:?} {}",
             place + 1,

@@ -129,11 +129,34 @@ fn try_one(copy: &Copy, tests: &[Test], reached: &[Reached], mutant: usize) -> R
     Ok(Fate::Missed { n_tests })
 }
 
-/// Tries what is built, with all tests.
-pub(crate) fn try_built(copy: &Copy, tests: &[Test]) -> Result<Fate> {
+/// How long each program's tests take together, seconds.
+pub(crate) fn programs_seconds(tests: &[Test], reached: &[Reached]) -> BTreeMap<String, f64> {
+    let mut seconds = BTreeMap::new();
+    for (test, reached) in tests.iter().zip(reached) {
+        *seconds.entry(file_stem(&test.program)).or_default() += reached.seconds;
+    }
+    seconds
+}
+
+/// The name of a program without the hash that cargo appends, which is another in each build.
+fn file_stem(program: &Path) -> String {
+    let name = program.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.rsplit_once('-').map_or(&*name, |(stem, _)| stem);
+    stem.to_owned()
+}
+
+/// Tries what is built, with all tests, of which it is known how long they take without a mutant.
+pub(crate) fn try_built(
+    copy: &Copy,
+    tests: &[Test],
+    usual: &BTreeMap<String, f64>,
+) -> Result<Fate> {
     let programs: BTreeSet<&PathBuf> = tests.iter().map(|test| &test.program).collect();
     for program in programs {
-        match run(&mut command(copy, program, &[], LONGEST.as_secs_f64()))? {
+        let seconds = usual
+            .get(&file_stem(program))
+            .map_or(LONGEST.as_secs_f64(), |s| PATIENCE * s + GRACE);
+        match run(&mut command(copy, program, &[], seconds))? {
             End::Passed => {}
             End::Failed => return Ok(Fate::Caught),
             End::Late => return Ok(Fate::Late),
@@ -208,5 +231,12 @@ mod tests {
         assert_eq!(shell("exit 101"), End::Failed);
         assert_eq!(shell("kill -ABRT $$"), End::Failed);
         assert_eq!(shell("kill -XCPU $$"), End::Late);
+    }
+
+    #[test]
+    fn a_program_is_known_without_its_hash() {
+        let stem = |path: &str| file_stem(Path::new(path));
+        assert_eq!(stem("/t/deps/pose_error-0af3"), "pose_error");
+        assert_eq!(stem("plain"), "plain");
     }
 }

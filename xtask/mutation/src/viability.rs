@@ -163,7 +163,7 @@ fn errors(command: &mut Command) -> Result<Vec<Error>> {
 }
 
 /// Tries a mutant by itself, in a build of its own.
-pub(crate) fn alone(copy: &Copy, mutant: &Mutant) -> Result<Fate> {
+pub(crate) fn alone(copy: &Copy, mutant: &Mutant, usual: &BTreeMap<String, f64>) -> Result<Fate> {
     copy.restore()?;
     let mut text = copy.sources[&mutant.file].clone();
     text.replace_range(mutant.range.clone(), &mutant.replacement);
@@ -172,7 +172,7 @@ pub(crate) fn alone(copy: &Copy, mutant: &Mutant) -> Result<Fate> {
         return Ok(Fate::DoesNotCompile);
     }
     let programs = programs::build(copy)?;
-    trial::try_built(copy, &programs)
+    trial::try_built(copy, &programs, usual)
 }
 
 #[cfg(test)]
