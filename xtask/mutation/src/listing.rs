@@ -20,6 +20,8 @@ pub(crate) struct Mutant {
     pub(crate) range: Range<usize>,
     /// What replaces them.
     pub(crate) replacement: String,
+    /// The function that it is in returns an `impl Trait`.
+    pub(crate) returns_impl: bool,
     /// What it is known by when lines above it come and go.
     pub(crate) key: Key,
 }
@@ -65,6 +67,9 @@ fn mutant<'a>(value: &Value, source: impl Fn(&str) -> Option<&'a str>) -> Option
     Some(Mutant {
         name,
         genre: word("genre")?,
+        returns_impl: value["function"]["return_type"]
+            .as_str()
+            .is_some_and(|returned| returned.contains("impl ")),
         range,
         replacement: word("replacement")?,
         key,

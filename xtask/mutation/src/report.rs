@@ -152,6 +152,7 @@ mod tests {
                 file: String::new(),
                 genre: String::new(),
                 range: 0..0,
+                returns_impl: false,
                 replacement: String::new(),
                 key: Key {
                     file: "x.rs".to_owned(),

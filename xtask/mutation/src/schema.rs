@@ -19,8 +19,6 @@ pub(crate) struct Woven {
     pub(crate) alternatives: Vec<(Range<usize>, usize)>,
     /// Where places with mutants are in the text, originals and alternatives, with the mutants.
     pub(crate) places: Vec<(Range<usize>, Vec<usize>)>,
-    /// Where mutants that replace a function's body are in the text, with the body's place in the original.
-    pub(crate) bodies: Vec<(usize, usize, usize)>,
     /// Mutants that cannot be put behind a switch.
     pub(crate) left: Vec<usize>,
 }
@@ -51,7 +49,6 @@ pub(crate) fn weave(text: &str, mutants: &[(usize, &Mutant)]) -> Result<Woven> {
         text: String::with_capacity(2 * text.len()),
         alternatives: Vec::new(),
         places: Vec::new(),
-        bodies: Vec::new(),
         left,
     };
     woven.render(text, 0..text.len(), &edits);
@@ -122,6 +119,8 @@ fn add(
         "BinaryOperator" | "UnaryOperator" => places.operators.get(&start).is_some_and(choose),
         "MatchArmGuard" => choose(&mutant.range.clone()),
         "StructField" => places.fields.get(&start).is_some_and(choose),
+        // An `impl Trait` is one type, which a second way out of the function does not have.
+        "FnValue" if mutant.returns_impl => false,
         "FnValue" => {
             let early = format!("if {} {{ return {}; }} ", on(id), mutant.replacement);
             edits.insert(Place::insertion(start, id), Edit::Insert(early, id));
@@ -160,9 +159,6 @@ impl Woven {
                 Edit::Insert(inserted, id) => {
                     self.text.push_str(inserted);
                     self.alternatives.push((begin..self.text.len(), *id));
-                    if inserted.starts_with("if ") {
-                        self.bodies.push((begin, place.begin, *id));
-                    }
                 }
                 Edit::Choice(alternatives) => {
                     let inside = edits[i..]
@@ -268,6 +264,7 @@ mod tests {
             genre: genre.to_owned(),
             range: start..start + what.len(),
             replacement: replacement.to_owned(),
+            returns_impl: false,
             key: crate::listing::Key::default(),
         }
     }
@@ -328,6 +325,14 @@ mod tests {
         );
         assert!(woven.text.contains("1 if !crate::mutation_switch::on(2) && ((if crate::mutation_switch::on(3) { true } else"));
         assert!(woven.left.is_empty());
+    }
+
+    #[test]
+    fn what_returns_an_unnamed_type_is_left() {
+        let text = "fn f() -> impl Iterator<Item = u8> { g() }";
+        let mut mutant = mutant(text, "FnValue", "g()", "std::iter::empty()");
+        mutant.returns_impl = true;
+        assert_eq!(woven(text, &[mutant]).left, [0]);
     }
 
     #[test]

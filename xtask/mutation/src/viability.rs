@@ -105,14 +105,6 @@ fn blame(woven: &Woven, error: &Error) -> (BTreeSet<usize>, BTreeSet<usize>) {
             alone.extend(ids);
         }
     }
-    // The body of a function that had returned something else before: an `impl Trait` is one type.
-    let before = woven.bodies.iter().filter(|(at, _, _)| *at < error.begin);
-    if alone.is_empty()
-        && let Some((_, body, _)) = before.max_by_key(|(at, _, _)| *at)
-    {
-        let of_body = woven.bodies.iter().filter(|(_, place, _)| place == body);
-        alone.extend(of_body.map(|(_, _, id)| *id));
-    }
     (wrong, alone)
 }
 
@@ -185,7 +177,6 @@ mod tests {
             text: String::new(),
             alternatives: vec![(10..20, 0), (30..60, 1)],
             places: vec![(5..70, vec![0, 1])],
-            bodies: vec![(100, 50, 2), (110, 50, 3), (120, 90, 4)],
             left: Vec::new(),
         };
         let error = |code: &str, begin, end| Error {
