@@ -191,6 +191,13 @@ fn models_in_another_unit_or_far_from_their_origin_are_doubted() {
             &scene.truth,
         );
     }
+    // Centimetres taken for decimetres: a size that an object may have, but not behind that mask.
+    let model = Model::new(cuboid([1.5, 0.9, 0.6]));
+    let found = doubts(&model, &observation, &scene.truth);
+    assert!(
+        matches!(found[..], [Doubt::Sliver { pixels, at_most, .. }] if at_most > 100.0 * pixels as f64),
+        "{found:?}"
+    );
     let mesh = cuboid([0.1, 0.06, 0.04]);
     let vertices = mesh
         .vertices()

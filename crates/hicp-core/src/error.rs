@@ -8,7 +8,8 @@ use thiserror::Error;
 pub enum CameraError {
     /// A focal length that is not positive or that no lens has.
     #[error(
-        "focal length {name} is {value}, expected a number of pixels above 0 and at most {}",
+        "focal length {name} is {}, expected a number of pixels above 0 and at most {}",
+        Number(*value),
         crate::camera::MAX_FOCAL_LENGTH
     )]
     FocalLength {
@@ -19,7 +20,8 @@ pub enum CameraError {
     },
     /// A principal point that is nowhere near the image.
     #[error(
-        "principal point {name} is {value}, expected a number of pixels between -{0} and {0}",
+        "principal point {name} is {}, expected a number of pixels between -{1} and {1}",
+        Number(*value),
         crate::camera::MAX_FOCAL_LENGTH
     )]
     PrincipalPoint {
@@ -41,7 +43,8 @@ pub enum CameraError {
     },
     /// A calibration matrix that is not of the form [fx 0 cx; 0 fy cy; 0 0 1].
     #[error(
-        "camera matrix entry [{row}][{column}] is {found}, expected {expected}: K must be [fx 0 cx; 0 fy cy; 0 0 1]"
+        "camera matrix entry [{row}][{column}] is {}, expected {expected}: K must be [fx 0 cx; 0 fy cy; 0 0 1]",
+        Number(*found)
     )]
     MatrixEntry {
         /// Row of the entry, from 0.
@@ -187,7 +190,8 @@ pub enum RotationError {
     },
     /// R Rᵀ is not the identity.
     #[error(
-        "rotation is not orthogonal: the largest entry of |R Rᵀ - I| is {deviation}, expected at most {tolerance}"
+        "rotation is not orthogonal: the largest entry of |R Rᵀ - I| is {}, expected at most {tolerance}",
+        Number(*deviation)
     )]
     NotOrthogonal {
         /// max |R Rᵀ − I|.
@@ -197,7 +201,8 @@ pub enum RotationError {
     },
     /// The determinant is not +1: a reflection when it is −1.
     #[error(
-        "rotation has determinant {determinant}, expected 1 within {tolerance} (-1 is a reflection)"
+        "rotation has determinant {}, expected 1 within {tolerance} (-1 is a reflection)",
+        Number(*determinant)
     )]
     Determinant {
         /// det R.
@@ -205,4 +210,48 @@ pub enum RotationError {
         /// The largest deviation accepted.
         tolerance: f64,
     },
+}
+
+/// A number that was given, as people write it: powers of ten where digits would fill lines.
+struct Number(f64);
+
+impl std::fmt::Display for Number {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(number) = self;
+        match number.abs() {
+            size if size != 0.0 && !(1e-9..1e15).contains(&size) => write!(f, "{number:e}"),
+            _ => write!(f, "{number}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_exact() {
+        for (number, written) in [
+            (0.0, "0"),
+            (-1066.778, "-1066.778"),
+            (1e300, "1e300"),
+            (1e15, "1e15"),
+            (999_999_999_999_999.0, "999999999999999"),
+            (5e-324, "5e-324"),
+            (1e-9, "0.000000001"),
+            (9.5e-10, "9.5e-10"),
+            (f64::NAN, "NaN"),
+            (f64::NEG_INFINITY, "-inf"),
+        ] {
+            assert_eq!(Number(number).to_string(), written);
+        }
+        let error = CameraError::PrincipalPoint {
+            name: "cx",
+            value: 2e300,
+        };
+        assert_eq!(
+            error.to_string(),
+            "principal point cx is 2e300, expected a number of pixels between -1000000000 and 1000000000"
+        );
+    }
 }

@@ -89,7 +89,13 @@ impl Termination {
             Self::PairsLost => "the next step lost too many pairs",
             Self::LossIncreased => "the next step raised the loss",
             Self::Degenerate => "the pairs did not determine a step",
-            other => other.name(),
+            Self::Oscillating => {
+                "the pose came back to where it had been, and would go on doing so"
+            }
+            Self::OutOfBounds => "the pose left the bounds set about the initial one",
+            Self::Deadline => "the time was up",
+            Self::Stopped => "the observer asked to stop",
+            Self::ScoreNotImproved => "the score did not improve",
         }
     }
 }

@@ -63,7 +63,7 @@ fn in_words(doubt: &Doubt, names: &Names<'_>) -> String {
         Doubt::Depth { .. } => format!(
             "{depth}: {doubt}: check --depth-scale (now {depth_scale} mm per unit) and cam_t_m2c (mm)"
         ),
-        Doubt::Mask { .. } => {
+        Doubt::Mask { .. } | Doubt::Sliver { .. } => {
             format!("{mask}: {doubt}: check --model-unit {model_unit} and cam_t_m2c (mm)")
         }
         _ => format!("{model}: {doubt}"),

@@ -17,6 +17,10 @@ const DEPTH_RATIO: f64 = 3.0;
 /// How many times more pixels than the model can cover the mask may have.
 const MASK_RATIO: f64 = 10.0;
 
+/// How many times fewer pixels than the model could cover the mask may have. A thin object covers a twentieth of its disc, and a mask
+/// that is mostly occluded a fraction of that; a unit that is wrong by ten makes a hundred times the pixels.
+const SLIVER_RATIO: f64 = 100.0;
+
 /// Something that looks wrong about the inputs of a refinement, though none of them is refused. Lengths are metres.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -77,6 +81,22 @@ pub enum Doubt {
         /// z of the centre of the object.
         distance: f64,
     },
+    /// The object could cover a hundred times the pixels of the mask: probably a wrong unit of the mesh, or a mask of something else.
+    #[error(
+        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) could cover {at_most:.0}",
+        Meters(*diameter),
+        Meters(*distance)
+    )]
+    Sliver {
+        /// Pixels of the mask.
+        pixels: usize,
+        /// Pixels of a disc of the model's diameter at its distance, in an image without end.
+        at_most: f64,
+        /// Diameter of the model.
+        diameter: f64,
+        /// z of the centre of the object.
+        distance: f64,
+    },
 }
 
 /// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, metres.
@@ -121,8 +141,18 @@ pub fn doubts(model: &Model, observation: &Observation, init: &Isometry3<f64>) -
     let at_most =
         FRAC_PI_4 * (camera.fx() * diameter / distance) * (camera.fy() * diameter / distance);
     // One doubt about the same numbers is enough.
-    if doubts.is_empty() && pixels as f64 > MASK_RATIO * at_most.max(1.0) {
+    if !doubts.is_empty() || pixels == 0 {
+        return doubts;
+    }
+    if pixels as f64 > MASK_RATIO * at_most.max(1.0) {
         doubts.push(Doubt::Mask {
+            pixels,
+            at_most,
+            diameter,
+            distance,
+        });
+    } else if at_most > SLIVER_RATIO * pixels as f64 {
+        doubts.push(Doubt::Sliver {
             pixels,
             at_most,
             diameter,

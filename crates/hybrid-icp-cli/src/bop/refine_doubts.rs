@@ -22,7 +22,7 @@ impl Kind {
         match doubt {
             Doubt::NoDepth => Some(Self::NoDepth),
             Doubt::Depth { .. } => Some(Self::Depth),
-            Doubt::Mask { .. } => Some(Self::Mask),
+            Doubt::Mask { .. } | Doubt::Sliver { .. } => Some(Self::Mask),
             // Models are looked at by themselves, and a pose behind the camera is a matter of its row.
             _ => None,
         }
