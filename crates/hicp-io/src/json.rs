@@ -172,6 +172,7 @@ fn describe(value: &Value) -> String {
         Value::Number(number) => number.to_string(),
         Value::String(text) => format!("the text {}", quote(text)),
         Value::Array(items) => format!("an array of {}", items.len()),
+        Value::Object(members) if members.is_empty() => "an empty object".to_owned(),
         Value::Object(members) => {
             let mut names: Vec<String> = members.keys().take(12).map(|key| quote(key)).collect();
             if members.len() > names.len() {
@@ -240,5 +241,10 @@ mod tests {
             message(item.get("z").map(|_| ())).ends_with("expected an object with the key `z`")
         );
         assert!(document.root().numbered().is_err());
+        assert_eq!(describe(&serde_json::json!({})), "an empty object");
+        assert_eq!(
+            describe(&serde_json::json!({"a": 1, "b": 2})),
+            "an object with the keys \"a\", \"b\""
+        );
     }
 }
