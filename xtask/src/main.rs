@@ -33,7 +33,7 @@ cargo xtask COMMAND
           benches in test mode, counts, instructions, tidy, api, deny, valgrind, the Python module,
           and the README's commands
   tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
-          crate documentation, nothing left open, docs/deviations.md up to date
+          crate documentation, nothing left open, docs/deviations.md and reasons of missed mutants up to date
   bless   writes docs/deviations.md from the `// Deviation:` comments in the code
 
   python [--ray] [--open3d] [PYTEST OPTIONS]

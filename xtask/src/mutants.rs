@@ -49,6 +49,40 @@ pub(crate) fn run(root: &Path, arguments: &[&str]) -> Findings {
     Ok(())
 }
 
+/// What is wrong with the lists of mutants that are left with a reason: lines of code that are not there any more, and reasons without
+/// words. That they are still missed only `mutants` can say.
+pub(crate) fn outdated_reasons(root: &Path) -> Vec<String> {
+    let mut findings = Vec::new();
+    for name in CRATES {
+        let list = format!("xtask/mutation/left/{name}.tsv");
+        let Ok(text) = std::fs::read_to_string(root.join(&list)) else {
+            continue;
+        };
+        let source = |file: &str| {
+            std::fs::read_to_string(root.join("crates").join(name).join("src").join(file))
+                .unwrap_or_default()
+        };
+        for (number, line) in text.lines().enumerate() {
+            if let Some(finding) = outdated(line, source) {
+                findings.push(format!("{list}:{}: {finding}", number + 1));
+            }
+        }
+    }
+    findings
+}
+
+fn outdated(line: &str, source: impl Fn(&str) -> String) -> Option<String> {
+    let fields: Vec<&str> = line.split('\t').collect();
+    let [file, _, code, _, reason] = fields[..] else {
+        return Some(format!("{} fields, expected five", fields.len()));
+    };
+    if !source(file).lines().any(|line| line.trim() == code) {
+        return Some(format!("{file} has no line {code:?}"));
+    }
+    let is_reason = reason.contains(' ') && !reason.starts_with('?');
+    (!is_reason).then(|| format!("{reason:?}, expected the reason why no test can tell"))
+}
+
 /// The crates, and what `mutation` is told besides.
 fn parse<'a, 'b>(arguments: &'b [&'a str]) -> Result<(Vec<&'a str>, &'b [&'a str]), Vec<String>> {
     match arguments {
@@ -64,6 +98,21 @@ fn parse<'a, 'b>(arguments: &'b [&'a str]) -> Result<(Vec<&'a str>, &'b [&'a str
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn reasons_go_with_the_code() {
+        let source = |file: &str| match file {
+            "a.rs" => "fn f() {\n    x < y\n}".to_owned(),
+            _ => String::new(),
+        };
+        let told = |line: &str| outdated(line, source).unwrap();
+        let right = "a.rs\t3\tx < y\treplace < with <= in f\tequal only by rounding";
+        assert_eq!(outdated(right, source), None);
+        assert!(told(&right.replace("a.rs", "b.rs")).contains("no line"));
+        assert!(told(&right.replace("x < y", "x > y")).contains("no line"));
+        assert!(told("a.rs\t3\tx < y\tc\t? line 2, reached by 0 tests").contains("reason"));
+        assert!(told("a.rs\t3").contains("2 fields"));
+    }
 
     #[test]
     fn arguments_are_read() {

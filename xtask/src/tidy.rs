@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{Findings, deviations, relative, rust_files};
+use crate::{Findings, deviations, mutants, relative, rust_files};
 
 /// Every crate and its level: dependencies within the workspace go strictly downwards.
 const LAYERS: &[(&str, u32)] = &[
@@ -51,6 +51,7 @@ pub(crate) fn run(root: &Path) -> Findings {
     findings.extend(crate_documentation(root));
     findings.extend(left_open(root));
     findings.extend(deviations::check(root));
+    findings.extend(mutants::outdated_reasons(root));
     if findings.is_empty() {
         Ok(())
     } else {
