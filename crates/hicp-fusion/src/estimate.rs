@@ -144,9 +144,7 @@ pub(crate) fn checked_covariance(covariance: &Matrix6<f64>) -> Result<Matrix6<f6
     let lifted = symmetric + Matrix6::identity() * (slack + f64::MIN_POSITIVE);
     if lifted.cholesky().is_none() {
         let eigenvalue = symmetric.symmetric_eigenvalues().min();
-        if eigenvalue < -slack {
-            return Err(FusionError::CovarianceNegative { eigenvalue });
-        }
+        return Err(FusionError::CovarianceNegative { eigenvalue });
     }
     Ok(symmetric)
 }

@@ -175,19 +175,21 @@ impl Fusion {
                 break;
             }
             // Invariant: `at` belongs to `pose`, and its cost never rises by more than rounding.
-            let (candidate, linearization) = loop {
+            let highest = at.cost * (1.0 + 1e-12);
+            let (candidate, linearization, falls) = loop {
                 let candidate = moved(&pose, &step);
                 let linearization = self.linearize(&candidate);
                 iterations += 1;
-                if linearization.cost <= at.cost * (1.0 + 1e-12) + f64::MIN_POSITIVE
+                let falls = linearization.cost <= highest;
+                if falls
                     || iterations >= self.limits.max_iterations
                     || step.norm() < self.limits.tolerance
                 {
-                    break (candidate, linearization);
+                    break (candidate, linearization, falls);
                 }
                 step *= 0.5;
             };
-            if linearization.cost > at.cost * (1.0 + 1e-12) + f64::MIN_POSITIVE {
+            if !falls {
                 // The smallest step raises V: as near to a minimum as rounding allows, or out of evaluations.
                 converged = step.norm() < self.limits.tolerance;
                 break;

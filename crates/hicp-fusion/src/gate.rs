@@ -35,8 +35,8 @@ impl Default for Gate {
 
 /// A fuser behind a [`Gate`]: what fails is not fused.
 ///
-/// While nothing has passed, there is something all the same: the estimate with the lowest MVE stands provisionally, alone,
-/// until the first one passes.
+/// While nothing has passed, there is something all the same: the estimate with the lowest MVE, the first of equals, stands
+/// provisionally, alone, until the first one passes.
 ///
 /// Inside [`crate::SymmetryAware`], not around it: a symmetric pose is no outlier.
 ///

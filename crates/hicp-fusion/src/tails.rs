@@ -4,7 +4,7 @@
 ///
 /// With `degrees_of_freedom` ν the error follows Student's distribution in six dimensions with scale matrix Σ: outliers that no
 /// covariance foresees give it heavy tails. ν = ∞ is the normal distribution, and the result that of χ²₆. What is not between 0 and
-/// ∞ (NaN included) has probability 0; a ν that is not positive counts as ∞.
+/// ∞ (NaN included) has probability 0; a ν that is not positive counts as ∞, and so does one from 10⁷ on.
 ///
 /// With u = x/(x + ν) and b = ν/2 it is the regularised incomplete beta function I_u(3, b) = 1 − (1 − u)ᵇ (1 + b u + b (b + 1) u²/2).
 ///
@@ -65,6 +65,12 @@ mod tests {
             let normal = probability_within(x, f64::INFINITY);
             assert!((probability_within(x, 9e6) - normal).abs() < 1e-5, "{x}");
         }
+        for nu in [0.0, -1.0, f64::NAN, 1e7, 1e300] {
+            assert_eq!(
+                probability_within(5.0, nu),
+                probability_within(5.0, f64::INFINITY)
+            );
+        }
         let quantiles = [(5.348_12, 0.5), (10.644_64, 0.9), (16.811_89, 0.99)];
         for (x, expected) in quantiles {
             assert!((probability_within(x, f64::INFINITY) - expected).abs() < 1e-6);
@@ -73,7 +79,7 @@ mod tests {
 
     #[test]
     fn what_is_no_distance_has_no_probability() {
-        for nu in [4.0, f64::INFINITY, f64::NAN, -1.0] {
+        for nu in [4.0, 0.0, f64::INFINITY, f64::NAN, -1.0] {
             assert_eq!(probability_within(0.0, nu), 0.0);
             assert_eq!(probability_within(-1.0, nu), 0.0);
             assert_eq!(probability_within(f64::NAN, nu), 0.0);
