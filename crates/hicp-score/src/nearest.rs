@@ -133,3 +133,53 @@ impl NearestPoints {
         sum / points.len() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By what a search passes over: the distance to the nearest point of the box.
+    #[test]
+    fn the_distance_of_a_box_is_that_of_its_nearest_point() {
+        let node = Node {
+            min: Point3::new(-1.0, 0.0, 2.0),
+            max: Point3::new(1.0, 0.5, 5.0),
+            first: 0,
+            count: 0,
+        };
+        let places: [f64; 8] = [-3.0, -1.0, -0.25, 0.0, 0.25, 1.0, 2.5, 8.0];
+        for x in places {
+            for y in places {
+                for z in places {
+                    let point = Point3::new(x, y, z);
+                    let nearest =
+                        Point3::new(x.clamp(-1.0, 1.0), y.clamp(0.0, 0.5), z.clamp(2.0, 5.0));
+                    let expected = (point - nearest).norm_squared();
+                    assert_eq!(node.distance_squared(&point), expected, "{point}");
+                }
+            }
+        }
+    }
+
+    /// What makes a query short: the two halves of a node lie side by side along its longest edge.
+    #[test]
+    fn the_halves_of_a_node_do_not_overlap() {
+        // Of no order, and without equal coordinates.
+        let points: Vec<Point3<f32>> = (0..500_u32)
+            .map(|i| Point3::new(i * 383 % 509, i * 191 % 503, i * 97 % 521))
+            .map(|p| p.map(f64::from).cast())
+            .collect();
+        let tree = NearestPoints::new(&points);
+        let inner = (0..tree.nodes.len()).filter(|index| tree.nodes[*index].count == 0);
+        let mut halved = 0;
+        for index in inner {
+            let node = tree.nodes[index];
+            let [a, b] = [index + 1, node.first].map(|child| tree.nodes[child]);
+            let axis = (node.max - node.min).imax();
+            assert!(a.max[axis] < b.min[axis], "node {index}");
+            halved += 1;
+        }
+        // 500 points halve into 64 leaves of 7 or 8.
+        assert_eq!((halved, tree.nodes.len()), (63, 127));
+    }
+}

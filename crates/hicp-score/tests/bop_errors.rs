@@ -12,7 +12,7 @@ use hicp_core::{
     Symmetries, SymmetryAxis, TriMesh, UnitQuaternion, Vector3,
 };
 use hicp_score::{
-    ModelPoints, ScoreError, VISIBILITY_TOLERANCE_METERS, add, bop_vsd, mspd, mssd,
+    ModelPoints, ScoreError, VISIBILITY_TOLERANCE_METERS, add, adi, bop_vsd, mspd, mssd,
     spheres_overlap, visibility_masks, vsd,
 };
 use support::{Numbers, RayCaster, cuboid, pose, render_depth, wedge};
@@ -152,6 +152,22 @@ fn a_symmetric_equivalent_is_no_error_for_mssd_mspd_and_adi() {
 }
 
 #[test]
+fn a_model_without_symmetries_has_the_errors_of_its_points() {
+    let model = Model::new(wedge());
+    let points = ModelPoints::new(&model);
+    assert!(!points.is_symmetric());
+    assert_eq!(points.symmetries(), [Isometry3::identity()]);
+    assert_eq!(points.diameter(), model.diameter());
+    let mut numbers = Numbers(814);
+    for _ in 0..10 {
+        let (a, b) = two_poses(&mut numbers);
+        assert_eq!(points.add(&a, &b), add(&a, &b, points.points()));
+        assert_eq!(points.adi(&a, &b), adi(&a, &b, points.points()));
+        assert!(points.adi(&a, &b) > 1e-3);
+    }
+}
+
+#[test]
 fn a_continuous_symmetry_is_cut_into_315_steps() {
     // A prism of 63 corners about a displaced axis: 63 divides 315.
     let axis = SymmetryAxis::new(Vector3::z(), Point3::new(0.01, -0.02, 0.0)).unwrap();
@@ -211,6 +227,17 @@ fn spheres_overlap_by_their_projections() {
     assert!(!spheres_overlap(&at(0.0, 1.0), &at(0.101, 1.0), 0.1));
     // One behind the other covers it, however far away.
     assert!(spheres_overlap(&at(0.1, 1.0), &at(0.2, 2.0), 0.1));
+    // In units of the focal length: radii of 0.05 / 0.5 and 0.05 / 2, and so 0.125 from centre to centre.
+    for (x, expected) in [(0.12, true), (0.13, false)] {
+        let near = spheres_overlap(&at(0.5 * x, 0.5), &at(0.0, 2.0), 0.1);
+        let far = spheres_overlap(&at(0.0, 0.5), &at(2.0 * x, 2.0), 0.1);
+        assert_eq!((near, far), (expected, expected), "{x}");
+    }
+    // What touches does not overlap.
+    assert!(!spheres_overlap(&at(0.0, 1.0), &at(0.25, 1.0), 0.25));
+    // Behind the camera there is no image, whatever the other one's place.
+    assert!(!spheres_overlap(&at(0.0, 0.5), &at(0.0, -1.0), 0.1));
+    assert!(!spheres_overlap(&at(0.0, -1.0), &at(0.0, 0.5), 0.1));
 }
 
 fn view(model: &Model, pose: &Isometry3<f64>) -> RenderedView {

@@ -82,6 +82,10 @@ fn bins_hold_their_lower_bounds() {
     assert_eq!(counts, [(3, 0), (1, 1), (1, 0), (4, 4)]);
     assert_eq!(table[1].mean_score(), Some(0.25));
     assert_eq!(table[3].share_correct(), Some(1.0));
+    // Of 0, 0.1 and −3, and of 0.75, 0.9, 1 and 7.
+    for (index, mean) in [(0, -2.9 / 3.0), (3, 9.65 / 4.0)] {
+        assert!((table[index].mean_score().unwrap_or(0.0) - mean).abs() < 1e-15);
+    }
     let empty = reliability(&[], 2);
     assert_eq!(
         (empty[0].share_correct(), empty[1].mean_score()),

@@ -335,4 +335,13 @@ fn a_score_renders_a_pose_once_and_boxes_change_nothing() {
 fn scores_say_their_names() {
     let truth = Vsd::new(at()).name();
     assert_eq!((MeanVsd::default().name(), truth), ("mve", "vsd"));
+    // One that says none is called after its type, boxed too.
+    struct Fair;
+    impl Score for Fair {
+        fn score(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> f64 {
+            0.5
+        }
+    }
+    assert_eq!(Fair.name(), "Fair");
+    assert_eq!((Box::new(Fair) as Box<dyn Score>).name(), "Fair");
 }

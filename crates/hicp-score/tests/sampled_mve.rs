@@ -180,3 +180,79 @@ fn it_is_its_definition() {
         (1500, 200)
     );
 }
+
+/// An open triangle in a plane through the origin, seen by every pixel that it can be.
+fn sheet(corners: [[f32; 3]; 3]) -> Model {
+    let corners = corners.map(hicp_core::Point3::from);
+    Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap())
+}
+
+/// Everything measured at half a metre, all of it masked but some.
+fn wall(camera: PinholeCamera, but: Option<usize>, depth_there: f32) -> Observation {
+    let n = (camera.width() * camera.height()) as usize;
+    let mut depth = vec![0.5; n];
+    let mut mask = vec![true; n];
+    if let Some(index) = but {
+        (depth[index], mask[index]) = (depth_there, false);
+    }
+    Observation::new(
+        DepthImage::from_meters(camera.width(), camera.height(), depth).unwrap(),
+        Mask::new(camera.width(), camera.height(), mask).unwrap(),
+        camera,
+    )
+    .unwrap()
+}
+
+/// Nothing of it may come back in at another edge.
+#[test]
+fn what_lies_beside_the_image_is_not_in_it() {
+    let model = Model::new(wedge());
+    let observation = wall(camera(), None, 0.0);
+    let mut sampled = SampledMve::new(1500, 100_000);
+    let mut at = |x: f64, y: f64| {
+        let pose = pose(x, y, 0.5, 0.4, -0.3, 0.2);
+        score(&mut sampled, &model, &observation, &pose)
+    };
+    assert!(at(0.0, 0.0) < 1.0);
+    // The image is 0.4 m wide there and 0.29 m high.
+    for x in [-0.4, 0.0, 0.4] {
+        for y in [-0.3, 0.0, 0.3] {
+            assert_eq!(at(x, y) < 1.0, (x, y) == (0.0, 0.0), "{x} {y}");
+        }
+    }
+}
+
+/// Pixel centres are at integers, and so the image ends half a pixel after the last; there is nothing on that line.
+#[test]
+fn the_right_and_the_lower_edge_are_not_in_the_image() {
+    let pose = Isometry3::translation(0.0, 0.0, 0.5);
+    let mut sampled = SampledMve::new(1500, 100_000);
+    let mut found = |model: &Model, cx: f64, cy: f64| {
+        let camera = PinholeCamera::new(20.0, 20.0, cx, cy, 8, 8).unwrap();
+        score(&mut sampled, model, &wall(camera, None, 0.0), &pose)
+    };
+    // Both contain the optical axis, and so are seen from the side: all x, or all y, are zero.
+    let upright = sheet([[0.0, -0.1, -0.1], [0.0, 0.1, -0.1], [0.0, 0.0, 0.2]]);
+    let level = sheet([[-0.1, 0.0, -0.1], [0.1, 0.0, -0.1], [0.0, 0.0, 0.2]]);
+    assert_eq!(found(&upright, 7.5, 3.0), 1.0);
+    assert!(found(&upright, 7.49, 3.0) < 1.0);
+    assert_eq!(found(&level, 3.0, 7.5), 1.0);
+    assert!(found(&level, 3.0, 7.49) < 1.0);
+}
+
+#[test]
+fn what_is_exactly_the_tolerance_in_front_does_not_hide() {
+    let model = sheet([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 2.0, 0.0]]);
+    let pose = Isometry3::translation(0.0, 0.0, 0.5);
+    // Outside the mask is the principal point, where depths are distances to the bit.
+    let camera = PinholeCamera::new(8.0, 8.0, 4.0, 3.0, 8, 8).unwrap();
+    let observation = wall(camera, Some(3 * 8 + 4), 0.25);
+    let found = |tolerance: f64| {
+        let mut sampled = SampledMve::new(20_000, 100_000);
+        sampled.occlusion_tolerance = tolerance;
+        score(&mut sampled, &model, &observation, &pose)
+    };
+    // All others agree.
+    assert_eq!(found(0.25_f64.next_down()), 0.0);
+    assert!((found(0.25) - 1.0 / 64.0).abs() < 1e-15);
+}
