@@ -152,7 +152,7 @@ impl<R: Renderer + ?Sized> Renderer for Box<R> {
 /// Number of renders kept: a Hybrid ICP iteration asks for the same pose at most a few renders apart.
 const CACHED_VIEWS: usize = 4;
 
-/// A renderer that remembers its last renders.
+/// A renderer that remembers its last renders: the four that were used last.
 ///
 /// The score that looks at a pose and the selection that starts from it ask for the same render; whoever comes second
 /// gets it for the price of a key comparison. Keyed by model, camera and the bits of the pose, so a hit returns exactly
@@ -266,4 +266,50 @@ impl std::fmt::Debug for RenderCache {
 fn pose_bits(pose: &Isometry3<f64>) -> [u64; 7] {
     let (t, q) = (&pose.translation.vector, &pose.rotation.coords);
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Shows the whole region.
+    struct Flat;
+
+    impl Renderer for Flat {
+        fn render(
+            &mut self,
+            _: &TriMesh,
+            _: &PinholeCamera,
+            _: &Isometry3<f64>,
+            region: &PixelRegion,
+            view: &mut RenderedView,
+        ) {
+            view.reset(*region);
+        }
+    }
+
+    #[test]
+    fn all_views_grow_with_the_largest_and_not_much_beyond() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let corners = corners.map(nalgebra::Point3::from).to_vec();
+        let model = Model::new(TriMesh::new(corners, vec![[0, 1, 2]]).unwrap());
+        let mut cache = RenderCache::new(Flat);
+        for side in [10, 15, 9, 34] {
+            let camera = PinholeCamera::new(9.0, 9.0, 1.0, 1.0, side, side).unwrap();
+            // From one entry to all of them, so that the next size meets both empty and full ones.
+            for step in 0..CACHED_VIEWS {
+                let pose = Isometry3::translation(0.0, 0.0, 1.0 + step as f64);
+                cache.view(&model, &camera, &pose);
+                let largest = side.max(if side == 9 { 15 } else { 0 });
+                let area = (largest * largest) as usize;
+                for entry in &cache.entries {
+                    for capacity in [entry.view.depth.capacity(), entry.view.triangles.capacity()] {
+                        // Each size but the smallest has twice the pixels of the one before, so that a vector asks for no more than it wants.
+                        assert!((area..area + area / 4).contains(&capacity), "{capacity}");
+                    }
+                }
+            }
+        }
+    }
 }

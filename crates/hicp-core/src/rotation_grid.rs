@@ -41,6 +41,61 @@ mod tests {
     use crate::so3;
     use nalgebra::Vector3;
 
+    /// (x, y, z, w) = (r sin α, r cos α, R sin β, R cos β) with s = i + ½, r² = s/n, R² = 1 − s/n, α = 2πs/√2 and
+    /// β = 2πs/ψ, as the paper's page gives them, computed with thirty digits.
+    #[test]
+    fn the_grid_is_the_published_spiral() {
+        assert!((PSI.powi(4) - PSI - 4.0).abs() < 1e-14);
+        let golden = [
+            (
+                0,
+                1,
+                [
+                    0.562_640_058_572_400_2,
+                    -0.428_294_483_375_219_45,
+                    0.628_011_140_981_484,
+                    -0.324_964_623_925_643_2,
+                ],
+            ),
+            (
+                0,
+                5,
+                [
+                    0.251_620_283_566_47,
+                    -0.191_539_115_843_028_84,
+                    0.842_565_361_117_081_3,
+                    -0.435_985_793_628_235_6,
+                ],
+            ),
+            (
+                3,
+                5,
+                [
+                    0.131_538_016_023_735_2,
+                    -0.826_255_257_375_430_9,
+                    0.536_697_750_538_592,
+                    -0.109_341_321_406_022_4,
+                ],
+            ),
+            (
+                41,
+                100,
+                [
+                    0.532_965_368_805_561_3,
+                    -0.361_867_262_478_870_9,
+                    0.271_902_492_610_603_1,
+                    0.714_890_924_905_429_8,
+                ],
+            ),
+        ];
+        for (index, count, expected) in golden {
+            let found = rotation_grid(index, count).coords;
+            // The angles reach 184 radians, of which f64 keeps 3e-14.
+            let error = (found - nalgebra::Vector4::from(expected)).amax();
+            assert!(error < 1e-13, "{index} of {count}: {error}");
+        }
+    }
+
     /// Of rotations spread evenly, the farthest from any is not much farther than of balls packed without gaps.
     #[test]
     fn the_grid_leaves_no_large_gap_and_no_cluster() {

@@ -7,8 +7,9 @@ use crate::surfel::Surfel;
 
 /// Returns `count` surfels spread evenly over the area of a mesh, in the object frame.
 ///
-/// Systematic sampling: the i-th sample stands at (i + ½)/count of the accumulated area, and inside its triangle at the
-/// i-th point of a low-discrepancy sequence. Deterministic; every region of the surface gets its share of the samples to
+/// Systematic sampling: the i-th sample stands at (i + ½)/count of the accumulated area, in the later of two triangles when
+/// that is their border, and inside its triangle at the i-th point of a low-discrepancy sequence: Roberts's R₂ from (½, ½), in
+/// the triangle's edges from its first corner, folded into it. Deterministic; every region of the surface gets its share of the samples to
 /// within one. Normals follow the winding, turned outward where a closed mesh is wound inward. Cost: O(triangles + count).
 #[must_use]
 pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {

@@ -52,12 +52,13 @@ fn what_is_derived_of_a_model_or_an_observation_is_theirs_and_not_their_clones()
     let camera = PinholeCamera::new(10.0, 10.0, 1.0, 1.0, 3, 3).unwrap();
     let depth = DepthImage::from_meters(3, 3, vec![1.0; 9]).unwrap();
     let observation = Observation::new(depth, Mask::full(3, 3), camera).unwrap();
-    for (owner, clone) in [
-        (model.derived(), model.clone().derived()),
-        (observation.derived(), observation.clone().derived()),
-    ] {
-        assert_eq!(*owner.get_or_build(1, || 5_u64), 5);
-        assert_eq!(*owner.get_or_build(1, || 6_u64), 5);
-        assert_eq!(*clone.get_or_build(1, || 7_u64), 7);
-    }
+    let clones = (model.clone(), observation.clone());
+    let of_model = |model: &Model, value| *model.derived().get_or_build(1, || value);
+    assert_eq!(of_model(&model, 5_u64), 5);
+    assert_eq!(of_model(&model, 6_u64), 5);
+    assert_eq!(of_model(&clones.0, 7_u64), 7);
+    let of_image = |image: &Observation, value| *image.derived().get_or_build(1, || value);
+    assert_eq!(of_image(&observation, 5_u64), 5);
+    assert_eq!(of_image(&observation, 6_u64), 5);
+    assert_eq!(of_image(&clones.1, 7_u64), 7);
 }

@@ -4,52 +4,15 @@
 
 mod support;
 
-use hicp_core::{Facing, Model, ModelConfig, Point3, TriMesh, diameter, sample_surface};
+use hicp_core::{
+    Facing, Isometry3, Model, ModelConfig, Point3, Symmetries, SymmetryAxis, TriMesh, Vector3,
+    sample_surface,
+};
 use proptest::prelude::*;
 use support::{Numbers, cuboid, wedge};
 
-fn brute_force(points: &[Point3<f32>]) -> f64 {
-    let mut best = 0.0_f64;
-    for a in points {
-        for b in points {
-            best = best.max((a.cast::<f64>() - b.cast::<f64>()).norm());
-        }
-    }
-    best
-}
-
-fn cloud() -> impl Strategy<Value = Vec<Point3<f32>>> {
-    // Balls, boxes stretched a thousandfold, planes, lines and heaps of duplicates: coordinates on a coarse grid.
-    (
-        0_usize..400,
-        1_i32..60,
-        [0.0_f32..10.0, 0.0..10.0, 0.0..10.0],
-        0_u64..u64::MAX,
-    )
-        .prop_map(|(count, grid, scales, seed)| {
-            let mut numbers = Numbers(seed);
-            let scale = scales.map(|s| if s < 2.0 { 0.0 } else { 0.001 * s * s * s });
-            (0..count)
-                .map(|_| {
-                    #[allow(clippy::cast_possible_truncation)]
-                    Point3::from(
-                        scale.map(|s| s * (numbers.normal() * f64::from(grid)).round() as f32),
-                    )
-                })
-                .collect()
-        })
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
-
-    #[test]
-    fn diameter_is_the_brute_force_one(points in cloud()) {
-        let (found, expected) = (diameter(&points), brute_force(&points));
-        // The promise: a relative 1e-9, and never more than there is.
-        prop_assert!(found <= expected * (1.0 + 4.0 * f64::EPSILON));
-        prop_assert!(found >= expected * (1.0 - 1.1e-9), "{} of {}", found, expected);
-    }
 
     #[test]
     fn samples_are_spread_by_area_to_within_one(seed in 0_u64..u64::MAX, count in 1_usize..500) {
@@ -104,13 +67,6 @@ fn on_triangle(mesh: &TriMesh, t: usize, sample: &hicp_core::Surfel) -> Result<(
 }
 
 #[test]
-fn no_points_and_one_point_have_no_diameter() {
-    assert_eq!(diameter(&[]), 0.0);
-    assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0)]), 0.0);
-    assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0); 100]), 0.0);
-}
-
-#[test]
 fn samples_of_a_closed_mesh_point_outward_however_it_is_wound() {
     let outward = wedge();
     let triangles = outward
@@ -157,6 +113,36 @@ fn samples_cover_a_triangle_evenly() {
 }
 
 #[test]
+fn samples_follow_robertss_sequence_and_fall_into_the_later_triangle_on_a_border() {
+    // The plastic number, g³ = g + 1: the step has a slope of a third there.
+    let g = (0..60).fold(1.3_f64, |g, _| (g + 1.0).cbrt());
+    let corner = |x: f32, y: f32| Point3::new(x, y, 0.0);
+    let square = vec![
+        corner(0.0, 0.0),
+        corner(1.0, 0.0),
+        corner(1.0, 1.0),
+        corner(0.0, 1.0),
+    ];
+    let mesh = TriMesh::new(square.clone(), vec![[0, 1, 3]]).unwrap();
+    for (i, sample) in sample_surface(&mesh, 500).iter().enumerate() {
+        let place = [g.recip(), g.powi(-2)].map(|step| (0.5 + i as f64 * step).fract());
+        let [s, t] = match place {
+            [s, t] if s + t > 1.0 => [1.0 - s, 1.0 - t],
+            inside => inside,
+        };
+        // Rounded to f32 below 1; the reference's steps are off by 1e-16, 500 times.
+        let expected = Point3::new(s, t, 0.0);
+        assert!((sample.point.cast::<f64>() - expected).norm() < 1e-7, "{i}");
+    }
+    // Half of the area is where the two halves meet; the first place, (½, ½), is the middle of the edge across.
+    for triangles in [vec![[0, 1, 2], [0, 2, 3]], vec![[0, 2, 3], [0, 1, 2]]] {
+        let [_, b, c] = triangles[1].map(|i: u32| square[i as usize]);
+        let mesh = TriMesh::new(square.clone(), triangles).unwrap();
+        assert_eq!(sample_surface(&mesh, 1)[0].point, nalgebra::center(&b, &c));
+    }
+}
+
+#[test]
 fn a_model_knows_its_size() {
     let mut vertices = cuboid(0.03, 0.04, 0.12).vertices().to_vec();
     // A vertex that no triangle uses counts for nothing.
@@ -188,4 +174,19 @@ fn a_model_knows_its_size() {
     }
     assert_ne!(model.id(), with(None).id());
     assert_eq!(model.id(), model.clone().id());
+}
+
+#[test]
+fn a_model_keeps_its_symmetries() {
+    assert!(Model::new(wedge()).symmetries().is_empty());
+    let symmetries = Symmetries {
+        discrete: vec![Isometry3::rotation(Vector3::y() * std::f64::consts::PI)],
+        continuous: vec![SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap()],
+    };
+    let config = ModelConfig {
+        symmetries: symmetries.clone(),
+        ..ModelConfig::default()
+    };
+    let model = Model::with_config(wedge(), config);
+    assert_eq!(*model.symmetries(), symmetries);
 }

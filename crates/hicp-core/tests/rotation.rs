@@ -116,6 +116,24 @@ fn pitfall_17_shears_of_determinant_one_and_scales_are_refused() {
 }
 
 #[test]
+fn the_tolerance_is_still_tolerated() {
+    // Rows (1, s, 0) and (0, 1, 0) have the product s, to the bit.
+    let shear = |s: f64| Matrix3::new(1.0, s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    for sign in [-1.0, 1.0] {
+        let found = rotation_from_matrix(&shear(sign * ROTATION_TOLERANCE)).unwrap();
+        // The polar factor of a shear by s turns by atan(s/2).
+        let angle = so3::angle(&found) - (0.5 * ROTATION_TOLERANCE).atan();
+        assert!(angle.abs() < 4.0 * f64::EPSILON, "{angle}");
+        let beyond = ROTATION_TOLERANCE.next_up();
+        assert!(matches!(
+            rotation_from_matrix(&shear(sign * beyond)),
+            Err(RotationError::NotOrthogonal { deviation, tolerance })
+                if deviation == beyond && tolerance == ROTATION_TOLERANCE
+        ));
+    }
+}
+
+#[test]
 fn what_is_not_finite_is_named() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for row in 0..3 {

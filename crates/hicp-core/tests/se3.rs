@@ -138,6 +138,35 @@ fn left_jacobian_is_its_series_and_its_inverse_inverts_it() {
     }
 }
 
+/// Q has no closed form to be exact in, but along the axes its series is summed to the last digit.
+#[test]
+fn the_coefficients_of_q_keep_their_digits_to_the_end_of_their_series() {
+    for (turn, shift) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+        for angle in [0.02, 0.05, 0.09, so3::SERIES_ANGLE * (1.0 - 1e-9)] {
+            let mut xi = Vector6::zeros();
+            (xi[shift], xi[3 + turn]) = (1.0, angle);
+            let error = se3::left_jacobian(&xi) - series(&se3::curly_hat(&xi), 1);
+            // The largest entry is ½: two of its roundings.
+            let error = error.fixed_view::<3, 3>(0, 3).amax();
+            assert!(error < f64::EPSILON, "{turn} {shift} {angle}: {error}");
+        }
+    }
+}
+
+#[test]
+fn log_and_jacobian_together_are_those_alone() {
+    for xi in twists() {
+        let motion = se3::exp(&xi);
+        let (log, d, b) = se3::log_and_left_jacobian_inverse(&motion);
+        assert_eq!(log, se3::log(&motion));
+        let whole = se3::left_jacobian_inverse(&log);
+        assert_eq!(whole.fixed_view::<3, 3>(0, 0), d);
+        assert_eq!(whole.fixed_view::<3, 3>(0, 3), b);
+        assert_eq!(whole.fixed_view::<3, 3>(3, 0).amax(), 0.0);
+        assert_eq!(whole.fixed_view::<3, 3>(3, 3), d);
+    }
+}
+
 #[test]
 fn nothing_jumps_where_the_series_ends() {
     let mut numbers = Numbers(15);

@@ -6,7 +6,7 @@ mod support;
 
 use std::f64::consts::PI;
 
-use hicp_core::{Matrix3, UnitQuaternion, Vector3, so3};
+use hicp_core::{Matrix3, Quaternion, UnitQuaternion, Vector3, so3};
 use support::Numbers;
 
 /// Every scale at which an implementation may switch formulas, both sides of the series' end, and the half turn.
@@ -92,6 +92,25 @@ fn pitfall_17_log_of_exp_is_the_identity_at_every_angle_below_a_half_turn() {
     }
 }
 
+/// Where the logarithm leaves atan2 for its series the second term still counts: at a sine of 1e-7 it is 15 units of the last place.
+#[test]
+fn log_keeps_its_digits_where_its_series_ends() {
+    let mut numbers = Numbers(5);
+    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        for _ in 0..200 {
+            let half = numbers.between(0.9e-7, 1.1e-7);
+            let (sin, cos) = half.sin_cos();
+            let rotation = UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, axis * sin));
+            let error = (so3::log(&rotation) - axis * (2.0 * half)).norm();
+            // Roundings of sine, cosine, quotient, difference and product: half an ε each at the most.
+            assert!(
+                error <= 2.5 * f64::EPSILON * (2.0 * half),
+                "{half}: {error}"
+            );
+        }
+    }
+}
+
 #[test]
 fn pitfall_17_a_half_turn_has_an_angle_of_pi_about_one_of_its_two_axes() {
     for axis in axes() {
@@ -100,7 +119,7 @@ fn pitfall_17_a_half_turn_has_an_angle_of_pi_about_one_of_its_two_axes() {
         let error = (found - phi).norm().min((found + phi).norm());
         assert!(error < 8.0 * f64::EPSILON * PI, "{axis}: {error}");
         // A quaternion whose real part is zero to the bit.
-        let exact = UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_parts(0.0, axis));
+        let exact = UnitQuaternion::from_quaternion(Quaternion::from_parts(0.0, axis));
         let found = so3::log(&exact);
         assert!((found.norm() - PI).abs() < 8.0 * f64::EPSILON * PI);
         assert!(found.cross(&phi).norm() < 1e-14);
