@@ -96,3 +96,56 @@ fn visit(points: &[Point3<f64>], a: &Node, b: &Node, best: &mut f64) {
         (Some(_), None) => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes hold their points tightly; halves share a node's points evenly; leaves are small, or one point many times.
+    fn check(points: &[Point3<f64>], node: &Node) {
+        let own = &points[node.start..node.end];
+        for axis in 0..3 {
+            let coordinates = || own.iter().map(|p| p[axis]);
+            assert_eq!(coordinates().fold(f64::INFINITY, f64::min), node.min[axis]);
+            assert_eq!(
+                coordinates().fold(f64::NEG_INFINITY, f64::max),
+                node.max[axis]
+            );
+        }
+        let coincide = own.iter().all(|p| *p == own[0]);
+        assert_eq!(
+            node.children.is_none(),
+            own.len() <= LEAF_SIZE || coincide,
+            "{} points",
+            own.len()
+        );
+        if let Some(children) = &node.children {
+            let (low, high) = (&children.0, &children.1);
+            assert_eq!((low.start, high.end), (node.start, node.end));
+            assert_eq!((low.end, low.end - low.start), (high.start, own.len() / 2));
+            check(points, low);
+            check(points, high);
+        }
+    }
+
+    #[test]
+    fn a_tree_halves_its_points_down_to_small_leaves() {
+        for count in [1, 2, LEAF_SIZE, LEAF_SIZE + 1, 2 * LEAF_SIZE, 1000] {
+            // A spiral, and a heap of one of its points as large as it.
+            let spiral = (0..count).map(|i| {
+                let x = i as f64;
+                Point3::new(x.sin(), x.cos(), 0.01 * x)
+            });
+            let heap = std::iter::repeat_n(Point3::new(0.0, 1.0, 0.0), count);
+            for mut points in [
+                spiral.clone().collect::<Vec<_>>(),
+                heap.clone().collect(),
+                spiral.chain(heap).collect(),
+            ] {
+                let root = Node::build(&mut points, 0);
+                assert_eq!((root.start, root.end), (0, points.len()));
+                check(&points, &root);
+            }
+        }
+    }
+}
