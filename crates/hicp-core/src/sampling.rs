@@ -1,7 +1,5 @@
 //! Points spread uniformly over a surface.
 
-use nalgebra::UnitVector3;
-
 use crate::mesh::{Facing, TriMesh};
 use crate::surfel::Surfel;
 
@@ -17,11 +15,7 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
     const STEP_1: f64 = 0.754_877_666_246_692_7;
     const STEP_2: f64 = 0.569_840_290_998_053_3;
 
-    let flip = if mesh.facing() == Facing::Inward {
-        -1.0
-    } else {
-        1.0
-    };
+    let inward = mesh.facing() == Facing::Inward;
     let spacing = mesh.area() / count.max(1) as f64;
     let mut samples = Vec::with_capacity(count);
     let mut accumulated = 0.0;
@@ -30,6 +24,7 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
         let Some(normal) = mesh.normal(triangle) else {
             continue;
         };
+        let normal = if inward { -normal } else { normal };
         let [a, b, c] = mesh.corners(triangle).map(|p| p.cast::<f64>());
         while samples.len() < count && (samples.len() as f64 + 0.5) * spacing < accumulated {
             let i = samples.len() as f64;
@@ -39,7 +34,7 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
             }
             samples.push(Surfel {
                 point: (a + (b - a) * s + (c - a) * t).cast::<f32>(),
-                normal: UnitVector3::new_unchecked(normal.into_inner() * flip),
+                normal,
             });
         }
     }
