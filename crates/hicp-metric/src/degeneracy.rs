@@ -86,7 +86,7 @@ impl NormalEquations {
             });
         }
         let mean_diagonal = self.damping_trace() / 6.0;
-        let finite = self.scaled_hessian().trace().is_finite() && mean_diagonal.is_finite();
+        let finite = self.scaled_hessian().trace().is_finite();
         if self.rows < n_free || !finite || mean_diagonal <= 0.0 {
             return None;
         }
@@ -108,12 +108,13 @@ impl NormalEquations {
     /// Iterated Tikhonov: each pass leaves λ/(h + λ) of the error that it found, and nothing of a free direction moves.
     pub(crate) fn exact_twist(&self) -> Option<Vector6<f64>> {
         const PASSES: usize = 4;
-        let mean_diagonal = self.damping_trace() / 6.0;
-        if self.rows < 6 || !mean_diagonal.is_finite() || mean_diagonal <= 0.0 {
+        if self.rows < 6 {
             return None;
         }
+        let mean_diagonal = self.damping_trace() / 6.0;
         let hessian = self.scaled_hessian();
         let damped = hessian + Matrix6::identity() * (DAMPING * mean_diagonal);
+        // None where the rows say nothing or not in numbers.
         let factor = damped.cholesky()?;
         let mut z = Vector6::zeros();
         for _ in 0..PASSES {
@@ -147,7 +148,7 @@ impl NormalEquations {
             &self.scaled_gradient(),
         );
         let eigen = eigen(hessian)?;
-        let largest = eigen.eigenvalues.max();
+        let limit = self.threshold.max(0.0) * eigen.eigenvalues.max().max(0.0);
         let mut y = Vector6::zeros();
         for (value, direction) in eigen
             .eigenvalues
@@ -155,7 +156,7 @@ impl NormalEquations {
             .zip(eigen.eigenvectors.column_iter())
         {
             // Held unknowns have the eigenvalue zero.
-            if *value > self.threshold.max(0.0) * largest && *value > 0.0 {
+            if *value > limit {
                 y -= direction * (direction.dot(&gradient) / (value * (1.0 + lambda)));
             }
         }
@@ -178,12 +179,10 @@ impl NormalEquations {
 
     /// Marquardt's damping: relative to each diagonal entry, with a floor for directions without information.
     fn damp(&self, hessian: &mut Matrix6<f64>, lambda: f64) {
-        if lambda > 0.0 {
-            let floor = DIAGONAL_FLOOR * self.damping_trace() / 6.0;
-            for i in 0..6 {
-                let diagonal = hessian[(i, i)];
-                hessian[(i, i)] += lambda * diagonal.max(floor);
-            }
+        let floor = DIAGONAL_FLOOR * self.damping_trace() / 6.0;
+        for i in 0..6 {
+            let diagonal = hessian[(i, i)];
+            hessian[(i, i)] += lambda * diagonal.max(floor);
         }
     }
 

@@ -63,14 +63,9 @@ impl NormalEquations {
         let eigen = eigen(self.scaled_hessian())?;
         let mut order = [0, 1, 2, 3, 4, 5];
         order.sort_unstable_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-        let largest = eigen.eigenvalues[order[5]];
-        let relative = |i: usize| {
-            if largest > 0.0 {
-                (eigen.eigenvalues[i] / largest).max(0.0)
-            } else {
-                0.0
-            }
-        };
+        // Zero over something where there is no information.
+        let largest = eigen.eigenvalues[order[5]].max(f64::MIN_POSITIVE);
+        let relative = |i: usize| (eigen.eigenvalues[i] / largest).max(0.0);
         Some(Observability {
             eigenvalues: order.map(relative),
             directions: order.map(|i| eigen.eigenvectors.column(i).into_owned()),

@@ -45,11 +45,9 @@ impl ErrorMetric for PointToPoint {
         let pairs = pairs.as_slice();
         // Sums relative to the first pair that counts, so that objects far from the camera lose no digits, and points all
         // in one place give sums of exact zeros.
-        let mut counting = pairs.iter().filter(|pair| pair.weight > 0.0);
-        let first = counting.next()?;
-        if counting.take(MIN_PAIRS - 1).count() < MIN_PAIRS - 1 {
-            return None;
-        }
+        let counting = || pairs.iter().filter(|pair| pair.weight > 0.0);
+        let first = counting().next()?;
+        counting().nth(MIN_PAIRS - 1)?;
         let source_origin = first.source.point.cast::<f64>();
         let target_origin = first.target.point.cast::<f64>();
         let sums = vectorized(SumProducts {
@@ -58,7 +56,7 @@ impl ErrorMetric for PointToPoint {
             target_origin,
         });
         let weight = sums.weight;
-        if !(weight > 0.0 && sums.spread.is_finite() && sums.loss.is_finite()) {
+        if !(weight > 0.0 && sums.spread.is_finite()) {
             return None;
         }
         let (source_mean, target_mean) = (sums.source / weight, sums.target / weight);

@@ -89,9 +89,7 @@ impl ErrorMetric for Symmetric {
             squares += source.norm_squared() * w;
             weight += w;
         }
-        if !(weight > 0.0 && squares.is_finite()) {
-            return None;
-        }
+        // Without weight, or with points that are not finite, neither are these; then the rows have no solution.
         let (source_mean, target_mean) = (source_sum / weight, target_sum / weight);
         let variance = squares / weight - source_mean.norm_squared();
         let length = if variance > 1e-12 {
@@ -121,10 +119,9 @@ impl ErrorMetric for Symmetric {
         let (source_mean, target_mean) = (origin.coords + source_mean, origin.coords + target_mean);
         let translation = target_mean + half * (shift * cosine) - rotation * source_mean;
         let increment = Isometry3::from_parts(Translation3::from(translation), rotation);
-        let mean_loss = system.loss() / weight;
-        (hicp_core::se3::is_finite(&increment) && mean_loss.is_finite()).then_some(Step {
+        hicp_core::se3::is_finite(&increment).then_some(Step {
             increment,
-            mean_loss,
+            mean_loss: system.loss() / weight,
         })
     }
 
