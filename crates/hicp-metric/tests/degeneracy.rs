@@ -215,6 +215,21 @@ fn thresholds_bound_what_moves() {
     assert!(scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
     assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
     assert!(system.solve_with(Degeneracy::Refuse, 0.0).is_some());
+    // The ratio at the threshold is degenerate too, and that of the best direction is 1.
+    let still = system.solve_with(Degeneracy::Freeze, 1.0).unwrap();
+    assert_eq!(scenes::difference(&still, &Isometry3::identity()).1, 0.0);
+    assert_eq!(system.solve_with(Degeneracy::Refuse, 1.0), None);
+    assert_eq!(system.observability().unwrap().n_degenerate(1.0), 6);
+    // Six directions of the same information, to the bit: whatever is below 1 leaves all of them, and 1 none.
+    let mut alike = NormalEquations::new(Point3::origin(), 1.0);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for (lever, direction) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (axes[i], axes[j])) {
+        alike.add_row(&Point3::from(lever), &direction, 0.1, 1.0);
+        alike.add_row(&Point3::from(-lever), &-direction, 0.1, 1.0);
+    }
+    assert_eq!(alike.information(), Matrix6::identity() * 2.0);
+    assert!(alike.solve_with(Degeneracy::Refuse, 0.999).is_some());
+    assert_eq!(alike.solve_with(Degeneracy::Refuse, 1.0), None);
     // A negative threshold is none.
     let (zero, below) = (
         system.solve_with(Degeneracy::Freeze, 0.0),
@@ -229,6 +244,10 @@ fn numbers_that_are_none_end_in_none() {
     let found = empty.observability().unwrap();
     assert_eq!(found.n_degenerate(0.0), 6);
     assert_eq!(empty.solve(), None);
+    let mut silent = NormalEquations::new(center(), 0.1);
+    for _ in 0..6 {
+        silent.add_row(&center(), &Vector3::zeros(), 0.1, 1.0);
+    }
     for bad in [f64::NAN, f64::INFINITY] {
         empty.add_row(&Point3::new(bad, 0.0, 1.0), &Vector3::z(), 0.1, 1.0);
         assert!(empty.observability().is_none());
@@ -241,6 +260,7 @@ fn numbers_that_are_none_end_in_none() {
         Degeneracy::Ignore,
     ] {
         assert_eq!(empty.solve_with(policy, 1e-3), None);
+        assert_eq!(silent.solve_with(policy, 1e-3), None, "{policy:?}");
         let mut metric = conditioned(PointToPlane, policy);
         assert_eq!(metric.minimize(&Correspondences::new()), None);
         let one: Correspondences = [Pair::new(

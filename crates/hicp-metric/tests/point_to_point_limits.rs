@@ -254,3 +254,47 @@ fn pitfall_18_tiny_weights_are_tiny() {
     let inliers: Correspondences = pairs.as_slice()[..30].iter().copied().collect();
     assert!(rms(&inliers, &found) <= bound);
 }
+
+/// From the smallest numbers of f32 to its largest: a power of two of all lengths changes no bit of the rotation.
+#[test]
+fn the_rotation_does_not_depend_on_the_unit_of_length() {
+    let mut numbers = Numbers(118);
+    let points: Vec<[Vector3<f64>; 2]> = (0..20)
+        .map(|_| [(); 2].map(|()| numbers.vector().map(|x| (1000.0 * x).round())))
+        .collect();
+    let step = |unit: f64| {
+        let pairs: Correspondences = points
+            .iter()
+            .map(|[p, q]| pair((p * unit).into(), (q * unit).into(), Vector3::z(), 1.0))
+            .collect();
+        PointToPoint.minimize(&pairs).unwrap()
+    };
+    let expected = step(1.0);
+    for power in [-149, -100, 100, 115] {
+        let unit = 2.0_f64.powi(power);
+        let found = step(unit);
+        assert_eq!(
+            found.increment.rotation, expected.increment.rotation,
+            "{power}"
+        );
+        assert_eq!(found.mean_loss, expected.mean_loss * unit * unit, "{power}");
+    }
+}
+
+/// A line and one that is opposite to it but for 10⁻¹¹ rad, in whole numbers that f32 holds: the axis of that half turn is known to few
+/// digits, and the line arrives where it should all the same.
+#[test]
+fn pitfall_12_a_line_is_mapped_onto_one_that_is_all_but_opposite() {
+    let size = f64::from((1 << 24) - 10_000);
+    for off in [[3000.0, -5000.0], [-9000.0, 1234.0], [1000.0, 2000.0]] {
+        let from = Vector3::new(size, size - off[0], size - off[1]);
+        let to = -(from - Vector3::new(1.0, 1.0, 1.0));
+        let pairs: Correspondences = [-1.0, 0.0, 1.0]
+            .map(|at| pair((from * at).into(), (to * at).into(), Vector3::z(), 1.0))
+            .into_iter()
+            .collect();
+        let found = PointToPoint.minimize(&pairs).unwrap().increment;
+        let arrived = found.rotation * from.normalize() - to.normalize();
+        assert!(arrived.norm() < 1e-12, "{off:?}: {}", arrived.norm());
+    }
+}

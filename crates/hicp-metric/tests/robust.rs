@@ -71,6 +71,44 @@ fn the_weight_is_the_slope_of_the_loss_over_the_residual() {
     }
 }
 
+/// Fair's loss is a difference of nearly equal numbers near zero: its series, c² (u²/2 − u³/3 + u⁴/4 − …), to the last term that counts.
+#[test]
+fn fairs_loss_keeps_its_digits_near_zero() {
+    for c in [1.3998, 0.02, 50.0] {
+        for u in [1e-12_f64, 1e-9, 1e-6, 3e-5, 9.9e-5, 1.1e-4, 1e-3, 1e-2] {
+            let series: f64 = (2..20)
+                .rev()
+                .map(|n| (-u).powi(n) / f64::from(n) * c * c)
+                .sum();
+            let found = Kernel::Fair(c).loss(c * u);
+            // Where the difference takes over it has lost 4 of 16 digits.
+            assert!((found - series).abs() < 1e-11 * series, "{c} {u}: {found}");
+        }
+    }
+}
+
+/// What rejects has a loss that levels off: c²/2, and c²/6 for Tukey's.
+#[test]
+fn losses_that_level_off_do_so_at_their_limits() {
+    for c in [0.3, 1.0, 4.6851] {
+        let half = 0.5 * c * c;
+        let kernels = [
+            (Kernel::GemanMcClure(c), half),
+            (Kernel::Welsch(c), half),
+            (Kernel::Tukey(c), half / 3.0),
+        ];
+        for (kernel, limit) in kernels {
+            for x in [1e9, 1e200, f64::MAX, f64::INFINITY] {
+                let loss = kernel.loss(x);
+                assert!(
+                    (loss - limit).abs() < 1e-12 * limit,
+                    "{kernel:?} {x}: {loss}"
+                );
+            }
+        }
+    }
+}
+
 /// The constants have 95 % efficiency: (E ψ′)² / E ψ² over a Gaussian, ψ = x w.
 #[test]
 fn tuning_constants_have_95_percent_efficiency() {

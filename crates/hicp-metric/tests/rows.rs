@@ -5,9 +5,10 @@ mod scenes;
 
 use std::f64::consts::PI;
 
-use hicp_core::{Isometry3, Matrix3, Pair, Point3, Vector3, se3};
+use hicp_core::{Correspondences, Isometry3, Matrix3, Pair, Point3, Vector3, se3};
 use hicp_metric::{
-    ErrorMetric, Generalized, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
+    ErrorMetric, Generalized, Kernel, PlaneToPoint, PointToPlane, PointToPoint, Robust, Scale,
+    Symmetric, WeightedSum,
 };
 use scenes::{Numbers, carried, center, check_rows, difference, messy, resized, same_information};
 
@@ -89,9 +90,10 @@ fn generalized_normals_may_be_parallel_opposite_or_anything() {
         PI,
     ] {
         let mut pair = base;
-        let turn = Isometry3::new(Vector3::zeros(), numbers.direction() * angle);
-        let axis = numbers.direction();
-        pair.target = scenes::surfel(pair.target.point.cast(), axis);
+        let normal = numbers.direction();
+        let across = normal.cross(&numbers.direction()).normalize();
+        let turn = Isometry3::new(Vector3::zeros(), across * angle);
+        pair.target = scenes::surfel(pair.target.point.cast(), normal);
         let turned = turn.rotation * pair.target.normal.cast::<f64>().into_inner();
         pair.source = scenes::surfel(pair.source.point.cast(), turned);
         for epsilon in [1e-4, 1e-3, 0.1, 1.0] {
@@ -103,6 +105,12 @@ fn generalized_normals_may_be_parallel_opposite_or_anything() {
             );
         }
     }
+    // Opposite to the bit.
+    let mut pair = base;
+    pair.source.normal = -pair.target.normal;
+    let expected = generalized(1e-3, &pair, &Isometry3::identity());
+    let found = Generalized::default().squared_error(&pair);
+    assert!((found - expected).abs() <= 1e-5 * expected);
 }
 
 fn metrics() -> Vec<Box<dyn ErrorMetric>> {
@@ -180,7 +188,6 @@ fn mean_loss_minimize_and_system_agree() {
     }
 }
 
-/// No pair, one pair, pairs all in one place, pairs without weight: a step or none, never a number that is none.
 /// A sum would fall as pairs are lost, and rise as they are found.
 #[test]
 fn the_loss_is_a_mean_that_does_not_depend_on_how_many_pairs_there_are() {
@@ -200,6 +207,7 @@ fn the_loss_is_a_mean_that_does_not_depend_on_how_many_pairs_there_are() {
     }
 }
 
+/// No pair, one pair, pairs all in one place, pairs without weight: a step or none, never a number that is none.
 #[test]
 fn few_and_coincident_pairs_give_no_nonsense() {
     let mut numbers = Numbers(16);
@@ -225,6 +233,52 @@ fn few_and_coincident_pairs_give_no_nonsense() {
                 assert!(difference(&step.increment, &Isometry3::identity()).1 < 0.1);
             }
             assert!(i != 0 && i != 5 || step.is_none(), "{}", metric.name());
+        }
+    }
+}
+
+/// Without weight, with weights that are none, and with points that are not finite there is no mean and no system.
+#[test]
+fn what_is_no_number_has_no_loss() {
+    let mut numbers = Numbers(20);
+    let pairs = messy(&mut numbers, 20);
+    let mut wrong: Vec<Correspondences> = Vec::new();
+    for weight in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        let mut pairs = pairs.clone();
+        pairs
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(|p| p.weight = weight);
+        wrong.push(pairs);
+    }
+    // They cancel.
+    let mut cancelling = pairs.clone();
+    for (i, pair) in cancelling.as_mut_slice().iter_mut().enumerate() {
+        pair.weight = [1.0, -1.0][i % 2];
+    }
+    wrong.push(cancelling);
+    for bad in [f32::NAN, f32::INFINITY] {
+        for axis in 0..3 {
+            for index in [0, 13] {
+                let (mut source, mut target) = (pairs.clone(), pairs.clone());
+                source.as_mut_slice()[index].source.point[axis] = bad;
+                target.as_mut_slice()[index].target.point[axis] = bad;
+                wrong.extend([source, target]);
+            }
+        }
+    }
+    let mut all = metrics();
+    all.push(Box::new(Robust::new(
+        PointToPoint,
+        Kernel::FAIR,
+        Scale::Meters(0.01),
+    )));
+    for metric in &mut all {
+        for (i, pairs) in wrong.iter().enumerate() {
+            let name = metric.name();
+            assert_eq!(metric.mean_loss(pairs), None, "{name} {i}");
+            assert_eq!(metric.minimize(pairs), None, "{name} {i}");
+            assert!(metric.system(pairs).is_none(), "{name} {i}");
         }
     }
 }

@@ -38,7 +38,7 @@ impl<M: ErrorMetric> ErrorMetric for Spy<M> {
     }
 }
 
-/// Everything that stands around one metric, by the name that it states; none of them changes a pair's error.
+/// What stands around one metric, by the name that it states, and changes neither a pair's error nor the mean of all.
 fn around<M: ErrorMetric + Clone + 'static>(
     metric: &M,
 ) -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
@@ -94,10 +94,20 @@ fn around<M: ErrorMetric + Clone + 'static>(
 }
 
 fn every_kind() -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
-    let mut all = around(&PointToPoint);
-    all.extend(around(&PointToPlane));
-    all.extend(around(&Symmetric));
-    all.extend(around(&Generalized::default()));
+    let mut all = with_kernel(&PointToPoint);
+    all.extend(with_kernel(&PointToPlane));
+    all.extend(with_kernel(&Symmetric));
+    all.extend(with_kernel(&Generalized::default()));
+    all
+}
+
+/// A kernel belongs to the set of pairs: it changes the mean, but no pair's own error.
+fn with_kernel<M: ErrorMetric + Clone + 'static>(
+    metric: &M,
+) -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
+    let mut all = around(metric);
+    let robust = Robust::new(metric.clone(), Kernel::TUKEY, Scale::Meters(1e-4));
+    all.push(("robust", Box::new(robust)));
     all
 }
 
@@ -151,6 +161,24 @@ fn losses_are_those_of_the_metric() {
             "{name}"
         );
     }
+}
+
+/// What iterates or takes turns asks the metric inside what the pairs determine.
+#[test]
+fn systems_are_those_of_the_metric() {
+    let mut numbers = Numbers(30);
+    let pairs = messy(&mut numbers, 50);
+    let expected = PointToPlane.system(&pairs).unwrap();
+    let same = ["gauss-newton", "levenberg-marquardt", "metric-schedule"];
+    let mut found = 0;
+    for (name, mut wrapped) in around(&PointToPlane) {
+        let system = wrapped.system(&pairs).unwrap();
+        if same.contains(&name) {
+            assert_eq!(system, expected, "{name}");
+            found += 1;
+        }
+    }
+    assert_eq!(found, same.len());
 }
 
 #[test]
