@@ -320,13 +320,12 @@ fn plane_fit<const N: usize>(
     let (nx, ny) = (n * b * fx, n * c * fy);
     let nz = w0 - x * nx - y * ny;
     let norm = (nx * nx + ny * ny + nz * nz).map(f64::sqrt);
-    // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
-    let determined = determinant - Lanes::all(1e-3) * n * (suu + svv);
     let scale = norm.map(|norm| -1.0 / norm);
     let mut normal = [nx * scale, ny * scale, nz * scale];
     for lane in 0..N {
         let fitted = (n.0[lane] >= MIN_SUPPORT)
-            & (determined.0[lane] > 0.0)
+            // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
+            & (determinant.0[lane] > 0.0)
             & (w0.0[lane] > 0.0)
             & (norm.0[lane] < f64::INFINITY);
         for component in &mut normal {
