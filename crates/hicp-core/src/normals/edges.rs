@@ -208,6 +208,71 @@ impl BitRows {
 mod tests {
     use super::*;
 
+    /// Rows of bits beside the same pixel by pixel: what was set, by the bytes of runs that begin anywhere and cross the words' borders.
+    fn bits_and_pixels(region: &PixelRegion, seed: usize) -> (BitRows, Vec<Vec<bool>>) {
+        let (width, height) = (region.width(), region.height());
+        let mut bits = BitRows::new(region);
+        let mut pixels = vec![vec![false; width]; height];
+        for (v, row) in pixels.iter_mut().enumerate() {
+            // Words are half full, or mostly empty.
+            let every = if v % 2 == 0 { 2 } else { 7 };
+            for first in [seed + 5 * v, (seed * 37 + 11 * v) % width] {
+                let is_set = |u: usize| (31 * u * u + seed * u + v).is_multiple_of(every);
+                let end = width.min(first + 40 + v);
+                let run: Vec<u8> = (first..end).map(|u| u8::from(is_set(u))).collect();
+                assert_eq!(bits.set(v, first, &run), run.contains(&1));
+                for (u, set) in (first..).zip(run) {
+                    row[u] |= set == 1;
+                }
+            }
+        }
+        (bits, pixels)
+    }
+
+    #[test]
+    fn bits_are_those_that_were_set() {
+        for (seed, width) in (0..).zip([65, 70, 128, 131, 200]) {
+            let region = PixelRegion::of_image(width, 8);
+            let (bits, pixels) = bits_and_pixels(&region, seed);
+            let width = region.width();
+            for (v, row) in pixels.iter().enumerate() {
+                for u in 0..width {
+                    for count in [1, 6, 7, 63] {
+                        let set = |i: &usize| row.get(u + i).is_some_and(|set| *set);
+                        let expected: u64 = (0..count).filter(set).map(|i| 1 << i).sum();
+                        assert_eq!(bits.get(u, v, count), expected, "{u} {v} {count}");
+                    }
+                }
+                for end in [width, width - 1, 64, 63, 1] {
+                    let expected: Vec<usize> = (0..end).filter(|u| row[*u]).collect();
+                    assert_eq!(bits.columns(v, end).collect::<Vec<_>>(), expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn dilation_of_crowds_is_that_of_each() {
+        for (seed, width) in (0..).zip([65, 70, 131, 200]) {
+            let region = PixelRegion::of_image(width, 8);
+            for radius in 0..=3_usize {
+                let (mut bits, pixels) = bits_and_pixels(&region, seed);
+                bits.dilate(radius);
+                for v in 0..8_usize {
+                    let rows = &pixels[v.saturating_sub(radius)..(v + radius + 1).min(8)];
+                    let near = |u: &usize| {
+                        let columns =
+                            u.saturating_sub(radius)..(u + radius + 1).min(region.width());
+                        rows.iter().any(|row| row[columns.clone()].contains(&true))
+                    };
+                    let expected: Vec<usize> = (0..region.width()).filter(near).collect();
+                    let found: Vec<usize> = bits.columns(v, region.width()).collect();
+                    assert_eq!(found, expected, "{width} {radius}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn dilation_is_by_rows_and_columns() {
         let region = PixelRegion {

@@ -58,10 +58,10 @@ pub(crate) fn estimate_normals(
     patch: &DepthPatch<'_>,
     mut found: impl FnMut(usize, usize, &[[f32; 3]]),
 ) {
-    let (width, height) = (patch.region.width(), patch.region.height());
-    if width == 0 || height == 0 {
+    if patch.region.is_empty() {
         return;
     }
+    let (width, height) = (patch.region.width(), patch.region.height());
     let spans: Vec<_> = (0..height).map(|v| used(patch.row(v))).collect();
     let noise = relative_noise(patch);
     let focal = patch.camera.fx().min(patch.camera.fy());
@@ -146,4 +146,27 @@ fn window_radius(slope_noise_per_pixel: f64) -> usize {
             side * side * r * (r + 1.0) / 3.0 >= needed
         })
         .unwrap_or(*RADIUS.end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_window_is_the_smallest_whose_slope_is_good_enough() {
+        // Σu² over a full window, pixel by pixel.
+        let squares = |r: i32| -> f64 {
+            let row: i32 = (-r..=r).map(|u| u * u).sum();
+            f64::from((2 * r + 1) * row)
+        };
+        assert_eq!(window_radius(0.0), 2);
+        assert_eq!(window_radius(f64::INFINITY), 10);
+        for r in 2..=10_u8 {
+            // The noise at which the standard error is just what it may be.
+            let noise = SLOPE_ERROR * squares(r.into()).sqrt();
+            let r = usize::from(r);
+            assert_eq!(window_radius(noise * (1.0 - 1e-9)), r);
+            assert_eq!(window_radius(noise * (1.0 + 1e-9)), (r + 1).min(10));
+        }
+    }
 }
