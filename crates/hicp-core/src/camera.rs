@@ -115,7 +115,7 @@ impl PinholeCamera {
     ///
     /// # Errors
     ///
-    /// As [`PinholeCamera::new`], and when K has a skew or its last row is not (0, 0, 1).
+    /// As [`PinholeCamera::new`], and when K has a skew or its last row is not (0, 0, 1), by more than 1e-6.
     pub fn from_matrix(k: &Matrix3<f64>, width: u32, height: u32) -> Result<Self, CameraError> {
         for (row, column, expected) in [
             (0, 1, 0.0),

@@ -17,7 +17,7 @@ use crate::surfel::Surfel;
 ///
 /// Immutable. The whole depth image and the mask are kept apart: correspondences come from inside the mask, but the score
 /// needs what stands in front of the object. Vertex and normal maps cover the mask's bounding box only; a pixel has a surfel
-/// when it is masked, has a depth, and enough neighbours on its own side of the depth edges to carry a normal.
+/// when it is masked, has a depth of at least 0.1 mm, and enough neighbours on its own side of the depth edges to carry a normal.
 ///
 /// An empty mask or a depth image of zeros makes an observation without surfels; refining against it ends with "no pairs".
 ///
@@ -101,7 +101,7 @@ impl Observation {
         );
         let nothing = Surfel {
             point: Point3::origin(),
-            normal: UnitVector3::new_unchecked(-Vector3::z()),
+            normal: Vector3::z_axis(),
         };
         let mut surfels = Vec::with_capacity(region.area());
         let mut n_surfels = 0;

@@ -177,6 +177,12 @@ fn a_calibration_matrix_is_read_and_any_other_matrix_named() {
         assert_eq!((r, c, found.to_bits()), (row, column, value.to_bits()));
         assert_eq!(expected, if row == 2 && column == 2 { 1.0 } else { 0.0 });
     }
+    // Rounding passes up to 1e-6, which is what a calibration's printed digits leave.
+    let mut rounded = k;
+    rounded[(0, 1)] = 1e-6;
+    assert_eq!(PinholeCamera::from_matrix(&rounded, 640, 480), Ok(camera));
+    rounded[(0, 1)] = 1e-6_f64.next_up();
+    assert!(PinholeCamera::from_matrix(&rounded, 640, 480).is_err());
     // A transposed matrix, the most common slip, does not pass.
     assert!(PinholeCamera::from_matrix(&k.transpose(), 640, 480).is_err());
 }

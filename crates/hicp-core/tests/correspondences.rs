@@ -1,5 +1,7 @@
 //! The list that associations write and metrics read.
 
+#![allow(clippy::float_cmp)] // Numbers that are exact.
+
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3};
 
 fn pair(x: f32) -> Pair {
@@ -39,7 +41,61 @@ fn room_that_was_made_is_used_and_kept() {
         pairs.push(pair(f32::from(i)));
     }
     assert_eq!((pairs.len(), pairs.as_slice().as_ptr()), (100, place));
+    let kept = pairs.as_slice().iter().map(|p| p.source.point.x);
+    assert!(kept.eq((0..100_u8).map(f32::from)));
+    assert!(!pairs.is_empty());
     pairs.begin(&Isometry3::identity(), 0);
     pairs.push(pair(0.0));
     assert_eq!(pairs.as_slice().as_ptr(), place);
+}
+
+/// Two lists that grow by turns would move, for each is in the way of the other.
+#[test]
+fn room_that_was_made_spares_the_pairs_from_moving() {
+    let mut lists = [Correspondences::new(), Correspondences::new()];
+    for list in &mut lists {
+        list.reserve(1000);
+        list.push(pair(0.0));
+    }
+    let places = lists.each_ref().map(|list| list.as_slice().as_ptr());
+    for _ in 1..1000 {
+        for list in &mut lists {
+            list.push(pair(1.0));
+        }
+    }
+    assert_eq!(lists.map(|list| list.as_slice().as_ptr()), places);
+}
+
+#[test]
+fn pairs_are_reweighted_kept_and_added_in_their_order() {
+    let xs = |pairs: &Correspondences| -> Vec<f32> {
+        let x = |p: &Pair| p.source.point.x;
+        pairs.as_slice().iter().map(x).collect()
+    };
+    let mut pairs: Correspondences = [4.0, 1.0, 3.0, 2.0].map(pair).into_iter().collect();
+    // All that were collected have asked for a pair; nothing moved them.
+    assert_eq!((pairs.n_candidates(), pairs.len()), (4, 4));
+    assert_eq!(pairs.camera_from_object(), &Isometry3::identity());
+    assert_eq!(xs(&pairs), [4.0, 1.0, 3.0, 2.0]);
+    pairs.retain(|p| p.source.point.x != 1.0);
+    assert_eq!(xs(&pairs), [4.0, 3.0, 2.0]);
+    pairs.extend([5.0, 1.0].map(pair));
+    assert_eq!(xs(&pairs), [4.0, 3.0, 2.0, 5.0, 1.0]);
+    assert_eq!(pairs.n_candidates(), 4);
+    for pair in pairs.as_mut_slice() {
+        pair.weight = pair.source.point.x / 2.0;
+    }
+    let weights = pairs.as_slice().iter().map(|p| p.weight);
+    assert!(weights.eq([2.0, 1.5, 1.0, 2.5, 0.5]));
+}
+
+#[test]
+fn the_distance_of_a_pair_is_that_of_its_points() {
+    let mut pair = pair(1.0);
+    assert_eq!(pair.distance(), 0.0);
+    pair.target.point = Point3::new(3.0, -3.0, 7.0);
+    // 2² + 3² + 6² = 7²
+    assert_eq!(pair.distance(), 7.0);
+    std::mem::swap(&mut pair.source, &mut pair.target);
+    assert_eq!((pair.distance(), pair.weight), (7.0, 1.0));
 }

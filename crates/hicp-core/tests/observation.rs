@@ -97,6 +97,19 @@ fn depths_that_no_camera_measures_are_missing() {
 }
 
 #[test]
+fn pixels_are_row_major_and_there_are_none_outside() {
+    let depth = DepthImage::from_meters(3, 2, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+    for v in 0..4 {
+        for u in 0..5 {
+            let inside = u < 3 && v < 2;
+            let expected = inside.then(|| (1 + u + 3 * v) as f32);
+            assert_eq!(depth.get(u, v), expected, "({u}, {v})");
+        }
+    }
+    assert_eq!(depth.get(u32::MAX, u32::MAX), None);
+}
+
+#[test]
 fn observations_of_one_image_share_its_depth() {
     let depth = Arc::new(DepthImage::from_meters(32, 24, vec![0.5; 32 * 24]).unwrap());
     let half = |left: bool| {
