@@ -5,7 +5,7 @@ use std::ops::Range;
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use crate::workspace::{Copy, output};
+use crate::working_copy::{WorkingCopy, output};
 
 /// A change of the code in one place.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,7 @@ pub(crate) struct Key {
 }
 
 /// All mutants of the crate.
-pub(crate) fn list(copy: &Copy) -> Result<Vec<Mutant>> {
+pub(crate) fn list(copy: &WorkingCopy) -> Result<Vec<Mutant>> {
     copy.restore()?;
     let said =
         output(&mut copy.cargo(&["mutants", "--list", "--json", "--package", &copy.package]))?;

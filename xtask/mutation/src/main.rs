@@ -14,7 +14,7 @@ mod report;
 mod schema;
 mod trial;
 mod viability;
-mod workspace;
+mod working_copy;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::listing::Mutant;
 use crate::report::Fate;
-use crate::workspace::Copy;
+use crate::working_copy::WorkingCopy;
 
 /// What the command line asks for.
 struct Options {
@@ -39,7 +39,7 @@ struct Options {
 
 fn main() -> Result<()> {
     let options = parse()?;
-    let copy = Copy::make(&options.root, &options.target, &options.package)?;
+    let copy = WorkingCopy::make(&options.root, &options.target, &options.package)?;
     let folder = options.target.join(&options.package);
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let mut mutants = listing::list(&copy)?;
@@ -68,7 +68,7 @@ fn main() -> Result<()> {
 }
 
 /// What became of each mutant.
-fn fates(copy: &Copy, mutants: &[Mutant], jobs: usize) -> Result<BTreeMap<usize, Fate>> {
+fn fates(copy: &WorkingCopy, mutants: &[Mutant], jobs: usize) -> Result<BTreeMap<usize, Fate>> {
     let mut fates = BTreeMap::new();
     let mut singles = Vec::new();
     viability::weave(copy, mutants, &mut fates, &mut singles)?;

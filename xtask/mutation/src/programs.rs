@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use serde_json::Value;
 
-use crate::workspace::{Copy, output};
+use crate::working_copy::{WorkingCopy, output};
 
 /// A test of a program.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub(crate) struct Test {
 }
 
 /// Builds the crate's unit and integration tests and lists them. Examples in the documentation are left out: each would be built anew.
-pub(crate) fn build(copy: &Copy) -> Result<Vec<Test>> {
+pub(crate) fn build(copy: &WorkingCopy) -> Result<Vec<Test>> {
     let said = output(&mut copy.cargo(&[
         "test",
         "--no-run",

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::programs::Test;
 use crate::report::Fate;
-use crate::workspace::Copy;
+use crate::working_copy::WorkingCopy;
 
 /// Tests below this are run in one process for all of a program, seconds; longer ones one by one, for the first to fail ends the trial.
 const SHORT: f64 = 0.05;
@@ -39,7 +39,7 @@ pub(crate) struct Reached {
 }
 
 /// Runs each test once, without a mutant, and says which mutants it reaches.
-pub(crate) fn trace(copy: &Copy, tests: &[Test]) -> Result<Vec<Reached>> {
+pub(crate) fn trace(copy: &WorkingCopy, tests: &[Test]) -> Result<Vec<Reached>> {
     let file = copy.target.join("reached.txt");
     let mut all = Vec::new();
     for test in tests {
@@ -63,7 +63,7 @@ pub(crate) fn trace(copy: &Copy, tests: &[Test]) -> Result<Vec<Reached>> {
 
 /// Tries mutants that are woven in, some at a time.
 pub(crate) fn try_woven(
-    copy: &Copy,
+    copy: &WorkingCopy,
     tests: &[Test],
     reached: &[Reached],
     mutants: &[usize],
@@ -95,7 +95,7 @@ pub(crate) fn try_woven(
     done.into_inner().map_err(|e| anyhow::anyhow!("{e}"))
 }
 
-fn try_one(copy: &Copy, tests: &[Test], reached: &[Reached], mutant: usize) -> Result<Fate> {
+fn try_one(copy: &WorkingCopy, tests: &[Test], reached: &[Reached], mutant: usize) -> Result<Fate> {
     let on = mutant.to_string();
     let mut short: HashMap<&Path, (Vec<&str>, f64)> = HashMap::new();
     let mut long = Vec::new();
@@ -147,7 +147,7 @@ fn file_stem(program: &Path) -> String {
 
 /// Tries what is built, with all tests, of which it is known how long they take without a mutant.
 pub(crate) fn try_built(
-    copy: &Copy,
+    copy: &WorkingCopy,
     tests: &[Test],
     usual: &BTreeMap<String, f64>,
 ) -> Result<Fate> {
@@ -169,7 +169,7 @@ pub(crate) fn try_built(
 
 /// A test program, with limits on its time and memory that a mutant may exceed. Property tests draw the same cases in each run, do not
 /// look for the least that fails, and leave nothing behind for the next.
-fn command(copy: &Copy, program: &Path, tests: &[&str], seconds: f64) -> Command {
+fn command(copy: &WorkingCopy, program: &Path, tests: &[&str], seconds: f64) -> Command {
     let mut command = Command::new("sh");
     let limits = format!(
         "ulimit -v {MEMORY}; ulimit -t {:.0}; exec \"$0\" \"$@\"",

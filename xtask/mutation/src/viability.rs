@@ -11,7 +11,7 @@ use crate::programs;
 use crate::report::Fate;
 use crate::schema::{self, SWITCH, Woven};
 use crate::trial;
-use crate::workspace::{Copy, write};
+use crate::working_copy::{WorkingCopy, write};
 
 /// Errors of types: a mutant in which the compiler sees one does not compile by itself either.
 const OF_TYPES: [&str; 8] = [
@@ -20,7 +20,7 @@ const OF_TYPES: [&str; 8] = [
 
 /// Writes the crate with all mutants that compile in it; notes those that do not, and those to be built alone.
 pub(crate) fn weave(
-    copy: &Copy,
+    copy: &WorkingCopy,
     mutants: &[Mutant],
     fates: &mut BTreeMap<usize, Fate>,
     singles: &mut Vec<usize>,
@@ -108,7 +108,7 @@ fn blame(woven: &Woven, error: &Error) -> (BTreeSet<usize>, BTreeSet<usize>) {
     (wrong, alone)
 }
 
-fn check(copy: &Copy) -> Command {
+fn check(copy: &WorkingCopy) -> Command {
     copy.cargo(&[
         "check",
         "--lib",
@@ -155,7 +155,11 @@ fn errors(command: &mut Command) -> Result<Vec<Error>> {
 }
 
 /// Tries a mutant by itself, in a build of its own.
-pub(crate) fn alone(copy: &Copy, mutant: &Mutant, usual: &BTreeMap<String, f64>) -> Result<Fate> {
+pub(crate) fn alone(
+    copy: &WorkingCopy,
+    mutant: &Mutant,
+    usual: &BTreeMap<String, f64>,
+) -> Result<Fate> {
     copy.restore()?;
     let mut text = copy.sources[&mutant.file].clone();
     text.replace_range(mutant.range.clone(), &mutant.replacement);

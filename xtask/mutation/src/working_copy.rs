@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 /// A copy of the workspace.
-pub(crate) struct Copy {
+pub(crate) struct WorkingCopy {
     /// Its folder.
     pub(crate) root: PathBuf,
     /// Where it is built.
@@ -18,7 +18,7 @@ pub(crate) struct Copy {
     pub(crate) sources: BTreeMap<String, String>,
 }
 
-impl Copy {
+impl WorkingCopy {
     /// Copies what is not yet there or has changed, so that what is built stays.
     pub(crate) fn make(root: &Path, target: &Path, package: &str) -> Result<Self> {
         let mut git = Command::new("git");
