@@ -8,11 +8,11 @@ use crate::fuser::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 
-/// Share of a distance that is rounding, and angle (rad) at a distance of zero.
-const ROUNDING: f64 = 1e-12;
+/// Share of a length that is rounding.
+const ROUNDING: f64 = 1e-13;
 
-/// Square of the sine of an angle below which two axes are one, declared twice.
-const PARALLEL: f64 = 1e-6;
+/// Square of the sine of an angle below which two axes are one, declared twice: ten degrees, for those of a sphere are far apart.
+const PARALLEL: f64 = 0.03;
 
 /// A fuser for an object with declared symmetries: each estimate is replaced by the equivalent pose nearest to what is held.
 ///
@@ -91,10 +91,12 @@ impl<F: Fuser> SymmetryAware<F> {
         reference: &Isometry3<f64>,
     ) -> Isometry3<f64> {
         let mut best = (*pose, self.distance(pose, reference));
+        let places = pose.translation.vector.norm() + reference.translation.vector.norm();
+        let rounding = ROUNDING * (self.radius + places);
         let mut consider = |candidate: Isometry3<f64>| {
             let distance = self.distance(&candidate, reference);
-            // By more than rounding, of which there is some where the distance is zero too: what is nearest already stays as it is.
-            if distance < best.1 * (1.0 - ROUNDING) - (ROUNDING * self.radius).powi(2) {
+            // By more than rounding, that of the lengths it is a difference of too: what is nearest already stays as it is.
+            if distance < best.1 * (1.0 - ROUNDING) - rounding {
                 best = (candidate, distance);
             }
         };
@@ -115,10 +117,11 @@ impl<F: Fuser> SymmetryAware<F> {
         best.0
     }
 
+    /// √(|φ|²r² + |Δc|²), metres.
     fn distance(&self, pose: &Isometry3<f64>, reference: &Isometry3<f64>) -> f64 {
         let (angle, _) = se3::pose_distance(pose, reference);
         let apart = pose * self.center - reference * self.center;
-        (angle * self.radius).powi(2) + apart.norm_squared()
+        (angle * self.radius).hypot(apart.norm())
     }
 }
 

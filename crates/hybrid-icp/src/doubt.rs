@@ -17,9 +17,9 @@ const DEPTH_RATIO: f64 = 3.0;
 /// How many times more pixels than the model can cover the mask may have.
 const MASK_RATIO: f64 = 10.0;
 
-/// How many times fewer pixels than the model could cover the mask may have. A thin object covers a twentieth of its disc, and a mask
-/// that is mostly occluded a fraction of that; a unit that is wrong by ten makes a hundred times the pixels.
-const SLIVER_RATIO: f64 = 100.0;
+/// How many times fewer pixels than the smallest side of the model's box the mask may have: nineteen twentieths may be occluded. A unit
+/// that is wrong by ten makes a hundred times the pixels.
+const SLIVER_RATIO: f64 = 20.0;
 
 /// Something that looks wrong about the inputs of a refinement, though none of them is refused. Lengths are metres.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -81,17 +81,18 @@ pub enum Doubt {
         /// z of the centre of the object.
         distance: f64,
     },
-    /// The object could cover a hundred times the pixels of the mask: probably a wrong unit of the mesh, or a mask of something else.
+    /// From its smallest side the object covers many more pixels than the mask has, which does not touch the border of the image: probably
+    /// a wrong unit of the mesh, or a mask of something else.
     #[error(
-        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) could cover {at_most:.0}",
+        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) covers {at_least:.0} from its smallest side",
         Meters(*diameter),
         Meters(*distance)
     )]
     Sliver {
         /// Pixels of the mask.
         pixels: usize,
-        /// Pixels of a disc of the model's diameter at its distance, in an image without end.
-        at_most: f64,
+        /// Pixels of the smallest side of the model's bounding box at its distance.
+        at_least: f64,
         /// Diameter of the model.
         diameter: f64,
         /// z of the centre of the object.
@@ -102,7 +103,7 @@ pub enum Doubt {
 /// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, metres.
 ///
 /// Nothing is refused for it: a caller with a person to tell tells them, a robot cell counts them. Cost: one look at the
-/// pixels of the mask's box.
+/// pixels of the mask's box, and one at the vertices.
 ///
 /// ```
 /// use hybrid_icp::*;
@@ -151,10 +152,12 @@ pub fn doubts(model: &Model, observation: &Observation, init: &Isometry3<f64>) -
             diameter,
             distance,
         });
-    } else if at_most > SLIVER_RATIO * pixels as f64 {
+    }
+    let at_least = camera.fx() * camera.fy() * smallest_side(model) / distance.powi(2);
+    if at_least > SLIVER_RATIO * pixels as f64 && !touches_border(observation) {
         doubts.push(Doubt::Sliver {
             pixels,
-            at_most,
+            at_least,
             diameter,
             distance,
         });
@@ -185,6 +188,29 @@ pub fn doubts_of_model(model: &Model) -> Vec<Doubt> {
         doubts.push(Doubt::CoarseCoordinates { step, diameter });
     }
     doubts
+}
+
+/// Area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
+fn smallest_side(model: &Model) -> f64 {
+    let vertices = model.mesh().vertices();
+    let mut sides = [0, 1, 2].map(|axis| {
+        let along = vertices.iter().map(|p| f64::from(p[axis]));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        (high - low).max(0.0)
+    });
+    sides.sort_by(f64::total_cmp);
+    sides[0] * sides[1]
+}
+
+/// Whether the mask goes on beyond the image, for all one can tell.
+fn touches_border(observation: &Observation) -> bool {
+    let (camera, region) = (observation.camera(), observation.region());
+    region.u_min == 0
+        || region.v_min == 0
+        || region.u_max == camera.width()
+        || region.v_max == camera.height()
 }
 
 /// A length as people write it, however large or small.

@@ -1,6 +1,6 @@
 //! Mutation testing of a crate with one build: `cargo xtask mutants`.
 //!
-//! cargo-mutants builds a crate anew for each of its mutants, which for thousands of them takes days. Here cargo-mutants only lists them
+//! cargo-mutants builds a crate anew for each of its mutants, which for thousands of them takes a day. Here cargo-mutants only lists them
 //! (`cargo mutants --list`); a copy of the crate is written that holds all of them at once, each behind a switch that an environment
 //! variable turns on ("mutant schemata", Untch, Offutt & Harrold 1993), and is built once. Each test is then run once to see which
 //! mutants it reaches, and each mutant is tried by the tests that reach it until one fails.

@@ -12,9 +12,9 @@ use crate::listing::{Key, Mutant};
 pub(crate) enum Fate {
     /// It is no program.
     DoesNotCompile,
-    /// A test failed.
+    /// A test failed, or ran out of the memory it may have.
     Caught,
-    /// A test did not end in time, or not within the memory it may have.
+    /// A test did not end in time.
     Late,
     /// No test failed, of so many that reach it.
     Missed { n_tests: usize },

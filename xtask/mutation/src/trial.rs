@@ -203,8 +203,7 @@ fn run(command: &mut Command) -> Result<End> {
     let mut pause = Duration::from_micros(500);
     loop {
         if let Some(status) = child.try_wait()? {
-            use std::os::unix::process::ExitStatusExt;
-            return Ok(match (status.success(), status.signal()) {
+            return Ok(match (status.success(), signal(status)) {
                 (true, _) => End::Passed,
                 (_, Some(SIGXCPU | SIGKILL)) => End::Late,
                 _ => End::Failed,
@@ -220,7 +219,19 @@ fn run(command: &mut Command) -> Result<End> {
     }
 }
 
-#[cfg(test)]
+/// The signal that ended a process.
+#[cfg(unix)]
+fn signal(status: std::process::ExitStatus) -> Option<i32> {
+    std::os::unix::process::ExitStatusExt::signal(&status)
+}
+
+/// There are none elsewhere; nor is there the shell that sets the limits.
+#[cfg(not(unix))]
+fn signal(_: std::process::ExitStatus) -> Option<i32> {
+    None
+}
+
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 

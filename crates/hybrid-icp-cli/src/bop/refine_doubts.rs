@@ -15,6 +15,7 @@ enum Kind {
     NoDepth,
     Depth,
     Mask,
+    Sliver,
 }
 
 impl Kind {
@@ -22,7 +23,8 @@ impl Kind {
         match doubt {
             Doubt::NoDepth => Some(Self::NoDepth),
             Doubt::Depth { .. } => Some(Self::Depth),
-            Doubt::Mask { .. } | Doubt::Sliver { .. } => Some(Self::Mask),
+            Doubt::Mask { .. } => Some(Self::Mask),
+            Doubt::Sliver { .. } => Some(Self::Sliver),
             // Models are looked at by themselves, and a pose behind the camera is a matter of its row.
             _ => None,
         }
@@ -35,6 +37,7 @@ impl Kind {
                 "check depth_scale in scene_camera.json, and that --results states millimetres"
             }
             Self::Mask => "check that models are in mm, and that --results states millimetres",
+            Self::Sliver => "check that models are in mm, and what the masks are of",
         }
     }
 }
