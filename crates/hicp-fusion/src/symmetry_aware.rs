@@ -95,8 +95,8 @@ impl<F: Fuser> SymmetryAware<F> {
         let rounding = ROUNDING * (self.radius + places);
         let mut consider = |candidate: Isometry3<f64>| {
             let distance = self.distance(&candidate, reference);
-            // By more than rounding, that of the lengths it is a difference of too: what is nearest already stays as it is.
-            if distance < best.1 * (1.0 - ROUNDING) - rounding {
+            // By more than the rounding of the lengths that it is a difference of: what is nearest already stays as it is.
+            if distance < best.1 - rounding {
                 best = (candidate, distance);
             }
         };

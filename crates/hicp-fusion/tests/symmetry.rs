@@ -259,22 +259,29 @@ fn a_pose_represents_itself() {
 /// Near what is held, and at any distance from the camera, where the renormalised pose is nearer by rounding only.
 #[test]
 fn a_pose_without_a_nearer_partner_stays_as_it_is() {
-    let fuser = aware(Symmetries {
+    let symmetries = Symmetries {
         discrete: vec![
             Isometry3::identity(),
             Isometry3::rotation(Vector3::z() * PI),
         ],
         continuous: vec![],
-    });
+    };
+    let inner = BatchFuser::average(FuserConfig::default());
+    let center = Point3::new(0.02, -0.03, 0.04);
+    let fuser = SymmetryAware::new(inner, symmetries, center, 0.1).unwrap();
     let mut random = Random(71);
-    for exponent in 1..10 {
-        let offset = 10_f64.powi(-exponent);
-        for _ in 0..100 {
-            let reference = random.pose(1.0);
-            let mut pose = reference * random.pose(offset);
-            pose.rotation =
-                UnitQuaternion::new_unchecked(pose.rotation.into_inner() * (1.0 + 1e-15));
-            assert_eq!(fuser.representative(&pose, &reference), pose, "{offset}");
+    for meters in [0.0, 1.0, 1e3] {
+        for exponent in 1..10 {
+            let offset = 10_f64.powi(-exponent);
+            for _ in 0..100 {
+                let mut reference = random.pose(1.0);
+                reference.translation.vector *= meters;
+                let mut pose = reference * random.pose(offset);
+                let quaternion = pose.rotation.into_inner() * (1.0 + 1e-15);
+                pose.rotation = UnitQuaternion::new_unchecked(quaternion);
+                let found = fuser.representative(&pose, &reference);
+                assert_eq!(found, pose, "{offset} at {meters} m");
+            }
         }
     }
 }
@@ -289,9 +296,13 @@ fn a_screw_is_turned_back_by_a_nanoradian() {
     };
     let inner = BatchFuser::average(FuserConfig::default());
     let fuser = SymmetryAware::new(inner, symmetries, Point3::origin(), 1e-3).unwrap();
-    let reference = turned(Vector3::y(), 0.7);
-    let found = fuser.representative(&(reference * axis.rotation(1e-9)), &reference);
-    assert!(apart(&found, &reference) < 1e-14);
+    // Far away a turn must be larger to be more than rounding: of 2e-13 m per metre.
+    for (far, angle, tolerance) in [(0.0, 1e-9, 1e-14), (1.0, 1e-9, 1e-14), (1e3, 1e-5, 1e-12)] {
+        let mut reference = turned(Vector3::y(), 0.7);
+        reference.translation.vector *= far;
+        let found = fuser.representative(&(reference * axis.rotation(angle)), &reference);
+        assert!(apart(&found, &reference) < tolerance, "{far}");
+    }
 }
 
 /// Upside down every angle about the axis is as far, and what rounding makes of it does not turn the object.
