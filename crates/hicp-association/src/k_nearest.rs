@@ -14,7 +14,7 @@ use crate::stride::Stride;
 /// The soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec (2002): the k matches
 /// average out part of the noise of single ones, at the price of a bias toward the middle of the neighbourhood. A model
 /// point has a total weight of 1, also where fewer than k points were observed. Pairs of one point are in order of distance,
-/// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k) per point.
+/// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k²) at most per point, for k is meant to be small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KNearest {
     /// How many observed points every model point is paired with; 0 counts as 1.

@@ -14,7 +14,7 @@ use crate::stride::Stride;
 ///
 /// Among the k closest observed points, the closest with n·m ≥ cos θ_max; no pair when none is. Where two sheets of the
 /// surface run side by side (a mug's wall, a thin plate) the plain nearest neighbour sits on the wrong one, and rejecting it
-/// afterwards leaves the point without a pair; this finds the one behind it. Cost: O(log n + k) per point.
+/// afterwards leaves the point without a pair; this finds the one behind it. Cost: O(log n + k²) at most per point, for k is meant to be small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalCompatible {
     /// Largest angle between the two normals, degrees; NaN and negative values pair nothing.

@@ -47,12 +47,15 @@ pub const MAX_IMAGE_SIDE: u32 = 32_768;
 /// any lens, and small enough that no pixel of a mesh that can be read is beyond the range of numbers.
 pub const MAX_FOCAL_LENGTH: f64 = 1e9;
 
+/// The shortest focal length accepted, in pixels: with less, all that a camera sees falls into one of its pixels.
+pub const MIN_FOCAL_LENGTH: f64 = 1e-3;
+
 impl PinholeCamera {
     /// Makes a camera whose pixel centres are at integers.
     ///
     /// # Errors
     ///
-    /// [`CameraError`] when a focal length is not above 0 and at most [`MAX_FOCAL_LENGTH`], the principal point is further away
+    /// [`CameraError`] when a focal length is not within [`MIN_FOCAL_LENGTH`] and [`MAX_FOCAL_LENGTH`], the principal point is further away
     /// than that or not a number, or a side of the image is zero or above [`MAX_IMAGE_SIDE`].
     pub fn new(
         fx: f64,
@@ -63,7 +66,7 @@ impl PinholeCamera {
         height: u32,
     ) -> Result<Self, CameraError> {
         for (name, value) in [("fx", fx), ("fy", fy)] {
-            if !(value > 0.0 && value <= MAX_FOCAL_LENGTH) {
+            if !(MIN_FOCAL_LENGTH..=MAX_FOCAL_LENGTH).contains(&value) {
                 return Err(CameraError::FocalLength { name, value });
             }
         }

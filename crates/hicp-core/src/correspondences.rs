@@ -91,6 +91,10 @@ impl Correspondences {
     }
 
     /// Makes room for `additional` more pairs.
+    ///
+    /// # Panics
+    ///
+    /// When they are more than memory can hold.
     pub fn reserve(&mut self, additional: usize) {
         self.pairs.reserve(additional);
     }

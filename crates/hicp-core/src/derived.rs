@@ -18,7 +18,8 @@ pub struct Derived {
 impl Derived {
     /// Returns the value of type `T` under `key`, building it first if nobody has.
     ///
-    /// Threads that ask for the same value wait for the one that builds it; others do not wait. Cost when present: one
+    /// Threads that ask for the same value wait for the one that builds it; others do not wait. `build` may ask for other values but not
+    /// for its own, for which it would wait for ever. Values live as long as their owner. Cost when present: one
     /// uncontended lock and a short scan, no allocation.
     pub fn get_or_build<T, F>(&self, key: u64, build: F) -> Arc<T>
     where

@@ -1,19 +1,27 @@
 //! The largest distance between two points of a set.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 const LEAF_SIZE: usize = 16;
 
 /// Returns the largest distance between two of the points, as BOP defines a model's diameter; 0 for fewer than two points.
+/// Points that are not finite do not count.
 ///
-/// Exact up to a relative 1e-9. A double sweep gives a lower bound, then pairs of nodes of a box tree are discarded by the
-/// largest distance between their boxes. Cost: about O(n log n) for surfaces.
+/// Exact up to a relative 1e-7, less than what rounding coordinates to `f32` changes. A double sweep gives a lower bound, then pairs of
+/// nodes of a box tree are discarded by the largest distance between their boxes, and by the cones in which the middle sees them, which
+/// spares round objects the pairs that are nearly as long as the longest. Cost: about O(n log n) for surfaces.
 #[must_use]
 pub fn diameter(points: &[Point3<f32>]) -> f64 {
-    let mut points: Vec<Point3<f64>> = points.iter().map(|p| p.cast::<f64>()).collect();
-    let Some(first) = points.first().copied() else {
-        return 0.0;
-    };
+    let finite = |p: &&Point3<f32>| p.iter().all(|x| x.is_finite());
+    let mut points: Vec<Point3<f64>> = points.iter().filter(finite).map(|p| p.cast()).collect();
+    match points.first().copied() {
+        Some(first) => farthest_pair(&mut points, first).best.sqrt(),
+        None => 0.0,
+    }
+}
+
+/// Searches points, which are reordered, from one of them on.
+fn farthest_pair(points: &mut [Point3<f64>], first: Point3<f64>) -> Search<'_> {
     let mut best = 0.0_f64;
     let mut from = first;
     for _ in 0..4 {
@@ -27,73 +35,129 @@ pub fn diameter(points: &[Point3<f32>]) -> f64 {
         best = best.max((farthest - from).norm_squared());
         from = farthest;
     }
-    let root = Node::build(&mut points, 0);
-    visit(&points, &root, &root, &mut best);
-    best.sqrt()
+    let (min, max) = bounds(points);
+    let root = Node::build(points, 0, &nalgebra::center(&min, &max));
+    let mut search = Search {
+        points,
+        best,
+        compared: 0,
+    };
+    search.visit(&root, &root);
+    search
+}
+
+fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
+    let first = (points[0], points[0]);
+    points
+        .iter()
+        .fold(first, |(min, max), p| (min.inf(p), max.sup(p)))
 }
 
 struct Node {
     min: Point3<f64>,
     max: Point3<f64>,
+    /// Largest distance from the middle of the whole.
+    radius: f64,
+    /// The axis of a cone from there that holds all points, and the largest angle to it, radians.
+    axis: Vector3<f64>,
+    angle: f64,
     start: usize,
     end: usize,
     children: Option<Box<(Node, Node)>>,
 }
 
 impl Node {
-    /// Builds the tree over `points`, which is reordered; `start` is the index of its first point in the whole.
-    fn build(points: &mut [Point3<f64>], start: usize) -> Self {
-        let (mut min, mut max) = (points[0], points[0]);
-        for p in &*points {
-            min = min.inf(p);
-            max = max.sup(p);
-        }
-        let end = start + points.len();
+    /// Builds the tree over `points`, which is reordered; `start` is the index of its first point in the whole. Points that coincide make
+    /// a leaf of one.
+    fn build(points: &mut [Point3<f64>], start: usize, middle_of_all: &Point3<f64>) -> Self {
+        let (min, max) = bounds(points);
+        let end = start + if min == max { 1 } else { points.len() };
         let axis = (max - min).imax();
         let children = (points.len() > LEAF_SIZE && max[axis] > min[axis]).then(|| {
             let middle = points.len() / 2;
             points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
             let (low, high) = points.split_at_mut(middle);
-            Box::new((Self::build(low, start), Self::build(high, start + middle)))
+            Box::new((
+                Self::build(low, start, middle_of_all),
+                Self::build(high, start + middle, middle_of_all),
+            ))
         });
+        let axis = (nalgebra::center(&min, &max) - middle_of_all)
+            .try_normalize(0.0)
+            .unwrap_or_default();
+        let (mut radius, mut angle) = (0.0_f64, 0.0_f64);
+        for p in &*points {
+            let from_middle = p - middle_of_all;
+            let distance = from_middle.norm();
+            radius = radius.max(distance);
+            // A point in the middle of all is in every cone.
+            angle = angle.max((axis.dot(&from_middle) / distance).clamp(-1.0, 1.0).acos());
+        }
         Self {
             min,
             max,
+            radius,
+            axis,
+            angle,
             start,
             end,
             children,
         }
     }
 
+    /// Bounds the squared distance of two points by the boxes that they are in.
     fn farthest_squared(&self, other: &Self) -> f64 {
         (self.max - other.min)
             .abs()
             .sup(&(other.max - self.min).abs())
             .norm_squared()
     }
+
+    /// Bounds it by how far they are from the middle of the whole, and by how far from opposite each other they are seen there at least.
+    fn farthest_squared_about_middle(&self, other: &Self) -> f64 {
+        let from_opposite = (-self.axis.dot(&other.axis)).clamp(-1.0, 1.0).acos();
+        let bend = (from_opposite - self.angle - other.angle).max(0.0);
+        let (a, b) = (self.radius, other.radius);
+        // Beyond a right angle the farthest two are not those that are farthest from the middle.
+        a * a + b * b + 2.0 * a * b * bend.cos().max(0.0)
+    }
 }
 
-fn visit(points: &[Point3<f64>], a: &Node, b: &Node, best: &mut f64) {
-    if a.farthest_squared(b) <= *best * (1.0 + 2e-9) {
-        return;
-    }
-    match (&a.children, &b.children) {
-        (None, None) => {
-            for p in &points[a.start..a.end] {
-                for q in &points[b.start..b.end] {
-                    *best = best.max((p - q).norm_squared());
+/// The search for the farthest pair.
+struct Search<'a> {
+    points: &'a [Point3<f64>],
+    /// The largest squared distance found.
+    best: f64,
+    /// How many pairs of points were looked at.
+    compared: u64,
+}
+
+impl Search<'_> {
+    fn visit(&mut self, a: &Node, b: &Node) {
+        let longest = self.best * (1.0 + 2e-7);
+        if a.farthest_squared(b) <= longest || a.farthest_squared_about_middle(b) <= longest {
+            return;
+        }
+        match (&a.children, &b.children) {
+            (None, None) => {
+                self.compared += ((a.end - a.start) * (b.end - b.start)) as u64;
+                for p in &self.points[a.start..a.end] {
+                    for q in &self.points[b.start..b.end] {
+                        self.best = self.best.max((p - q).norm_squared());
+                    }
                 }
             }
+            // No leaf has more points than a node that is none.
+            (Some(children), _) if a.end - a.start >= b.end - b.start => {
+                self.visit(&children.0, b);
+                self.visit(&children.1, b);
+            }
+            (_, Some(children)) => {
+                self.visit(a, &children.0);
+                self.visit(a, &children.1);
+            }
+            (Some(_), None) => {}
         }
-        (Some(children), _) if b.children.is_none() || a.end - a.start >= b.end - b.start => {
-            visit(points, &children.0, b, best);
-            visit(points, &children.1, b, best);
-        }
-        (_, Some(children)) => {
-            visit(points, a, &children.0, best);
-            visit(points, a, &children.1, best);
-        }
-        (Some(_), None) => {}
     }
 }
 
@@ -101,9 +165,9 @@ fn visit(points: &[Point3<f64>], a: &Node, b: &Node, best: &mut f64) {
 mod tests {
     use super::*;
 
-    /// Boxes hold their points tightly; halves share a node's points evenly; leaves are small, or one point many times.
-    fn check(points: &[Point3<f64>], node: &Node) {
-        let own = &points[node.start..node.end];
+    /// Boxes hold their points tightly; halves share a node's points evenly; leaves are small, or stand for points that coincide.
+    fn check(points: &[Point3<f64>], node: &Node, count: usize) {
+        let own = &points[node.start..node.start + count];
         for axis in 0..3 {
             let coordinates = || own.iter().map(|p| p[axis]);
             assert_eq!(coordinates().fold(f64::INFINITY, f64::min), node.min[axis]);
@@ -112,7 +176,14 @@ mod tests {
                 node.max[axis]
             );
         }
+        let from_middle = || own.iter().map(|p| p - Point3::new(0.5, 0.5, 0.5));
+        assert_eq!(
+            node.radius,
+            from_middle().map(|d| d.norm()).fold(0.0, f64::max)
+        );
+        assert!(from_middle().all(|d| d.angle(&node.axis) <= node.angle + 1e-7));
         let coincide = own.iter().all(|p| *p == own[0]);
+        assert_eq!(node.end, node.start + if coincide { 1 } else { count });
         assert_eq!(
             node.children.is_none(),
             own.len() <= LEAF_SIZE || coincide,
@@ -121,10 +192,10 @@ mod tests {
         );
         if let Some(children) = &node.children {
             let (low, high) = (&children.0, &children.1);
-            assert_eq!((low.start, high.end), (node.start, node.end));
-            assert_eq!((low.end, low.end - low.start), (high.start, own.len() / 2));
-            check(points, low);
-            check(points, high);
+            assert_eq!(low.start, node.start);
+            assert_eq!(high.start - low.start, count / 2);
+            check(points, low, count / 2);
+            check(points, high, count - count / 2);
         }
     }
 
@@ -142,10 +213,46 @@ mod tests {
                 heap.clone().collect(),
                 spiral.chain(heap).collect(),
             ] {
-                let root = Node::build(&mut points, 0);
-                assert_eq!((root.start, root.end), (0, points.len()));
-                check(&points, &root);
+                let root = Node::build(&mut points, 0, &Point3::new(0.5, 0.5, 0.5));
+                check(&points, &root, points.len());
             }
+        }
+    }
+
+    #[test]
+    fn every_pair_of_a_leaf_is_looked_at() {
+        let mut points: Vec<_> = (0..10)
+            .map(|i| Point3::new(f64::from(i).sin(), f64::from(i).cos(), 0.0))
+            .collect();
+        let first = points[0];
+        assert_eq!(farthest_pair(&mut points, first).compared, 100);
+    }
+
+    #[test]
+    #[allow(clippy::cast_possible_truncation)]
+    fn pairs_that_are_nearly_the_longest_are_not_all_looked_at() {
+        let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let count = 20_000;
+        let sphere = (0..count).map(|i| {
+            let along = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
+            let across = (1.0 - along * along).sqrt();
+            let (sin, cos) = (f64::from(i) * golden).sin_cos();
+            Point3::new(across * cos, across * sin, along).map(|x| f64::from(x as f32))
+        });
+        let ring = (0..count).map(|i| {
+            let (sin, cos) = (f64::from(i) * golden).sin_cos();
+            Point3::new(cos, sin, f64::from(i % 2)).map(|x| f64::from(x as f32))
+        });
+        let heaps = (0..count).map(|i| Point3::new(f64::from(i % 2), f64::from(i / 2 % 2), 0.0));
+        for (mut points, longest) in [
+            (sphere.collect::<Vec<_>>(), 2.0),
+            (ring.collect(), 5.0_f64.sqrt()),
+            (heaps.collect(), 2.0_f64.sqrt()),
+        ] {
+            let first = points[0];
+            let found = farthest_pair(&mut points, first);
+            assert!((found.best.sqrt() / longest - 1.0).abs() < 1e-6);
+            assert!(found.compared < 1_000_000, "{}", found.compared);
         }
     }
 }

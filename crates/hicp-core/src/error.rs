@@ -8,8 +8,9 @@ use thiserror::Error;
 pub enum CameraError {
     /// A focal length that is not positive or that no lens has.
     #[error(
-        "focal length {name} is {}, expected a number of pixels above 0 and at most {}",
+        "focal length {name} is {}, expected a number of pixels above 0, {} to {}",
         Number(*value),
+        crate::camera::MIN_FOCAL_LENGTH,
         crate::camera::MAX_FOCAL_LENGTH
     )]
     FocalLength {

@@ -180,6 +180,10 @@ impl Mask {
     }
 
     /// Makes a mask in which every pixel belongs to the object.
+    ///
+    /// # Panics
+    ///
+    /// When `width * height` bytes are more than memory can hold; no camera has sides above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     #[must_use]
     pub fn full(width: u32, height: u32) -> Self {
         let pixels = vec![true; width as usize * height as usize];

@@ -185,6 +185,12 @@ impl TriMesh {
         used
     }
 
+    /// The positions of the vertices that triangles use, in their order. Cost: O(triangles) at the first.
+    pub fn used_points(&self) -> impl Iterator<Item = Point3<f32>> + '_ {
+        let used = self.used_vertices().into_iter().zip(&self.vertices);
+        used.filter_map(|(used, vertex)| used.then_some(*vertex))
+    }
+
     /// Returns which way the triangles face; found on first use and kept. Cost: O(triangles) once.
     ///
     /// Vertices at the same position count as one, so that seams of texture coordinates do not open a mesh.

@@ -13,7 +13,7 @@ use crate::symmetry::Symmetries;
 /// What a [`Model`] is made with, besides its mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelConfig {
-    /// Number of area-uniform surface samples. The count hardly matters for accuracy between 300 and 3000.
+    /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES). The count hardly matters for accuracy between 300 and 3000.
     pub samples: usize,
     /// Diameter in metres where a dataset prescribes one; otherwise it is the largest distance between two used vertices.
     pub diameter: Option<f64>,
@@ -58,12 +58,7 @@ impl Model {
     /// A configured diameter that is not finite and positive is ignored.
     #[must_use]
     pub fn with_config(mesh: TriMesh, config: ModelConfig) -> Self {
-        let used: Vec<Point3<f32>> = mesh
-            .used_vertices()
-            .iter()
-            .zip(mesh.vertices())
-            .filter_map(|(used, vertex)| used.then_some(*vertex))
-            .collect();
+        let used: Vec<Point3<f32>> = mesh.used_points().collect();
         let first = used.first().copied().unwrap_or_else(Point3::origin);
         let (min, max) = used
             .iter()

@@ -25,6 +25,10 @@ pub struct RenderedView {
 
 impl RenderedView {
     /// Empties the view and makes it cover `region`. Allocates only when the region is larger than any before.
+    ///
+    /// # Panics
+    ///
+    /// When eight bytes per pixel are more than memory can hold; no camera has sides above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     pub fn reset(&mut self, region: PixelRegion) {
         self.region = region;
         self.depth.clear();
@@ -82,7 +86,8 @@ impl RenderedView {
 
     /// Returns the rendered surface at an image pixel, in the camera frame with the normal facing the camera.
     ///
-    /// `None` where nothing was rendered. `mesh`, `camera` and `camera_from_object` must be those of the render.
+    /// `None` where nothing was rendered, and for a triangle that `mesh` does not have. `mesh`, `camera` and `camera_from_object` must be
+    /// those of the render.
     #[must_use]
     pub fn surfel_at(
         &self,
@@ -97,7 +102,11 @@ impl RenderedView {
         if depth <= 0.0 {
             return None;
         }
-        let normal = mesh.normal(self.triangles[index] as usize)?;
+        let triangle = self.triangles[index] as usize;
+        if triangle >= mesh.triangles().len() {
+            return None;
+        }
+        let normal = mesh.normal(triangle)?;
         let point = camera.unproject(f64::from(u), f64::from(v), f64::from(depth));
         let normal = camera_from_object.rotation * normal.cast::<f64>().into_inner();
         let facing = if normal.dot(&point.coords) > 0.0 {

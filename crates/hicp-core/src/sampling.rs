@@ -3,7 +3,10 @@
 use crate::mesh::{Facing, TriMesh};
 use crate::surfel::Surfel;
 
-/// Returns `count` surfels spread evenly over the area of a mesh, in the object frame.
+/// The largest number of samples that a surface is given.
+pub const MAX_SAMPLES: usize = 10_000_000;
+
+/// Returns `count` surfels, at most [`MAX_SAMPLES`], spread evenly over the area of a mesh, in the object frame.
 ///
 /// Systematic sampling: the i-th sample stands at (i + ½)/count of the accumulated area, in the later of two triangles when
 /// that is their border, and inside its triangle at the i-th point of a low-discrepancy sequence: Roberts's R₂ from (½, ½), in
@@ -15,6 +18,7 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
     const STEP_1: f64 = 0.754_877_666_246_692_7;
     const STEP_2: f64 = 0.569_840_290_998_053_3;
 
+    let count = count.min(MAX_SAMPLES);
     let inward = mesh.facing() == Facing::Inward;
     let spacing = mesh.area() / count.max(1) as f64;
     let mut samples = Vec::with_capacity(count);

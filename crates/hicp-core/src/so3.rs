@@ -26,7 +26,7 @@ pub fn hat(phi: &Vector3<f64>) -> Matrix3<f64> {
     )
 }
 
-/// Returns exp(φ^), the rotation by |φ| radians about φ.
+/// Returns exp(φ^), the rotation by |φ| radians about φ, which must be finite: components up to 1e150.
 ///
 /// ```
 /// use nalgebra::Vector3;

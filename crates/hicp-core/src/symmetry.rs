@@ -7,6 +7,9 @@ use crate::error::SymmetryError;
 /// Rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
 pub const CONTINUOUS_STEPS: usize = 315;
 
+/// The largest number of motions that symmetries read from outside may stand for: a thousand times what any object has.
+pub const MAX_SYMMETRY_MOTIONS: usize = 1_000_000;
+
 /// A continuous rotational symmetry: any rotation about a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SymmetryAxis {
@@ -77,9 +80,21 @@ impl Symmetries {
         self.discrete.is_empty() && self.continuous.is_empty()
     }
 
+    /// Returns how many motions [`Symmetries::motions`] returns, without making them.
+    #[must_use]
+    pub fn n_motions(&self) -> usize {
+        let continuous = self.continuous.len().saturating_mul(CONTINUOUS_STEPS);
+        continuous.max(1).saturating_mul(self.discrete.len() + 1)
+    }
+
     /// Returns the symmetry motions as BOP expands them, the identity first.
     ///
     /// Every continuous symmetry is divided into [`CONTINUOUS_STEPS`] rotations, each composed with every discrete one (continuous ∘ discrete).
+    /// Readers refuse symmetries of more than [`MAX_SYMMETRY_MOTIONS`].
+    ///
+    /// # Panics
+    ///
+    /// When [`Symmetries::n_motions`] are more than memory can hold.
     #[must_use]
     pub fn motions(&self) -> Vec<Isometry3<f64>> {
         let mut discrete = vec![Isometry3::identity()];
@@ -87,8 +102,7 @@ impl Symmetries {
         if self.continuous.is_empty() {
             return discrete;
         }
-        let mut motions =
-            Vec::with_capacity(discrete.len() * self.continuous.len() * CONTINUOUS_STEPS);
+        let mut motions = Vec::with_capacity(self.n_motions());
         for axis in &self.continuous {
             for step in 0..CONTINUOUS_STEPS {
                 let rotation =

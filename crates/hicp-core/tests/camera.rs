@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss)]
 
 use hicp_core::{
-    CameraError, DepthImage, ImageError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, Matrix3, PinholeCamera,
-    PixelCenters, Point3,
+    CameraError, DepthImage, ImageError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH,
+    Matrix3, PinholeCamera, PixelCenters, Point3,
 };
 
 fn camera() -> PinholeCamera {
@@ -72,7 +72,17 @@ fn centers_at_halves_shift_the_principal_point_by_half_a_pixel() {
 #[test]
 fn impossible_focal_lengths_and_centers_are_named() {
     let beyond = MAX_FOCAL_LENGTH * (1.0 + f64::EPSILON);
-    for value in [0.0, -1.0, beyond, f64::MAX, f64::NAN, f64::INFINITY] {
+    let below = MIN_FOCAL_LENGTH * (1.0 - f64::EPSILON);
+    for value in [
+        0.0,
+        -1.0,
+        1e-200,
+        below,
+        beyond,
+        f64::MAX,
+        f64::NAN,
+        f64::INFINITY,
+    ] {
         for name in ["fx", "fy"] {
             let (fx, fy) = if name == "fx" {
                 (value, 1.0)
@@ -110,13 +120,20 @@ fn the_longest_focal_length_is_accepted_and_the_message_states_it() {
     for (cx, cy) in [(far, -far), (-far, far)] {
         assert!(PinholeCamera::new(far, far, cx, cy, 1, 1).is_ok());
     }
+    let near = MIN_FOCAL_LENGTH;
+    let camera = PinholeCamera::new(near, near, 0.0, 0.0, 2, 2).unwrap();
+    let distances = DepthImage::from_meters(2, 2, vec![0.0, 1.0, 0.0, 1.0])
+        .unwrap()
+        .to_distance(&camera)
+        .unwrap();
+    assert!(distances.pixels().iter().all(|d| d.is_finite()));
     let told = |fx, cx| {
         let refused = PinholeCamera::new(fx, 1.0, cx, 0.0, 1, 1);
         refused.unwrap_err().to_string()
     };
     assert_eq!(
         told(2e9, 0.0),
-        "focal length fx is 2000000000, expected a number of pixels above 0 and at most 1000000000"
+        "focal length fx is 2000000000, expected a number of pixels above 0, 0.001 to 1000000000"
     );
     assert_eq!(
         told(1.0, -2e9),

@@ -50,9 +50,9 @@ proptest! {
     #[test]
     fn diameter_is_the_brute_force_one(points in cloud()) {
         let (found, expected) = (diameter(&points), brute_force(&points));
-        // The promise: a relative 1e-9, and never more than there is.
+        // The promise: a relative 1e-7, and never more than there is.
         prop_assert!(found <= expected * (1.0 + 4.0 * f64::EPSILON));
-        prop_assert!(found >= expected * (1.0 - 1.1e-9), "{} of {}", found, expected);
+        prop_assert!(found >= expected * (1.0 - 1.1e-7), "{} of {}", found, expected);
     }
 }
 
@@ -61,6 +61,11 @@ fn no_points_and_one_point_have_no_diameter() {
     assert_eq!(diameter(&[]), 0.0);
     assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0)]), 0.0);
     assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0); 100]), 0.0);
+    let unknown = [f32::NAN, f32::INFINITY].map(|x| Point3::new(0.0, x, 0.0));
+    assert_eq!(diameter(&unknown), 0.0);
+    let mut points = vec![Point3::origin(), Point3::new(0.0, 0.0, 2.0)];
+    points.extend(unknown);
+    assert_eq!(diameter(&points), 2.0);
 }
 
 /// On a sphere nearly every point has a partner nearly as far as the farthest, so that going from point to farthest point ends at
@@ -76,14 +81,14 @@ fn the_farthest_pair_is_found_where_many_are_nearly_as_far() {
             .collect();
         let expected = brute_force(&points);
         misled += usize::from(sweeps(&points) < expected * (1.0 - 1e-6));
-        assert!((diameter(&points) - expected).abs() < 1.1e-9 * expected);
+        assert!((diameter(&points) - expected).abs() < 1.1e-7 * expected);
         // Nor does it matter how often one of the two is there.
         let end = *points
             .iter()
             .max_by(|a, b| reach(&points, a).total_cmp(&reach(&points, b)))
             .unwrap();
         points.extend([end; 150]);
-        assert!((diameter(&points) - expected).abs() < 1.1e-9 * expected);
+        assert!((diameter(&points) - expected).abs() < 1.1e-7 * expected);
     }
     assert!(misled > 50, "{misled}");
 }
@@ -131,5 +136,5 @@ fn a_million_points_of_a_surface_are_no_hardship() {
         .collect();
     let expected = 2.0 * f64::from(0.05_f32);
     let found = diameter(&points);
-    assert!((found - expected).abs() < 1.1e-9 * expected, "{found}");
+    assert!((found - expected).abs() < 1.1e-7 * expected, "{found}");
 }

@@ -176,6 +176,7 @@ fn unused_vertices_are_known() {
         mesh.used_vertices(),
         [true, true, false, true, true, true, true]
     );
+    assert!(mesh.used_points().eq(wedge().vertices().iter().copied()));
     assert_eq!(mesh.facing(), Facing::Outward);
 }
 

@@ -5,8 +5,8 @@
 mod support;
 
 use hicp_core::{
-    Facing, Isometry3, Model, ModelConfig, Point3, Symmetries, SymmetryAxis, TriMesh, Vector3,
-    sample_surface,
+    Facing, Isometry3, MAX_SAMPLES, Model, ModelConfig, Point3, Symmetries, SymmetryAxis, TriMesh,
+    Vector3, sample_surface,
 };
 use proptest::prelude::*;
 use support::{Numbers, cuboid, wedge};
@@ -84,6 +84,17 @@ fn samples_of_a_closed_mesh_point_outward_however_it_is_wound() {
             assert!(sample.normal.dot(&sample.point.coords) > 0.0);
         }
     }
+}
+
+#[test]
+fn samples_have_a_limit() {
+    let corners = vec![
+        Point3::origin(),
+        Point3::new(1.0, 0.0, 0.0),
+        Point3::new(0.0, 1.0, 0.0),
+    ];
+    let mesh = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
+    assert_eq!(sample_surface(&mesh, usize::MAX).len(), MAX_SAMPLES);
 }
 
 #[test]

@@ -8,7 +8,10 @@
 
 mod support;
 
-use hicp_core::{DepthImage, Mask, Observation, PinholeCamera, Vector3};
+use hicp_core::{
+    DepthImage, MAX_DEPTH_METERS, MAX_FOCAL_LENGTH, MIN_FOCAL_LENGTH, Mask, Observation,
+    PinholeCamera, Vector3,
+};
 use support::{Numbers, degrees_between};
 
 fn image(camera: &PinholeCamera, depth: impl Fn(u32, u32) -> f32) -> Observation {
@@ -141,12 +144,31 @@ fn lines_of_every_slope_determine_no_normal() {
     }
 }
 
-/// Focal lengths so short that the slopes of rays are beyond the range of numbers, along one axis or both.
+/// The widest and the narrowest rays there are, along one axis or both, of the nearest and furthest surfaces: points, the squares of
+/// their distances and normals are still numbers.
 #[test]
-fn a_camera_without_finite_rays_has_no_surfels() {
-    for (cx, cy) in [(-1e9, 0.0), (0.0, 1e9), (1e9, 1e9), (-1e9, 1e9)] {
-        let camera = PinholeCamera::new(1e-300, 1e-300, cx, cy, 9, 9).unwrap();
-        let observation = image(&camera, |u, v| 0.5 + 0.01 * u as f32 + 0.003 * v as f32);
-        assert_eq!((observation.n_surfels(), observation.n_measured()), (0, 81));
+fn a_camera_at_its_limits_has_finite_surfels() {
+    for focal in [MIN_FOCAL_LENGTH, MAX_FOCAL_LENGTH] {
+        let mut n_surfels = 0;
+        for (cx, cy) in [(-1e9, 0.0), (0.0, 1e9), (1e9, 1e9), (-1e9, 1e9), (4.0, 4.0)] {
+            let camera = PinholeCamera::new(focal, focal, cx, cy, 9, 9).unwrap();
+            // No steeper than pixels are wide.
+            let slope = (1.0 / focal).min(1.0) as f32;
+            for scale in [2e-4, 1.0, 1.5 * MAX_DEPTH_METERS] {
+                let observation = image(&camera, |u, v| {
+                    scale * (0.5 + slope * (0.01 * u as f32 + 0.003 * v as f32))
+                });
+                assert_eq!(observation.n_measured(), 81);
+                n_surfels += observation.n_surfels();
+                for (_, surfel) in observation.surfels(1) {
+                    assert!(surfel.point.coords.norm_squared().is_finite());
+                    assert!(
+                        (surfel.normal.norm() - 1.0).abs() < 1e-6,
+                        "{focal} {cx} {cy} {scale} {surfel:?}"
+                    );
+                }
+            }
+        }
+        assert!(n_surfels > 0, "{focal}");
     }
 }

@@ -120,6 +120,12 @@ fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_t
     let turned = |[a, b, c]: &[u32; 3]| [*a, *c, *b];
     let inward = outward.triangles().iter().map(turned).collect();
     let inward = TriMesh::new(outward.vertices().to_vec(), inward).unwrap();
+    // Of which a view of the whole shows triangles that are not there.
+    let one = TriMesh::new(
+        outward.vertices().to_vec(),
+        outward.triangles()[..1].to_vec(),
+    )
+    .unwrap();
     let mut judged = 0;
     for pose in poses(6) {
         for mesh in [&outward, &inward] {
@@ -129,6 +135,10 @@ fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_t
             let view = fresh(mesh, &camera, &pose, &part);
             for (u, v) in (0..36).flat_map(|v| (0..48).map(move |u| (u, v))) {
                 let surfel = whole.surfel_at(u, v, mesh, &camera, &pose);
+                assert_eq!(whole.surfel_at(u, v, &one, &camera, &pose).is_some(), {
+                    let index = camera.region().index(u, v).unwrap();
+                    whole.triangles()[index] == 0
+                });
                 assert_eq!(surfel.is_some(), whole.depth_at(u, v) > 0.0);
                 let of_part = view.surfel_at(u, v, mesh, &camera, &pose);
                 assert_eq!(of_part, surfel.filter(|_| part.contains(u, v)));

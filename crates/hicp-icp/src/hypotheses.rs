@@ -73,20 +73,26 @@ impl<'a> Hypotheses<'a> {
             .filter_map(|rotation| self.place(&rotation))
     }
 
-    /// The hypotheses of a set of rotations.
+    /// The hypotheses of a set of rotations, `None` for a rotation that is outside of the bound: whoever has a time limit looks at the clock
+    /// there too.
     pub(crate) fn of(
         &self,
         rotations: Rotations,
         count: usize,
-    ) -> impl Iterator<Item = Isometry3<f64>> + use<'_> {
+    ) -> impl Iterator<Item = Option<Isometry3<f64>>> + use<'_> {
+        let symmetries = self.model.symmetries();
         // Of a bounded search as many hypotheses fall into the bound.
         let grid = match (rotations, self.bound) {
             (Rotations::Even, Some(bound)) => enlarged(count, bound.rotation_degrees.to_radians()),
+            (Rotations::Symmetry, _) if symmetries.continuous.is_empty() => {
+                count.min(symmetries.discrete.len())
+            }
             _ => count,
         };
-        (0..grid)
-            .filter_map(move |index| self.rotation(rotations, index, grid))
-            .filter_map(|rotation| self.place(&rotation))
+        (0..grid).map(move |index| {
+            self.rotation(rotations, index, grid)
+                .and_then(|rotation| self.place(&rotation))
+        })
     }
 
     fn rotation(

@@ -175,11 +175,15 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
         let hypotheses = from
             .neighbors(init)
             .chain(from.neighbors(local))
+            .map(Some)
             .chain(from.of(options.rotations, options.hypotheses));
         for pose in hypotheses {
             if clock.is_over() {
                 return;
             }
+            let Some(pose) = pose else {
+                continue;
+            };
             let mut context = session.workspace.context(problem);
             let score = self.ranking.score(&mut context, &pose);
             self.list(score, pose);

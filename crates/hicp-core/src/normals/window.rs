@@ -319,6 +319,7 @@ fn plane_fit<const N: usize>(
     let w0 = w * determinant + b * (n * u0 - u) + c * (n * v0 - v);
     let (nx, ny) = (n * b * fx, n * c * fy);
     let nz = w0 - x * nx - y * ny;
+    // A number: with the limits of a camera and of the depths that are fitted, the squares stay below 1e90.
     let norm = (nx * nx + ny * ny + nz * nz).map(f64::sqrt);
     let scale = norm.map(|norm| -1.0 / norm);
     let mut normal = [nx * scale, ny * scale, nz * scale];
@@ -326,8 +327,7 @@ fn plane_fit<const N: usize>(
         let fitted = (n.0[lane] >= MIN_SUPPORT)
             // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
             & (determinant.0[lane] > 0.0)
-            & (w0.0[lane] > 0.0)
-            & (norm.0[lane] < f64::INFINITY);
+            & (w0.0[lane] > 0.0);
         for component in &mut normal {
             component.0[lane] = if fitted { component.0[lane] } else { 0.0 };
         }
