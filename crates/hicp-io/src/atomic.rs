@@ -13,7 +13,7 @@ use crate::error::IoError;
 /// `write` fills a temporary file in the same folder, which is flushed to the disk and then renamed over `path`. When
 /// anything fails the temporary file is removed and what was at `path` stays as it was; nobody ever sees half a file.
 /// A new file gets the permissions a newly created one gets (0666 without the umask on Unix), a replaced one keeps its own;
-/// a file that may not be written to is not replaced; a symbolic link is followed.
+/// a file that may not be written to is not replaced; a symbolic link is followed, also one to a file that is still to be made.
 /// What is not a regular file (a pipe, `/dev/stdout`) cannot be replaced and is written in place.
 ///
 /// # Errors
@@ -38,7 +38,7 @@ where
             .write(true)
             .open(path)
             .and_then(|file| fill(file, write).map(|_| ())),
-        Target::New => replace(path, None, write),
+        Target::New(file) => replace(&file, None, write),
         Target::Old(file, permissions) => replace(&file, Some(permissions), write),
     };
     written.map_err(|e| IoError::write(path, e))
@@ -59,8 +59,7 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
     let path = path.as_ref();
     let folder = match target_of(path)? {
         Target::Stream => return Ok(()),
-        Target::New => folder_of(path).to_owned(),
-        Target::Old(file, _) => folder_of(&file).to_owned(),
+        Target::New(file) | Target::Old(file, _) => folder_of(&file).to_owned(),
     };
     // The temporary file is gone when this returns.
     match temporary(&folder) {
@@ -69,12 +68,15 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
     }
 }
 
+/// Most links that are followed one after the other; systems follow fewer.
+const LINKS: usize = 64;
+
 /// What a path to be written leads to.
 enum Target {
     /// A pipe, a device: it cannot be replaced.
     Stream,
-    /// Nothing yet.
-    New,
+    /// Nothing yet: where it will be, with links followed.
+    New(PathBuf),
     /// A regular file, with links followed, and its permissions.
     Old(PathBuf, fs::Permissions),
 }
@@ -93,12 +95,33 @@ fn target_of(path: &Path) -> Result<Target, IoError> {
                 .map(|file| Target::Old(file, metadata.permissions()))
                 .map_err(failed)
         }
-        Err(_) if folder_of(path).is_dir() => Ok(Target::New),
-        Err(_) => Err(IoError::MissingFolder {
-            path: path.to_owned(),
-            folder: folder_of(path).to_owned(),
-        }),
+        Err(error) => {
+            let file = end_of_links(path, error).map_err(failed)?;
+            match folder_of(&file) {
+                folder if folder.is_dir() => Ok(Target::New(file)),
+                folder => Err(IoError::MissingFolder {
+                    path: path.to_owned(),
+                    folder: folder.to_owned(),
+                }),
+            }
+        }
     }
+}
+
+/// Where a path leads at which there is no file, which is what `error` said: renaming would replace a link instead of following it.
+fn end_of_links(path: &Path, error: io::Error) -> io::Result<PathBuf> {
+    let mut file = path.to_owned();
+    for _ in 0..LINKS {
+        if !fs::symlink_metadata(&file).is_ok_and(|found| found.is_symlink()) {
+            return Ok(file);
+        }
+        // A ring, or a folder that may not be entered.
+        if error.kind() != io::ErrorKind::NotFound {
+            return Err(error);
+        }
+        file = folder_of(&file).join(fs::read_link(&file)?);
+    }
+    Err(error)
 }
 
 /// The folder that a path is in.
@@ -243,5 +266,40 @@ mod tests {
         write_atomically(&link, |writer| writer.write_all(b"through")).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read_to_string(&atomic).unwrap(), "through");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_lead_to_files_that_are_still_to_be_made() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        fs::create_dir(at("below")).unwrap();
+        // Relative to the folder of the link, not to that of the program.
+        symlink("below/second", at("first")).unwrap();
+        symlink("new", at("below/second")).unwrap();
+        check_writable(at("first")).unwrap();
+        assert_eq!(names(&at("below")), ["second"]);
+        write_atomically(at("first"), |writer| writer.write_all(b"through")).unwrap();
+        for link in ["first", "below/second"] {
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink());
+        }
+        let made = fs::symlink_metadata(at("below/new")).unwrap();
+        assert!(made.is_file());
+        assert_eq!(fs::read(at("first")).unwrap(), b"through");
+
+        symlink("no/new", at("nowhere")).unwrap();
+        assert!(matches!(
+            check_writable(at("nowhere")),
+            Err(IoError::MissingFolder { path, folder }) if path == at("nowhere") && folder == at("no")
+        ));
+        symlink("ring", at("ring")).unwrap();
+        for result in [
+            check_writable(at("ring")),
+            write_atomically(at("ring"), |_| Ok(())),
+        ] {
+            assert!(matches!(result, Err(IoError::Write { path, .. }) if path == at("ring")));
+        }
+        assert!(fs::symlink_metadata(at("ring")).unwrap().is_symlink());
     }
 }

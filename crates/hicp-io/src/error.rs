@@ -197,7 +197,11 @@ pub enum IoError {
         z: f32,
     },
     /// A mesh that can be read but not used.
-    #[error("{} does not hold a usable mesh", path.display())]
+    #[error(
+        "{} does not hold a usable mesh{}",
+        path.display(),
+        match source { MeshError::NoArea { .. } => ", expected a triangle that has an area", _ => "" }
+    )]
     Mesh {
         /// The file.
         path: PathBuf,
@@ -449,11 +453,30 @@ impl IoError {
     pub(crate) fn at(path: &Path, place: Place, found: &str, expected: impl Into<String>) -> Self {
         match place {
             Place::Line(line) => Self::line(path, line, found, expected),
+            Place::Byte(_) => Self::unquoted(path, place, found, expected),
+        }
+    }
+
+    /// Something wrong at a place; `found` is not the text that stands there but says what it is.
+    pub(crate) fn unquoted(
+        path: &Path,
+        place: Place,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        let (path, found, expected) = (path.to_owned(), found.into(), expected.into());
+        match place {
+            Place::Line(line) => Self::Line {
+                path,
+                line,
+                found,
+                expected,
+            },
             Place::Byte(offset) => Self::Bytes {
-                path: path.to_owned(),
+                path,
                 offset,
-                found: found.to_owned(),
-                expected: expected.into(),
+                found,
+                expected,
             },
         }
     }

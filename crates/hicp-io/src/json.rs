@@ -1,8 +1,11 @@
 //! JSON values that know their file and their path of keys, so that every refusal can name both.
 
+use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
 
 use crate::error::{IoError, quote};
 use crate::limits::ReadLimits;
@@ -28,13 +31,12 @@ impl Document {
 
     fn parse(path: &Path, what: Limited, limit: u64) -> Result<Self, IoError> {
         let content = Source::open(path)?.read(what, limit)?;
-        let value = serde_json::from_slice(text_bytes(path, &content)?).map_err(|error| {
-            IoError::JsonSyntax {
-                path: path.to_owned(),
-                line: error.line(),
-                column: error.column(),
-                source: error.into(),
-            }
+        let parsed = serde_json::from_slice::<Unambiguous>(text_bytes(path, &content)?);
+        let Unambiguous(value) = parsed.map_err(|error| IoError::JsonSyntax {
+            path: path.to_owned(),
+            line: error.line(),
+            column: error.column(),
+            source: error.into(),
         })?;
         Ok(Self {
             path: path.to_owned(),
@@ -48,6 +50,76 @@ impl Document {
             key: "$".to_owned(),
             value: &self.value,
         }
+    }
+}
+
+/// A value in which no object has a key twice, of which one would be lost.
+struct Unambiguous(Value);
+
+impl<'de> Deserialize<'de> for Unambiguous {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ValueVisitor).map(Self)
+    }
+}
+
+struct ValueVisitor;
+
+impl<'de> Visitor<'de> for ValueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_string<E>(self, value: String) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Unambiguous(value)) = items.next_element()? {
+            values.push(value);
+        }
+        Ok(values.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some(key) = members.next_key::<String>()? {
+            if object.contains_key(&key) {
+                let key = quote(&key);
+                return Err(A::Error::custom(format!(
+                    "the key {key} twice in one object, expected it once"
+                )));
+            }
+            let Unambiguous(value) = members.next_value()?;
+            object.insert(key, value);
+        }
+        Ok(object.into())
     }
 }
 
@@ -99,7 +171,13 @@ impl<'a> Node<'a> {
             numbered.push((number, Self { path, key, value }));
         }
         numbered.sort_by_key(|(number, _)| *number);
-        Ok(numbered)
+        match numbered.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some([(number, _), (_, second)]) => Err(second.refuse_found(
+                format!("the number {number} a second time"),
+                "each number once",
+            )),
+            _ => Ok(numbered),
+        }
     }
 
     pub(crate) fn items(&self) -> Result<Vec<Self>, IoError> {
@@ -165,6 +243,41 @@ impl<'a> Node<'a> {
     }
 }
 
+/// Refuses to write a value of ours in which something is `null`: it was not a finite number.
+pub(crate) fn check_finite(value: &Value) -> io::Result<()> {
+    fn find(value: &Value, key: &mut String) -> bool {
+        let length = key.len();
+        let mut inside = |name: String, value| {
+            key.truncate(length);
+            key.push_str(&name);
+            find(value, key)
+        };
+        match value {
+            Value::Null => true,
+            Value::Array(items) => {
+                let mut items = items.iter().enumerate();
+                items.any(|(index, item)| inside(format!("[{index}]"), item))
+            }
+            Value::Object(members) => {
+                let mut members = members.iter();
+                members.any(|(name, member)| inside(format!(".{name}"), member))
+            }
+            _ => false,
+        }
+    }
+    let mut key = "$".to_owned();
+    if find(value, &mut key) {
+        return Err(not_finite(&key));
+    }
+    Ok(())
+}
+
+/// The error for a number that no file can state.
+pub(crate) fn not_finite(place: &str) -> io::Error {
+    let text = format!("{place} is not a finite number, expected one");
+    io::Error::new(io::ErrorKind::InvalidInput, text)
+}
+
 fn describe(value: &Value) -> String {
     match value {
         Value::Null => "null".to_owned(),
@@ -209,6 +322,34 @@ mod tests {
             Err(IoError::JsonSyntax { line, .. }) => assert_eq!(line, 2),
             other => panic!("{other:?}"),
         }
+    }
+
+    #[test]
+    fn what_is_there_twice_is_not_lost() {
+        for (text, at) in [
+            ("{\"a\": 1,\n \"a\": 2}", 2),
+            ("[\n{\"b\": {\"c\": 1}},\n{\"b\": {\"c\": 1, \"c\": 1}}]", 3),
+        ] {
+            match document(text) {
+                Err(IoError::JsonSyntax { line, source, .. }) => {
+                    assert_eq!(line, at);
+                    assert!(
+                        source.to_string().contains("twice in one object"),
+                        "{source}"
+                    );
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        let numbers = document("{\"2\": 1, \"1\": 0, \"000002\": 3}").unwrap();
+        let error = numbers.root().numbered().unwrap_err().to_string();
+        assert!(error.contains("the number 2 a second time"), "{error}");
+        let all = document("{\"a\": [null, true, -1, 18446744073709551615, 0.1, \"\\u00e9\", {}]}");
+        let text = all.unwrap().value.to_string();
+        assert_eq!(
+            text,
+            "{\"a\":[null,true,-1,18446744073709551615,0.1,\"é\",{}]}"
+        );
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod limits;
 pub use limits::ReadLimits;
 
 mod source;
+pub use source::is_absent;
 
 mod atomic;
 mod atomic_folder;

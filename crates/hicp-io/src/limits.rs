@@ -34,7 +34,7 @@ pub struct ReadLimits {
     pub max_vertices: u64,
     /// Triangles of a mesh: 10 million, after polygons are cut. `hicp_core::MAX_MESH_ELEMENTS` holds whatever stands here.
     pub max_triangles: u64,
-    /// Pixels of an image: 2²⁷. `hicp_core::MAX_IMAGE_SIDE` holds whatever stands here.
+    /// Pixels of an image: 2²⁵, four times those of a 4K camera. `hicp_core::MAX_IMAGE_SIDE` holds whatever stands here.
     pub max_pixels: u64,
     /// Rows of a result file: 10 million.
     pub max_rows: u64,
@@ -48,7 +48,7 @@ impl ReadLimits {
         max_small_json_bytes: 1 << 24,
         max_vertices: 10_000_000,
         max_triangles: 10_000_000,
-        max_pixels: 1 << 27,
+        max_pixels: 1 << 25,
         max_rows: 10_000_000,
     };
 

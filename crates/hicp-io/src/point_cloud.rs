@@ -42,7 +42,7 @@ pub fn read_point_cloud_ply(
         .map(|point| point.cast::<f32>())
         .collect();
     // A file states normals for all vertices or for none.
-    let without = |v: &ply::Vertex| v.value[3..].iter().all(|x| x.is_nan());
+    let without = |v: &ply::Vertex<6>| v.value[3..].iter().all(|x| x.is_nan());
     if vertices.iter().all(without) {
         return Ok(PointCloud {
             points,
@@ -169,7 +169,12 @@ mod tests {
                 ..
             })
         ));
-        for (names, body) in [("x y z", "0 nan 0"), ("x y z nx ny nz", "0 0 0 0 0 0")] {
+        for (names, body) in [
+            ("x y z", "0 nan 0"),
+            ("x y z nx ny nz", "0 0 0 0 0 0"),
+            // A mesh is read without them.
+            ("x y z nx ny nz", "0 0 0 0 0 -nan(ind)"),
+        ] {
             let properties: String = names
                 .split(' ')
                 .map(|name| format!("property float {name}\n"))

@@ -6,7 +6,7 @@ use hicp_core::{Isometry3, Matrix3, RotationError, Translation3, rotation_from_m
 
 use crate::atomic::write_atomically;
 use crate::error::IoError;
-use crate::json::{Document, Node};
+use crate::json::{Document, Node, check_finite};
 use crate::limits::ReadLimits;
 
 /// Returns the pose of a row-major rotation and a translation in millimetres; the pose is in metres.
@@ -81,11 +81,14 @@ impl ReadLimits {
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_pose_json(path: impl AsRef<Path>, pose: &Isometry3<f64>) -> Result<(), IoError> {
     let (rotation, translation) = pose_to_bop(pose);
     let value = serde_json::json!({ "cam_R_m2c": rotation, "cam_t_m2c": translation });
-    write_atomically(path, |writer| writeln!(writer, "{value}"))
+    write_atomically(path, |writer| {
+        check_finite(&value)?;
+        writeln!(writer, "{value}")
+    })
 }
 
 /// Reads the pose stated by two members of a JSON object.

@@ -4,8 +4,24 @@ use std::fs::{File, Metadata};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use crate::error::{IoError, Place};
+use crate::error::{END_OF_FILE, IoError, Place};
 use crate::limits::ReadLimits;
+
+/// Returns whether nothing is at a path.
+///
+/// What cannot be told counts as being there, so that reading it says why: a share that does not answer or a folder that may not be
+/// entered is no reason to go on as if a file had never been.
+///
+/// # Examples
+///
+/// ```
+/// assert!(hicp_io::is_absent("no/such/models_info.json"));
+/// assert!(!hicp_io::is_absent(std::env::temp_dir()));
+/// ```
+#[must_use]
+pub fn is_absent(path: impl AsRef<Path>) -> bool {
+    matches!(path.as_ref().try_exists(), Ok(false))
+}
 
 /// What is looked at before a file is read whole.
 const HEAD_BYTES: u64 = 1 << 16;
@@ -65,7 +81,25 @@ impl<'a> Source<'a> {
             .metadata()
             .map_err(|e| IoError::read(self.path, e))?;
         let written = |metadata: &Metadata| metadata.modified().ok();
-        if content.len() as u64 != expected || written(&now) != written(&self.opened) {
+        let read = content.len() as u64;
+        let is_touched = now.len() != expected || written(&now) != written(&self.opened);
+        if read != expected && !is_touched {
+            // Files that the system makes up as they are read, such as those of /proc, have any size; those that change twice within a tick
+            // of the clock of the file system seem untouched.
+            return Err(IoError::Bytes {
+                path: self.path.to_owned(),
+                offset: read.min(expected),
+                found: if read < expected {
+                    END_OF_FILE.to_owned()
+                } else {
+                    "more bytes".to_owned()
+                },
+                expected: format!(
+                    "a file of {expected} bytes, the size that the file system tells, that stays as it is while it is read"
+                ),
+            });
+        }
+        if is_touched {
             return Err(IoError::Changed {
                 path: self.path.to_owned(),
                 before: expected,
@@ -227,6 +261,23 @@ mod tests {
                 }
                 other => panic!("{name}: {other:?}"),
             }
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_of_another_size_than_it_states_is_refused_in_true_words() {
+        match read_bytes(Path::new("/proc/self/status"), 100) {
+            Err(IoError::Bytes {
+                offset: 0,
+                found,
+                expected,
+                ..
+            }) => {
+                assert_eq!(found, "more bytes");
+                assert!(expected.starts_with("a file of 0 bytes"), "{expected}");
+            }
+            other => panic!("{other:?}"),
         }
     }
 

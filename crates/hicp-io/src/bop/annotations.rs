@@ -10,6 +10,7 @@ use crate::error::IoError;
 use crate::json::{Document, Node};
 use crate::limits::ReadLimits;
 use crate::pose::pose_of;
+use crate::source::is_absent;
 
 /// The camera of an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,7 +104,7 @@ fn instances<T>(
     path: &Path,
     read: impl Fn(&Node<'_>) -> Result<T, IoError>,
 ) -> Result<Option<Instances<T>>, IoError> {
-    if !path.is_file() {
+    if is_absent(path) {
         return Ok(None);
     }
     by_image(limits, path, |node| {

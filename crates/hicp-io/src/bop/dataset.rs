@@ -10,6 +10,7 @@ use super::scene::Scene;
 use super::targets::Target;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
+use crate::source::is_absent;
 use crate::unit::LengthUnit;
 
 /// A dataset in BOP's layout: a folder with models, and with scenes in folders such as `test` or `test_primesense`.
@@ -83,7 +84,7 @@ impl Dataset {
         names
             .map(|name| self.root.join(name))
             .into_iter()
-            .find(|dir| dir.is_dir())
+            .find(|dir| !is_absent(dir))
             .ok_or_else(|| missing(self.root.join("models"), "folder of models"))
     }
 
@@ -166,11 +167,10 @@ impl Dataset {
 
     fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {
         let dir = self.root.join(split);
-        if dir.is_dir() {
-            Ok(dir)
-        } else {
-            Err(missing(dir, "split"))
+        if is_absent(&dir) {
+            return Err(missing(dir, "split"));
         }
+        Ok(dir)
     }
 }
 

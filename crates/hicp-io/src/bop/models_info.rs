@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, SymmetryError, Vector3};
+use hicp_core::{
+    Isometry3, MAX_SYMMETRY_MOTIONS, Point3, Symmetries, SymmetryAxis, SymmetryError, Vector3,
+};
 
 use crate::error::IoError;
 use crate::json::{Document, Node};
@@ -57,7 +59,7 @@ fn model_info(node: &Node<'_>) -> Result<ModelInfo, IoError> {
         node.optional(key)
             .map_or(Ok(Vec::new()), |node| node.items())
     };
-    Ok(ModelInfo {
+    let info = ModelInfo {
         diameter_m: diameter_mm / 1000.0,
         symmetries: Symmetries {
             discrete: list("symmetries_discrete")?
@@ -69,7 +71,20 @@ fn model_info(node: &Node<'_>) -> Result<ModelInfo, IoError> {
                 .map(continuous)
                 .collect::<Result<_, _>>()?,
         },
-    })
+    };
+    // They are expanded when errors are measured: lists of ten thousand each would be terabytes.
+    let motions = info.symmetries.n_motions();
+    if motions > MAX_SYMMETRY_MOTIONS {
+        return Err(node.refuse_found(
+            format!(
+                "{} discrete and {} continuous symmetries, which make {motions} motions",
+                info.symmetries.discrete.len(),
+                info.symmetries.continuous.len()
+            ),
+            format!("at most {MAX_SYMMETRY_MOTIONS}"),
+        ));
+    }
+    Ok(info)
 }
 
 /// A rigid motion as a row-major 4×4 matrix in millimetres.
@@ -154,6 +169,20 @@ mod tests {
                 "{bad}"
             );
         }
+        let axes = |count| {
+            format!(
+                r#", "symmetries_continuous": [{}]"#,
+                vec![r#"{"axis": [0,0,1], "offset": [0,0,0]}"#; count].join(", ")
+            )
+        };
+        assert!(model(&axes(3174)).is_ok());
+        let error = model(&axes(3175)).unwrap_err().to_string();
+        assert!(
+            error.contains(
+                "$.3: found 0 discrete and 3175 continuous symmetries, which make 1000125 motions"
+            ),
+            "{error}"
+        );
         for bad in [
             r#"{"3": {}}"#,
             r#"{"3": {"diameter": 0}}"#,

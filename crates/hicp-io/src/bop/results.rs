@@ -9,6 +9,7 @@ use hicp_core::Isometry3;
 use super::result_cells::{COLUMNS, Cells, csv_error, find_columns, line_of};
 use crate::atomic::write_atomically;
 use crate::error::{IoError, Place};
+use crate::json::not_finite;
 use crate::limits::ReadLimits;
 use crate::pose::pose_to_bop;
 use crate::source::{Limited, read_bytes, text_bytes};
@@ -166,11 +167,14 @@ fn parse_within(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite, which no reader would take.
 pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), IoError> {
     write_atomically(path, |writer| {
         writeln!(writer, "{}", ResultRow::header())?;
-        for row in rows {
+        for (number, row) in (1_usize..).zip(rows) {
+            if let Some(field) = row.not_finite() {
+                return Err(not_finite(&format!("{field} of row {number}")));
+            }
             writeln!(writer, "{row}")?;
         }
         Ok(())
@@ -182,6 +186,18 @@ impl ResultRow {
     #[must_use]
     pub fn header() -> String {
         COLUMNS.join(",")
+    }
+
+    /// The column of a number that is not finite.
+    fn not_finite(&self) -> Option<&'static str> {
+        let fields = [
+            ("score", std::slice::from_ref(&self.score)),
+            ("R", &self.rotation),
+            ("t", &self.translation_mm),
+            ("time", self.time_s.as_slice()),
+        ];
+        let mut fields = fields.into_iter();
+        fields.find_map(|(name, numbers)| numbers.iter().any(|x| !x.is_finite()).then_some(name))
     }
 }
 

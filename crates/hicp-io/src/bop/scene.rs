@@ -11,6 +11,7 @@ use super::annotations::{
 use super::dataset::missing;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
+use crate::source::is_absent;
 
 /// A scene of a dataset. Its JSON files are in memory, its images are read on demand.
 #[derive(Clone, Debug)]
@@ -39,11 +40,11 @@ impl Scene {
     /// As [`Scene::open`].
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
-        if !dir.is_dir() {
+        if is_absent(&dir) {
             return Err(missing(dir, "scene"));
         }
         let cameras = dir.join("scene_camera.json");
-        if !cameras.is_file() {
+        if is_absent(&cameras) {
             return Err(missing(cameras, "file of cameras"));
         }
         Ok(Self {
@@ -121,12 +122,12 @@ impl Scene {
     /// [`IoError::Missing`] when there is none, [`IoError::Extension`] when it is a TIFF file, which is not supported.
     pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
         let png = self.dir.join(format!("depth/{im_id:06}.png"));
-        if png.is_file() {
+        if !is_absent(&png) {
             return Ok(png);
         }
         for extension in ["tif", "tiff"] {
             let path = png.with_extension(extension);
-            if path.is_file() {
+            if !is_absent(&path) {
                 return Err(IoError::Extension {
                     path,
                     found: extension.to_owned(),
@@ -164,7 +165,7 @@ impl Scene {
             .iter()
             .flat_map(|folder| ["png", "jpg"].map(|ext| format!("{folder}/{im_id:06}.{ext}")))
             .map(|name| self.dir.join(name))
-            .find(|path| path.is_file())
+            .find(|path| !is_absent(path))
     }
 
     /// Returns the path of the mask of the visible part of an instance, whether or not it exists.
@@ -189,11 +190,10 @@ impl Scene {
     /// [`IoError::Missing`] when there is none, otherwise as [`read_mask_png`](crate::read_mask_png).
     pub fn read_visible_mask(&self, im_id: u32, instance: usize) -> Result<Mask, IoError> {
         let path = self.visible_mask_path(im_id, instance);
-        if path.is_file() {
-            self.limits.read_mask_png(path)
-        } else {
-            Err(missing(path, "mask"))
+        if is_absent(&path) {
+            return Err(missing(path, "mask"));
         }
+        self.limits.read_mask_png(path)
     }
 }
 
@@ -265,6 +265,54 @@ mod tests {
         ));
         assert!(matches!(scene.read_depth(2), Err(IoError::JsonValue { key, .. }) if key == "$.2"));
         assert!(scene.color_path(2).unwrap().ends_with("gray/000002.jpg"));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_not_missing() {
+        let (dir, opened) = scene(&[
+            (
+                "scene_camera.json",
+                &CAMERA.replace(r#""2": {"#, r#""2": {"depth_scale": 1, "#),
+            ),
+            ("depth/000002.png/file", ""),
+            ("depth/000010.tiff/file", ""),
+            ("mask_visib/000002_000000.png/file", ""),
+            ("gray/000002.png/file", ""),
+        ]);
+        let opened = opened.unwrap();
+        let folder = |error: IoError| matches!(error, IoError::NotAFile { .. });
+        assert!(folder(opened.read_depth(2).unwrap_err()));
+        assert!(folder(opened.read_visible_mask(2, 0).unwrap_err()));
+        assert!(opened.color_path(2).unwrap().ends_with("gray/000002.png"));
+        assert!(matches!(
+            opened.read_depth(10),
+            Err(IoError::Extension { .. })
+        ));
+        for name in ["scene_gt.json", "scene_gt_info.json"] {
+            let path = dir.path().join(name);
+            fs::create_dir(&path).unwrap();
+            assert!(folder(Scene::open(dir.path()).unwrap_err()), "{name}");
+            fs::remove_dir(&path).unwrap();
+        }
+        let file = dir.path().join("scene_camera.json");
+        let inside_a_file = Scene::open(&file).unwrap_err();
+        assert!(
+            matches!(inside_a_file, IoError::Read { .. }),
+            "{inside_a_file}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_nowhere_are_missing_and_links_in_a_ring_are_not() {
+        use std::os::unix::fs::symlink;
+        let (dir, _) = scene(&[("scene_camera.json", CAMERA)]);
+        let path = dir.path().join("scene_gt.json");
+        symlink(dir.path().join("nothing"), &path).unwrap();
+        assert!(Scene::open(dir.path()).unwrap().ground_truth(2).is_none());
+        fs::remove_file(&path).unwrap();
+        symlink(&path, &path).unwrap();
+        assert!(matches!(Scene::open(dir.path()), Err(IoError::Read { .. })));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::models_info::ModelInfo;
 use super::targets::Target;
 use crate::atomic::write_atomically;
 use crate::error::IoError;
+use crate::json::check_finite;
 use crate::pose::pose_to_bop;
 
 /// Writes a `scene_camera.json`: the cameras of a scene by image. Millimetres; every number is read back exactly but for the
@@ -18,7 +19,7 @@ use crate::pose::pose_to_bop;
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_scene_camera(
     path: impl AsRef<Path>,
     cameras: &BTreeMap<u32, SceneCamera>,
@@ -42,7 +43,7 @@ pub fn write_scene_camera(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_scene_gt(
     path: impl AsRef<Path>,
     truths: &BTreeMap<u32, Vec<GroundTruth>>,
@@ -60,7 +61,7 @@ pub fn write_scene_gt(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_scene_gt_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, Vec<GroundTruthInfo>>,
@@ -85,7 +86,7 @@ pub fn write_scene_gt_info(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_models_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, ModelInfo>,
@@ -112,7 +113,7 @@ pub fn write_models_info(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
 pub fn write_targets(path: impl AsRef<Path>, targets: &[Target]) -> Result<(), IoError> {
     let one = |target: &Target| {
         json!({
@@ -144,7 +145,10 @@ fn write_by_id<T>(
 }
 
 fn write_value(path: &Path, value: &Value) -> Result<(), IoError> {
-    write_atomically(path, |file| writeln!(file, "{value:#}"))
+    write_atomically(path, |file| {
+        check_finite(value)?;
+        writeln!(file, "{value:#}")
+    })
 }
 
 #[cfg(test)]

@@ -236,7 +236,7 @@ mod tests {
                 Err(IoError::ImageTooLarge { .. })
             ));
         }
-        assert!(matches!(announce(8192, 8192), Err(IoError::Promise { .. })));
+        assert!(matches!(announce(4096, 8192), Err(IoError::Promise { .. })));
         assert!(matches!(announce(2, 2), Err(IoError::Png { .. })));
     }
 

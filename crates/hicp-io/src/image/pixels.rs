@@ -11,7 +11,7 @@ use crate::error::{IoError, Place};
 use crate::limits::ReadLimits;
 use crate::source::{Source, read_bytes};
 
-/// Largest number of pixels of an image that is read unless told otherwise: 2²⁷, half a gigabyte of depth.
+/// Largest number of pixels of an image that is read unless told otherwise: 2²⁵, four times those of a 4K camera.
 pub const MAX_IMAGE_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
 
 /// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image it announces.
@@ -93,7 +93,10 @@ pub(super) fn read(
         .output_buffer_size()
         .ok_or(DecodingError::LimitsExceeded)
         .map_err(failed)?;
-    let mut bytes = vec![0; size];
+    let mut bytes = Vec::new();
+    let reserved = bytes.try_reserve_exact(size);
+    reserved.map_err(|_| IoError::read(path, io::ErrorKind::OutOfMemory.into()))?;
+    bytes.resize(size, 0);
     let frame = reader.next_frame(&mut bytes).map_err(failed)?;
     bytes.truncate(frame.buffer_size());
     Ok(Pixels {

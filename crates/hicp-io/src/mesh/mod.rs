@@ -9,6 +9,7 @@ use crate::limits::ReadLimits;
 use crate::source::{Limited, Source};
 use crate::unit::LengthUnit;
 
+mod lines;
 mod obj;
 mod off;
 pub(crate) mod ply;
@@ -40,8 +41,9 @@ const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 ///
 /// [`IoError`] that names the file and where in it the trouble is: what is no regular file, or above a limit, an unknown
 /// extension, text that is not UTF-8, a malformed or truncated file, a header that promises more than the file holds, a face
-/// whose vertex is not there, a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`, a file without
-/// faces, and, as [`IoError::Mesh`], whatever else [`TriMesh::new`] refuses.
+/// whose vertex is not there, a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`, concave polygons
+/// that take more than a fraction of a second to cut (of some ten thousand corners), a file without faces, and, as
+/// [`IoError::Mesh`], whatever else [`TriMesh::new`] refuses.
 pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
     ReadLimits::DEFAULT.read_mesh(path, unit)
 }
@@ -124,15 +126,7 @@ impl Reading<'_> {
             None => Ok(()),
             Some(expected) => {
                 let found = format!("the position {position:?}");
-                Err(match place {
-                    Place::Line(line) => IoError::Line {
-                        path: self.path.to_owned(),
-                        line,
-                        found,
-                        expected,
-                    },
-                    Place::Byte(_) => IoError::at(self.path, place, &found, expected),
-                })
+                Err(IoError::unquoted(self.path, place, found, expected))
             }
         }
     }
@@ -143,8 +137,10 @@ impl Reading<'_> {
 struct RawMesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
-    /// Where the file ends, to tell what is missing there.
+    /// Where faces are missed when there are none: the end of the file, or what says that there are none.
     end: Place,
+    /// What stands there.
+    found: String,
     /// What cutting polygons may still cost.
     clipping_budget: u64,
 }
@@ -155,6 +151,7 @@ impl RawMesh {
             vertices: Vec::new(),
             triangles: Vec::new(),
             end,
+            found: END_OF_FILE.to_owned(),
             clipping_budget: polygon::CLIPPING_BUDGET,
         }
     }
@@ -169,8 +166,18 @@ impl RawMesh {
         let more = corners.len().saturating_sub(2);
         reading.check_triangles(place, self.triangles.len() + more)?;
         let budget = &mut self.clipping_budget;
-        polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget);
-        Ok(())
+        if polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget) {
+            return Ok(());
+        }
+        Err(IoError::unquoted(
+            reading.path,
+            place,
+            format!("a concave polygon of {} corners", corners.len()),
+            format!(
+                "one that is cut into triangles within {} steps, together with those before it: cut it beforehand",
+                polygon::CLIPPING_BUDGET
+            ),
+        ))
     }
 
     fn finish(self, reading: &Reading<'_>) -> Result<TriMesh, IoError> {
@@ -185,20 +192,11 @@ impl RawMesh {
             MeshError::NoTriangles { .. } => IoError::at(
                 path,
                 self.end,
-                END_OF_FILE,
+                &self.found,
                 "a face of three corners or more",
             ),
             error => IoError::mesh(path, error),
         })
-    }
-}
-
-/// Returns the byte that ends lines: of old, carriage returns did.
-fn line_end(content: &[u8]) -> u8 {
-    if content.contains(&b'\n') {
-        b'\n'
-    } else {
-        b'\r'
     }
 }
 
@@ -240,6 +238,45 @@ mod tests {
             let mesh = read_mesh(&path, unit).unwrap();
             assert!((mesh.area() / area - 1.0).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn a_concave_polygon_beyond_the_budget_is_refused_where_it_stands() {
+        let mut mesh = RawMesh::new(Place::Line(1));
+        let dart = [[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]];
+        mesh.vertices = dart.map(|p| Point3::new(p[0], p[1], 0.0)).to_vec();
+        let reading = reading("a.obj");
+        for spent in [false, true] {
+            if spent {
+                mesh.clipping_budget = 0;
+            }
+            let convex = mesh.add_face(&reading, Place::Line(7), &[0, 1, 3]);
+            assert!(convex.is_ok());
+            let concave = mesh.add_face(&reading, Place::Line(8), &[0, 1, 2, 3]);
+            match (spent, concave) {
+                (false, Ok(())) => {}
+                (true, Err(IoError::Line { line, found, .. })) => {
+                    assert_eq!(
+                        (line, found.as_str()),
+                        (8, "a concave polygon of 4 corners")
+                    );
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_mesh_without_area_tells_what_was_expected() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.obj");
+        std::fs::write(&path, "v 0 0 0\nv 1 0 0\nf 1 2 2\n").unwrap();
+        let error = read_mesh(&path, LengthUnit::Meters).unwrap_err();
+        let told = error.to_string();
+        assert!(
+            told.ends_with("mesh, expected a triangle that has an area"),
+            "{told}"
+        );
     }
 
     #[test]

@@ -7,7 +7,8 @@ use std::io::{self, BufRead, Read};
 
 use hicp_core::Point3;
 
-use super::{RawMesh, Reading, line_end};
+use super::lines::Lines;
+use super::{RawMesh, Reading};
 use crate::error::{IoError, Place};
 use crate::source::text_bytes;
 
@@ -36,9 +37,11 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
         })?
         .0;
 
-    let end = Place::Line(records.end);
-    drop(records);
+    let end = Place::Line(records.end.max(1));
     let mut mesh = RawMesh::new(end);
+    // As many faces come back, in their order.
+    let mut places = records.into_face_lines().into_iter().map(Place::Line);
+    let mut place = || places.next().unwrap_or(end);
     for tobj::Model { mesh: part, .. } in models {
         // One model comes back, as no record that starts another gets through.
         mesh.vertices.extend(
@@ -48,13 +51,13 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
         );
         if part.face_arities.is_empty() {
             for corners in part.indices.chunks_exact(3) {
-                mesh.add_face(reading, end, corners)?;
+                mesh.add_face(reading, place(), corners)?;
             }
         } else {
             let mut rest = part.indices.as_slice();
             for arity in part.face_arities {
                 let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
-                mesh.add_face(reading, end, corners)?;
+                mesh.add_face(reading, place(), corners)?;
                 rest = others;
             }
         }
@@ -75,10 +78,9 @@ struct Records {
 
 impl Records {
     fn of(reading: &Reading<'_>, content: &[u8]) -> Result<Self, IoError> {
-        let line_end = line_end(content);
         let mut records = Self::default();
         let mut pending = String::new();
-        for (number, line) in (1_u32..).zip(content.split(|byte| *byte == line_end)) {
+        for (number, line) in (1_u32..).zip(Lines::new(content)) {
             records.end = number as usize;
             let line = String::from_utf8_lossy(line);
             let line = line.split('#').next().unwrap_or_default().trim();
@@ -92,6 +94,9 @@ impl Records {
                 records.add(reading, &std::mem::take(&mut pending), number)?;
             }
         }
+        // The last line may promise another that does not come.
+        let end = u32::try_from(records.end).unwrap_or(u32::MAX);
+        records.add(reading, &pending, end)?;
         Ok(records)
     }
 
@@ -110,9 +115,10 @@ impl Records {
                     self.text.push_str(word);
                 }
             }
-            Some("f") => {
+            // Fewer corners make no face: they are not kept, for any number of such records would pass the limit.
+            Some("f") if words.clone().count() >= 3 => {
                 self.text.push('f');
-                self.triangles += words.clone().count().saturating_sub(2);
+                self.triangles += words.clone().count() - 2;
                 reading.check_triangles(place, self.triangles)?;
                 for word in words {
                     let position = word.split('/').next().filter(|index| !index.is_empty());
@@ -168,12 +174,18 @@ impl Records {
                 Ok(index) => (1..=vertices).contains(&usize::try_from(index).unwrap_or(0)),
                 Err(_) => false,
             };
-            let corners = line.split_whitespace().skip(1);
-            if corners.clone().count() >= 3 && !corners.clone().all(valid) {
+            if !line.split_whitespace().skip(1).all(valid) {
                 return record;
             }
         }
         0
+    }
+
+    /// The line of every face.
+    fn into_face_lines(self) -> Vec<usize> {
+        let records = self.text.lines().zip(self.lines);
+        let faces = records.filter(|(record, _)| record.starts_with('f'));
+        faces.map(|(_, line)| line as usize).collect()
     }
 
     fn error(&self, reading: &Reading<'_>, record: usize, error: tobj::LoadError) -> IoError {
@@ -287,8 +299,59 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_continued_at_the_end_of_the_file_is_dropped_or_read_but_never_panics() {
+    fn a_line_that_is_continued_at_the_end_of_the_file_is_read() {
+        let mesh = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1 \\").unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);
         assert!(read("v 0 0 0\nf 1 \\").unwrap().triangles.is_empty());
         assert!(read("\\").unwrap().triangles.is_empty());
+        match read("v 0 0 0\nv 1 \\\n0 x \\") {
+            Err(IoError::Line { line, found, .. }) => {
+                assert_eq!((line, found.as_str()), (3, "\"v 1 0 x\""));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn lines_may_end_each_in_its_own_way() {
+        for text in [
+            "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\ng a\rf 1 3 4",
+            "v 0 0 0\rv 1 0 0\rv 1 1 0\rv 0 1 0\rf 1 2 3 # a\rf 1 3 4\n",
+            "v 0 0 0\r\nv 1 0 0\nv 1 1 0\rv 0 1 0\r\nf 1 2 3 \\\r 4",
+        ] {
+            let mesh = read(text).unwrap();
+            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]], "{text:?}");
+        }
+    }
+
+    #[test]
+    fn faces_of_fewer_than_three_corners_are_not_kept() {
+        let text = format!("v 0 0 0\n{}f 1 1 1\nf\n", "f 9 9\nf\n".repeat(100));
+        let records = Records::of(&reading("a.obj"), text.as_bytes()).unwrap();
+        assert_eq!(records.text, "v 0 0 0\nf 1 1 1\n");
+        assert_eq!((records.triangles, records.end), (1, 203));
+        assert_eq!(records.into_face_lines(), [202]);
+    }
+
+    #[test]
+    fn every_face_that_is_kept_counts_against_the_limit() {
+        let limits = crate::ReadLimits {
+            max_triangles: 3,
+            ..crate::ReadLimits::DEFAULT
+        };
+        let reading = Reading {
+            limits: &limits,
+            ..reading("a.obj")
+        };
+        let text = "v 0 0 0\nf 1 1 1\nf 1 1 1 1\n";
+        assert!(parse(&reading, text.into()).is_ok());
+        assert!(matches!(
+            parse(&reading, format!("{text}f 1 1\nf 1 1 1\n").into()),
+            Err(IoError::Limit {
+                place: Some(Place::Line(5)),
+                count: 4,
+                ..
+            })
+        ));
     }
 }

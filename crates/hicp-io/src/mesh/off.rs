@@ -2,7 +2,7 @@
 
 use hicp_core::Point3;
 
-use super::{RawMesh, Reading, line_end};
+use super::{RawMesh, Reading, lines};
 use crate::error::{END_OF_FILE, IoError, Place};
 use crate::source::text_bytes;
 
@@ -11,12 +11,13 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
     let path = reading.path;
     let text = text_bytes(path, &content)?;
     let mut lines = Lines::new(text);
-    let counts = read_counts(reading, &mut lines)?;
+    let (counts, line) = read_counts(reading, &mut lines)?;
     let [vertices, faces] = counts.map(|count| usize::try_from(count).unwrap_or(usize::MAX));
     reading.check_vertices(lines.place(), vertices)?;
     reading.check_triangles(lines.place(), faces)?;
 
     let mut mesh = RawMesh::new(lines.place());
+    mesh.found = line;
     mesh.vertices.reserve_exact(vertices);
     for number in 0..vertices {
         let expected = || format!("three coordinates of vertex {number} of {vertices}");
@@ -62,13 +63,17 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
             return Err(wrong());
         }
         mesh.add_face(reading, lines.place(), &corners)?;
-        mesh.end = lines.place();
+        (mesh.end, mesh.found) = (lines.place(), line);
     }
     Ok(mesh)
 }
 
-/// Reads the keyword and the counts of vertices and faces, and refuses what the rest of the file cannot hold.
-fn read_counts(reading: &Reading<'_>, lines: &mut Lines<'_>) -> Result<[u64; 2], IoError> {
+/// Reads the keyword, the counts of vertices and faces and the line that tells them, and refuses what the rest of the file
+/// cannot hold.
+fn read_counts(
+    reading: &Reading<'_>,
+    lines: &mut Lines<'_>,
+) -> Result<([u64; 2], String), IoError> {
     let keyword = "`OFF`, `COFF`, `NOFF` or `CNOFF`";
     let mut line = lines.next().ok_or_else(|| lines.ended(reading, keyword))?;
     let rest = ["OFF", "COFF", "NOFF", "CNOFF"]
@@ -87,12 +92,12 @@ fn read_counts(reading: &Reading<'_>, lines: &mut Lines<'_>) -> Result<[u64; 2],
         .split_whitespace()
         .map(|word| word.parse().ok())
         .collect();
-    let Some([vertices, faces] | [vertices, faces, _]) = numbers.as_deref() else {
+    let Some(&([vertices, faces] | [vertices, faces, _])) = numbers.as_deref() else {
         return Err(lines.error(reading, &line, expected));
     };
-    let available = lines.left() as u64 + 1;
+    let available = lines.left() as u64;
     // A vertex takes three digits with a separator each, a face at least one.
-    for (what, count, bytes) in [("vertices", *vertices, 6_u64), ("faces", *faces, 2)] {
+    for (what, count, bytes) in [("vertices", vertices, 6_u64), ("faces", faces, 2)] {
         let needed = bytes.saturating_mul(count);
         if needed > available {
             return Err(IoError::Promise {
@@ -105,33 +110,25 @@ fn read_counts(reading: &Reading<'_>, lines: &mut Lines<'_>) -> Result<[u64; 2],
             });
         }
     }
-    Ok([*vertices, *faces])
+    Ok(([vertices, faces], line))
 }
 
 /// The lines that say something, without comments.
 struct Lines<'a> {
-    rest: &'a [u8],
-    end: u8,
+    rest: lines::Lines<'a>,
     number: usize,
 }
 
 impl<'a> Lines<'a> {
     fn new(content: &'a [u8]) -> Self {
         Self {
-            rest: content,
-            end: line_end(content),
+            rest: lines::Lines::new(content),
             number: 0,
         }
     }
 
     fn next(&mut self) -> Option<String> {
-        while !self.rest.is_empty() {
-            let end = self.rest.iter().position(|byte| *byte == self.end);
-            let (line, rest) = match end {
-                Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
-                None => (self.rest, &[][..]),
-            };
-            self.rest = rest;
+        for line in self.rest.by_ref() {
             self.number += 1;
             let line = String::from_utf8_lossy(line);
             let line = line.split('#').next().unwrap_or_default().trim();
@@ -142,8 +139,9 @@ impl<'a> Lines<'a> {
         None
     }
 
+    /// Bytes of the lines that are left, with one for the end of each.
     fn left(&self) -> usize {
-        self.rest.len()
+        self.rest.clone().map(|line| line.len() + 1).sum()
     }
 
     fn place(&self) -> Place {
@@ -194,6 +192,38 @@ mod tests {
                 .len(),
             3
         );
+    }
+
+    #[test]
+    fn lines_may_end_each_in_its_own_way() {
+        let text = format!("OFF\r4 3 0\n{BODY}")
+            .replace(" # right", "\r")
+            .replace("0.5\n2", "0.5\r2");
+        let mesh = read(&text).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
+        assert_eq!(mesh.vertices.len(), 4);
+    }
+
+    #[test]
+    fn a_file_without_faces_tells_what_says_so() {
+        for (text, at, what) in [
+            ("OFF\n1 0 0\n0 0 0\n", 2, "\"1 0 0\""),
+            ("OFF 1 0 0 # none\n0 0 0\n", 1, "\"1 0 0\""),
+            ("OFF\n1 1 0\n0 0 0\n2 0 0\nmore", 4, "\"2 0 0\""),
+        ] {
+            match read(text).unwrap().finish(&reading("a.off")) {
+                Err(IoError::Line {
+                    line,
+                    found,
+                    expected,
+                    ..
+                }) => {
+                    assert_eq!((line, found.as_str()), (at, what));
+                    assert_eq!(expected, "a face of three corners or more");
+                }
+                other => panic!("{text:?}: {other:?}"),
+            }
+        }
     }
 
     #[test]

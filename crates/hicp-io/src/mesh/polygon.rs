@@ -2,31 +2,31 @@
 
 use hicp_core::{Point2, Point3, Vector3};
 
-/// Polygons with more corners are cut into a fan: ear clipping is quadratic at best.
-const MAX_CLIPPED_CORNERS: usize = 1024;
-
-/// Looks at points that clipping ears may cost for all polygons of a file, some seconds: beyond it they are cut into fans.
-pub(super) const CLIPPING_BUDGET: u64 = 1 << 30;
+/// Looks at points that clipping ears may cost for all polygons of a file, a fraction of a second: it is quadratic at best.
+pub(super) const CLIPPING_BUDGET: u64 = 1 << 28;
 
 /// Appends the n − 2 triangles of a polygon of n corners, with its winding; nothing for fewer than three corners.
 ///
 /// A convex polygon becomes a fan, a concave one is clipped ear by ear in its mean plane. What is left of a polygon that
-/// crosses itself, or for which the budget does not suffice, becomes a fan. Corners must be indices into `vertices`.
+/// crosses itself becomes a fan. Returns whether the budget sufficed; the triangles are of no use otherwise. Corners must be
+/// indices into `vertices`.
 pub(super) fn triangulate(
     vertices: &[Point3<f64>],
     corners: &[u32],
     triangles: &mut Vec<[u32; 3]>,
     budget: &mut u64,
-) {
-    if corners.len() <= 3 || corners.len() > MAX_CLIPPED_CORNERS {
-        return fan(corners, triangles);
+) -> bool {
+    if corners.len() <= 3 {
+        fan(corners, triangles);
+        return true;
     }
     let points = flatten(vertices, corners);
     let n = corners.len();
     if (0..n).all(|i| turn(&points[(i + n - 1) % n], &points[i], &points[(i + 1) % n]) >= 0.0) {
-        return fan(corners, triangles);
+        fan(corners, triangles);
+        return true;
     }
-    clip_ears(&points, corners, triangles, budget);
+    clip_ears(&points, corners, triangles, budget)
 }
 
 fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
@@ -62,45 +62,80 @@ fn clip_ears(
     corners: &[u32],
     triangles: &mut Vec<[u32; 3]>,
     budget: &mut u64,
-) {
-    let mut left: Vec<usize> = (0..points.len()).collect();
+) -> bool {
+    let n = points.len();
+    let mut remainder = Remainder {
+        points,
+        left: (0..n).collect(),
+        is_left: vec![true; n],
+        last_blocking: (0..n).collect(),
+    };
     let (mut at, mut misses) = (0, 0);
-    while left.len() > 3 && misses < left.len() && *budget > 0 {
+    while remainder.left.len() > 3 && misses < remainder.left.len() {
+        if *budget == 0 {
+            return false;
+        }
+        let left = &remainder.left;
         let n = left.len();
         at %= n;
         let ear = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]];
-        if is_ear(points, &left, ear, budget) {
+        if remainder.is_ear(ear, budget) {
             triangles.push(ear.map(|i| corners[i]));
-            left.remove(at);
+            remainder.left.remove(at);
+            remainder.is_left[ear[1]] = false;
             misses = 0;
         } else {
             misses += 1;
             at += 1;
         }
     }
-    let rest: Vec<u32> = left.iter().map(|i| corners[*i]).collect();
+    let rest: Vec<u32> = remainder.left.iter().map(|i| corners[*i]).collect();
     fan(&rest, triangles);
+    true
 }
 
-fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3], budget: &mut u64) -> bool {
-    let [a, b, c] = ear.map(|i| points[i]);
-    *budget = budget.saturating_sub(1);
-    // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbour on the line.
-    if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
-        return false;
+/// What is left of a polygon whose ears are clipped.
+struct Remainder<'a> {
+    points: &'a [Point2<f64>],
+    /// The corners left, in order.
+    left: Vec<usize>,
+    /// The same by corner.
+    is_left: Vec<bool>,
+    /// By corner, what last kept it from being an ear; itself at first, which never does.
+    last_blocking: Vec<usize>,
+}
+
+impl Remainder<'_> {
+    fn is_ear(&mut self, ear: [usize; 3], budget: &mut u64) -> bool {
+        let [a, b, c] = ear.map(|i| self.points[i]);
+        *budget = budget.saturating_sub(1);
+        // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbour on the line.
+        if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
+            return false;
+        }
+        let blocks = |i: &usize| {
+            let p = self.points[*i];
+            // Corners are visited twice where a hole is bridged: equal positions do not block.
+            let outside = p == a
+                || p == b
+                || p == c
+                || turn(&a, &b, &p) < 0.0
+                || turn(&b, &c, &p) < 0.0
+                || turn(&c, &a, &p) < 0.0;
+            !outside
+        };
+        // What blocked the corner when it was last looked at mostly does so still: a long search is saved.
+        let last = self.last_blocking[ear[1]];
+        if self.is_left[last] && blocks(&last) {
+            return false;
+        }
+        let blocking = self.left.iter().position(blocks);
+        *budget = budget.saturating_sub(blocking.unwrap_or(self.left.len()) as u64);
+        if let Some(position) = blocking {
+            self.last_blocking[ear[1]] = self.left[position];
+        }
+        blocking.is_none()
     }
-    let blocking = left.iter().map(|i| points[*i]).position(|p| {
-        // Corners are visited twice where a hole is bridged: equal positions do not block.
-        let outside = p == a
-            || p == b
-            || p == c
-            || turn(&a, &b, &p) < 0.0
-            || turn(&b, &c, &p) < 0.0
-            || turn(&c, &a, &p) < 0.0;
-        !outside
-    });
-    *budget = budget.saturating_sub(blocking.unwrap_or(left.len()) as u64);
-    blocking.is_none()
 }
 
 #[cfg(test)]
@@ -124,7 +159,7 @@ mod tests {
         let corners: Vec<u32> = (0..).take(vertices.len()).collect();
         let mut triangles = Vec::new();
         let mut budget = CLIPPING_BUDGET;
-        triangulate(vertices, &corners, &mut triangles, &mut budget);
+        assert!(triangulate(vertices, &corners, &mut triangles, &mut budget));
         triangles
     }
 
@@ -180,13 +215,24 @@ mod tests {
     }
 
     #[test]
-    fn a_spent_budget_leaves_fans_of_as_many_triangles() {
+    fn a_spent_budget_is_told_of_concave_polygons_only() {
         let dart = flat(&[[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]]);
         let corners: Vec<u32> = (0..4).collect();
         let mut triangles = Vec::new();
         let mut budget = 0;
-        triangulate(&dart, &corners, &mut triangles, &mut budget);
-        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert!(!triangulate(&dart, &corners, &mut triangles, &mut budget));
+        // A convex polygon costs nothing, however many corners it has.
+        let parabola: Vec<[f64; 2]> = (0..5000).map(f64::from).map(|x| [x, x * x]).collect();
+        let corners: Vec<u32> = (0..5000).collect();
+        triangles.clear();
+        assert!(triangulate(
+            &flat(&parabola),
+            &corners,
+            &mut triangles,
+            &mut budget
+        ));
+        assert_eq!(triangles.len(), 4998);
+        triangles.clear();
         // A comb: nearly every corner between its teeth is no ear for long.
         let comb: Vec<[f64; 2]> = (0..1000)
             .map(|i| [f64::from(i), f64::from(i % 2) * 100.0])
@@ -194,9 +240,47 @@ mod tests {
             .collect();
         let corners: Vec<u32> = (0..1002).rev().collect();
         let mut budget = CLIPPING_BUDGET;
-        triangulate(&flat(&comb), &corners, &mut triangles, &mut budget);
-        assert_eq!(triangles.len(), 2 + 1000);
-        assert!(budget < CLIPPING_BUDGET);
+        assert!(triangulate(
+            &flat(&comb),
+            &corners,
+            &mut triangles,
+            &mut budget
+        ));
+        assert_eq!(triangles.len(), 1000);
+        let steps = CLIPPING_BUDGET - budget;
+        assert!(steps > 0);
+        let mut enough = steps + 1;
+        assert!(triangulate(
+            &flat(&comb),
+            &corners,
+            &mut triangles,
+            &mut enough
+        ));
+        let mut too_few = steps / 2;
+        assert!(!triangulate(
+            &flat(&comb),
+            &corners,
+            &mut triangles,
+            &mut too_few
+        ));
+    }
+
+    #[test]
+    fn a_concave_polygon_of_many_corners_is_covered_once() {
+        let n = 2050;
+        let star: Vec<[f64; 2]> = (0..n)
+            .map(|i| {
+                let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+                let radius = if i % 2 == 0 { 1.0 } else { 0.5 };
+                [radius * angle.cos(), radius * angle.sin()]
+            })
+            .collect();
+        let vertices = flat(&star);
+        let triangles = cut(&vertices);
+        assert_eq!(triangles.len(), 2048);
+        let (signed, absolute) = area(&vertices, &triangles, &Vector3::z());
+        let expected = 0.25 * f64::from(n) * (std::f64::consts::TAU / f64::from(n)).sin();
+        assert!((signed - expected).abs() < 1e-9 && (absolute - expected).abs() < 1e-9);
     }
 
     proptest! {

@@ -4,8 +4,13 @@
 //! not finite, take binary files for text by the first word of their header, and do not say where a file is broken; all of
 //! these occur in files that people have. Normals are not read: the winding says the same.
 
+use std::path::Path;
+
+use hicp_core::Point3;
+
+use super::lines::Lines;
 use super::weld::Welder;
-use super::{RawMesh, Reading, line_end};
+use super::{RawMesh, Reading};
 use crate::error::{END_OF_FILE, IoError, Place};
 use crate::source::text_bytes;
 
@@ -17,7 +22,7 @@ const COUNT: Place = Place::Byte(80);
 /// Refuses a binary file by its header, when it has the triangles that it promises and they are too many.
 pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
     match triangle_count(head) {
-        Some(count) if binary_bytes(count) == bytes => {
+        Some(count) if fits(binary_bytes(count), bytes) => {
             reading.check_triangles(COUNT, count as usize)
         }
         _ => Ok(()),
@@ -26,26 +31,33 @@ pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Resu
 
 /// Parses an STL file; vertices at the same position become one.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    if is_ascii(&content) {
-        parse_ascii(reading, text_bytes(reading.path, &content)?)
+    // By size first: any 80 bytes may begin a binary file, `solid` and what looks like UTF-16 among them.
+    let is_binary = triangle_count(&content)
+        .is_some_and(|count| fits(binary_bytes(count), content.len() as u64));
+    if is_binary {
+        return parse_binary(reading, &content);
+    }
+    let text = text_bytes(reading.path, &content)?;
+    // Some programs fill the last block of a text with zeros. A binary header that has lost its triangles ends in some, too.
+    let filling = text.iter().rev().take_while(|byte| **byte == 0).count();
+    let text = match &text[..text.len() - filling] {
+        filled if filled.len() > HEADER_BYTES => filled,
+        _ => text,
+    };
+    if is_text(text) {
+        parse_ascii(reading, text)
     } else {
-        text_bytes(reading.path, &content)?;
         parse_binary(reading, &content)
     }
 }
 
-/// Decides by size first: many exporters start the header of binary files with `solid`.
-fn is_ascii(content: &[u8]) -> bool {
-    let fits_binary =
-        triangle_count(content).is_some_and(|count| binary_bytes(count) == content.len() as u64);
+/// Tells text from a binary file that has lost its end: its count holds a 0 or another byte that no text does.
+fn is_text(content: &[u8]) -> bool {
     let start = &content[..content.len().min(512)];
-    !fits_binary && !start.contains(&0) && {
-        let text = String::from_utf8_lossy(start);
-        text.trim_start_matches('\u{feff}')
-            .trim_start()
-            .get(..5)
-            .is_some_and(|word| word.eq_ignore_ascii_case("solid"))
-    }
+    let solid = start.trim_ascii_start().get(..5);
+    let is_solid = solid.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let breaks = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
+    !start.is_empty() && !start.contains(&0) && (is_solid || !start.iter().any(breaks))
 }
 
 fn triangle_count(content: &[u8]) -> Option<u32> {
@@ -55,6 +67,11 @@ fn triangle_count(content: &[u8]) -> Option<u32> {
 
 fn binary_bytes(count: u32) -> u64 {
     HEADER_BYTES as u64 + u64::from(count) * TRIANGLE_BYTES as u64
+}
+
+/// Says whether a file has the bytes that a binary one takes: a few bytes of padding are harmless, another triangle is not.
+fn fits(needed: u64, bytes: u64) -> bool {
+    (needed..needed + TRIANGLE_BYTES as u64).contains(&bytes)
 }
 
 fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
@@ -79,7 +96,6 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
             available: body.len() as u64,
         });
     }
-    // A few bytes of padding are harmless; whole triangles that the header leaves out are not.
     let there = body.len() / TRIANGLE_BYTES;
     if there > count as usize {
         return Err(IoError::at(
@@ -91,6 +107,7 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
     }
     reading.check_triangles(COUNT, there)?;
     let mut mesh = RawMesh::new(COUNT);
+    mesh.found = format!("a count of {count} triangles");
     mesh.triangles.reserve_exact(there);
     let mut welder = Welder::default();
     for (number, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
@@ -115,53 +132,176 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
 
 fn parse_ascii(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
     let path = reading.path;
+    let mut words = Words::new(content);
     let mut mesh = RawMesh::new(Place::Line(1));
     let mut welder = Welder::default();
-    let mut facet: Vec<u32> = Vec::with_capacity(3);
-    let mut open = false;
-    let line_end = line_end(content);
-    for (number, line) in (1_usize..).zip(content.split(|byte| *byte == line_end)) {
-        let place = Place::Line(number);
-        mesh.end = place;
-        let line = String::from_utf8_lossy(line);
-        let mut words = line.split_whitespace();
-        let Some(keyword) = words.next().map(str::to_ascii_lowercase) else {
-            continue;
-        };
-        match keyword.as_str() {
-            "vertex" => {
-                let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
-                let [x, y, z] = numbers[..] else {
-                    let expected = "`vertex` and three numbers";
-                    return Err(IoError::line(path, number, &line, expected));
-                };
-                reading.check_position(place, &[x, y, z])?;
-                facet.push(welder.index([x, y, z], &mut mesh.vertices));
-                reading.check_vertices(place, mesh.vertices.len())?;
-            }
-            "endfacet" => {
-                let [a, b, c] = facet[..] else {
-                    let expected = format!("3 vertices before `endfacet`, not {}", facet.len());
-                    return Err(IoError::line(path, number, &line, expected));
-                };
-                mesh.triangles.push([a, b, c]);
-                reading.check_triangles(place, mesh.triangles.len())?;
-                facet.clear();
-            }
-            "solid" => open = true,
-            "endsolid" => open = false,
-            "facet" | "outer" | "endloop" => {}
-            _ => {
-                return Err(IoError::line(path, number, &line, "a keyword of ASCII STL"));
-            }
+    words.expect(path, "solid", "`solid`, or a binary header of 84 bytes")?;
+    words.skip_name();
+    // Without its last line a file may have lost any number of facets.
+    let mut open = true;
+    while let Some(word) = words.next() {
+        if word.is("facet") {
+            open = true;
+            let corners = parse_facet(reading, &mut words, &mut mesh.vertices, &mut welder)?;
+            mesh.triangles.push(corners);
+            reading.check_triangles(Place::Line(word.line), mesh.triangles.len())?;
+        } else if word.is("solid") || word.is("endsolid") {
+            open = word.is("solid");
+            words.skip_name();
+        } else {
+            return Err(word.error(path, "`facet`, `endsolid` or `solid`"));
         }
     }
-    // Without its last line a file may have lost any number of facets.
-    match (facet.is_empty(), open) {
-        (false, _) => Err(IoError::at(path, mesh.end, END_OF_FILE, "`endfacet`")),
-        (true, true) => Err(IoError::at(path, mesh.end, END_OF_FILE, "`endsolid`")),
-        (true, false) => Ok(mesh),
+    if open {
+        return Err(words.ended(path, "`endsolid`"));
     }
+    mesh.end = Place::Line(words.line());
+    Ok(mesh)
+}
+
+/// Reads what follows `facet`.
+fn parse_facet(
+    reading: &Reading<'_>,
+    words: &mut Words<'_>,
+    vertices: &mut Vec<Point3<f64>>,
+    welder: &mut Welder,
+) -> Result<[u32; 3], IoError> {
+    let path = reading.path;
+    let normal = "`normal` and three components";
+    words.expect(path, "normal", normal)?;
+    for _ in 0..3 {
+        // Some programs write what C prints for a normal without a direction: any word will do, but the next keyword.
+        let component = words.next().ok_or_else(|| words.ended(path, normal))?;
+        if component.is("outer") {
+            return Err(component.error(path, normal));
+        }
+    }
+    words.expect(path, "outer", "`outer loop`")?;
+    words.expect(path, "loop", "`outer loop`")?;
+    let mut corners = [0; 3];
+    for (index, which) in corners.iter_mut().zip(["first", "second", "third"]) {
+        let expected = format!("the {which} `vertex` of three and its three numbers");
+        let word = words.expect(path, "vertex", &expected)?;
+        let mut position = [0.0; 3];
+        for value in &mut position {
+            let number = words.next().and_then(|word| word.number());
+            *value = number.ok_or_else(|| word.error(path, expected.as_str()))?;
+        }
+        let place = Place::Line(word.line);
+        reading.check_position(place, &position)?;
+        *index = welder.index(position, vertices);
+        reading.check_vertices(place, vertices.len())?;
+    }
+    words.expect(path, "endloop", "`endloop` after three vertices")?;
+    words.expect(path, "endfacet", "`endfacet`")?;
+    Ok(corners)
+}
+
+/// The words of a text: to this format a line end is a space like any other, but behind a name.
+#[derive(Clone, Debug)]
+struct Words<'a> {
+    lines: Lines<'a>,
+    /// Lines taken.
+    taken: usize,
+    /// What is left of the last of them.
+    rest: &'a [u8],
+}
+
+impl<'a> Words<'a> {
+    fn new(content: &'a [u8]) -> Self {
+        Self {
+            lines: Lines::new(content),
+            taken: 0,
+            rest: &[],
+        }
+    }
+
+    fn next(&mut self) -> Option<Word<'a>> {
+        loop {
+            if let Some(word) = self.next_of_line() {
+                return Some(word);
+            }
+            self.rest = self.lines.next()?;
+            self.taken += 1;
+        }
+    }
+
+    fn next_of_line(&mut self) -> Option<Word<'a>> {
+        let from = self.rest.iter().position(|byte| !is_space(*byte))?;
+        let from = &self.rest[from..];
+        let end = from.iter().position(|byte| is_space(*byte));
+        let (text, rest) = from.split_at(end.unwrap_or(from.len()));
+        self.rest = rest;
+        Some(Word {
+            text,
+            from,
+            line: self.taken,
+        })
+    }
+
+    /// Skips the rest of the line, which is a name, up to a facet or `endsolid` that some programs write behind it.
+    fn skip_name(&mut self) {
+        let mut ahead = self.clone();
+        while let Some(word) = ahead.next_of_line() {
+            let is_facet = || {
+                let next = ahead.clone().next_of_line();
+                word.is("facet") && next.is_some_and(|next| next.is("normal"))
+            };
+            if word.is("endsolid") || is_facet() {
+                return;
+            }
+            *self = ahead.clone();
+        }
+    }
+
+    fn expect(&mut self, path: &Path, keyword: &str, expected: &str) -> Result<Word<'a>, IoError> {
+        match self.next() {
+            Some(word) if word.is(keyword) => Ok(word),
+            Some(word) => Err(word.error(path, expected)),
+            None => Err(self.ended(path, expected)),
+        }
+    }
+
+    /// The line of the last word.
+    fn line(&self) -> usize {
+        self.taken.max(1)
+    }
+
+    fn ended(&self, path: &Path, expected: &str) -> IoError {
+        IoError::line(path, self.line(), END_OF_FILE, expected)
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Word<'a> {
+    text: &'a [u8],
+    /// The rest of its line, from it on.
+    from: &'a [u8],
+    line: usize,
+}
+
+impl Word<'_> {
+    fn is(&self, keyword: &str) -> bool {
+        self.text.eq_ignore_ascii_case(keyword.as_bytes())
+    }
+
+    fn number(&self) -> Option<f64> {
+        std::str::from_utf8(self.text).ok()?.parse().ok()
+    }
+
+    fn error(&self, path: &Path, expected: &str) -> IoError {
+        IoError::line(
+            path,
+            self.line,
+            &String::from_utf8_lossy(self.from),
+            expected,
+        )
+    }
+}
+
+/// What the C library takes for white space, line ends aside.
+fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
 }
 
 #[cfg(test)]
@@ -212,8 +352,72 @@ mod tests {
         for content in [truncated, binary(b"x", u32::MAX, 1), binary(b"solid", 3, 2)] {
             assert!(matches!(read(&content), Err(IoError::Promise { .. })));
         }
-        for content in [&b""[..], b"abc", &[0; 83]] {
+        for content in [&b""[..], b"a\x01c", &[0; 83]] {
             assert!(matches!(read(content), Err(IoError::Bytes { .. })));
+        }
+    }
+
+    #[test]
+    fn binary_files_whose_header_looks_like_another_encoding() {
+        for title in [
+            &b"\xff\xfeA\0B\0"[..],
+            b"A\0B\0",
+            b"\0A\0B",
+            b"\xef\xbb\xbfx",
+        ] {
+            let mut content = binary(title, 2, 2);
+            assert_eq!(read(&content).unwrap().triangles.len(), 2);
+            content.push(0);
+            assert_eq!(read(&content).unwrap().triangles.len(), 2);
+        }
+        let text = "\u{feff}solid".encode_utf16().flat_map(u16::to_le_bytes);
+        assert!(matches!(
+            parse(&reading("a.stl"), text.collect()),
+            Err(IoError::Encoding { .. })
+        ));
+    }
+
+    #[test]
+    fn a_count_of_0_is_told_where_it_stands() {
+        match read(&binary(b"x", 0, 0)).unwrap().finish(&reading("a.stl")) {
+            Err(IoError::Bytes {
+                offset: 80,
+                found,
+                expected,
+                ..
+            }) => {
+                assert_eq!(found, "a count of 0 triangles");
+                assert_eq!(expected, "a face of three corners or more");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn text_that_does_not_begin_with_solid_is_told_as_text() {
+        let html = format!("<html>{}", "x".repeat(200));
+        let mesh = format!("{FACET}endsolid\n");
+        let comment = format!("\n; M\u{fc}ller\nsolid\n{FACET}endsolid\n");
+        for (text, at, what) in [
+            ("abc", 1, "\"abc\""),
+            ("solids\n", 1, "\"solids\""),
+            (" \n\n", 2, END_OF_FILE),
+            (&mesh, 1, "\"facet normal nan nan nan\""),
+            (&comment, 2, "\"; M\u{fc}ller\""),
+            (&html, 1, &format!("{:?}...", &html[..60])),
+        ] {
+            match read(text.as_bytes()) {
+                Err(IoError::Line {
+                    line,
+                    found,
+                    expected,
+                    ..
+                }) => {
+                    assert_eq!((line, found.as_str()), (at, what));
+                    assert!(expected.starts_with("`solid`"), "{expected}");
+                }
+                other => panic!("{text:?}: {other:?}"),
+            }
         }
     }
 
@@ -244,16 +448,72 @@ mod tests {
         assert_eq!((mesh.triangles.len(), mesh.vertices.len()), (2, 3));
     }
 
+    /// Spaces and line ends are the same, but behind a name, and no facet gets lost whichever stand where.
+    #[test]
+    fn ascii_words_may_stand_on_any_line() {
+        let line = FACET.replace('\n', " ");
+        let words = FACET.replace(' ', "\n");
+        for (text, count) in [
+            (format!("solid x\n{line}\n{FACET}endsolid"), 2),
+            (format!("solid x\n{FACET}{line}\nendsolid"), 2),
+            (format!("solid x\n{words}{line}endsolid x"), 2),
+            (
+                format!(
+                    "solid x\n{}{FACET}endsolid x",
+                    FACET.replacen("endfacet\n", "endfacet ", 1)
+                ),
+                2,
+            ),
+            (format!("solid x {line}\n{FACET}endsolid x"), 2),
+            (format!("solid {line}{line} endsolid x"), 2),
+            (
+                format!("solid x\n{FACET}endsolid x solid y {line}endsolid y"),
+                2,
+            ),
+            (
+                format!("solid x endsolid x\nsolid y\n{FACET}endsolid y\nsolid z endsolid"),
+                1,
+            ),
+            (
+                format!("solid a facet of normal size\n{FACET}endsolid a solid facet"),
+                1,
+            ),
+            (
+                format!("solid M\u{fc}ller\r\n{FACET}endsolid").replace("endloop\n", "endloop\r"),
+                1,
+            ),
+            (format!("solid\n{FACET}\rendsolid").replace('\n', "\r"), 1),
+            (format!("\n\t solid x\n{FACET}endsolid x\n\0\0\0"), 1),
+        ] {
+            let mesh = read(text.as_bytes()).unwrap();
+            assert_eq!(mesh.triangles.len(), count, "{text:?}");
+            assert_eq!(mesh.vertices.len(), 3, "{text:?}");
+        }
+    }
+
     #[test]
     fn ascii_errors_name_the_line() {
         for (from, to, at) in [
             ("vertex 1 0 -0.0", "vertex 1 0", 5),
             ("vertex 1 0 -0.0", "vertex 1 0 z", 5),
             ("vertex 1 0 -0.0", "vertex 1 0 0 0", 5),
-            ("vertex 0 0 0\n", "", 7),
+            ("vertex 1 0 -0.0", "vertex 1 0 0 5,0", 5),
+            ("vertex 1 0 -0.0", "vertex 1 0 0\nvertex 1 0 0", 7),
+            ("vertex 0 0 0\n", "", 6),
             ("outer loop", "inner loop", 3),
-            ("endfacet\n", "", 9),
-            ("endsolid x\n", "", 9),
+            ("outer loop", "outer", 4),
+            ("outer loop\n", "", 3),
+            ("normal nan nan nan", "nan nan nan", 2),
+            ("normal nan nan nan", "normal nan nan", 3),
+            ("normal nan nan nan", "normal nan nan nan nan", 2),
+            ("facet normal nan nan nan\nouter loop\n", "", 2),
+            ("endloop\n", "", 7),
+            ("endfacet\n", "", 8),
+            ("endfacet\n", "endfacet\nendfacet\n", 9),
+            ("endsolid x\n", "", 8),
+            ("endsolid x\n", "endsolid x facet normal 0 0 1\n", 9),
+            ("endsolid x\n", "endsolid x\nmore", 10),
+            ("endloop\nendfacet\nendsolid x\n", "", 6),
             ("vertex 1 0 -0.0", "vertex 1 0 nan", 5),
             ("vertex 1 0 -0.0", "vertex 1 0 1e30", 5),
         ] {

@@ -4,29 +4,29 @@
 
 use std::path::Path;
 
-use ply_rs_bw::ply::{ElementDef, Property, PropertyAccessResult, PropertyType, ScalarType};
+use ply_rs_bw::ply::{ElementDef, Property, PropertyType, ScalarType};
 
 use super::Header;
 use super::header::parse_scalar;
 use super::rows::Row;
 use crate::error::{END_OF_FILE, IoError, Place};
-use crate::mesh::Reading;
+use crate::mesh::{Reading, lines};
 
 /// The lines of a payload, one element each.
 pub(super) struct Lines<'a> {
     path: &'a Path,
-    rest: &'a [u8],
-    line_end: u8,
+    header: &'a Header,
+    lines: lines::Lines<'a>,
     line: usize,
 }
 
 impl<'a> Lines<'a> {
     /// Makes the lines that follow a header.
-    pub(super) fn new(path: &'a Path, content: &'a [u8], header: &Header) -> Self {
+    pub(super) fn new(path: &'a Path, content: &'a [u8], header: &'a Header) -> Self {
         Self {
             path,
-            rest: &content[header.bytes..],
-            line_end: header.line_end,
+            header,
+            lines: lines::Lines::new(&content[header.bytes..]),
             line: header.lines,
         }
     }
@@ -49,14 +49,20 @@ impl<'a> Lines<'a> {
             let mut element = E::new();
             let mut words = text.split_ascii_whitespace();
             for property in def.properties.values() {
-                let value = parse_property(&mut words, &property.data_type);
-                let result = value.map(|value| element.set_property(&property.name, value));
-                if matches!(result, None | Some(PropertyAccessResult::UnsupportedType)) {
+                let kept = E::keeps(property);
+                let there = if kept {
+                    parse_property(&mut words, &property.data_type)
+                        .map(|value| element.set_property(&property.name, value))
+                        .is_some()
+                } else {
+                    skip_property(&mut words, &property.data_type).is_some()
+                };
+                if !there {
                     let expected = format!(
                         "property `{}` of element `{}` as {}",
-                        property.name,
+                        self.header.name_of(&property.name),
                         def.name,
-                        describe(&property.data_type)
+                        describe(&property.data_type, kept)
                     );
                     return Err(IoError::line(self.path, self.line, text, expected));
                 }
@@ -70,13 +76,7 @@ impl<'a> Lines<'a> {
 
     /// Returns the next line that is not blank.
     fn next_line(&mut self) -> Option<&'a str> {
-        while !self.rest.is_empty() {
-            let end = self.rest.iter().position(|byte| *byte == self.line_end);
-            let (line, rest) = match end {
-                Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
-                None => (self.rest, &[][..]),
-            };
-            self.rest = rest;
+        for line in self.lines.by_ref() {
             self.line += 1;
             // What is not text is no number either.
             let text = std::str::from_utf8(line).unwrap_or("not text");
@@ -94,42 +94,37 @@ fn parse_property<'a>(
 ) -> Option<Property> {
     match data_type {
         PropertyType::Scalar(scalar) => parse_scalar(words.next()?, scalar),
-        PropertyType::List(_, scalar) => {
+        PropertyType::List(..) => {
             let count: usize = words.next()?.parse().ok()?;
-            if matches!(scalar, ScalarType::Float | ScalarType::Double) {
-                list(words, count).map(Property::ListDouble)
-            } else {
-                // The declared width matters in binary files only; indices are checked against the vertices anyway.
-                let integers: Vec<i64> = list(words, count)?;
-                let narrow = integers
-                    .iter()
-                    .map(|i| i32::try_from(*i))
-                    .collect::<Result<_, _>>();
-                narrow.ok().map(Property::ListInt)
-            }
+            // The declared width matters in binary files only; indices are checked against the vertices anyway.
+            let integers: Vec<i32> = words
+                .take(count)
+                .map_while(|word| word.parse().ok())
+                .collect();
+            (integers.len() == count).then_some(Property::ListInt(integers))
         }
     }
 }
 
-fn list<'a, T: std::str::FromStr>(
+/// Goes past a property that nobody reads, whatever its words say: exporters write what does not fit the type, or is no number.
+fn skip_property<'a>(
     words: &mut impl Iterator<Item = &'a str>,
-    count: usize,
-) -> Option<Vec<T>> {
-    let values: Vec<T> = words
-        .take(count)
-        .map_while(|word| word.parse().ok())
-        .collect();
-    (values.len() == count).then_some(values)
+    data_type: &PropertyType,
+) -> Option<()> {
+    let count: usize = match data_type {
+        PropertyType::Scalar(_) => 1,
+        PropertyType::List(..) => words.next()?.parse().ok()?,
+    };
+    (words.take(count).count() == count).then_some(())
 }
 
-fn describe(data_type: &PropertyType) -> &'static str {
+fn describe(data_type: &PropertyType, kept: bool) -> &'static str {
     match data_type {
+        PropertyType::Scalar(_) if !kept => "a word",
         PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => "a number",
         PropertyType::Scalar(_) => "an integer in the range of its type",
-        PropertyType::List(_, ScalarType::Float | ScalarType::Double) => {
-            "a count and that many numbers"
-        }
-        PropertyType::List(..) => "a count and that many integers",
+        PropertyType::List(..) if !kept => "a count and that many words",
+        PropertyType::List(..) => "a count and that many 32-bit integers",
     }
 }
 
@@ -157,7 +152,8 @@ mod tests {
             ("0 0 0\n1 0\n0 1 0\n3 0 1 2 0\n", 12),
             ("0 0 0\n1 0 x\n0 1 0\n3 0 1 2 0\n", 12),
             ("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", 14),
-            ("0 0 0\n1 0 0\n0 1 0\n3 0 1 2 256\n", 14),
+            ("0 0 0\n1 0 0\n0 1 0\n3 0 1 4294967295 0\n", 14),
+            ("0 0 0\r\n1 0 0\r0 1 0\n\r3 0 1 2\r", 15),
             ("0 0 0\n1 0 0\n0 1 0\n9999999999 0 1 2 0\n", 14),
             ("0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5 0\n", 14),
             ("0 0 0\n1 0 0\n0 1 0\n-3 0 1 2 0\n", 14),
@@ -169,6 +165,51 @@ mod tests {
             match parse_mesh(&reading("a.ply"), format!("{HEAD}{body}").into_bytes()) {
                 Err(IoError::Line { line, .. }) => assert_eq!(line, at, "{body:?}"),
                 other => panic!("{body:?}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn every_line_may_end_in_its_own_way() {
+        for body in [
+            "0 0 0\r1 0 0\r0 1 0\r3 0 1 2 0\r",
+            "0 0 0\r\n1 0 0\r0 1 0\n\r\n3 0 1 2 0",
+        ] {
+            for head in [HEAD.to_owned(), HEAD.replace('\n', "\r")] {
+                let text = format!("{head}{body}");
+                let mesh = parse_mesh(&reading("a.ply"), text.into_bytes()).unwrap();
+                assert_eq!(mesh.vertices[1].coords.as_slice(), [1.0, 0.0, 0.0]);
+                assert_eq!(mesh.triangles, [[0, 1, 2]]);
+            }
+        }
+    }
+
+    #[test]
+    fn words_that_nobody_reads_are_counted_only() {
+        let head = "ply\nformat ascii 1.0\nelement odd 1\nproperty list uchar int ids\nelement vertex 3\n\
+            property float nx\nproperty uchar red\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 1\nproperty list uchar uint rgba\nproperty list uchar int vertex_indices\n\
+            property uchar a%1\nend_header\n";
+        let body = "2 4294967295 x\n-nan(ind) 256 0 0 0\nnan 0.5 1 0 0\n1,5 red 0 1 0\n1 4294967295 3 0 1 2 -1\n";
+        let mesh = parse_mesh(&reading("a.ply"), format!("{head}{body}").into_bytes()).unwrap();
+        assert_eq!(mesh.vertices[1].coords.as_slice(), [1.0, 0.0, 0.0]);
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+
+        for (given, short, at, property) in [
+            ("2 4294967295 x", "2 4294967295", 16, "ids"),
+            ("2 4294967295 x", "x 4294967295", 16, "ids"),
+            ("2 4294967295 x", "-2 4294967295", 16, "ids"),
+            ("-nan(ind) 256 0 0 0", "-nan(ind) 256 0 0", 17, "z"),
+            (" 0 1 2 -1", " 0 1 2", 20, "a%1"),
+        ] {
+            let text = format!("{head}{}", body.replace(given, short));
+            match parse_mesh(&reading("a.ply"), text.into_bytes()) {
+                Err(IoError::Line { line, expected, .. }) => {
+                    assert_eq!(line, at, "{short}");
+                    let named = format!("property `{property}` of ");
+                    assert!(expected.starts_with(&named), "{expected}");
+                }
+                other => panic!("{short}: {other:?}"),
             }
         }
     }

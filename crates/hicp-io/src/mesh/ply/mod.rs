@@ -37,14 +37,8 @@ pub(super) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawM
     let mut faces = Faces::default();
     let (vertices, header) = read(reading, &content, &mut faces)?;
     drop(content);
-    let mut mesh = RawMesh::new(match header.ply.elements.contains_key("face") {
-        true => header.place_of("face"),
-        false => Place::Line(header.lines),
-    });
-    mesh.vertices = vertices
-        .iter()
-        .map(|v| Point3::new(v.value[0], v.value[1], v.value[2]))
-        .collect();
+    let mut mesh = RawMesh::new(Place::Line(header.lines));
+    mesh.vertices = vertices.iter().map(|v| Point3::from(v.value)).collect();
     drop(vertices);
     mesh.triangles.reserve(faces.places.len());
     let mut corners = Vec::new();
@@ -69,6 +63,9 @@ pub(super) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawM
         }
         mesh.add_face(reading, place, &corners)?;
     }
+    if mesh.triangles.is_empty() {
+        return Err(header.without_triangles(reading.path));
+    }
     Ok(mesh)
 }
 
@@ -79,16 +76,19 @@ struct Faces {
     places: Vec<(Place, usize)>,
 }
 
-/// Reads all vertices of a PLY file.
-pub(crate) fn read_vertices(reading: &Reading<'_>, content: &[u8]) -> Result<Vec<Vertex>, IoError> {
+/// Reads all vertices of a PLY file, with normals.
+pub(crate) fn read_vertices(
+    reading: &Reading<'_>,
+    content: &[u8],
+) -> Result<Vec<Vertex<6>>, IoError> {
     Ok(read(reading, content, &mut Faces::default())?.0)
 }
 
-fn read(
+fn read<const N: usize>(
     reading: &Reading<'_>,
     content: &[u8],
     faces: &mut Faces,
-) -> Result<(Vec<Vertex>, Header), IoError> {
+) -> Result<(Vec<Vertex<N>>, Header), IoError> {
     let path = reading.path;
     let header = Header::parse(path, content, content.len() as u64)?;
     check_counts(reading, &header)?;
@@ -107,9 +107,12 @@ fn read(
             }
             "face" => {
                 header.require(path, element, header::FACE_LIST)?;
+                // Counted here, for what is kept of them is eight times the size of small indices in the file.
+                let mut triangles = 0_usize;
                 payload.read(element, |place, face: Face| {
                     // A triangle fan has two corners more than triangles.
-                    reading.check_triangles(place, face.corners.len().saturating_sub(2))?;
+                    triangles += face.corners.len().saturating_sub(2);
+                    reading.check_triangles(place, triangles)?;
                     faces.places.push((place, face.corners.len()));
                     faces.corners.extend(face.corners);
                     Ok(())
@@ -141,7 +144,7 @@ enum Payload<'a> {
 }
 
 impl<'a> Payload<'a> {
-    fn new(reading: &'a Reading<'a>, content: &'a [u8], header: &Header) -> Self {
+    fn new(reading: &'a Reading<'a>, content: &'a [u8], header: &'a Header) -> Self {
         if header.ply.encoding == Encoding::Ascii {
             return Self::Ascii(reading, ascii::Lines::new(reading.path, content, header));
         }
@@ -301,5 +304,83 @@ mod tests {
     fn strips_are_refused_by_name() {
         let content = b"ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n3 0 1 2\n";
         assert!(matches!(mesh(content), Err(IoError::Unsupported { .. })));
+    }
+
+    #[test]
+    fn names_that_are_there_twice_shift_nothing() {
+        for names in [
+            ["quality", "quality"],
+            ["s(1)", "s[1]"],
+            ["h\u{f6}he", "h\u{e4}he"],
+        ] {
+            let mut content = format!(
+                "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                 property float z\nproperty float {}\nproperty float {}\nelement face 1\n\
+                 property list uchar uchar vertex_index\nend_header\n",
+                names[0], names[1]
+            )
+            .into_bytes();
+            for [x, y, z] in CORNERS {
+                for value in [x, y, z, 0.25, 0.75] {
+                    content.extend(value.to_le_bytes());
+                }
+            }
+            content.extend([4, 0, 1, 2, 3]);
+            let mesh = mesh(&content).unwrap();
+            assert_eq!(mesh.vertices, CORNERS.map(|c| Point3::from(c).cast()));
+            assert_eq!(mesh.triangles.len(), 2);
+        }
+    }
+
+    #[test]
+    fn bytes_are_counted_from_the_mark() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n\
+            property uchar z\nelement face 2\nproperty list uchar uchar vertex_index\nend_header\n";
+        for mark in ["", "\u{feff}"] {
+            let mut content = format!("{mark}{text}").into_bytes();
+            let faces = content.len() as u64 + 3;
+            content.extend([1, 2, 3, 3, 0, 0, 0, 3, 0, 0, 0]);
+            assert_eq!(mesh(&content).unwrap().vertices, [Point3::new(1., 2., 3.)]);
+            content.pop();
+            match mesh(&content) {
+                Err(IoError::Bytes { offset, .. }) => assert_eq!(offset, faces + 4),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_triangles_is_told_so_by_its_header() {
+        for (elements, rows, at, found) in [
+            ("", "", 7, "the elements [\"vertex\"]"),
+            (
+                "element Face 0\n",
+                "",
+                8,
+                "the elements [\"vertex\", \"Face\"]",
+            ),
+            ("element face 0\n", "", 7, "\"element face 0\""),
+            (
+                "element face 1\nproperty list uchar int vertex_index\n",
+                "2 0 0\n",
+                7,
+                "\"element face 1\"",
+            ),
+        ] {
+            let content = format!(
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                 {elements}end_header\n0 0 0\n{rows}"
+            );
+            let error = mesh(content.as_bytes()).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!("line {at}: found {found}, ")),
+                "{error}"
+            );
+            assert_eq!(
+                error.contains("a point cloud, no mesh"),
+                rows.is_empty(),
+                "{error}"
+            );
+        }
     }
 }

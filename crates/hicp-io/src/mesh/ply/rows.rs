@@ -1,6 +1,6 @@
 //! The elements that are kept: vertices and faces.
 
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType};
 
 use super::header::is_face_list;
 use crate::error::{IoError, Place};
@@ -8,43 +8,59 @@ use crate::mesh::Reading;
 
 /// An element that a file holds one of per row.
 pub(super) trait Row: PropertyAccess {
+    /// Returns whether a property is read. Of the others nothing is asked but that they can be read past.
+    fn keeps(_: &PropertyDef) -> bool {
+        false
+    }
+
     /// Refuses what was read where it stands.
     fn check(&self, _: &Reading<'_>, _: Place) -> Result<(), IoError> {
         Ok(())
     }
 }
 
-impl Row for Vertex {
+impl<const N: usize> Row for Vertex<N> {
+    fn keeps(property: &PropertyDef) -> bool {
+        let named = VERTEX_NAMES[..N].contains(&property.name.as_str());
+        named && matches!(property.data_type, PropertyType::Scalar(_))
+    }
+
     fn check(&self, reading: &Reading<'_>, place: Place) -> Result<(), IoError> {
         reading.check_position(place, &self.value[..3])
     }
 }
 
-impl Row for Face {}
+impl Row for Face {
+    fn keeps(property: &PropertyDef) -> bool {
+        is_face_list(&property.name)
+    }
+}
 
 impl Row for Skipped {}
 
-/// A vertex: x, y, z, nx, ny, nz; NaN where the file says nothing.
+/// What is read of a vertex, in the order of [`Vertex::value`].
+pub(super) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+
+/// A vertex: x, y, z, and nx, ny, nz if N is 6; NaN where the file says nothing.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Vertex {
-    pub(crate) value: [f64; 6],
+pub(crate) struct Vertex<const N: usize> {
+    pub(crate) value: [f64; N],
 }
 
-impl PropertyAccess for Vertex {
+impl<const N: usize> PropertyAccess for Vertex<N> {
     fn new() -> Self {
         Self {
-            value: [f64::NAN; 6],
+            value: [f64::NAN; N],
         }
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let names = ["x", "y", "z", "nx", "ny", "nz"];
-        match (names.iter().position(|n| *n == name), scalar(&property)) {
+        let index = VERTEX_NAMES[..N].iter().position(|n| *n == name);
+        match (index, scalar(&property)) {
             (Some(index), Some(number)) => {
                 self.value[index] = number;
                 PropertyAccessResult::Set
             }
-            (Some(_), None) => PropertyAccessResult::UnsupportedType,
             _ => PropertyAccessResult::Ignored,
         }
     }
