@@ -17,7 +17,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Modules in reading order: `score` (trait), `mean_vsd`, `sampled_mve`, `vsd`, `tolerances`, `bop_vsd`, `pose_error`, `model_points`,
+//! Modules in reading order: `score` (trait), `mean_vsd`, `sampled_mve`, `relief`, `vsd`, `tolerances`, `bop_vsd`, `pose_error`, `model_points`,
 //! `recall`, `calibration`, `error`.
 
 // Counts become floating point numbers; all are far below 2⁵³.
@@ -32,6 +32,7 @@ mod model_points;
 mod nearest;
 mod pose_error;
 mod recall;
+mod relief;
 mod sampled_mve;
 mod score;
 mod tolerances;
@@ -46,6 +47,7 @@ pub use pose_error::{add, adi, mspd, mssd};
 pub use recall::{
     N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates,
 };
+pub use relief::Relief;
 pub use sampled_mve::SampledMve;
 pub use score::Score;
 pub use tolerances::{N_TOLERANCES, tolerances};

@@ -1,8 +1,10 @@
-//! What looks wrong about inputs of which each is well-formed: mostly units that do not go together.
+//! What looks wrong about inputs of which each is well-formed, mostly units that do not go together, and about what came of them.
 
 use std::f64::consts::FRAC_PI_4;
 
-use hicp_core::{Isometry3, Model, Observation};
+use hicp_core::{Isometry3, Model, Observation, diameter};
+use hicp_score::Relief;
+use hicp_switch::PAPER_ALPHA;
 use thiserror::Error;
 
 /// Diameters beyond which an object is taken for one in another unit: a coin in metres, a car in millimetres.
@@ -10,6 +12,9 @@ const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 
 /// Share of the diameter that rounding the coordinates may cost.
 const COARSE: f64 = 1e-3;
+
+/// How flat a surface is said to be at most, metres: the step of most depth images.
+const FINEST: f64 = 1e-3;
 
 /// How many times nearer or further than the pose says the measured surface may be.
 const DEPTH_RATIO: f64 = 3.0;
@@ -21,7 +26,14 @@ const MASK_RATIO: f64 = 10.0;
 /// that is wrong by ten makes a hundred times the pixels.
 const SLIVER_RATIO: f64 = 20.0;
 
-/// Something that looks wrong about the inputs of a refinement, though none of them is refused. Lengths are metres.
+/// MVE from which on an initial pose explains nothing of the mask ([`Doubt::FoundElsewhere`]): of 71 poses that four estimators gave for their
+/// own object one has it, and so has everything that was found in the mask of another object (`docs/robustness.md`).
+pub const EXPLAINS_NOTHING: f64 = 0.9;
+
+/// Share of the mesh's diameter by which a stated one may differ: BOP's are those of other versions of the mesh, with more vertices.
+const DIAMETER_TOLERANCE: f64 = 0.05;
+
+/// Something that looks wrong about the inputs of a refinement or about its result, though nothing is refused. Lengths are metres.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Doubt {
@@ -30,6 +42,14 @@ pub enum Doubt {
     Diameter {
         /// Diameter of the model.
         diameter: f64,
+    },
+    /// The diameter that the model was given is another than that of its mesh ([`doubt_of_diameter`]).
+    #[error("the stated diameter is {}, but that of the mesh is {}", Meters(*stated), Meters(*measured))]
+    StatedDiameter {
+        /// The diameter that the model was made with.
+        stated: f64,
+        /// Largest distance between two vertices that triangles use.
+        measured: f64,
     },
     /// The mesh is so far from its origin that `f32` rounds its shape.
     #[error(
@@ -97,6 +117,45 @@ pub enum Doubt {
         diameter: f64,
         /// z of the centre of the object.
         distance: f64,
+    },
+    /// The refinement made the pose worse, by the score that judges both.
+    #[error(
+        "the returned pose explains the image worse than the initial one (MVE {mve:.3}, was {mve_initial:.3})"
+    )]
+    Worse {
+        /// MVE of the initial pose.
+        mve_initial: f64,
+        /// MVE of the returned pose.
+        mve: f64,
+    },
+    /// The returned pose has an MVE of [`PAPER_ALPHA`] or more.
+    #[error("MVE {mve:.3}: the pose does not explain the image, do not trust it")]
+    Unexplained {
+        /// MVE of the returned pose.
+        mve: f64,
+    },
+    /// The returned pose explains what the initial one has nothing to do with: the mask may be that of another object, and whatever is there
+    /// looks enough like this one from one side to be matched.
+    #[error(
+        "the initial pose explained nothing of the mask (MVE {mve_initial:.3}): what was found there (MVE {mve:.3}) may be another object"
+    )]
+    FoundElsewhere {
+        /// MVE of the initial pose.
+        mve_initial: f64,
+        /// MVE of the returned pose.
+        mve: f64,
+    },
+    /// A plane explains the depth inside the mask better than the returned pose does, and the model is not flat there ([`Relief::is_flat`]): the
+    /// mask may be of a wall, a table, a box, or of something that the sensor does not see.
+    #[error(
+        "the surface inside the mask is flat to within {}, that of the model at the pose only to within {}, and {} away from it: what is there may be another object",
+        Meters(relief.measured.max(FINEST)),
+        Meters(relief.rendered),
+        Meters(relief.residual)
+    )]
+    Flat {
+        /// How flat the two surfaces are, and how far one is from the other.
+        relief: Relief,
     },
 }
 
@@ -190,9 +249,74 @@ pub fn doubts_of_model(model: &Model) -> Vec<Doubt> {
     doubts
 }
 
+/// Returns [`Doubt::StatedDiameter`] where the diameter that a model was made with ([`ModelConfig::diameter`](crate::ModelConfig::diameter))
+/// differs by more than a twentieth from that of its mesh.
+///
+/// A dataset's file can be wrong or that of other models, and what is measured in diameters is then wrong without a trace. Not one of
+/// [`doubts_of_model`], for it costs about O(n log n) of the vertices: ask once per model.
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?;
+/// assert_eq!(doubt_of_diameter(&Model::new(mesh.clone())), None);
+/// let config = ModelConfig { diameter: Some(1.4), ..ModelConfig::default() };
+/// let doubt = doubt_of_diameter(&Model::with_config(mesh, config));
+/// assert!(matches!(doubt, Some(Doubt::StatedDiameter { .. })));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn doubt_of_diameter(model: &Model) -> Option<Doubt> {
+    let vertices: Vec<_> = model.mesh().used_points().collect();
+    let (stated, measured) = (model.diameter(), diameter(&vertices));
+    let differ = (stated - measured).abs() > DIAMETER_TOLERANCE * measured;
+    differ.then_some(Doubt::StatedDiameter { stated, measured })
+}
+
+/// Returns what looks wrong about the result of a refinement, by the scores of its initial and of its returned pose
+/// ([`Refinement::mve_initial`](crate::Refinement::mve_initial), [`Refinement::mve`](crate::Refinement::mve) and
+/// [`Refinement::relief`](crate::Refinement::relief)).
+///
+/// No doubt does not mean that the pose is right: an object that looks nearly the same from two sides explains the image in both
+/// orientations, and one of similar shape may have an MVE of 0.2 or 0.3.
+///
+/// ```
+/// use hybrid_icp::*;
+/// // A rough pose that became a good one.
+/// let at = |residual| Some(Relief { residual, measured: 0.0025, rendered: 0.009, diameter: 0.2 });
+/// assert_eq!(doubts_of_result(0.6, 0.1, at(0.002)), []);
+/// // Something was found in the mask, but nothing that the detector had seen there.
+/// assert!(matches!(doubts_of_result(0.95, 0.2, None)[..], [Doubt::FoundElsewhere { .. }]));
+/// // Nothing was found.
+/// assert!(matches!(doubts_of_result(0.95, 0.7, None)[..], [Doubt::Unexplained { .. }]));
+/// // It got worse, but not bad.
+/// assert!(matches!(doubts_of_result(0.1, 0.2, None)[..], [Doubt::Worse { .. }]));
+/// // The object was found on a wall.
+/// assert!(matches!(doubts_of_result(0.6, 0.1, at(0.008))[..], [Doubt::Flat { .. }]));
+/// ```
+#[must_use]
+pub fn doubts_of_result(mve_initial: f64, mve: f64, relief: Option<Relief>) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    if mve > mve_initial {
+        doubts.push(Doubt::Worse { mve_initial, mve });
+    }
+    if mve >= PAPER_ALPHA {
+        doubts.push(Doubt::Unexplained { mve });
+        return doubts;
+    }
+    if mve_initial >= EXPLAINS_NOTHING {
+        doubts.push(Doubt::FoundElsewhere { mve_initial, mve });
+    }
+    if let Some(relief) = relief.filter(Relief::is_flat) {
+        doubts.push(Doubt::Flat { relief });
+    }
+    doubts
+}
+
 /// Area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
 fn smallest_side(model: &Model) -> f64 {
-    let vertices = model.mesh().vertices();
+    let vertices: Vec<_> = model.mesh().used_points().collect();
     let mut sides = [0, 1, 2].map(|axis| {
         let along = vertices.iter().map(|p| f64::from(p[axis]));
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {

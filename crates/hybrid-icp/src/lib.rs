@@ -50,7 +50,9 @@ mod suggest;
 mod trace;
 
 pub use calibration::Calibration;
-pub use doubt::{Doubt, doubts, doubts_of_model};
+pub use doubt::{
+    Doubt, EXPLAINS_NOTHING, doubt_of_diameter, doubts, doubts_of_model, doubts_of_result,
+};
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
@@ -62,11 +64,12 @@ pub use hicp_association::{
 };
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
-    ImageError, Isometry3, Mask, Matrix3, Matrix6, MeshError, MeshSurvey, Model, ModelConfig,
-    Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters, PixelRegion, Point2,
-    Point3, Problem, RenderCache, RenderedView, Renderer, RotationError, Surfel, Symmetries,
-    SymmetryAxis, SymmetryError, Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
-    Vector6, Work, rotation_from_matrix, rotation_grid, se3, so3,
+    ImageError, Isometry3, MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Mask, Matrix3, Matrix6, MeshError,
+    MeshSurvey, Model, ModelConfig, Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera,
+    PixelCenters, PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer,
+    RotationError, Surfel, Symmetries, SymmetryAxis, SymmetryError, Translation3, TriMesh,
+    UnitQuaternion, UnitVector3, Vector3, Vector6, Work, rotation_from_matrix, rotation_grid, se3,
+    so3,
 };
 pub use hicp_fusion as fusion;
 pub use hicp_icp::{
@@ -85,9 +88,9 @@ pub use hicp_metric::{
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
-    ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd,
-    add, adi, bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area,
-    spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
+    ReliabilityBin, Relief, SampledMve, Score, ScoreError, TargetErrors,
+    VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances, most_visible, mspd, mssd,
+    reliability, roc_area, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
 };
 pub use hicp_switch::{
     Alternate, PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds,

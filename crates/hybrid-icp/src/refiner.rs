@@ -3,8 +3,9 @@
 use hicp_core::{Isometry3, Model, Observation, Problem};
 use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
-use hicp_score::{MeanVsd, Score};
+use hicp_score::{MeanVsd, Relief, Score};
 
+use crate::doubt::{Doubt, doubts_of_result};
 use crate::preset::{BoxedStage, Preset};
 
 /// What a refinement returns: a pose, how it came about, and how well it explains the image.
@@ -16,8 +17,20 @@ pub struct Refinement {
     pub mve_initial: f64,
     /// The mean VSD estimate of the returned pose.
     ///
-    /// Above about 0.4 the pose is not to be trusted; above `mve_initial` the refinement made it worse.
+    /// Above about 0.4 the pose is not to be trusted; above `mve_initial` the refinement made it worse; where `mve_initial` is 0.9 or more it
+    /// may be the pose of another object ([`Self::doubts`]).
     pub mve: f64,
+    /// How flat the measured and the rendered surface are at the returned pose: whether a plane would explain the depth better. `None` where
+    /// fewer than 64 pixels show both.
+    pub relief: Option<Relief>,
+}
+
+impl Refinement {
+    /// Returns why the pose is not to be trusted ([`doubts_of_result`]); nothing where no score says so.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<Doubt> {
+        doubts_of_result(self.mve_initial, self.mve, self.relief)
+    }
 }
 
 /// A pipeline with its scratch memory and renderer: make one per thread, use it for any number of refinements.
@@ -98,10 +111,12 @@ impl Refiner {
             init,
             &mut Session::new(&mut self.workspace, observer),
         );
+        let pose = &outcome.camera_from_object;
         Refinement {
             outcome,
             mve_initial,
-            mve: self.mve(model, observation, &outcome.camera_from_object),
+            mve: self.mve(model, observation, pose),
+            relief: Relief::at(&mut self.workspace.context(&problem), pose),
         }
     }
 
