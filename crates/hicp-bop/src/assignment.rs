@@ -36,7 +36,11 @@ pub fn assign_masks(overlaps: &[Vec<u64>]) -> Vec<Option<usize>> {
             (Some(overlap), Some(most)) => (*overlap, overlaps[row][most]),
             _ => return 0,
         };
-        if 2 * overlap >= most { overlap } else { 0 }
+        if overlap >= most.div_ceil(2) {
+            overlap
+        } else {
+            0
+        }
     };
     let mut chosen = own.clone();
     for (mask, row) in best_matching(n_masks, overlaps.len(), gain) {
@@ -134,6 +138,12 @@ mod tests {
             }
         }
         best
+    }
+
+    #[test]
+    fn overlaps_may_be_of_any_size() {
+        let overlaps = [vec![u64::MAX, 1], vec![1, 1]];
+        assert_eq!(assign_masks(&overlaps), [Some(0), Some(1)]);
     }
 
     #[test]

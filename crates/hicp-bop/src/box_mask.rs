@@ -64,14 +64,8 @@ impl BoxMask {
     fn corners(&self, model: &Model) -> (Point3<f64>, Point3<f64>) {
         let by = (self.margin * model.diameter()).max(0.0);
         let center = model.center();
-        let vertices = model
-            .mesh()
-            .vertices()
-            .iter()
-            .zip(model.mesh().used_vertices());
-        let offsets = vertices
-            .filter(|(_, used)| *used)
-            .map(|(vertex, _)| (vertex.cast::<f64>() - center).abs());
+        let vertices = model.mesh().used_points();
+        let offsets = vertices.map(|vertex| (vertex.cast::<f64>() - center).abs());
         let half = offsets.fold(Vector3::zeros(), |half: Vector3<f64>, offset| {
             half.sup(&offset)
         });

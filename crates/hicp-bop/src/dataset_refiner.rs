@@ -154,5 +154,6 @@ fn refine(
         fate,
         pose,
         mve: Some((refinement.mve_initial, refinement.mve)),
+        relief: refinement.relief,
     }
 }

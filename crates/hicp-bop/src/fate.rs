@@ -4,7 +4,7 @@ use std::fmt;
 
 use hybrid_icp::Termination;
 
-use crate::fault::Fault;
+use crate::fault::{Fault, FaultKind};
 
 /// What became of a row of a result file. All but [`Fate::Refined`] leave the row's pose as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -96,10 +96,10 @@ impl PartialOrd for Fate {
 
 impl From<&Fault> for Fate {
     fn from(fault: &Fault) -> Self {
-        if fault.missing {
-            Self::MissingFrame
-        } else {
-            Self::Damaged
+        match fault.kind {
+            FaultKind::Missing => Self::MissingFrame,
+            FaultKind::MissingMask => Self::NoMask,
+            FaultKind::Damaged => Self::Damaged,
         }
     }
 }

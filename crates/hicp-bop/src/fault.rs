@@ -4,11 +4,22 @@ use std::error::Error;
 
 use hicp_io::IoError;
 
+/// What is the matter with a part of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// It is not there, which is no fault of the dataset: parts of one are often all that one has.
+    Missing,
+    /// The same, of masks of an image that is there.
+    MissingMask,
+    /// It is there, but cannot be used.
+    Damaged,
+}
+
 /// Why something of a dataset cannot be used; it costs the rows that need it, and no others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// It is not there, which is no fault of the dataset: parts of one are often all that one has.
-    pub missing: bool,
+    /// What is the matter with it.
+    pub kind: FaultKind,
     /// What is wrong, with path, place and what was expected.
     pub text: String,
 }
@@ -18,7 +29,10 @@ impl Fault {
     #[must_use]
     pub fn of(error: &IoError) -> Self {
         Self {
-            missing: matches!(error, IoError::Missing { .. }),
+            kind: match error {
+                IoError::Missing { .. } => FaultKind::Missing,
+                _ => FaultKind::Damaged,
+            },
             text: chain(error),
         }
     }
@@ -27,7 +41,7 @@ impl Fault {
     #[must_use]
     pub fn damaged(text: String) -> Self {
         Self {
-            missing: false,
+            kind: FaultKind::Damaged,
             text,
         }
     }

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use hicp_io::bop::{Detection, Rle};
+use hicp_io::{IoError, is_absent};
 use hybrid_icp::{Isometry3, Mask, Model, Observation, Refiner};
 
 use crate::assignment::assign_masks;
 use crate::box_mask::BoxMask;
 use crate::fate::Fate;
-use crate::fault::Fault;
+use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;
 
 /// An image while its rows are refined: its depth read once and shared by its observations, a mask read when a row of its object asks for it, an observation
@@ -48,14 +49,17 @@ enum Seen {
 }
 
 impl<'a> Frame<'a> {
-    /// An image whose masks are the visible masks of its ground truth; without ground truth it has none.
+    /// An image whose masks are the visible masks of its ground truth; without ground truth it has none, and a fault that says so.
     #[must_use]
     pub fn with_visible_masks(image: Image) -> Self {
-        let truths = image.scene.ground_truth(image.im_id).unwrap_or_default();
-        let masks = truths.iter().enumerate();
+        let truths = image.scene.ground_truth(image.im_id);
+        let unknown = truths.is_none().then(|| no_ground_truth(&image));
+        let masks = truths.unwrap_or_default().iter().enumerate();
         let masks = masks.map(|(instance, truth)| (truth.obj_id, Source::Instance(instance)));
         let masks = candidates(masks);
-        Self::new(image, masks)
+        let mut frame = Self::new(image, masks);
+        frame.faults.extend(unknown);
+        frame
     }
 
     /// An image whose masks are the segmentations of detections; those without one are of no use and no harm.
@@ -87,7 +91,7 @@ impl<'a> Frame<'a> {
         &self.image
     }
 
-    /// Masks that could not be used, as far as rows asked for them.
+    /// Masks that are missing or could not be used, as far as rows asked for them.
     #[must_use]
     pub fn into_faults(self) -> Vec<Fault> {
         self.faults
@@ -175,11 +179,10 @@ impl<'a> Frame<'a> {
         if matches!(self.masks[index].seen, Seen::Unread) {
             let seen = match self.mask_of(self.masks[index].source) {
                 Ok(mask) => Seen::Read(mask),
-                // An instance whose mask is not there is one without a mask.
-                Err(fault) if fault.missing => Seen::Unusable(Fate::NoMask),
                 Err(fault) => {
+                    let fate = Fate::from(&fault);
                     self.faults.push(fault);
-                    Seen::Unusable(Fate::Damaged)
+                    Seen::Unusable(fate)
                 }
             };
             self.masks[index].seen = seen;
@@ -196,7 +199,7 @@ impl<'a> Frame<'a> {
             Source::Instance(instance) => {
                 let mask = scene.read_visible_mask(*im_id, instance);
                 let path = scene.visible_mask_path(*im_id, instance);
-                (mask.map_err(|e| Fault::of(&e))?, path.display().to_string())
+                (mask.map_err(|e| of_mask(&e))?, path.display().to_string())
             }
             Source::Code(code) => (
                 code.to_mask(),
@@ -245,6 +248,29 @@ impl<'a> Frame<'a> {
                 both.count() as u64
             })
             .collect()
+    }
+}
+
+/// What an error while reading a mask says. An instance whose mask is not there is one without a mask.
+fn of_mask(error: &IoError) -> Fault {
+    let fault = Fault::of(error);
+    let kind = match fault.kind {
+        FaultKind::Missing => FaultKind::MissingMask,
+        other => other,
+    };
+    Fault { kind, ..fault }
+}
+
+/// Why nothing is known of the instances of an image, in the words of what else is missing.
+fn no_ground_truth(image: &Image) -> Fault {
+    let path = image.scene.dir().join("scene_gt.json");
+    let why = match is_absent(&path) {
+        true => "does not exist".to_owned(),
+        false => format!("does not have image {}", image.im_id),
+    };
+    Fault {
+        kind: FaultKind::MissingMask,
+        text: format!("ground truth is missing: {} {why}", path.display()),
     }
 }
 

@@ -57,7 +57,7 @@ pub use best_rows::best_rows;
 pub use box_mask::BoxMask;
 pub use dataset_refiner::DatasetRefiner;
 pub use fate::Fate;
-pub use fault::{Fault, chain};
+pub use fault::{Fault, FaultKind, chain};
 pub use frame::Frame;
 pub use frames::{FrameKey, FrameRows, Targets, detections_by_frame, frames_of};
 pub use mask_source::MaskSource;

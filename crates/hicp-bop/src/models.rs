@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use hicp_io::bop::{Dataset, ModelInfo};
-use hicp_io::{IoError, LengthUnit, ReadLimits};
+use hicp_io::{IoError, LengthUnit, ReadLimits, is_absent};
 use hybrid_icp::{Model, ModelConfig};
 
 use crate::fault::chain;
@@ -35,10 +35,10 @@ impl ModelFolder {
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         let info = dir.join("models_info.json");
-        let infos = if info.is_file() {
-            limits.read_models_info(info)?
-        } else {
+        let infos = if is_absent(&info) {
             BTreeMap::new()
+        } else {
+            limits.read_models_info(info)?
         };
         Ok(Self { dir, infos, limits })
     }
@@ -50,7 +50,7 @@ impl ModelFolder {
     /// As [`ReadLimits::read_mesh`].
     pub fn read(&self, obj_id: u32) -> Result<Option<Model>, IoError> {
         let path = Dataset::model_path_in(&self.dir, obj_id);
-        if !path.is_file() {
+        if is_absent(&path) {
             return Ok(None);
         }
         let info = self.infos.get(&obj_id);

@@ -1,7 +1,7 @@
 //! What a refinement of rows returns, and how it is entered into the file's rows.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Doubt, Isometry3};
+use hybrid_icp::{Doubt, Isometry3, Relief, doubts_of_result};
 
 use crate::fate::Fate;
 use crate::fault::Fault;
@@ -17,9 +17,20 @@ pub struct RowResult {
     pub pose: Option<Isometry3<f64>>,
     /// MVE of the row's pose and of the result's; `None` if it did not get as far as the pipeline.
     pub mve: Option<(f64, f64)>,
+    /// How flat the surfaces are at the result's pose ([`hybrid_icp::Refinement::relief`]).
+    pub relief: Option<Relief>,
 }
 
 impl RowResult {
+    /// Returns why the pose is not to be trusted ([`hybrid_icp::doubts_of_result`]); nothing where no score says so, or there is none.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<Doubt> {
+        match self.mve {
+            Some((before, after)) => doubts_of_result(before, after, self.relief),
+            None => Vec::new(),
+        }
+    }
+
     /// A row that did not get as far as the pipeline.
     #[must_use]
     pub fn unrefined(index: usize, fate: Fate) -> Self {
@@ -28,6 +39,7 @@ impl RowResult {
             fate,
             pose: None,
             mve: None,
+            relief: None,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use hicp_io::bop::{Dataset, Scene};
 use hybrid_icp::{DepthImage, PinholeCamera};
 
-use crate::fault::Fault;
+use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;
 
 /// The scenes of a split, opened when they are asked for; each may be missing or damaged without harm to the others.
@@ -86,7 +86,10 @@ impl Scenes {
     pub fn read(&self, (scene_id, im_id): FrameKey) -> Result<Image, Fault> {
         let scene = self.get(scene_id)?;
         let camera = scene.camera(im_id).map_err(|e| Fault {
-            missing: !scene.image_ids().any(|id| id == im_id),
+            kind: match scene.image_ids().any(|id| id == im_id) {
+                true => FaultKind::Damaged,
+                false => FaultKind::Missing,
+            },
             ..Fault::of(&e)
         })?;
         let depth = scene.read_depth(im_id).map_err(|e| Fault::of(&e))?;

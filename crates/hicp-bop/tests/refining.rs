@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use hicp_bop::{
-    BoxMask, DatasetRefiner, Fate, Fault, Frame, Image, MaskSource, ModelFolder, Models, Rescore,
-    RowResult, Scenes, detections_by_frame,
+    BoxMask, DatasetRefiner, Fate, Fault, FaultKind, Frame, Image, MaskSource, ModelFolder, Models,
+    Rescore, RowResult, Scenes, detections_by_frame,
 };
 use hicp_io::bop::{
     Dataset, Detection, GroundTruth, ResultRow, Rle, SceneCamera, write_scene_camera,
@@ -210,6 +210,28 @@ fn a_mask_that_cannot_be_used_is_a_fault_of_its_own() {
 }
 
 #[test]
+fn a_mask_that_is_missing_is_a_fault_that_names_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = dataset(dir.path());
+    let models = models(&dataset, &[BLOCK]);
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+    let scene = dir.path().join("test/000001");
+    let mut missing = |name: &str| {
+        std::fs::remove_file(scene.join(name)).unwrap();
+        let mut frame = Frame::with_visible_masks(image(&dataset));
+        let chosen = frame.choose(&mut refiner, &models.by_id[&BLOCK], BLOCK, &[truth()]);
+        assert_eq!(chosen, [Err(Fate::NoMask)]);
+        let faults = frame.into_faults();
+        assert!(
+            matches!(&faults[..], [fault] if fault.kind == FaultKind::MissingMask && fault.text.contains(name)),
+            "{faults:?}"
+        );
+    };
+    missing("mask_visib/000004_000000.png");
+    missing("scene_gt.json");
+}
+
+#[test]
 fn detections_go_to_their_images() {
     let elsewhere = Detection {
         image_id: 7,
@@ -237,7 +259,7 @@ fn limits_and_errors_are_told_as_faults() {
     let error = folder.read(BLOCK).unwrap_err();
     let fault = Fault::of(&error);
     assert!(
-        !fault.missing && fault.text.contains("obj_000005.ply"),
+        fault.kind == FaultKind::Damaged && fault.text.contains("obj_000005.ply"),
         "{fault:?}"
     );
     // A dataset hands its limits on to its scenes; a scene can have its own.
@@ -246,7 +268,8 @@ fn limits_and_errors_are_told_as_faults() {
     assert!(Fault::of(&error).text.contains("000004.png"), "{error}");
     assert!(scene.with_limits(ReadLimits::DEFAULT).read_depth(4).is_ok());
     let missing: IoError = dataset.scene("test", 2).unwrap_err();
-    assert!(Fault::of(&missing).missing);
+    assert!(Fault::of(&missing).kind == FaultKind::Missing);
+    assert_eq!(fault, Fault::damaged(fault.text.clone()));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use hicp_bop::Scenes;
+use hicp_bop::{FaultKind, Scenes};
 use hicp_io::bop::Dataset;
 
 fn dataset(scenes: &[u32]) -> tempfile::TempDir {
@@ -41,16 +41,19 @@ fn scenes_that_are_not_there_or_damaged_say_so() {
     let scenes = Scenes::new(&Dataset::open(dir.path()).unwrap(), "val", 0);
     let missing = scenes.get(9).unwrap_err();
     assert!(
-        missing.missing && missing.text.contains("000009"),
+        missing.kind == FaultKind::Missing && missing.text.contains("000009"),
         "{missing:?}"
     );
     let damaged = scenes.get(2).unwrap_err();
-    assert!(!damaged.missing && damaged.text.contains("scene_camera.json"));
+    assert!(damaged.kind == FaultKind::Damaged && damaged.text.contains("scene_camera.json"));
     let fault = scenes.read((1, 4)).unwrap_err();
-    assert!(fault.missing && fault.text.contains("image 4"), "{fault:?}");
+    assert!(
+        fault.kind == FaultKind::Missing && fault.text.contains("image 4"),
+        "{fault:?}"
+    );
     let fault = scenes.read((1, 3)).unwrap_err();
     assert!(
-        fault.missing && fault.text.contains("000003.png"),
+        fault.kind == FaultKind::Missing && fault.text.contains("000003.png"),
         "{fault:?}"
     );
 }
