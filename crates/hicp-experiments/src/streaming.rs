@@ -8,10 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use hicp_io::write_atomically;
+use hicp_io::{is_absent, write_atomically};
 
 use crate::error::ExperimentError;
 use crate::study::{CONFIG_FILE, RunOptions};
+
+/// Most characters of a line that a message shows.
+const SHOWN: usize = 300;
 
 /// A file of rows and the configuration beside it.
 pub(crate) struct Sheet<'a> {
@@ -110,7 +113,7 @@ impl Sheet<'_> {
     /// Opens the file of rows at its end; returns the first case that is not in it.
     fn open(&self, resume: bool) -> Result<(File, usize), ExperimentError> {
         let (path, stored) = (self.path(), self.folder.join(CONFIG_FILE));
-        if !path.exists() {
+        if is_absent(&path) {
             write_atomically(&stored, |w| w.write_all(self.config.as_bytes()))?;
             let mut file = File::create(&path).map_err(ExperimentError::file(&path))?;
             file.write_all(&self.header)
@@ -127,6 +130,7 @@ impl Sheet<'_> {
             });
         }
         let bytes = std::fs::read(&path).map_err(ExperimentError::file(&path))?;
+        self.check_header(&bytes)?;
         let (whole, cases) = self.whole_cases(&bytes);
         let mut file = OpenOptions::new()
             .write(true)
@@ -141,6 +145,34 @@ impl Sheet<'_> {
         file.seek(SeekFrom::End(0))
             .map_err(ExperimentError::file(&path))?;
         Ok((file, cases))
+    }
+
+    /// Refuses a file that does not begin as the rows do, unless its end cut off the first line: it is not of this study, and would be
+    /// written over. A machine that failed may leave zeros in what was cut off.
+    fn check_header(&self, bytes: &[u8]) -> Result<(), ExperimentError> {
+        let zeros = bytes.iter().rev().take_while(|byte| **byte == 0).count();
+        let written = &bytes[..bytes.len() - zeros];
+        if written.starts_with(&self.header) || self.header.starts_with(written) {
+            return Ok(());
+        }
+        let first_line = |bytes: &[u8]| {
+            let line = bytes.split(|byte| *byte == b'\n').next();
+            let text = String::from_utf8_lossy(line.unwrap_or_default()).into_owned();
+            let shown: String = text.chars().take(SHOWN).collect();
+            match shown.len() < text.len() {
+                true => shown + "…",
+                false => shown,
+            }
+        };
+        Err(ExperimentError::Row {
+            path: self.path(),
+            line: 1,
+            what: format!(
+                "found {:?}, expected {:?}: it is not of this study, and is not written over",
+                first_line(bytes),
+                first_line(&self.header)
+            ),
+        })
     }
 
     /// Returns where the last whole case ends, and how many cases are whole; 0 bytes when not even the header is.

@@ -104,6 +104,39 @@ fn a_stopped_study_keeps_whole_cases_and_goes_on() {
 }
 
 #[test]
+fn a_file_that_is_not_of_the_study_is_not_written_over() {
+    let config = config(Experiment::InitNoise, &TWO, 1);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 1, false).unwrap();
+    let whole = bytes(folder.path());
+    let path = folder.path().join(CASES_FILE);
+    let end = whole.iter().position(|byte| *byte == b'\n').unwrap();
+    let mut other_column = whole.clone();
+    other_column[end - 1] ^= 1;
+    for foreign in [
+        &b"a,b\n1,2\n"[..],
+        b"a",
+        b"\n",
+        b"\0\0a",
+        &other_column,
+        &[&whole[..end], b"\r\n"].concat(),
+    ] {
+        std::fs::write(&path, foreign).unwrap();
+        let told = go(&config, folder.path(), 1, true).unwrap_err();
+        assert!(
+            matches!(&told, ExperimentError::Row { path: p, line: 1, .. } if *p == path),
+            "{told}"
+        );
+        assert_eq!(bytes(folder.path()), foreign, "{told}");
+    }
+    for left in [&b"\0\0\0"[..], &[&whole[..end / 2], b"\0\0"].concat()] {
+        std::fs::write(&path, left).unwrap();
+        go(&config, folder.path(), 1, true).unwrap();
+        assert!(bytes(folder.path()) == whole);
+    }
+}
+
+#[test]
 fn rows_that_are_there_are_kept_even_their_times() {
     let mut config = config(Experiment::InitNoise, &TWO, 2);
     config.times = true;
