@@ -57,6 +57,14 @@ enum MadeOf {
 }
 
 impl Source {
+    /// The file, where it is one.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Preset(_) => None,
+        }
+    }
+
     /// A name for files: the preset's, or the file's without folder and ending.
     pub(crate) fn short_name(&self) -> String {
         match self {
@@ -81,10 +89,7 @@ impl PipelineArguments {
 
     /// The pipeline file, so that no output overwrites it.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
-        match &self.pipeline {
-            Source::File(path) => Some(path),
-            Source::Preset(_) => None,
-        }
+        self.pipeline.file()
     }
 
     /// Reads the file, applies the overrides, and makes sure that the pipeline builds.

@@ -17,7 +17,7 @@ use hybrid_icp::{
 use crate::choice::PipelineArguments;
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report;
-use crate::terminal::say;
+use crate::terminal::{say, warn};
 use crate::{doubts, outputs};
 
 /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
@@ -143,6 +143,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "{text}{}: the model's outline before (orange) and after (blue)",
         arguments.picture.display()
     ))?;
-    report::warn_of_distrust(&refined);
+    doubts::about_result(&refined).iter().for_each(warn);
     Ok(())
 }

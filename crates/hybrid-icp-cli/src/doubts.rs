@@ -1,4 +1,4 @@
-//! What looks wrong about the inputs of a refinement although each of them is well-formed.
+//! What looks wrong about the inputs of a refinement although each of them is well-formed, and about its result.
 
 use std::path::Display;
 
@@ -42,6 +42,11 @@ pub(crate) fn about_units(
 ) -> Vec<String> {
     let doubts = hybrid_icp::doubts(model, observation, init).into_iter();
     doubts.map(|doubt| in_words(&doubt, names)).collect()
+}
+
+/// Returns what to warn of: poses that are not to be trusted.
+pub(crate) fn about_result(refined: &Refinement) -> Vec<String> {
+    refined.doubts().iter().map(ToString::to_string).collect()
 }
 
 fn in_words(doubt: &Doubt, names: &Names<'_>) -> String {

@@ -81,8 +81,7 @@ impl Report {
         let model = Model::new(mesh);
         let (mesh, diameter_m) = (model.mesh(), model.diameter());
         let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        let used = mesh.used_vertices();
-        for (vertex, _) in mesh.vertices().iter().zip(&used).filter(|(_, used)| **used) {
+        for vertex in mesh.used_points() {
             for axis in 0..3 {
                 bounds[0][axis] = bounds[0][axis].min(vertex[axis]);
                 bounds[1][axis] = bounds[1][axis].max(vertex[axis]);

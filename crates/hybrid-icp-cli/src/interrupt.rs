@@ -2,9 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, Mutex};
-use std::time::Duration;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
+use anyhow::bail;
+use hicp_io::NewFolder;
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
@@ -19,8 +23,9 @@ const GRACE: Duration = Duration::from_millis(700);
 /// How often the flag is looked at.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// How often the program tries to remove what is unfinished.
-const REMOVALS: usize = 20;
+/// For how long the program tries to remove what is unfinished, and how long it waits in between.
+const REMOVAL: Duration = Duration::from_millis(700);
+const BETWEEN_REMOVALS: Duration = Duration::from_millis(2);
 
 static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static SAVING: AtomicBool = AtomicBool::new(false);
@@ -43,6 +48,12 @@ pub(crate) fn listen() {
             ));
         }
     }
+    // A file beyond the limit of this user is then an error of the write, which is told, and not the end of the program with a
+    // temporary file left behind.
+    #[cfg(unix)]
+    if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
+        warn(format_args!("signal {SIGXFSZ} ends the program: {error}"));
+    }
     std::thread::spawn(|| {
         while !asked() {
             std::thread::sleep(PERIOD);
@@ -51,10 +62,12 @@ pub(crate) fn listen() {
             std::thread::sleep(GRACE);
         }
         // A second signal need not wait for this.
-        if let Some(unfinished) = UNFINISHED.lock().ok().and_then(|mut path| path.take()) {
-            // Others may be writing into it meanwhile.
-            let mut tries = 0..REMOVALS;
-            while tries.next().is_some() && std::fs::remove_dir_all(&unfinished).is_err() {}
+        let unfinished = UNFINISHED
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        if let Some(unfinished) = unfinished {
+            remove(&unfinished);
         }
         complain("interrupted");
         std::process::exit(i32::from(EXIT_CODE));
@@ -66,10 +79,39 @@ pub(crate) fn can_resume() {
     SAVING.store(true, Ordering::Relaxed);
 }
 
-/// Says that a folder in the making goes when somebody asks the program to stop.
-pub(crate) fn remove_when_asked(folder: &Path) {
-    if let Ok(mut unfinished) = UNFINISHED.lock() {
-        *unfinished = Some(folder.to_owned());
+/// Removes a folder that others may be writing into: they fail as soon as what they write into is gone.
+fn remove(folder: &Path) {
+    let start = Instant::now();
+    while std::fs::remove_dir_all(folder).is_err() && folder.exists() && start.elapsed() < REMOVAL {
+        std::thread::sleep(BETWEEN_REMOVALS);
+    }
+}
+
+/// Begins a folder that is removed when somebody asks the program to stop. After somebody has, there is none.
+pub(crate) fn begin_folder(path: &Path) -> anyhow::Result<NewFolder> {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    if asked() {
+        bail!("interrupted");
+    }
+    let folder = NewFolder::begin(path)?;
+    *unfinished = Some(folder.path().to_owned());
+    Ok(folder)
+}
+
+/// Puts a folder in its place, unless it is being removed: then not even a part of it gets there.
+pub(crate) fn finish_folder(folder: NewFolder) -> anyhow::Result<()> {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    if unfinished.take().is_none() {
+        bail!("interrupted");
+    }
+    Ok(folder.finish()?)
+}
+
+/// Waits for the end of a program that was asked to stop and saves nothing: what failed since then may well have failed because
+/// what is unfinished is being removed, and says nothing to anybody.
+pub(crate) fn end_unless_saving() {
+    while asked() && !SAVING.load(Ordering::Relaxed) {
+        std::thread::park();
     }
 }
 

@@ -25,7 +25,7 @@ pub(crate) struct Limits {
     /// Triangles of a mesh, after polygons are cut. 10 million if not given; never more than 50 million.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_triangles: Option<u64>,
-    /// Pixels of an image. 2^27 if not given; sides are never longer than 32768.
+    /// Pixels of an image. 2^25 if not given; sides are never longer than 32768.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_pixels: Option<u64>,
     /// Rows of a result file. 10 million if not given.
@@ -86,4 +86,60 @@ pub(crate) fn limits() -> ReadLimits {
 /// Those on the work that a pipeline asks for.
 pub(crate) fn pipeline_limits() -> PipelineLimits {
     CHOSEN.get().copied().unwrap_or_default().1
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+
+    /// What a help text says that holds if nothing is given.
+    fn stated(help: &str) -> u64 {
+        let words: Vec<&str> = help
+            .split(" if not given")
+            .next()
+            .unwrap()
+            .split(' ')
+            .collect();
+        let number = |word: &str| word.parse::<u64>().ok();
+        match words[..] {
+            [.., n, "GiB"] => number(n).unwrap() << 30,
+            [.., n, "MiB"] => number(n).unwrap() << 20,
+            [.., n, "million"] => number(n).unwrap() * 1_000_000,
+            [.., power] if power.starts_with("2^") => 1 << number(&power[2..]).unwrap(),
+            [.., thousands, n] if number(thousands).is_some() => {
+                1000 * number(thousands).unwrap() + number(n).unwrap()
+            }
+            [.., n] => number(n).unwrap(),
+            [] => unreachable!(),
+        }
+    }
+
+    #[test]
+    fn the_help_states_the_defaults() {
+        let (read, work) = (ReadLimits::DEFAULT, PipelineLimits::DEFAULT);
+        let command = Limits::augment_args(clap::Command::new("limits"));
+        let found: Vec<(String, u64)> = command
+            .get_arguments()
+            .map(|argument| {
+                let help = argument.get_help().unwrap().to_string();
+                (argument.get_id().to_string(), stated(&help))
+            })
+            .collect();
+        let expected = [
+            ("max_file_bytes", read.max_file_bytes),
+            ("max_json_bytes", read.max_json_bytes),
+            ("max_small_json_bytes", read.max_small_json_bytes),
+            ("max_vertices", read.max_vertices),
+            ("max_triangles", read.max_triangles),
+            ("max_pixels", read.max_pixels),
+            ("max_rows", read.max_rows),
+            ("max_iterations", work.max_iterations),
+            ("max_hypotheses", work.max_hypotheses),
+            ("max_samples", work.max_samples),
+            ("max_neighbors", work.max_neighbors),
+        ];
+        let expected = expected.map(|(name, value)| (name.to_owned(), value));
+        assert_eq!(found, expected);
+    }
 }

@@ -92,6 +92,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            interrupt::end_unless_saving();
             terminal::complain(format_args!("{error:#}"));
             if interrupt::asked() {
                 ExitCode::from(interrupt::EXIT_CODE)

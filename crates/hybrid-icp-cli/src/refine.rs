@@ -46,8 +46,9 @@ pub(crate) struct Inputs {
 /// Refine one pose in one depth image.
 ///
 /// The result is JSON: the pose as cam_R_m2c and cam_t_m2c (mm), mve_initial and mve, outcome (refined or kept_initial) and
-/// its reason, termination, iterations, n_pairs, time_ms, and a trace with one object per stage that ran. A pose that
-/// cannot be refined is given back with the numbers of the file; that is an outcome and no error.
+/// its reason, termination, iterations, n_pairs, time_ms, warnings (texts, none where nothing looks wrong: what standard error
+/// says), and a trace with one object per stage that ran. A pose that cannot be refined is given back with the numbers of the
+/// file; that is an outcome and no error.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -172,11 +173,22 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let reason = doubts::reason(&refined, &model, &observation, &init);
     let summary = report::summary(&refined, &reason);
+    let names = Names {
+        model: inputs.model.display(),
+        model_unit: inputs.model_unit,
+        depth: inputs.depth.display(),
+        depth_scale,
+        mask: inputs.mask.display(),
+        init: inputs.init.display(),
+    };
+    let mut warnings = doubts::about_units(&model, &observation, &init, &names);
+    warnings.extend(doubts::about_result(&refined));
     let report = Report::new(
         pipeline.name(),
         &init_file,
         &refined,
         reason,
+        warnings,
         &trace.trace.stages,
         time_ms,
     );
@@ -193,18 +205,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         picture.outline(&mut refiner, &model, &observation, &after, AFTER);
         picture.write(path)?;
     }
-    let names = Names {
-        model: inputs.model.display(),
-        model_unit: inputs.model_unit,
-        depth: inputs.depth.display(),
-        depth_scale,
-        mask: inputs.mask.display(),
-        init: inputs.init.display(),
-    };
-    for doubt in doubts::about_units(&model, &observation, &init, &names) {
-        warn(doubt);
-    }
-    report::warn_of_distrust(&refined);
+    report.warnings.iter().for_each(warn);
     match arguments.output {
         Some(_) => say(summary),
         None => say(json),

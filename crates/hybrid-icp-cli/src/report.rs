@@ -6,8 +6,6 @@ use hicp_io::PoseFile;
 use hybrid_icp::{Refinement, StageRecord, Verdict};
 use serde::Serialize;
 
-use crate::terminal::warn;
-
 /// The JSON report of a refinement; lengths in millimetres where BOP has them so, losses in m².
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
@@ -25,6 +23,8 @@ pub(crate) struct Report {
     iterations: usize,
     n_pairs: usize,
     time_ms: f64,
+    /// What looks wrong about the inputs and the result, as it is told on standard error.
+    pub(crate) warnings: Vec<String>,
     trace: Vec<StageReport>,
 }
 
@@ -55,6 +55,7 @@ impl Report {
         init: &PoseFile,
         refined: &Refinement,
         reason: String,
+        warnings: Vec<String>,
         stages: &[StageRecord],
         time_ms: f64,
     ) -> Self {
@@ -76,6 +77,7 @@ impl Report {
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
             time_ms,
+            warnings,
             trace: (1..).zip(stages).map(StageReport::new).collect(),
         }
     }
@@ -149,21 +151,5 @@ pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
             "kept the initial pose: {reason}; MVE {:.3}, {} iterations",
             refined.mve, outcome.iterations
         ),
-    }
-}
-
-/// Warns where the pose is not to be trusted.
-pub(crate) fn warn_of_distrust(refined: &Refinement) {
-    if refined.mve > refined.mve_initial {
-        warn(format_args!(
-            "the returned pose explains the image worse than the initial one (MVE {:.3}, was {:.3})",
-            refined.mve, refined.mve_initial
-        ));
-    }
-    if refined.mve >= hybrid_icp::PAPER_ALPHA {
-        warn(format_args!(
-            "MVE {:.3}: the pose does not explain the image, do not trust it",
-            refined.mve
-        ));
     }
 }

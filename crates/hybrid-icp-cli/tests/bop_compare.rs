@@ -35,7 +35,13 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
     run(folder, words.split(' ')).exits(0);
     let words = format!("{COMPARE} --pipelines hybrid,nn-point-to-point");
     let told = run(folder, words.split(' ')).exits(0);
-    assert_eq!(told.err, "");
+    // What did not come out well is told by the pipeline that it is of.
+    let begin = "warning: compared/nn-point-to-point.csv: ";
+    assert!(
+        told.err.lines().count() == 1 && told.err.starts_with(begin),
+        "{}",
+        told.err
+    );
     assert_eq!(
         names(&folder.join("compared")),
         [
@@ -135,4 +141,51 @@ fn wrong_pipelines_are_told_before_anything_is_computed() {
     run(folder, words.split(' '))
         .exits(1)
         .complains(&["initial_synthetic-test.csv"]);
+}
+
+#[test]
+fn no_input_is_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let words = "bop generate --scenes 1 --images 1 --instances 2 --out set";
+    run(folder, words.split(' ')).exits(0);
+    let init = std::fs::read(folder.join("set/initial_synthetic-test.csv")).unwrap();
+    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
+    std::fs::create_dir(folder.join("out")).unwrap();
+    for name in ["hybrid.csv", "hybrid.csv.journal"] {
+        std::fs::write(folder.join("out").join(name), &init).unwrap();
+    }
+    std::fs::write(folder.join("test_targets_bop19.toml"), &pipeline).unwrap();
+    for (init, pipelines, out, parts) in [
+        (
+            "out/hybrid.csv",
+            "nn-point-to-point,hybrid",
+            "out",
+            &["--out and --init both name out/hybrid.csv"][..],
+        ),
+        (
+            "out/hybrid.csv.journal",
+            "hybrid",
+            "./out",
+            &["--out and --init both name ./out/hybrid.csv.journal"],
+        ),
+        (
+            "set/initial_synthetic-test.csv",
+            "test_targets_bop19.toml",
+            "set",
+            &["--out and --dataset both name set/test_targets_bop19.json"],
+        ),
+    ] {
+        let words =
+            format!("bop compare --dataset set --init {init} --pipelines {pipelines} --out {out}");
+        let told = run(folder, words.split(' ')).exits(1);
+        assert_eq!(told.complains(parts).out, "");
+        assert_eq!(
+            names(&folder.join("out")),
+            ["hybrid.csv", "hybrid.csv.journal"]
+        );
+    }
+    for name in ["hybrid.csv", "hybrid.csv.journal"] {
+        assert_eq!(std::fs::read(folder.join("out").join(name)).unwrap(), init);
+    }
 }

@@ -104,6 +104,25 @@ fn the_truth_scores_one_on_every_metric() {
     assert!(lines[0].contains("MSSD") && lines[3].trim_start().starts_with("all"));
 }
 
+/// Ten times the diameter makes nearly every pose a correct one.
+#[test]
+fn a_stated_diameter_that_is_not_the_meshs_is_told() {
+    let world = dataset();
+    write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
+    let info = json!({"1": {"diameter": 1500.0}}).to_string();
+    std::fs::write(world.path("models/models_info.json"), info).unwrap();
+    let run = eval(&world, &[]).exits(0).complains(&[
+        "models_info.json: object 1: the stated diameter is 1.5000 m, but that of the mesh is 0.1",
+        "recalls depend on it",
+    ]);
+    assert_eq!(run.err.lines().count(), 1, "{}", run.err);
+    let warnings = &read_json(&world)["warnings"];
+    assert_eq!(
+        run.err,
+        format!("warning: {}\n", warnings[0].as_str().unwrap())
+    );
+}
+
 #[test]
 fn neither_threads_nor_the_order_of_rows_change_a_byte() {
     let world = dataset();
@@ -167,8 +186,8 @@ fn a_symmetric_equivalent_scores_one_on_mssd_and_mspd() {
     }
     let info = |symmetries: &Value| {
         let objects = json!({
-            "1": {"diameter": 120.0, "symmetries_discrete": symmetries},
-            "2": {"diameter": 300.0, "symmetries_discrete": symmetries},
+            "1": {"diameter": world.diameter_mm(CAR), "symmetries_discrete": symmetries},
+            "2": {"diameter": world.diameter_mm(HAMMER), "symmetries_discrete": symmetries},
         });
         std::fs::write(world.path("models/models_info.json"), objects.to_string()).unwrap();
     };

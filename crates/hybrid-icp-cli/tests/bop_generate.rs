@@ -55,7 +55,13 @@ fn generated_refined_evaluated() {
     let initial = "set/initial_synthetic-test.csv";
     let words = format!("bop refine --dataset set --results {initial} --output out.csv");
     let run = run(folder, words.split(' ')).exits(0);
-    assert_eq!(run.err, "");
+    // Of what is mostly hidden the initial pose may explain nothing.
+    let elsewhere = "rows the initial pose explained nothing of the mask";
+    assert!(
+        run.err.lines().all(|line| line.contains(elsewhere)),
+        "{}",
+        run.err
+    );
     assert!(
         !run.out.contains("no mask") && !run.out.contains("missing"),
         "{}",

@@ -143,7 +143,11 @@ fn missing_files_cost_their_rows_only() {
     // One of two cars loses its mask: its row has none that it overlaps.
     std::fs::remove_file(world.mask_path(12, 0, 0)).unwrap();
     let (run, refined) = world.refine(&rows, &[]);
-    let run = run.exits(0).complains(&["warning: ", "depth/000000.png"]);
+    let run = run.exits(0).complains(&[
+        "warning: depth image is missing: ./test/000003/depth/000000.png",
+        "warning: mask is missing: ./test/000012/mask_visib/0000",
+        "(and 1 more like it)",
+    ]);
     for line in [
         "6  refined",
         "2  kept: missing frame",
@@ -159,6 +163,64 @@ fn missing_files_cost_their_rows_only() {
         if (before.scene_id, before.im_id) == (3, 0) {
             assert!(same_pose(before, after) && after.time_s.is_none());
         }
+    }
+}
+
+#[test]
+fn ground_truth_that_masks_are_named_by_is_told_where_it_is_missing() {
+    let world = World::new();
+    let rows = world.rows();
+    let path = world.scene(3).join("scene_gt.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("\"40\":", "\"41\":")).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    let run = run.exits(0).complains(&[
+        "warning: ground truth is missing: ./test/000003/scene_gt.json does not have image 40",
+    ]);
+    assert!(run.out.contains("3  kept: no mask"), "{}", run.out);
+    std::fs::remove_file(&path).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    assert!(run.out.contains("5  kept: no mask"), "{}", run.out);
+    // Of both images, and told once.
+    assert_eq!(
+        run.exits(0).err,
+        "warning: ground truth is missing: ./test/000003/scene_gt.json does not exist\n"
+    );
+    // Nobody asks for it where masks come from elsewhere.
+    let (run, _) = world.refine(&rows, &["--mask", "none"]);
+    assert_eq!(run.exits(0).err, "");
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_wrong_is_told_where_the_summary_cannot_be_written() {
+    let world = World::new();
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    let depth = world.depth_path(3, 40);
+    std::fs::write(&depth, "no image").unwrap();
+    std::fs::remove_file(world.depth_path(12, 40)).unwrap();
+    let words = "bop refine --dataset . --results in.csv --output out.csv --no-time";
+    let told = || {
+        let full = std::fs::File::create("/dev/full").unwrap();
+        let mut command = program(world.folder.path());
+        let output = command.args(words.split(' ')).stdout(full).output();
+        let output = output.unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let err = told();
+    for part in [
+        "warning: depth image is missing",
+        "error: ./test/000003/depth/000040.png",
+        "error: 1 files could not be used",
+    ] {
+        assert!(err.contains(part), "no {part:?} in: {err}");
+    }
+    // Without it the summary is all that is wrong.
+    std::fs::remove_file(&depth).unwrap();
+    let err = told();
+    for part in ["warning: depth", "error: cannot write to standard output"] {
+        assert!(err.contains(part), "no {part:?} in: {err}");
     }
 }
 
@@ -188,6 +250,13 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
         for (before, after) in changed {
             world.assert_refined(before, after);
         }
+        // What cannot be read is not missing.
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        let (run, _) = world.refine(&rows, &[]);
+        let run = run.exits(1).complains(&["error: ", name, "a folder"]);
+        assert!(run.out.contains("kept: damaged file"), "{}", run.out);
+        std::fs::remove_dir(&path).unwrap();
         std::fs::write(&path, whole).unwrap();
     }
 

@@ -5,7 +5,8 @@ mod common;
 #[path = "common/world.rs"]
 mod world;
 
-use std::time::{Duration, Instant};
+use std::hash::Hasher as _;
+use std::time::{Duration, Instant, SystemTime};
 
 use common::*;
 use hicp_io::bop::{ResultRow, read_results, write_results};
@@ -103,8 +104,13 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     }
     // What the journal holds is not done again: it is written as it stands there.
     let text = String::from_utf8(held).unwrap();
-    let kept = text.replacen("\"refined\"", "\"kept: no mask of the object\"", 1);
-    std::fs::write(journal(&world), kept).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let (_, entry) = lines[1].split_once(' ').unwrap();
+    let kept = entry.replacen("\"refined\"", "\"kept: no mask of the object\"", 1);
+    let mut digest = std::hash::DefaultHasher::new();
+    digest.write(kept.as_bytes());
+    lines[1] = format!("{:016x} {kept}", digest.finish());
+    std::fs::write(journal(&world), lines.join("\n") + "\n").unwrap();
     let run = world.run(&["--no-time", "--resume"]).exits(0);
     assert!(
         run.out.contains("1  kept: no mask of the object"),
@@ -115,6 +121,166 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     let run = world.run(&["--no-time", "--resume"]).exits(0);
     assert!(!run.out.contains("journal"));
     assert_eq!(output(&world), expected);
+}
+
+#[test]
+fn lines_of_the_journal_that_changed_are_done_again() {
+    let world = World::new();
+    let (whole, _) = world.refine(&grouped(&world, 12), &["--no-time"]);
+    whole.exits(0);
+    let expected = output(&world);
+    let held = killed(&world);
+    let begin = held.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    let length = held[begin..].iter().position(|b| *b == b'\n').unwrap();
+    // A number of the first pose: a digit of it is another.
+    let text = std::str::from_utf8(&held[begin..begin + length]).unwrap();
+    let pose = begin + text.find("\"pose\":[").unwrap() + "\"pose\":[".len();
+    for (place, bit) in [(pose, 1), (pose + 3, 2), (begin, 1), (begin + length, 4)] {
+        let mut changed = held.clone();
+        changed[place] ^= bit;
+        std::fs::write(journal(&world), changed).unwrap();
+        let run = world.run(&["--no-time", "--resume"]).exits(0);
+        assert_eq!(output(&world), expected, "byte {place}");
+        // Without its end the line may be one that was cut off.
+        if place < begin + length {
+            run.complains(&["warning: out.csv.journal: 1 lines have changed"]);
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_only_over_the_files_that_it_began_with() {
+    let world = World::new();
+    let (whole, _) = world.refine(&grouped(&world, 12), &["--no-time"]);
+    whole.exits(0);
+    let expected = output(&world);
+    let held = killed(&world);
+    let refused = |name: &str, parts: [&str; 2]| {
+        let name = format!("out.csv.journal is of a run with {name} ");
+        let run = world.run(&["--no-time", "--resume"]).exits(1);
+        run.complains(&[&name, parts[0], parts[1]]);
+        assert_eq!(std::fs::read(journal(&world)).unwrap(), held);
+    };
+    for name in [
+        "models/obj_000001.ply",
+        "models/obj_000002.ply",
+        "test/000003/scene_camera.json",
+        "test/000012/scene_gt.json",
+    ] {
+        let path = world.path(name);
+        let (content, metadata) = (std::fs::read(&path).unwrap(), path.metadata().unwrap());
+        let changed_at = |time: SystemTime| {
+            let file = std::fs::File::options().append(true).open(&path).unwrap();
+            file.set_modified(time).unwrap();
+        };
+        let time = metadata.modified().unwrap();
+        // The same size at another time, and another size at the same time.
+        changed_at(time + Duration::from_millis(10));
+        refused(name, ["changed at", "expected of"]);
+        std::fs::write(&path, [&content[..], b" "].concat()).unwrap();
+        changed_at(time);
+        let sizes = [content.len(), content.len() + 1].map(|n| format!("of {n} bytes"));
+        refused(name, [&sizes[0], &format!("expected {}", sizes[1])]);
+        std::fs::write(&path, content).unwrap();
+        changed_at(time);
+    }
+    for name in ["models/models_info.json", "test/000003/scene_gt_info.json"] {
+        std::fs::write(world.path(name), "{}").unwrap();
+        refused(name, ["not there, expected", "of 2 bytes"]);
+        std::fs::remove_file(world.path(name)).unwrap();
+    }
+    // Scenes without rows are no matter of this run.
+    std::fs::create_dir(world.path("test/000004")).unwrap();
+    std::fs::write(world.path("test/000004/scene_gt.json"), "{}").unwrap();
+    world.run(&["--no-time", "--resume"]).exits(0);
+    assert_eq!(output(&world), expected);
+}
+
+#[test]
+fn what_looks_wrong_is_told_by_the_run_that_goes_on_as_well() {
+    let world = World::new();
+    for scene in [3, 12] {
+        let path = world.scene(scene).join("scene_camera.json");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let other = text.replace("\"depth_scale\":0.1", "\"depth_scale\":1.0");
+        assert_ne!(text, other);
+        std::fs::write(&path, other).unwrap();
+    }
+    let (whole, _) = world.refine(&grouped(&world, 12), &["--no-time"]);
+    let whole = whole.exits(0).complains(&["check depth_scale"]);
+    killed(&world);
+    let run = world.run(&["--no-time", "--resume"]).exits(0);
+    assert!(run.out.contains("frames from the journal"), "{}", run.out);
+    assert_eq!(run.err, whole.err);
+}
+
+#[test]
+fn a_file_in_the_place_of_the_journal_stays_as_it_is() {
+    let world = World::new();
+    let rows = grouped(&world, 1);
+    write_results(world.path("in.csv"), &rows).unwrap();
+    std::fs::write(world.path("notes"), "my notes").unwrap();
+    for resume in [&[][..], &["--resume"]] {
+        std::fs::write(journal(&world), "my notes").unwrap();
+        world
+            .run(resume)
+            .exits(1)
+            .complains(&["out.csv.journal is no journal of bop refine, expected one"]);
+        assert_eq!(std::fs::read(journal(&world)).unwrap(), b"my notes");
+        std::fs::remove_file(journal(&world)).unwrap();
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("notes", journal(&world)).unwrap();
+            world.run(resume).exits(1).complains(&["no journal"]);
+            assert_eq!(std::fs::read(world.path("notes")).unwrap(), b"my notes");
+            std::fs::remove_file(journal(&world)).unwrap();
+        }
+        std::fs::create_dir(journal(&world)).unwrap();
+        world.run(resume).exits(1).complains(&["out.csv.journal"]);
+        std::fs::remove_dir(journal(&world)).unwrap();
+    }
+    // An input is no place for it either, nor for what is told of the rows, and neither is the output.
+    write_results(world.path("k.csv.journal"), &rows).unwrap();
+    let input = std::fs::read(world.path("k.csv.journal")).unwrap();
+    let words = "bop refine --dataset . --results k.csv.journal --output k.csv";
+    run(world.folder.path(), words.split(' '))
+        .exits(1)
+        .complains(&["the journal of --output and --results both name k.csv.journal"]);
+    for (rows, other) in [
+        ("k.csv.journal", "--results"),
+        ("out.csv", "--output"),
+        ("out.csv.journal", "the journal of --output"),
+    ] {
+        let words = "bop refine --dataset . --results k.csv.journal --output out.csv --rows";
+        run(world.folder.path(), words.split(' ').chain([rows]))
+            .exits(1)
+            .complains(&[&format!("--rows and {other} both name {rows}")]);
+    }
+    assert_eq!(std::fs::read(world.path("k.csv.journal")).unwrap(), input);
+    assert!(!world.path("k.csv").exists() && !world.path("out.csv").exists());
+}
+
+/// The output may be the input: it is replaced last, so that a run that cannot write something else goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_in_place_that_cannot_tell_its_rows_goes_on() {
+    let world = World::new();
+    write_results(world.path("io.csv"), &world.rows()).unwrap();
+    let input = std::fs::read(world.path("io.csv")).unwrap();
+    let refine = |options: &str| {
+        let words = "bop refine --dataset . --results io.csv --output io.csv --no-time --rows";
+        run(
+            world.folder.path(),
+            words.split(' ').chain(options.split(' ')),
+        )
+    };
+    refine("/dev/full")
+        .exits(1)
+        .complains(&["/dev/full", "No space left"]);
+    assert_eq!(std::fs::read(world.path("io.csv")).unwrap(), input);
+    refine("rows.csv --resume").exits(0);
+    assert_ne!(std::fs::read(world.path("io.csv")).unwrap(), input);
+    assert!(world.path("rows.csv").exists() && !world.path("io.csv.journal").exists());
 }
 
 #[test]

@@ -108,6 +108,51 @@ fn one_of_three_alike_is_followed() {
     }
 }
 
+/// A dataset in the wrong unit is followed as well as can be, but not without a word.
+#[test]
+fn scales_and_sizes_that_cannot_be_are_told() {
+    let folder = cars();
+    let folder = folder.path();
+    let cameras = folder.join("set/test/000001/scene_camera.json");
+    let text = fs::read_to_string(&cameras).unwrap();
+    let scaled = |factor: f64| {
+        let mut value: Value = serde_json::from_str(&text).unwrap();
+        for camera in value.as_object_mut().unwrap().values_mut() {
+            let scale = camera["depth_scale"].as_f64().unwrap();
+            camera["depth_scale"] = (factor * scale).into();
+        }
+        fs::write(&cameras, value.to_string()).unwrap();
+        sequence(folder, INITIAL, "").exits(0)
+    };
+    let none =
+        "warning: out.jsonl: none of its 7 images was accepted: its poses are not to be trusted\n";
+    assert_eq!(scaled(2.0).err, none);
+    let told = scaled(10.0).err;
+    let begin = "warning: object 1 in image 0 of scene 1: the median depth inside the mask is ";
+    assert!(told.starts_with(begin) && told.ends_with(none), "{told}");
+    assert!(
+        told.contains(
+            ": check depth_scale in scene_camera.json, and that --init states millimetres\n"
+        ),
+        "{told}"
+    );
+    assert_eq!(told.lines().count(), 2, "{told}");
+
+    fs::write(&cameras, &text).unwrap();
+    let info = folder.join("set/models/models_info.json");
+    let mut value: Value = serde_json::from_str(&fs::read_to_string(&info).unwrap()).unwrap();
+    let diameter = value["1"]["diameter"].as_f64().unwrap();
+    value["1"]["diameter"] = (1e3 * diameter).into();
+    fs::write(&info, value.to_string()).unwrap();
+    let told = sequence(folder, INITIAL, "").exits(0).err;
+    let first = told.lines().next().unwrap();
+    assert!(
+        first.contains("models_info.json: object 1: the stated diameter is "),
+        "{told}"
+    );
+    assert!(!told.contains("is in mm"), "{told}");
+}
+
 #[test]
 fn images_without_the_object_move_the_pose_with_the_camera() {
     let folder = cars();

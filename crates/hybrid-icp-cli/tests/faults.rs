@@ -161,10 +161,22 @@ impl Job {
         );
     }
 
-    /// Sends a signal when some work is done; returns how long the program took to end.
+    /// Sends a signal when some work is done, and goes on with it; returns how long the program took to end.
     fn interrupt(&self, signal: &str) -> Duration {
         self.begin();
         let whole = self.finish();
+        let (took, told) = self.interrupted(signal);
+        assert!(
+            told.contains("--resume") || told.contains("interrupted"),
+            "{told}"
+        );
+        self.assert_whole_or_absent(&whole);
+        assert!(self.finish() == whole);
+        took
+    }
+
+    /// Sends a signal when some work is done; returns how long the program took to end, and what it said.
+    fn interrupted(&self, signal: &str) -> (Duration, String) {
         self.begin();
         let mut child = self.spawn();
         let begun = Instant::now();
@@ -189,16 +201,10 @@ impl Job {
         );
         let output = child.wait_with_output().unwrap();
         let took = sent.elapsed();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(130), "{told}");
-        assert!(
-            told.contains("--resume") || told.contains("interrupted"),
-            "{told}"
-        );
-        self.assert_whole_or_absent(&whole);
         assert!(lines() >= 2);
-        assert!(self.finish() == whole);
-        took
+        (took, told)
     }
 }
 
@@ -230,6 +236,26 @@ fn interrupted_runs_save_what_is_done_and_say_how_to_go_on() {
             job.arguments[..2].join(" ")
         );
     }
+}
+
+/// It has no `--resume`, and needs none.
+#[test]
+fn an_interrupted_comparison_goes_on_by_itself() {
+    let refine = bop_refine(12);
+    let words = "bop compare --dataset . --init in.csv --pipelines hybrid --out out --threads 1";
+    let job = Job {
+        arguments: words.split(' ').collect(),
+        kept: "hybrid.csv.journal",
+        ..refine
+    };
+    let (_, told) = job.interrupted("-INT");
+    assert!(
+        told.contains("frames are done; the same command goes on from there"),
+        "{told}"
+    );
+    let run = run(job.folder.path(), &job.arguments).exits(0);
+    assert!(run.out.contains("frames from the journal"), "{}", run.out);
+    assert!(!job.out().join(job.kept).exists());
 }
 
 /// Runs the program in a shell that does something first; returns `None`, aloud, where that cannot be done.
@@ -296,7 +322,7 @@ fn a_full_disk_leaves_what_was_there() {
     for name in ["out.json", "trace.jsonl", "overlay.png"] {
         scene.write(&format!("disk/{name}"), "the user's");
     }
-    let limit = "trap '' XFSZ && ulimit -f 1";
+    let limit = "ulimit -f 1";
     if let Some(run) = in_shell(scene.folder.path(), false, limit, &REFINE) {
         run.exits(1)
             .complains(&["error: cannot write disk/", "too large"]);

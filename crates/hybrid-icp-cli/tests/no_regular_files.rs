@@ -147,6 +147,9 @@ fn every_input_of_the_commands_over_datasets() {
     each_is_told(folder, "bop eval --dataset . --results in.csv", "in.csv");
     let show = "bop show --dataset . --scene 3 --image 0 --results in.csv --out show.png";
     each_is_told(folder, show, "in.csv");
+    std::fs::write(world.path("out.csv.journal"), "").unwrap();
+    each_is_told(folder, refine, "out.csv.journal");
+    std::fs::remove_file(world.path("out.csv.journal")).unwrap();
     assert!(!world.path("out.csv").exists() && !world.path("show.png").exists());
 }
 

@@ -44,6 +44,7 @@ fn the_result_has_every_key_in_its_type() {
         assert!(!result[key].as_str().unwrap().is_empty(), "{key}");
     }
     assert_eq!(result["outcome"], "refined");
+    assert_eq!(result["warnings"], serde_json::json!([]));
 
     let stages = result["trace"].as_array().unwrap();
     assert!(stages.len() >= 2);
@@ -118,6 +119,38 @@ fn every_line_of_a_trace_can_be_the_start_of_another_run() {
     scene.write("init.json", last.to_string());
     let again = scene.result();
     assert_eq!(again["mve_initial"], result["mve"]);
+}
+
+/// Who reads only the file is told what is told on standard error, word for word.
+#[test]
+fn the_result_holds_every_warning() {
+    let told = |scene: &Scene, parts: &[&str]| {
+        let run = scene.run().exits(0).complains(parts);
+        let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
+        let result: Value = serde_json::from_str(&text).unwrap();
+        let warnings = result["warnings"].as_array().unwrap().iter();
+        let lines = warnings.map(|text| format!("warning: {}\n", text.as_str().unwrap()));
+        assert_eq!(lines.collect::<String>(), run.err);
+        result
+    };
+    let scene = Scene::new().with("--depth-scale", "1");
+    told(
+        &scene,
+        &["the median depth inside the mask", "do not trust it"],
+    );
+
+    // The search finds the car in its mask wherever it is told to begin; whether that is what the detector saw, nothing says.
+    let scene = Scene::new();
+    let aside = Isometry3::translation(3.0, 0.0, 0.0) * truth();
+    scene.write("init.json", pose_json(&aside).to_string());
+    let result = told(
+        &scene,
+        &[
+            "the initial pose explained nothing of the mask (MVE 1.000)",
+            "may be another object",
+        ],
+    );
+    assert!(result["mve"].as_f64().unwrap() < 0.4, "{result}");
 }
 
 #[test]

@@ -194,7 +194,7 @@ fn meshes() {
     refused_file("mesh.ply", "", &["mesh.ply"]);
     let scene = Scene::new().with("--model", "a.obj");
     scene.write("a.obj", "v 0 0 0\nv 1 0 0\n");
-    refused(scene, &["a.obj", "line 3", "expected a face"]);
+    refused(scene, &["a.obj", "line 2", "expected a face"]);
     let scene = Scene::new().with("--model", "a.obj");
     scene.write("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
     refused(scene, &["a.obj", "finite"]);

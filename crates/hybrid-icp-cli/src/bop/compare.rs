@@ -8,15 +8,18 @@ use clap::Args;
 
 use super::compare_report::{Comparison, Entry};
 use super::eval;
+use super::journal::Journal;
 use super::refine;
 use crate::choice::{PipelineArguments, Source};
+use crate::outputs;
 use crate::terminal::say;
 
 /// Refine a result file with several pipelines, and compare them by their evaluations.
 ///
 /// Writes, for every pipeline, its result file and its evaluation as JSON, and the comparison as compare.md, compare.html and
 /// compare.json: average recalls, the median ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, the time
-/// per pose on one thread of those given and its ratio to that of the first pipeline; AR and median ADI by object.
+/// per pose on one thread of those given and its ratio to that of the first pipeline; AR and median ADI by object. The same command goes
+/// on with a pipeline that was interrupted.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -49,6 +52,8 @@ Example:
 const INITIAL: &str = "initial";
 /// What the files of the comparison are called.
 const COMPARISON: &str = "compare";
+/// Their endings.
+const FORMS: [&str; 3] = ["md", "html", "json"];
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -66,6 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let out = &arguments.out;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
+    arguments.check_files()?;
     let dataset = (arguments.dataset.as_path(), arguments.split.as_str());
     let evaluate = |name: &str, results: &Path, seconds: Option<f64>| {
         say(format_args!("\n{name}:"))?;
@@ -99,11 +105,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let markdown = comparison.markdown();
     let json = comparison.json()?;
-    for (ending, text) in [
-        ("md", &markdown),
-        ("html", &comparison.html()),
-        ("json", &json),
-    ] {
+    for (ending, text) in FORMS.iter().zip([&markdown, &comparison.html(), &json]) {
         let path = out.join(format!("{COMPARISON}.{ending}"));
         hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
     }
@@ -113,4 +115,33 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         comparison.overall().markdown(),
         page.display()
     ))
+}
+
+impl Arguments {
+    /// Checks that every file of the comparison can be written, and that none takes the place of an input: the next pipeline
+    /// would begin where the one before it ended.
+    fn check_files(&self) -> anyhow::Result<()> {
+        let in_out = |name: &str| self.out.join(name);
+        let mut written = vec![in_out(&format!("{INITIAL}.json"))];
+        written.extend(FORMS.map(|ending| in_out(&format!("{COMPARISON}.{ending}"))));
+        for pipeline in &self.pipelines {
+            let name = pipeline.short_name();
+            let results = in_out(&format!("{name}.csv"));
+            let journal = Journal::path_of(&results);
+            written.extend([results, journal, in_out(&format!("{name}.json"))]);
+        }
+        let written: Vec<_> = written.iter().map(|path| ("--out", &**path)).collect();
+
+        let of_dataset = [
+            "test_targets_bop19.json",
+            "models/models_info.json",
+            "models_eval/models_info.json",
+        ];
+        let of_dataset = of_dataset.map(|name| self.dataset.join(name));
+        let mut read = vec![("--init", self.init.as_path())];
+        read.extend(of_dataset.iter().map(|path| ("--dataset", &**path)));
+        let files = self.pipelines.iter().filter_map(Source::file);
+        read.extend(files.map(|path| ("--pipelines", path.as_path())));
+        outputs::check(&written, &read, &[])
+    }
 }

@@ -132,6 +132,7 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let scenes = Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1);
     let models_dir = dataset.eval_models_dir()?;
     let models = pool.install(|| models::read(&models_dir, &objects))?;
+    let diameters = pool.install(|| models::doubted_diameters(&models, &models_dir));
 
     let judge = Judge {
         objects: EvaluatedObject::of_models(&models, arguments.symmetric.as_deref()),
@@ -160,20 +161,28 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
         arguments,
         &rows,
         (&targets, &models, &models_dir),
+        diameters.into_values().collect(),
         &judged,
         calibration,
     )
 }
 
-/// Tells and writes what was found.
+/// Tells and writes what was found; `warnings` are those that there were before.
 fn report(
     arguments: &Arguments,
     rows: &[ResultRow],
     (wanted, models, models_dir): (&Targets, &Models, &Path),
+    mut warnings: Vec<String>,
     frames: &[JudgedFrame],
     calibration: Option<Calibration>,
 ) -> anyhow::Result<Evaluation> {
-    let warnings = misfits(arguments, rows, wanted, (models, models_dir), frames);
+    warnings.extend(misfits(
+        arguments,
+        rows,
+        wanted,
+        (models, models_dir),
+        frames,
+    ));
     for text in &warnings {
         warn(text);
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::bop::{self, GroundTruth, GroundTruthInfo, ModelInfo, ResultRow, SceneCamera, Target};
-use hicp_io::{LengthUnit, NewFolder, write_depth_png, write_mask_png, write_ply};
+use hicp_io::{LengthUnit, write_depth_png, write_mask_png, write_ply};
 use hicp_sim::{
     AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout,
     MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, SeenObject, perturb, stream,
@@ -103,8 +103,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     check_folder(&arguments.out)?;
     // Whoever sees the dataset sees all of it.
-    let made = NewFolder::begin(&arguments.out)?;
-    interrupt::remove_when_asked(made.path());
+    let made = interrupt::begin_folder(&arguments.out)?;
     let out = made.path();
     write_models(out, &objects)?;
     let camera = PinholeCamera::new(570.0, 570.0, 319.5, 239.5, 640, 480)?;
@@ -149,7 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let initial: Vec<ResultRow> = records.iter().flat_map(|r| r.initial.clone()).collect();
     bop::write_results(out.join("initial_synthetic-test.csv"), &initial)?;
     bop::write_results(out.join("truth_synthetic-test.csv"), &truth(&records))?;
-    made.finish()?;
+    interrupt::finish_folder(made)?;
     say(format_args!(
         "{}: {} images of {} scenes, {} targets, {} rows in initial_synthetic-test.csv",
         arguments.out.display(),

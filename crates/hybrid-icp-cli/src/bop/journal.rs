@@ -5,41 +5,29 @@ use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context as _, bail};
-use hicp_bop::{Fate, Fault, FrameResult, RowResult};
-use hybrid_icp::{Isometry3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use anyhow::{Context as _, anyhow, bail};
+use hicp_bop::FrameResult;
+
+use super::journal_entry;
+use super::refine_settings::Setting;
+use crate::terminal::warn;
 
 /// A file beside the output: a line that says which run it is of, then a line for every image that is done.
 ///
 /// A line is on the disk before the next image of the thread begins. A line that was cut off by the end of a run is dropped,
-/// and its image done again. Numbers are kept as bits, so that what is read is what was written. Two runs cannot write
-/// the same journal at once.
+/// and its image done again; so is a line with another digest than it states, whose bits have changed since. Two runs cannot
+/// write the same journal at once.
 #[derive(Debug)]
 pub(crate) struct Journal {
     path: PathBuf,
     file: Mutex<File>,
 }
 
-/// What a journal holds of an image.
-#[derive(Debug, Serialize, Deserialize)]
-struct Entry {
-    /// Which image: its place among the run's.
-    frame: usize,
-    seconds: Option<u64>,
-    rows: Vec<Row>,
-    /// Whether it is only missing, and what it says.
-    problems: Vec<(bool, String)>,
-}
+/// What the first setting of every journal says: what the file is, and the form of its lines.
+const FORM: (&str, &str) = ("journal of bop refine", "3");
 
-#[derive(Debug, Serialize, Deserialize)]
-struct Row {
-    index: usize,
-    fate: String,
-    /// Bits of the translation and of the quaternion i, j, k, w.
-    pose: Option<[u64; 7]>,
-    mve: Option<[u64; 2]>,
-}
+/// How every journal begins.
+const OPENING: &[u8] = b"[[\"journal of bop refine\",";
 
 impl Journal {
     /// The journal of an output file: beside it, its name with `.journal` at the end.
@@ -54,10 +42,17 @@ impl Journal {
     /// Returns what it holds of images, by their place among the run's.
     pub(crate) fn open(
         path: PathBuf,
-        settings: &[(&str, String)],
+        settings: &[Setting],
         resume: bool,
     ) -> anyhow::Result<(Self, Vec<(usize, FrameResult)>)> {
         let cannot = |what: &str| format!("cannot {what} the journal {}", path.display());
+        // Reading a pipe or a device need not come to an end.
+        if std::fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
+            bail!(
+                "the journal {} is no regular file, expected one or none",
+                path.display()
+            );
+        }
         let mut file = OpenOptions::new()
             .read(true)
             .write(true)
@@ -77,33 +72,45 @@ impl Journal {
         let mut content = Vec::new();
         file.read_to_end(&mut content)
             .with_context(|| cannot("read"))?;
-        let header = serde_json::to_string(settings)? + "\n";
         let first = content
             .iter()
             .position(|byte| *byte == b'\n')
             .map(|end| end + 1);
         let mut done = Vec::new();
         match first {
-            Some(_) if !resume => bail!(
-                "{} holds the work of a run that did not finish: go on with it by --resume, or remove it to begin anew",
-                path.display()
-            ),
             Some(first) => {
-                check_settings(&path, &content[..first], settings)?;
-                let mut kept = first;
+                let theirs = read_header(&path, &content[..first])?;
+                if !resume {
+                    bail!(
+                        "{} holds the work of a run that did not finish: go on with it by --resume, or remove it to begin anew",
+                        path.display()
+                    );
+                }
+                check_settings(&path, &theirs, settings)?;
+                let (mut kept, mut damaged) = (first, 0);
                 for line in content[first..].split_inclusive(|byte| *byte == b'\n') {
-                    let Some(entry) = read_entry(line) else {
+                    if !line.ends_with(b"\n") {
                         break;
-                    };
+                    }
                     kept += line.len();
-                    done.push(entry);
+                    match journal_entry::read(line) {
+                        Some(entry) => done.push(entry),
+                        None => damaged += 1,
+                    }
+                }
+                if damaged > 0 {
+                    warn(format_args!(
+                        "{}: {damaged} lines have changed since they were written; their images are done again",
+                        path.display()
+                    ));
                 }
                 file.set_len(kept as u64).with_context(|| cannot("cut"))?;
                 file.seek(SeekFrom::End(0))
                     .with_context(|| cannot("read"))?;
             }
             // Not even its first line is whole: nothing is lost by beginning anew.
-            None => {
+            None if is_begun(&content) => {
+                let header = serde_json::to_string(&with_form(settings))? + "\n";
                 file.set_len(0).with_context(|| cannot("cut"))?;
                 file.seek(SeekFrom::Start(0))
                     .with_context(|| cannot("read"))?;
@@ -111,6 +118,7 @@ impl Journal {
                     .and_then(|()| file.sync_all())
                     .with_context(|| cannot("write"))?;
             }
+            None => return Err(no_journal(&path)),
         }
         let file = Mutex::new(file);
         Ok((Self { path, file }, done))
@@ -118,7 +126,7 @@ impl Journal {
 
     /// Puts an image's results on the disk.
     pub(crate) fn append(&self, frame: usize, result: &FrameResult) -> anyhow::Result<()> {
-        let line = serde_json::to_string(&Entry::of(frame, result))? + "\n";
+        let line = journal_entry::write(frame, result)?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.write_all(line.as_bytes())
             .and_then(|()| file.sync_data())
@@ -132,19 +140,56 @@ impl Journal {
     }
 }
 
-/// Refuses a journal of another run, and names the first setting that differs.
-fn check_settings(path: &Path, line: &[u8], settings: &[(&str, String)]) -> anyhow::Result<()> {
-    let Ok(theirs) = serde_json::from_slice::<Vec<(String, String)>>(line) else {
-        bail!(
-            "{} is no journal of bop refine, expected one: remove it",
-            path.display()
-        );
+/// The settings as they are written.
+fn with_form(settings: &[Setting]) -> Vec<(&str, &str)> {
+    let settings = settings.iter().map(|(name, value)| (&**name, &**value));
+    std::iter::once(FORM).chain(settings).collect()
+}
+
+/// Whether a file without a whole line is one that a run left as it began; a machine that failed may leave zeros in it.
+fn is_begun(content: &[u8]) -> bool {
+    let zeros = content.iter().rev().take_while(|byte| **byte == 0).count();
+    let written = &content[..content.len() - zeros];
+    written.starts_with(OPENING) || OPENING.starts_with(written)
+}
+
+/// It is somebody else's file, and stays as it is.
+fn no_journal(path: &Path) -> anyhow::Error {
+    anyhow!(
+        "{} is no journal of bop refine, expected one or no such file: it would be overwritten; move it, or choose another --output",
+        path.display()
+    )
+}
+
+/// Reads the settings of a journal; refuses what is none, and one of another form.
+fn read_header(path: &Path, line: &[u8]) -> anyhow::Result<Vec<Setting>> {
+    let Ok(mut theirs) = serde_json::from_slice::<Vec<Setting>>(line) else {
+        return Err(no_journal(path));
     };
+    let form = match theirs.first() {
+        Some((name, form)) if *name == FORM.0 => form.as_str(),
+        // The first form did not say so.
+        Some((name, _)) if name == "hybrid-icp" => "1",
+        _ => return Err(no_journal(path)),
+    };
+    if form != FORM.1 {
+        bail!(
+            "{} is a journal of form {form}, expected {}: finish that run with the version of hybrid-icp that began it, or remove it to begin anew",
+            path.display(),
+            FORM.1
+        );
+    }
+    theirs.remove(0);
+    Ok(theirs)
+}
+
+/// Refuses a journal of another run, and names the first setting that differs.
+fn check_settings(path: &Path, theirs: &[Setting], settings: &[Setting]) -> anyhow::Result<()> {
     for (index, (name, value)) in settings.iter().enumerate() {
         let (other, found) = theirs.get(index).map_or(("", "nothing"), |(n, v)| (n, v));
-        if other != *name || found != value {
+        if other != name || found != value {
             bail!(
-                "{} is of a run with {name} {found}, expected {value} as in this run: pass the same, or remove it to begin anew",
+                "{} is of a run with {name} {found}, expected {value} as in this run: make it the same, or remove the journal to begin anew",
                 path.display()
             );
         }
@@ -152,93 +197,25 @@ fn check_settings(path: &Path, line: &[u8], settings: &[(&str, String)]) -> anyh
     Ok(())
 }
 
-/// Reads a whole line; `None` for anything else.
-fn read_entry(line: &[u8]) -> Option<(usize, FrameResult)> {
-    let line = line.strip_suffix(b"\n")?;
-    let entry: Entry = serde_json::from_slice(line).ok()?;
-    let rows = entry.rows.iter().map(|row| {
-        Some(RowResult {
-            index: row.index,
-            fate: Fate::parse(&row.fate)?,
-            pose: row.pose.map(pose_of),
-            mve: row.mve.map(|[a, b]| (f64::from_bits(a), f64::from_bits(b))),
-        })
-    });
-    let problems = entry.problems.into_iter();
-    let result = FrameResult {
-        rows: rows.collect::<Option<_>>()?,
-        seconds: entry.seconds.map(f64::from_bits),
-        faults: problems
-            .map(|(missing, text)| Fault { missing, text })
-            .collect(),
-        // They are told by the run that looked.
-        doubts: Vec::new(),
-    };
-    Some((entry.frame, result))
-}
-
-impl Entry {
-    fn of(frame: usize, result: &FrameResult) -> Self {
-        let row = |row: &RowResult| Row {
-            index: row.index,
-            fate: row.fate.to_string(),
-            pose: row.pose.map(|pose| bits_of(&pose)),
-            mve: row.mve.map(|(a, b)| [a.to_bits(), b.to_bits()]),
-        };
-        let problems = result.faults.iter();
-        Self {
-            frame,
-            seconds: result.seconds.map(f64::to_bits),
-            rows: result.rows.iter().map(row).collect(),
-            problems: problems.map(|p| (p.missing, p.text.clone())).collect(),
-        }
-    }
-}
-
-fn bits_of(pose: &Isometry3<f64>) -> [u64; 7] {
-    let (t, q) = (pose.translation.vector, pose.rotation.coords);
-    [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
-}
-
-fn pose_of(bits: [u64; 7]) -> Isometry3<f64> {
-    let [x, y, z, i, j, k, w] = bits.map(f64::from_bits);
-    let rotation = UnitQuaternion::new_unchecked([i, j, k, w].into());
-    Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use super::super::journal_entry::tests::result;
     use super::*;
 
-    fn result() -> FrameResult {
-        let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.7), Vector3::new(0.3, 2.0, -1.0));
-        let row = |index, fate, pose, mve| RowResult {
-            index,
-            fate,
-            pose,
-            mve,
-        };
-        FrameResult {
-            rows: vec![
-                row(4, Fate::Refined, Some(pose), Some((0.1 + 0.2, 1.0 / 3.0))),
-                row(9, Fate::NoMask, None, None),
-            ],
-            seconds: Some(0.7 / 3.0),
-            faults: vec![Fault::damaged("a\n\"b\"".to_owned())],
-            doubts: Vec::new(),
-        }
-    }
-
-    fn settings(shard: &str) -> Vec<(&'static str, String)> {
-        vec![
-            ("--split", "test".to_owned()),
-            ("--shard", shard.to_owned()),
-        ]
+    fn settings(shard: &str) -> Vec<Setting> {
+        [("--split", "test"), ("--shard", shard)]
+            .map(|(name, value)| (name.to_owned(), value.to_owned()))
+            .to_vec()
     }
 
     #[test]
     fn what_was_appended_is_read_back_bit_for_bit_wherever_the_file_was_cut() {
+        // The fewer bytes, the fewer places to cut.
+        let result = || FrameResult {
+            doubts: Vec::new(),
+            ..result()
+        };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("out.csv.journal");
         let (journal, done) = Journal::open(path.clone(), &settings("1/2"), false).unwrap();
@@ -256,13 +233,7 @@ mod tests {
             let expected = (length as u64).saturating_sub(header) / line;
             assert_eq!(done.len() as u64, expected, "{length}");
             for ((frame, read), expected) in done.iter().zip([3, 1]) {
-                assert_eq!(*frame, expected);
-                let same = serde_json::to_string(&Entry::of(0, read)).unwrap();
-                assert_eq!(
-                    same,
-                    serde_json::to_string(&Entry::of(0, &result())).unwrap()
-                );
-                assert_eq!(read.rows[0].pose, result().rows[0].pose);
+                assert_eq!((*frame, read), (expected, &result()));
             }
             // What is appended now follows whole lines.
             journal.append(7, &result()).unwrap();
@@ -287,7 +258,93 @@ mod tests {
         let running = Journal::open(path.clone(), &settings("1/2"), true).unwrap();
         assert!(open("1/2", true).unwrap_err().contains("in use"));
         drop(running);
-        std::fs::write(&path, "scene_id\n").unwrap();
-        assert!(open("1/2", true).unwrap_err().contains("no journal"));
+        let forms = [
+            ("1", "[[\"hybrid-icp\",\"0.1.0\"],[\"--split\",\"test\"]]\n"),
+            ("2", "[[\"journal of bop refine\",\"2\"]]\n"),
+        ];
+        for (form, older) in forms {
+            std::fs::write(&path, older).unwrap();
+            for resume in [false, true] {
+                let told = open("1/2", resume).unwrap_err();
+                let expected = format!("form {form}, expected {}", FORM.1);
+                assert!(told.contains(&expected), "{told}");
+            }
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), older);
+        }
+    }
+
+    #[test]
+    fn a_line_that_changed_is_dropped_and_those_after_it_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("out.csv.journal");
+        let open = || Journal::open(path.clone(), &settings("1/2"), true).unwrap();
+        let (journal, _) = open();
+        let frames = |done: Vec<(usize, FrameResult)>| -> Vec<usize> {
+            assert!(done.iter().all(|(_, read)| *read == result()));
+            done.into_iter().map(|(frame, _)| frame).collect()
+        };
+        let header = std::fs::metadata(&path).unwrap().len() as usize;
+        for frame in [3, 1, 2] {
+            journal.append(frame, &result()).unwrap();
+        }
+        drop(journal);
+        let whole = std::fs::read(&path).unwrap();
+        let line = (whole.len() - header) / 3;
+        let middle = header + line..header + 2 * line;
+        for (changed, left) in [
+            (middle.start, &[3, 2][..]),
+            (middle.start + line / 2, &[3, 2]),
+            // The end of a line: two are one now.
+            (middle.end - 1, &[3]),
+            (middle.start - 1, &[2]),
+        ] {
+            let mut content = whole.clone();
+            content[changed] ^= 1;
+            std::fs::write(&path, &content).unwrap();
+            let (journal, done) = open();
+            assert_eq!(frames(done), left, "byte {changed}");
+            journal.append(1, &result()).unwrap();
+            drop(journal);
+            assert_eq!(frames(open().1), [left, &[1]].concat());
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_no_journal_stays_as_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("out.csv.journal");
+        let open = |resume: bool| Journal::open(path.clone(), &settings("1/2"), resume);
+        for content in [
+            "my notes",
+            "my notes\n",
+            "\n",
+            " ",
+            "[",
+            "[[\"journal\"",
+            "[[\"journal of a cat\",\"2\"]]",
+            "[[\"journal of a cat\",\"2\"]]\n",
+            "\0\0my notes",
+        ] {
+            for resume in [false, true] {
+                std::fs::write(&path, content).unwrap();
+                if OPENING.starts_with(content.as_bytes()) {
+                    // As far as one can tell it was to be one.
+                    open(resume).unwrap();
+                    continue;
+                }
+                let told = open(resume).unwrap_err().to_string();
+                assert!(told.contains("is no journal of bop refine"), "{told}");
+                assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
+            }
+        }
+        // What a machine that failed leaves of a file that was begun.
+        for zeros in ["\0".repeat(4096), "[[\"jour".to_owned() + &"\0".repeat(90)] {
+            std::fs::write(&path, zeros).unwrap();
+            assert!(open(false).unwrap().1.is_empty());
+        }
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        let told = open(false).unwrap_err().to_string();
+        assert!(told.contains("no regular file"), "{told}");
     }
 }

@@ -235,7 +235,7 @@ fn check_size(image: &Image, judged: &mut JudgedFrame) {
     let masks = (0..n_instances).map(|i| image.scene.visible_mask_path(image.im_id, i));
     let color = image.scene.color_path(image.im_id);
     let color = color.filter(|path| path.extension().is_some_and(|e| e == "png"));
-    for path in masks.chain(color).filter(|path| path.is_file()) {
+    for path in masks.chain(color).filter(|path| !hicp_io::is_absent(path)) {
         match hicp_io::read_png_size(&path) {
             Ok(found) if found != expected => judged.misfits.push(format!(
                 "{} is {}x{} pixels, expected {}x{} as the depth image",

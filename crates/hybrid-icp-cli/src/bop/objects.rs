@@ -33,19 +33,19 @@ impl Objects {
     /// Reads a folder: BOP models by their ids where it has a models_info.json, else its meshes numbered from 1 by name.
     pub(crate) fn read(dir: &Path, unit: LengthUnit) -> anyhow::Result<Self> {
         let info = dir.join("models_info.json");
-        let models = if info.is_file() {
+        let models = if hicp_io::is_absent(&info) {
+            let mut models = Vec::new();
+            for (id, path) in (1..).zip(meshes(dir)?) {
+                models.push((id, Model::new(read_mesh(path, unit)?)));
+            }
+            models
+        } else {
             let ids: BTreeSet<u32> = limits().read_models_info(&info)?.into_keys().collect();
             let read = models::read(dir, &ids)?;
             if let Some(broken) = read.broken.values().next() {
                 bail!("{broken}");
             }
             read.by_id.into_iter().collect()
-        } else {
-            let mut models = Vec::new();
-            for (id, path) in (1..).zip(meshes(dir)?) {
-                models.push((id, Model::new(read_mesh(path, unit)?)));
-            }
-            models
         };
         if models.is_empty() {
             bail!(

@@ -13,8 +13,10 @@ use hicp_io::bop::{Dataset, ResultRow};
 use rayon::prelude::*;
 
 use super::journal::Journal;
-use super::refine_summary::{Told, mean_seconds, report_faults};
-use super::{models, progress_bar, refine_doubts, refine_settings, targets, thread_pool};
+use super::refine_summary::{Doubted, Told, mean_seconds, report_faults, warn_of_distrust};
+use super::{
+    models, progress_bar, refine_doubts, refine_rows, refine_settings, targets, thread_pool,
+};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
 use crate::terminal::{say, warn};
@@ -83,9 +85,16 @@ pub(crate) struct Arguments {
     /// Write another score than that of the input, so that poses can be ranked without ground truth.
     #[arg(long, value_enum, value_name = "BY")]
     rescore: Option<Rescore>,
+    /// Write what became of every row of the output to a file: comma-separated, with its MVE before and after, and why its pose is not to be
+    /// trusted.
+    #[arg(long, value_name = "ROWS.csv")]
+    rows: Option<PathBuf>,
     /// Go on with a run of the same options that was killed; begin anew where it left no journal.
     #[arg(long)]
     resume: bool,
+    /// Whether another command runs this one, which has none of its options.
+    #[arg(skip)]
+    called: bool,
 }
 
 /// What masks are.
@@ -128,7 +137,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     arguments.check_files()?;
     let pipeline = arguments.pipeline.choose()?;
-    let mut rows = arguments.rows()?;
+    let mut rows = arguments.read_rows()?;
     let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;
     let masks = arguments.masks()?;
@@ -136,11 +145,12 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let pool = thread_pool(arguments.threads, frames.len())?;
 
     let start = Instant::now();
-    let settings = refine_settings::of(arguments, &pipeline, &rows, &masks);
-    let objects = rows.iter().map(|row| row.obj_id).collect();
     let models_dir = dataset.models_dir()?;
+    // Looked at before the files are read: what changes meanwhile is then another file for whoever goes on.
+    let settings = refine_settings::of(arguments, &pipeline, &rows, &masks, &models_dir);
+    let objects = rows.iter().map(|row| row.obj_id).collect();
     let models = pool.install(|| models::read(&models_dir, &objects))?;
-    refine_doubts::about_models(&models, &models_dir);
+    pool.install(|| refine_doubts::about_models(&models, &models_dir));
     let shared = DatasetRefiner {
         models,
         scenes: Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1),
@@ -148,7 +158,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     };
     let (journal, mut results) = arguments.journal(&settings, &frames)?;
     let resumed = results.iter().flatten().count();
-    pool.install(|| {
+    let ran = pool.install(|| {
         work(
             &shared,
             &pipeline,
@@ -156,11 +166,28 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
             (&rows, &frames),
             &mut results,
         )
-    })?;
+    });
+    if interrupt::asked() && ran.is_err() && journal.is_some() {
+        bail!(
+            "interrupted: {} of {} frames are done; {} goes on from there",
+            results.iter().flatten().count(),
+            frames.len(),
+            if arguments.called {
+                "the same command"
+            } else {
+                "--resume"
+            }
+        );
+    }
+    ran?;
     let results: Vec<FrameResult> = results.into_iter().flatten().collect();
 
     for result in &results {
         result.enter(&mut rows, arguments.rescore(), !arguments.no_time);
+    }
+    // The output comes last, for it may take the place of the input: until then a run that fails can go on.
+    if let Some(path) = &arguments.rows {
+        refine_rows::write(path, &rows, &results)?;
     }
     hicp_io::bop::write_results(&arguments.output, &rows)?;
     if let Some(journal) = journal {
@@ -173,8 +200,11 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
         threads: pool.current_num_threads(),
         resumed,
     };
-    say(told.summary(&results, &shared.models))?;
+    // What is wrong is told on the other stream, whatever becomes of this one.
+    let doubted = Doubted::of(&results);
+    let said = say(told.summary(&results, &shared.models, &doubted));
     refine_doubts::about_images(&results, &rows);
+    warn_of_distrust(&arguments.output, &doubted, &arguments.which());
     let images = arguments.dataset.join(&arguments.split);
     let files = (
         arguments.results.as_path(),
@@ -182,6 +212,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
         images.as_path(),
     );
     report_faults(files, (&shared.models, &models_dir), &results)?;
+    said?;
     Ok(mean_seconds(&results))
 }
 
@@ -217,18 +248,11 @@ fn work(
         },
     );
     progress.finish_and_clear();
-    if interrupt::asked() && ran.is_err() && journal.is_some() {
-        bail!(
-            "interrupted: {} of {} frames are done; --resume goes on from there",
-            results.iter().flatten().count(),
-            frames.len()
-        );
-    }
     ran
 }
 
 impl Arguments {
-    /// The command without options, but that it goes on with a run that was killed.
+    /// The command without options, but that it goes on with a run that was killed, as the command does that calls it.
     pub(super) fn plain(
         (dataset, split): (&Path, &str),
         pipeline: PipelineArguments,
@@ -250,7 +274,9 @@ impl Arguments {
             top_k: None,
             targets: None,
             rescore: None,
+            rows: None,
             resume: true,
+            called: true,
         }
     }
 
@@ -264,15 +290,21 @@ impl Arguments {
         ];
         let others = others.into_iter();
         inputs.extend(others.filter_map(|(option, path)| Some((option, path?.as_path()))));
-        outputs::check(
-            &[("--output", &self.output)],
-            &inputs,
-            &[("--output", "--results")],
-        )
+        let journal = self.journal_path();
+        let mut written = vec![("--output", self.output.as_path())];
+        written.extend(journal.as_deref().map(|p| ("the journal of --output", p)));
+        written.extend(self.rows.as_deref().map(|p| ("--rows", p)));
+        outputs::check(&written, &inputs, &[("--output", "--results")])
+    }
+
+    /// Where the journal is. There is none for what is not a file.
+    fn journal_path(&self) -> Option<PathBuf> {
+        let file = !self.output.exists() || self.output.is_file();
+        file.then(|| Journal::path_of(&self.output))
     }
 
     /// Reads the rows that are to be refined and written.
-    fn rows(&self) -> anyhow::Result<Vec<ResultRow>> {
+    fn read_rows(&self) -> anyhow::Result<Vec<ResultRow>> {
         let mut rows = limits().read_results(&self.results)?;
         if let Some(limit) = self.limit {
             rows.truncate(limit as usize);
@@ -296,6 +328,15 @@ impl Arguments {
         Ok(part.rows)
     }
 
+    /// What tells which rows are meant, in brackets, or nothing.
+    fn which(&self) -> String {
+        match &self.rows {
+            Some(path) => format!(" ({} tells which)", path.display()),
+            None if self.called => String::new(),
+            None => " (--rows tells which)".to_owned(),
+        }
+    }
+
     fn masks(&self) -> anyhow::Result<MaskSource> {
         Ok(match (&self.detections, self.mask) {
             (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),
@@ -311,17 +352,16 @@ impl Arguments {
         }
     }
 
-    /// Opens the journal, and returns it with what it holds of the frames. There is none for what is not a file.
+    /// Opens the journal, where there is to be one, and returns it with what it holds of the frames.
     fn journal(
         &self,
-        settings: &[(&str, String)],
+        settings: &[refine_settings::Setting],
         frames: &[FrameRows],
     ) -> anyhow::Result<(Option<Journal>, Vec<Option<FrameResult>>)> {
         let mut results: Vec<Option<FrameResult>> = frames.iter().map(|_| None).collect();
-        if self.output.exists() && !self.output.is_file() {
+        let Some(path) = self.journal_path() else {
             return Ok((None, results));
-        }
-        let path = Journal::path_of(&self.output);
+        };
         let (journal, done) = Journal::open(path, settings, self.resume)?;
         for (place, result) in done {
             let indices = frames.get(place).map_or(&[][..], |(_, indices)| indices);

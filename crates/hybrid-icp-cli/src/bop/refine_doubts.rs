@@ -1,17 +1,21 @@
 //! What looks wrong about a dataset, its models and the rows together, told once per object.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use hicp_bop::{FrameResult, Models};
 use hicp_io::bop::ResultRow;
 use hybrid_icp::{Doubt, doubts_of_model};
 
+use super::models;
 use crate::terminal::warn;
+
+/// Most scenes that are named one by one.
+const SCENES_SHOWN: usize = 5;
 
 /// What a doubt that needs an image is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+pub(super) enum Kind {
     NoDepth,
     Depth,
     Mask,
@@ -19,7 +23,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(doubt: &Doubt) -> Option<Self> {
+    pub(super) fn of(doubt: &Doubt) -> Option<Self> {
         match doubt {
             Doubt::NoDepth => Some(Self::NoDepth),
             Doubt::Depth { .. } => Some(Self::Depth),
@@ -30,22 +34,34 @@ impl Kind {
         }
     }
 
-    fn advice(self) -> &'static str {
+    /// Where to look for the cause; `poses` is the option that states them.
+    pub(super) fn advice(self, poses: &str) -> String {
         match self {
-            Self::NoDepth => "check depth_scale in scene_camera.json",
+            Self::NoDepth => "check depth_scale in scene_camera.json".to_owned(),
             Self::Depth => {
-                "check depth_scale in scene_camera.json, and that --results states millimetres"
+                format!(
+                    "check depth_scale in scene_camera.json, and that {poses} states millimetres"
+                )
             }
-            Self::Mask => "check that models are in mm, and that --results states millimetres",
-            Self::Sliver => "check that models are in mm, and what the masks are of",
+            Self::Mask => {
+                format!("check that models are in mm, and that {poses} states millimetres")
+            }
+            Self::Sliver => "check that models are in mm, and what the masks are of".to_owned(),
         }
     }
 }
 
-/// Warns of models that look as if they were in another unit.
+/// Warns of models that look as if they were in another unit, and of diameters that are not those of their meshes.
 pub(super) fn about_models(models: &Models, models_dir: &Path) {
+    let diameters = models::doubted_diameters(models, models_dir);
     for (obj_id, model) in &models.by_id {
-        for doubt in doubts_of_model(model) {
+        let diameter = diameters.get(obj_id);
+        if let Some(text) = diameter {
+            warn(text);
+        }
+        // One doubt about the same number is enough.
+        let told = |doubt: &Doubt| diameter.is_some() && matches!(doubt, Doubt::Diameter { .. });
+        for doubt in doubts_of_model(model).iter().filter(|doubt| !told(doubt)) {
             warn(format_args!(
                 "object {obj_id}: {doubt}: check that {} is in mm",
                 models_dir.display()
@@ -54,31 +70,74 @@ pub(super) fn about_models(models: &Models, models_dir: &Path) {
     }
 }
 
-/// Warns of what looks wrong in most images of an object; in a few it is the rows' poses that are far off.
+/// A doubt about an object: how often it was had in the scenes where it was had of most images.
+#[derive(Debug)]
+struct Told {
+    first: Doubt,
+    doubted: usize,
+    images: usize,
+    scenes: Vec<u32>,
+}
+
+/// Warns of what looks wrong in most images of an object in a scene, for each scene has its own files; in a few images it is the rows' poses
+/// that are far off.
 pub(super) fn about_images(results: &[FrameResult], rows: &[ResultRow]) {
-    let mut images: BTreeMap<u32, usize> = BTreeMap::new();
-    let mut doubted: BTreeMap<(u32, Kind), (usize, Doubt)> = BTreeMap::new();
+    let mut images: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+    let mut doubted: BTreeMap<(u32, Kind, u32), (usize, Doubt)> = BTreeMap::new();
     for result in results {
+        // All rows of a result are of one image.
+        let Some(scene_id) = result.rows.first().map(|row| rows[row.index].scene_id) else {
+            continue;
+        };
         let refined = result.rows.iter().filter(|row| row.mve.is_some());
-        let mut objects: Vec<u32> = refined.map(|row| rows[row.index].obj_id).collect();
-        objects.sort_unstable();
-        objects.dedup();
+        let objects: BTreeSet<u32> = refined.map(|row| rows[row.index].obj_id).collect();
         for obj_id in objects {
-            *images.entry(obj_id).or_default() += 1;
+            *images.entry((obj_id, scene_id)).or_default() += 1;
         }
         for (obj_id, doubt) in &result.doubts {
             if let Some(kind) = Kind::of(doubt) {
-                doubted.entry((*obj_id, kind)).or_insert((0, *doubt)).0 += 1;
+                let entry = doubted.entry((*obj_id, kind, scene_id));
+                entry.or_insert((0, *doubt)).0 += 1;
             }
         }
     }
-    for ((obj_id, kind), (count, first)) in doubted {
-        let all = images.get(&obj_id).copied().unwrap_or(count);
+    let mut told: BTreeMap<(u32, Kind), Told> = BTreeMap::new();
+    for ((obj_id, kind, scene_id), (count, first)) in doubted {
+        let all = images.get(&(obj_id, scene_id)).copied().unwrap_or(count);
         if 2 * count > all {
-            warn(format_args!(
-                "object {obj_id}: {first} ({count} of {all} images): {}",
-                kind.advice()
-            ));
+            let told = told.entry((obj_id, kind)).or_insert(Told {
+                first,
+                doubted: 0,
+                images: 0,
+                scenes: Vec::new(),
+            });
+            told.doubted += count;
+            told.images += all;
+            told.scenes.push(scene_id);
         }
+    }
+    for ((obj_id, kind), told) in told {
+        warn(format_args!(
+            "object {obj_id}: {} ({} of {} images of {}): {}",
+            told.first,
+            told.doubted,
+            told.images,
+            name_scenes(&told.scenes),
+            kind.advice("--results")
+        ));
+    }
+}
+
+/// Scenes by their ids, a few of them.
+fn name_scenes(scenes: &[u32]) -> String {
+    let ids: Vec<String> = scenes.iter().map(u32::to_string).collect();
+    match ids.as_slice() {
+        [one] => format!("scene {one}"),
+        few if few.len() <= SCENES_SHOWN => format!("scenes {}", few.join(", ")),
+        many => format!(
+            "scenes {} and {} more",
+            many[..SCENES_SHOWN].join(", "),
+            many.len() - SCENES_SHOWN
+        ),
     }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use anyhow::bail;
 use hicp_bop::{Fate, FrameResult, Models};
+use hybrid_icp::{Doubt, EXPLAINS_NOTHING, PAPER_ALPHA};
 
 use super::{median, models, problem};
 use crate::terminal::warn;
@@ -21,7 +22,12 @@ pub(super) struct Told<'a> {
 
 impl Told<'_> {
     /// Counts the rows by what became of them.
-    pub(super) fn summary(&self, results: &[FrameResult], models: &Models) -> String {
+    pub(super) fn summary(
+        &self,
+        results: &[FrameResult],
+        models: &Models,
+        doubted: &Doubted,
+    ) -> String {
         let rows = || results.iter().flat_map(|result| &result.rows);
         let mut text = format!(
             "{}: {} rows of {} frames in {:.1} s on {} threads",
@@ -51,7 +57,70 @@ impl Told<'_> {
         if let (Some(before), Some(after)) = (median(&mut before), median(&mut after)) {
             let _ = write!(text, "\n  median MVE {before:.3} -> {after:.3}");
         }
+        if doubted.unexplained > 0 {
+            let _ = write!(
+                text,
+                "\n  {:>7}  with an MVE of {PAPER_ALPHA} or more: not to be trusted",
+                doubted.unexplained
+            );
+        }
         text
+    }
+}
+
+/// How many rows that got as far as the pipeline have a pose that is not to be trusted.
+pub(super) struct Doubted {
+    rows: usize,
+    unexplained: usize,
+    elsewhere: usize,
+    flat: usize,
+}
+
+impl Doubted {
+    pub(super) fn of(results: &[FrameResult]) -> Self {
+        let rows = results.iter().flat_map(|result| &result.rows);
+        let mut doubted = Self {
+            rows: 0,
+            unexplained: 0,
+            elsewhere: 0,
+            flat: 0,
+        };
+        for row in rows.filter(|row| row.mve.is_some()) {
+            doubted.rows += 1;
+            for doubt in row.doubts() {
+                match doubt {
+                    Doubt::Unexplained { .. } => doubted.unexplained += 1,
+                    Doubt::FoundElsewhere { .. } => doubted.elsewhere += 1,
+                    Doubt::Flat { .. } => doubted.flat += 1,
+                    // Of single rows: a few that got a little worse are no reason to look at the whole.
+                    _ => {}
+                }
+            }
+        }
+        doubted
+    }
+}
+
+/// Warns of poses in the output that are not to be trusted; `which` says what tells them from the others.
+pub(super) fn warn_of_distrust(output: &Path, doubted: &Doubted, which: &str) {
+    let (output, rows) = (output.display(), doubted.rows);
+    if doubted.unexplained > 0 {
+        warn(format_args!(
+            "{output}: {} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: they are not to be trusted{which}",
+            doubted.unexplained
+        ));
+    }
+    if doubted.elsewhere > 0 {
+        warn(format_args!(
+            "{output}: in {} of {rows} rows the initial pose explained nothing of the mask (MVE {EXPLAINS_NOTHING} or more): what was found there may be another object{which}",
+            doubted.elsewhere
+        ));
+    }
+    if doubted.flat > 0 {
+        warn(format_args!(
+            "{output}: in {} of {rows} rows the surface inside the mask is flat, and that of the model at the pose is not: what was found there may be another object{which}",
+            doubted.flat
+        ));
     }
 }
 

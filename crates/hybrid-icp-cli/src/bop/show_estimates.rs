@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use hicp_bop::{Image, MaskSource, Models, Scenes, frames_of};
+use hicp_bop::{FaultKind, Image, MaskSource, Models, Scenes, frames_of};
 use hicp_io::bop::ResultRow;
 use hybrid_icp::{Isometry3, Mask, Preset, Refiner};
 
@@ -134,8 +134,10 @@ impl Inspection<'_> {
                 });
             }
         }
+        // An estimate whose mask is missing is shown without one.
         let faults = frame.into_faults().into_iter();
-        found.damaged.extend(faults.map(|fault| fault.text));
+        let damaged = faults.filter(|fault| fault.kind == FaultKind::Damaged);
+        found.damaged.extend(damaged.map(|fault| fault.text));
         found
     }
 }

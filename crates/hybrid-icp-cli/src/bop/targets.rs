@@ -25,7 +25,7 @@ pub(crate) fn choose(
     let of_dataset = dataset.root().join(TARGETS_FILE);
     let path = match given {
         Some(path) => path,
-        None if of_dataset.is_file() => &of_dataset,
+        None if !hicp_io::is_absent(&of_dataset) => &of_dataset,
         None => {
             warn(format_args!(
                 "{} does not exist: every instance of the split that is visible by {MIN_VISIBLE_FRACTION} or more is a target",

@@ -9,10 +9,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use hicp_io::LengthUnit;
 use hicp_io::bop::{ResultRow, read_results, write_results};
+use hicp_io::{LengthUnit, read_mesh};
 use hicp_sim::{Household, perturb, rng};
-use hybrid_icp::{DepthImage, Isometry3, Mask, TriMesh, Vector3, render_depth_image, se3};
+use hybrid_icp::{DepthImage, Isometry3, Mask, Model, TriMesh, Vector3, render_depth_image, se3};
 use serde_json::{Value, json};
 
 use crate::common::*;
@@ -104,6 +104,12 @@ impl World {
     pub(crate) fn mask_path(&self, scene: u32, image: u32, instance: usize) -> PathBuf {
         self.scene(scene)
             .join(format!("mask_visib/{image:06}_{instance:06}.png"))
+    }
+
+    /// Diameter of an object's mesh, millimetres.
+    pub(crate) fn diameter_mm(&self, obj_id: u32) -> f64 {
+        let path = self.path(&format!("models/obj_{obj_id:06}.ply"));
+        1e3 * Model::new(read_mesh(path, LengthUnit::Millimeters).unwrap()).diameter()
     }
 
     /// Renders instances into a depth image and their visible masks.

@@ -51,6 +51,14 @@ impl What {
         }
     }
 
+    /// Whether the image's own estimate was good enough to be held.
+    pub(super) fn is_accepted(&self) -> bool {
+        matches!(
+            self,
+            Self::Registered(SequentialEvent::Estimated(Update::Accepted(_)))
+        )
+    }
+
     /// The same for people.
     pub(super) fn describe(&self) -> &'static str {
         match self {

@@ -14,16 +14,17 @@ use clap::{Arg, Args, ValueEnum};
 use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, ResultRow, Scene, write_results};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
-use hybrid_icp::{Calibration, Isometry3, Model, SequentialEstimator};
+use hybrid_icp::{Calibration, Doubt, Isometry3, Model, SequentialEstimator};
 
 use self::camera_path::CameraPath;
 use self::lines::Line;
 use self::tracker::Tracker;
-use super::{median, progress_bar};
+use super::refine_doubts::Kind;
+use super::{median, models, progress_bar};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
 use crate::outputs;
-use crate::terminal::{complain, say};
+use crate::terminal::{complain, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
@@ -112,7 +113,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let scene = dataset.scene(&arguments.split, arguments.scene)?;
     let path = CameraPath::of(&scene, arguments.first)?;
     check_object(&scene, &path, arguments.object)?;
-    let model = read_model(&dataset.models_dir()?, arguments.object)?;
+    let models_dir = dataset.models_dir()?;
+    let model = read_model(&models_dir, arguments.object)?;
     let place = (arguments.scene, path.first(), arguments.object);
     let init = init::read(&arguments.init, place)?;
     let estimator = arguments
@@ -141,6 +143,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     ))?;
+    let diameter = models::doubted_diameter(arguments.object, &model, &models_dir);
+    if let Some(text) = &diameter {
+        warn(text);
+    }
+    for (im_id, doubt) in tracker.doubts() {
+        // One doubt about the same number is enough.
+        if diameter.is_none() || !matches!(doubt, Doubt::Diameter { .. }) {
+            warn(arguments.in_words(im_id, doubt, &models_dir));
+        }
+    }
+    if !lines.iter().any(|line| line.what.is_accepted()) {
+        warn(format_args!(
+            "{}: none of its {} images was accepted: its poses are not to be trusted",
+            arguments.output.display(),
+            lines.len()
+        ));
+    }
     let damaged = tracker.into_damaged();
     damaged.iter().for_each(complain);
     if !damaged.is_empty() {
@@ -180,6 +199,17 @@ impl Arguments {
         }
     }
 
+    /// What looks wrong about the inputs, and where to look for the cause.
+    fn in_words(&self, im_id: u32, doubt: &Doubt, models_dir: &Path) -> String {
+        let advice = match (Kind::of(doubt), doubt) {
+            (Some(kind), _) => kind.advice("--init"),
+            (None, Doubt::BehindCamera { .. }) => format!("check {}", self.init.display()),
+            (None, _) => format!("check that {} is in mm", models_dir.display()),
+        };
+        let (scene, object) = (self.scene, self.object);
+        format!("object {object} in image {im_id} of scene {scene}: {doubt}: {advice}")
+    }
+
     fn write(&self, lines: &[Line]) -> anyhow::Result<()> {
         let (scene, object) = (self.scene, self.object);
         hicp_io::write_atomically(&self.output, |file| {
@@ -207,7 +237,7 @@ fn check_object(scene: &Scene, path: &CameraPath, object: u32) -> anyhow::Result
     if counts.contains_key(&object) {
         return Ok(());
     }
-    if !file.is_file() {
+    if hicp_io::is_absent(&file) {
         bail!(
             "{} does not exist, expected one: it says which mask is whose",
             file.display()

@@ -5,8 +5,8 @@ use hicp_io::IoError;
 use hicp_io::bop::Scene;
 use hybrid_icp::fusion::CameraMotion;
 use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, SequentialEstimator,
-    render_depth_image,
+    DepthImage, Doubt, Isometry3, Mask, Model, Observation, PinholeCamera, SequentialEstimator,
+    doubts, render_depth_image,
 };
 
 use super::lines::Line;
@@ -24,6 +24,8 @@ pub(super) struct Tracker<'a> {
     estimator: SequentialEstimator,
     /// What is wrong with files, each once.
     damaged: Vec<String>,
+    /// What looks wrong in the first image that was registered: units and scales are those of all of them.
+    doubts: Option<(u32, Vec<Doubt>)>,
 }
 
 impl<'a> Tracker<'a> {
@@ -39,7 +41,14 @@ impl<'a> Tracker<'a> {
             object,
             estimator,
             damaged: Vec::new(),
+            doubts: None,
         }
+    }
+
+    /// What looks wrong about the inputs, and the image that it was seen in.
+    pub(super) fn doubts(&self) -> impl Iterator<Item = (u32, &Doubt)> {
+        let doubts = self.doubts.iter();
+        doubts.flat_map(|(im_id, doubts)| doubts.iter().map(|doubt| (*im_id, doubt)))
     }
 
     /// Messages about files that could not be used.
@@ -52,6 +61,8 @@ impl<'a> Tracker<'a> {
         let predicted = motion.apply(&self.estimator.camera_from_object());
         match self.observe(im_id, &predicted) {
             Ok((instance, observation)) => {
+                self.doubts
+                    .get_or_insert_with(|| (im_id, doubts(self.model, &observation, &predicted)));
                 let step = self.estimator.step(self.model, &observation, motion);
                 let mut line = Line::registered(im_id, instance, step);
                 line.off = self.off(&line);

@@ -1,0 +1,115 @@
+//! What became of every row of a `bop refine`, as comma-separated values.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use hicp_bop::{FrameResult, RowResult};
+use hicp_io::IoError;
+use hicp_io::bop::ResultRow;
+
+const HEADER: [&str; 8] = [
+    "scene_id",
+    "im_id",
+    "obj_id",
+    "row",
+    "fate",
+    "mve_initial",
+    "mve",
+    "doubts",
+];
+
+/// Writes a line per row of the output, in its order: what became of it, its MVE before and after, empty where it did not get as far as the
+/// pipeline, and why its pose is not to be trusted, empty where nothing says so.
+///
+/// `row` counts the output's rows from 0, as the errors of `bop eval` do.
+pub(super) fn write(
+    path: &Path,
+    rows: &[ResultRow],
+    results: &[FrameResult],
+) -> Result<(), IoError> {
+    let mut by_row: Vec<Option<&RowResult>> = vec![None; rows.len()];
+    for result in results.iter().flat_map(|result| &result.rows) {
+        if let Some(place) = by_row.get_mut(result.index) {
+            *place = Some(result);
+        }
+    }
+    hicp_io::write_atomically(path, |file| {
+        let results = by_row.iter().flatten().copied();
+        write_lines(file, results.filter_map(|r| Some((rows.get(r.index)?, r))))
+    })
+}
+
+fn write_lines<'a>(
+    file: &mut dyn Write,
+    rows: impl Iterator<Item = (&'a ResultRow, &'a RowResult)>,
+) -> io::Result<()> {
+    let mut lines = csv::Writer::from_writer(file);
+    lines.write_record(HEADER)?;
+    for (row, result) in rows {
+        let doubts: Vec<String> = result.doubts().iter().map(ToString::to_string).collect();
+        let number = |mve: Option<f64>| mve.map_or_else(String::new, |mve| mve.to_string());
+        lines.write_record([
+            row.scene_id.to_string(),
+            row.im_id.to_string(),
+            row.obj_id.to_string(),
+            result.index.to_string(),
+            result.fate.to_string(),
+            number(result.mve.map(|(before, _)| before)),
+            number(result.mve.map(|(_, after)| after)),
+            doubts.join("; "),
+        ])?;
+    }
+    lines.flush()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use hicp_bop::Fate;
+    use hybrid_icp::{Isometry3, Relief};
+
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_order_of_the_output_with_what_is_known_of_them() {
+        let rows: Vec<ResultRow> = (5..8)
+            .map(|obj_id| ResultRow::new(1, 2, obj_id, Isometry3::identity()))
+            .collect();
+        let relief = Relief {
+            residual: 0.01,
+            measured: 0.001,
+            rendered: 0.01,
+            diameter: 0.2,
+        };
+        let row = |index, fate, mve, relief| RowResult {
+            index,
+            fate,
+            pose: None,
+            mve,
+            relief,
+        };
+        let frame = |rows| FrameResult {
+            rows,
+            ..FrameResult::default()
+        };
+        let results = [
+            frame(vec![row(2, Fate::Refined, Some((0.95, 0.1)), Some(relief))]),
+            frame(vec![
+                row(1, Fate::NoMask, None, None),
+                row(0, Fate::Refined, Some((0.5, 0.25)), None),
+            ]),
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.csv");
+        write(&path, &rows, &results).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(path).unwrap(),
+            "scene_id,im_id,obj_id,row,fate,mve_initial,mve,doubts\n\
+             1,2,5,0,refined,0.5,0.25,\n\
+             1,2,6,1,kept: no mask of the object,,,\n\
+             1,2,7,2,refined,0.95,0.1,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \
+             another object; the surface inside the mask is flat to within 0.0010 m, that of the model at the pose only to within 0.0100 m, and \
+             0.0100 m away from it: what is there may be another object\"\n"
+        );
+    }
+}
