@@ -48,6 +48,14 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     ))
 }
 
+/// Returns an array whose numbers lie where the processor may read them: a copy of one that does not, such as a field of packed records.
+pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    match value.cast::<PyUntypedArray>() {
+        Ok(array) if !array.is_aligned() => value.call_method0("copy"),
+        _ => Ok(value.clone()),
+    }
+}
+
 /// Reads anything array-like into row-major numbers. `None` in `lengths` stands for any length.
 pub(crate) fn numbers<T: Element + Copy>(
     value: &Bound<'_, PyAny>,
@@ -58,7 +66,7 @@ pub(crate) fn numbers<T: Element + Copy>(
 where
     for<'a, 'py> PyArrayLikeDyn<'py, T, AllowTypeChange>: FromPyObject<'a, 'py>,
 {
-    let array = value
+    let array = aligned(value)?
         .extract::<PyArrayLikeDyn<'_, T, AllowTypeChange>>()
         .map_err(|_| unexpected(name, value, expected))?;
     let found = array.shape();

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use hicp_bop::{DatasetRefiner, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of};
+use hicp_bop::{
+    DatasetRefiner, FaultKind, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of,
+};
 use hicp_io::bop::{Dataset, ResultRow, read_detections, read_results, results_from_csv};
 use hybrid_icp::Refiner;
 use pyo3::prelude::*;
@@ -172,7 +174,10 @@ impl PyDatasetRefiner {
                 self.shared.frame(&mut refiner, *key, &rows, indices)
             };
             result.enter(&mut rows, self.rescore, false);
-            let damaged = result.faults.iter().filter(|fault| !fault.missing);
+            let damaged = result
+                .faults
+                .iter()
+                .filter(|fault| fault.kind == FaultKind::Damaged);
             Ok((
                 rows.iter().map(ToString::to_string).collect(),
                 result.rows.iter().map(|row| row.fate.to_string()).collect(),

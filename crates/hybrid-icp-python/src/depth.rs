@@ -132,6 +132,7 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
     if array.ndim() != 2 {
         return Err(unexpected("depth", value, EXPECTED_DEPTH));
     }
+    let value = &array::aligned(value)?;
     if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f32>>() {
         no_scale(scale, value)?;
         convert(&meters.as_array(), |z| z)

@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 
 use hicp_io::LengthUnit;
 use hybrid_icp::{
-    Model, ModelConfig, ModelPoints, Point3, Symmetries, SymmetryAxis, TriMesh, Vector3,
+    MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, ModelPoints, Point3, Symmetries,
+    SymmetryAxis, TriMesh, Vector3,
 };
 use numpy::{PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -181,6 +182,11 @@ impl<'a, 'py> Options<'a, 'py> {
         symmetries: Option<&'a Bound<'py, PyAny>>,
         axes: Vec<([f64; 3], [f64; 3])>,
     ) -> PyResult<Self> {
+        if samples > MAX_SAMPLES {
+            return Err(InputError::new_err(format!(
+                "samples is {samples}, expected at most {MAX_SAMPLES}"
+            )));
+        }
         Ok(Self {
             unit: unit.parse().map_err(errors::input)?,
             samples,
@@ -200,23 +206,30 @@ impl<'a, 'py> Options<'a, 'py> {
                 self.unit
             )));
         }
+        let symmetries = Symmetries {
+            discrete: match self.symmetries {
+                Some(value) => discrete(value, scale)?,
+                None => Vec::new(),
+            },
+            continuous: self
+                .axes
+                .iter()
+                .map(|(axis, offset)| {
+                    let offset = Point3::from(offset.map(|x| x * scale));
+                    SymmetryAxis::new(Vector3::from(*axis), offset).map_err(errors::input)
+                })
+                .collect::<PyResult<_>>()?,
+        };
+        let motions = symmetries.n_motions();
+        if motions > MAX_SYMMETRY_MOTIONS {
+            return Err(InputError::new_err(format!(
+                "symmetries and symmetry_axes make {motions} motions, expected at most {MAX_SYMMETRY_MOTIONS}"
+            )));
+        }
         let config = ModelConfig {
             samples: self.samples,
             diameter: self.diameter.map(|diameter| diameter * scale),
-            symmetries: Symmetries {
-                discrete: match self.symmetries {
-                    Some(value) => discrete(value, scale)?,
-                    None => Vec::new(),
-                },
-                continuous: self
-                    .axes
-                    .iter()
-                    .map(|(axis, offset)| {
-                        let offset = Point3::from(offset.map(|x| x * scale));
-                        SymmetryAxis::new(Vector3::from(*axis), offset).map_err(errors::input)
-                    })
-                    .collect::<PyResult<_>>()?,
-            },
+            symmetries,
         };
         let model = py.detach(|| Model::with_config(mesh, config));
         let diameter = model.diameter();
@@ -275,17 +288,18 @@ fn mesh(
             )
         })
         .collect();
-    let expected = "an (F, 3) array of vertex indices";
-    if let Ok(array) = faces.cast::<PyUntypedArray>()
+    let expected = "an (F, 3) array of integers";
+    // Asked for integers, NumPy would cut the fractions of a list off.
+    let numpy = faces.py().import("numpy")?;
+    let indices = numpy
+        .call_method1("asarray", (faces,))
+        .map_err(|_| array::unexpected("faces", faces, expected))?;
+    if let Ok(array) = indices.cast::<PyUntypedArray>()
         && !matches!(array.dtype().kind(), b'i' | b'u')
     {
-        return Err(array::unexpected(
-            "faces",
-            faces,
-            "an (F, 3) array of integers",
-        ));
+        return Err(array::unexpected("faces", &indices, expected));
     }
-    let (indices, _) = array::numbers::<i64>(faces, &[None, Some(3)], "faces", expected)?;
+    let (indices, _) = array::numbers::<i64>(&indices, &[None, Some(3)], "faces", expected)?;
     let mut triangles = Vec::with_capacity(indices.len() / 3);
     for (face, corners) in indices.chunks_exact(3).enumerate() {
         let mut triangle = [0_u32; 3];

@@ -76,6 +76,14 @@ impl PyResultOf {
         self.refinement.mve_initial
     }
 
+    /// Why the pose is not to be trusted, in words: it does not explain the image, got worse, was found where the initial pose explained
+    /// nothing, or lies on a surface that is flat where the model is not. Empty where the scores say nothing against it.
+    #[getter]
+    fn doubts(&self) -> Vec<String> {
+        let doubts = self.refinement.doubts();
+        doubts.iter().map(ToString::to_string).collect()
+    }
+
     /// "refined", or "kept_initial" when the initial pose is returned.
     #[getter]
     fn outcome(&self) -> &'static str {
@@ -170,6 +178,7 @@ impl PyResultOf {
         dict.set_item("T_co", list(Some(self.T_co(py)?))?)?;
         dict.set_item("mve", self.mve())?;
         dict.set_item("mve_initial", self.mve_initial())?;
+        dict.set_item("doubts", self.doubts())?;
         dict.set_item("outcome", self.outcome())?;
         dict.set_item("termination", self.termination())?;
         dict.set_item("iterations", self.iterations())?;

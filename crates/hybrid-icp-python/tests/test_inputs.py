@@ -90,6 +90,12 @@ def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
     [
         (lambda: hi.Model(np.zeros((3, 2)), [[0, 1, 2]]), r"vertices is .* shape \(3, 2\), expected a \(V, 3\) array"),
         (lambda: hi.Model(np.eye(3), np.zeros((1, 3))), "faces is an array of float64 .* expected an .F, 3. array of integers"),
+        (lambda: hi.Model(np.eye(3), [[0.9, 1.2, 2.7]]), "faces is an array of float64 .* expected an .F, 3. array of integers"),
+        (lambda: hi.Model(np.eye(3), [[0, 1, 2]], samples=10**12), "samples is 1000000000000, expected at most 10000000"),
+        (
+            lambda: hi.Model(np.eye(3), [[0, 1, 2]], symmetry_axes=[([0, 0, 1], [0, 0, 0])] * 4000),
+            "make 1260000 motions, expected at most 1000000",
+        ),
         (lambda: hi.Model(np.eye(3), [[0, 1, -1]]), r"faces\[0\] holds -1, expected indices from 0"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 3]]), "triangle 0 uses vertex 3, but there are 3 vertices"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], unit="inch"), 'unit is "inch", expected m, mm or cm'),
@@ -126,6 +132,23 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
         assert isinstance(raised.value, OSError)
 
 
+def shifted(array):
+    """Returns an equal array of which no number lies where a processor likes it to."""
+    buffer = np.zeros(array.nbytes + 1, np.uint8)
+    moved = buffer[1:].view(array.dtype).reshape(array.shape)
+    moved[...] = array
+    assert not moved.flags.aligned
+    return moved
+
+
+def packed(array):
+    """Returns an equal array that is a field of records without gaps."""
+    records = np.zeros(array.shape, dtype=[("valid", "u1"), ("value", array.dtype)])
+    records["value"] = array
+    assert not records["value"].flags.aligned
+    return records["value"]
+
+
 def test_layouts_and_types_of_arrays_do_not_matter(scene):
     def same(depth, mask, scale=None):
         other = hi.Observation(depth, mask, scene.camera, scale=scale)
@@ -139,9 +162,19 @@ def test_layouts_and_types_of_arrays_do_not_matter(scene):
     assert results[0] == results[1]
     same(np.repeat(scene.depth, 2, axis=1)[:, ::2], np.repeat(scene.mask, 2, axis=0)[::2])
     same(scene.depth.astype(np.float64), scene.mask.astype(np.uint8) * 255)
+    for moved in (shifted, packed):
+        same(moved(scene.depth), scene.mask)
+        same(moved(scene.depth.astype(np.float64)), scene.mask)
+        refined = hi.Pipeline.preset("hybrid").refine(scene.model, expected, moved(scene.rough)).to_dict()
+        assert refined == results[0]
+        vertices, faces = bracket()
+        model = hi.Model(moved(np.asarray(vertices, dtype=np.float64)), moved(np.asarray(faces, dtype=np.int64)), unit="mm")
+        assert np.array_equal(model.vertices, hi.Model(vertices, faces, unit="mm").vertices)
     units = np.round(scene.depth * 10000).astype(np.uint16)
     expected = hi.Observation((units * 0.1 / 1000).astype(np.float32), scene.mask, scene.camera)
     same(units, scene.mask, scale=0.0001)
+    same(shifted(units), scene.mask, scale=0.0001)
+    same(packed(units), scene.mask, scale=0.0001)
     before = expected.depth
     expected.depth[:] = 0
     assert np.array_equal(expected.depth, before)
