@@ -215,6 +215,46 @@ fn a_search_out_of_time_returns_what_it_has() {
     );
 }
 
+/// Rotations that lie outside of the bound cost time too, and symmetries that an object does not have cost none.
+#[test]
+fn a_search_that_finds_nothing_to_try_ends_in_time() {
+    let scene = scene(Household::Mug, 0.3, &mut rng(0));
+    let init = flipped(&scene, Vector3::z());
+    assert!(scene.model.symmetries().is_empty());
+    for (rotations, bound, time_limit) in [
+        (Rotations::Symmetry, None, None),
+        (
+            Rotations::ViewAxis,
+            Some(Bound {
+                translation_meters: 0.1,
+                rotation_degrees: 1e-9,
+            }),
+            Some(Duration::from_millis(100)),
+        ),
+    ] {
+        let options = SearchOptions {
+            rotations,
+            bound,
+            time_limit,
+            hypotheses: usize::MAX,
+            ..SearchOptions::default()
+        };
+        let mut refiner = Refiner::new(presets::search_with(options));
+        let refined = refiner.refine(&scene.model, &scene.observation, &init);
+        assert!(
+            refined
+                .outcome
+                .camera_from_object
+                .translation
+                .vector
+                .iter()
+                .all(|x| x.is_finite())
+        );
+        let out_of_time = refined.outcome.termination == Termination::Deadline;
+        assert_eq!(out_of_time, time_limit.is_some(), "{rotations:?}");
+    }
+}
+
 /// A threshold that is never passed makes a search what its local stage is.
 #[test]
 fn without_need_nothing_is_searched() {

@@ -9,9 +9,16 @@ fn generalized_icp_is_exact_to_a_fiftieth_of_a_degree_in_eight_iterations() {
     // All 200 starts of the example. Iterations are `Outcome::iterations`: evaluations, the first at the initial pose included,
     // so eight of them are at most seven increments.
     let starts = starts(20, 0.0);
-    let generalized = measure(&plain_icp(NEAREST_OF_ALL, "\"generalized\""), &starts);
-    let symmetric = measure(&plain_icp(NEAREST_OF_ALL, "\"symmetric\""), &starts);
-    let plane = measure(&plain_icp(NEAREST_OF_ALL, "\"point-to-plane\""), &starts);
+    let [generalized, symmetric, plane] = std::thread::scope(|scope| {
+        ["generalized", "symmetric", "point-to-plane"]
+            .map(|metric| {
+                let starts = &starts;
+                scope.spawn(move || {
+                    measure(&plain_icp(NEAREST_OF_ALL, &format!("\"{metric}\"")), starts)
+                })
+            })
+            .map(|thread| thread.join().unwrap())
+    });
     let table = format!("{generalized:?}\n{symmetric:?}\n{plane:?}");
     assert!(generalized.degrees < 0.02, "{table}");
     assert!(generalized.iterations <= 8.0, "{table}");

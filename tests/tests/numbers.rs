@@ -1,10 +1,14 @@
 //! Numbers that are none, or cannot be: refused where a type is made, or an honest outcome; never a NaN in a result.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::cast_possible_truncation)]
 
 use hicp_io::pose_from_bop;
+use hicp_sim::{Household, RelativeGaussian, rng};
+use hicp_tests::OBJECTS;
+use hicp_tests::starts::starts;
 use hybrid_icp::{
-    CameraError, DepthImage, Doubt, Isometry3, Mask, Matrix3, Model, Observation, PinholeCamera,
-    Point3, Preset, Refinement, Refiner, TriMesh, Verdict, doubts, render_depth_image,
+    CameraError, DepthImage, Doubt, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
+    PAPER_ALPHA, PinholeCamera, Point3, Preset, Refinement, Refiner, Relief, TriMesh, Verdict,
+    doubt_of_diameter, doubts, doubts_of_result, render_depth_image,
 };
 
 const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
@@ -216,7 +220,12 @@ fn models_far_too_large_for_their_mask_are_doubted() {
         let mask = Mask::new(160, 120, pixels).unwrap();
         let depth = DepthImage::from_meters(160, 120, vec![0.4; 160 * 120]).unwrap();
         let observation = Observation::new(depth, mask, camera()).unwrap();
-        doubts(&Model::new(cuboid(sides)), &observation, pose)
+        // A vertex far away that no triangle uses is no part of the object.
+        let mesh = cuboid(sides);
+        let mut vertices = mesh.vertices().to_vec();
+        vertices.push(Point3::new(90.0, 80.0, 70.0));
+        let mesh = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+        doubts(&Model::new(mesh), &observation, pose)
     };
     let seen = |u: usize, v: usize| scene.mask.pixels()[v * 160 + u];
     let found = told([1.0, 0.6, 0.4], &seen, &scene.truth);
@@ -237,6 +246,121 @@ fn models_far_too_large_for_their_mask_are_doubted() {
     );
     assert_eq!(told([0.1, 0.06, 0.04], &square(0, 8), &ahead), []);
     assert_eq!(told([0.6, 0.6, 0.0], &square(51, 59), &ahead), []);
+}
+
+/// A diameter that a dataset states may be that of another version of the mesh, but not of another object. Vertices that no triangle uses do
+/// not count.
+#[test]
+fn a_stated_diameter_that_is_not_the_meshs_is_doubted() {
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let own = Model::new(mesh.clone()).diameter();
+    let mut vertices = mesh.vertices().to_vec();
+    vertices.push(Point3::new(5.0, 0.0, 0.0));
+    let stray = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+    for mesh in [mesh, stray] {
+        let told = |factor: f64| {
+            let diameter = Some(factor * own);
+            let config = ModelConfig {
+                diameter,
+                ..ModelConfig::default()
+            };
+            doubt_of_diameter(&Model::with_config(mesh.clone(), config))
+        };
+        for near in [0.951, 1.0, 1.049] {
+            assert_eq!(told(near), None);
+        }
+        for far in [0.001, 0.949, 1.051, 1000.0] {
+            let expected = Doubt::StatedDiameter {
+                stated: far * own,
+                measured: own,
+            };
+            assert_eq!(told(far), Some(expected));
+        }
+    }
+}
+
+/// The scores of a refinement from which on its pose is doubted.
+#[test]
+fn results_are_doubted_by_their_scores() {
+    let (half, nearly) = (0.5, 0.4_f64.next_down());
+    assert_eq!(doubts_of_result(half, nearly, None), []);
+    assert_eq!(
+        doubts_of_result(half, 0.4, None),
+        [Doubt::Unexplained { mve: 0.4 }]
+    );
+    assert_eq!(doubts_of_result(0.9_f64.next_down(), nearly, None), []);
+    let found = doubts_of_result(0.9, nearly, None);
+    assert!(
+        matches!(found[..], [Doubt::FoundElsewhere { mve_initial: 0.9, mve }] if mve == nearly),
+        "{found:?}"
+    );
+    // One doubt about a pose that does not explain the image is enough.
+    assert_eq!(
+        doubts_of_result(1.0, 0.4, None),
+        [Doubt::Unexplained { mve: 0.4 }]
+    );
+    assert_eq!(doubts_of_result(0.2, 0.2, None), []);
+    let relief = Relief {
+        residual: 0.01,
+        measured: 0.002,
+        rendered: 0.0123,
+        diameter: 0.2,
+    };
+    assert_eq!(doubts_of_result(half, 0.4, Some(relief)).len(), 1);
+    // No depth image is as flat as numbers are.
+    let exact = Relief {
+        measured: 1e-16,
+        ..relief
+    };
+    let found = doubts_of_result(half, nearly, Some(exact));
+    assert!(found[0].to_string().contains("flat to within 0.0010 m"));
+    let found = doubts_of_result(half, nearly, Some(relief));
+    assert_eq!(found, [Doubt::Flat { relief }]);
+    assert_eq!(
+        found[0].to_string(),
+        "the surface inside the mask is flat to within 0.0020 m, that of the model at the pose only to within 0.0123 m, and 0.0100 m away from it: \
+         what is there may be another object"
+    );
+    let found = doubts_of_result(0.2, 0.3, None);
+    assert_eq!(
+        found[0].to_string(),
+        "the returned pose explains the image worse than the initial one (MVE 0.300, was 0.200)"
+    );
+    assert!(
+        matches!(
+            doubts_of_result(0.95, 0.97, None)[..],
+            [Doubt::Worse { .. }, Doubt::Unexplained { .. }]
+        ),
+        "both are so"
+    );
+}
+
+/// Objects without a flat side, found on a wall. One with a flat side may lie on the wall as it would in its own place.
+#[test]
+fn what_is_found_on_a_wall_is_doubted() {
+    const ROUND: [Household; 3] = [Household::Mug, Household::Bottle, Household::Bowl];
+    let mut refiner = Refiner::preset(Preset::Auto);
+    for (index, start) in starts(2, 0.3).iter().enumerate() {
+        let (scene, observation) = (&start.scene, &start.scene.observation);
+        let refined = refiner.refine(&scene.model, observation, &start.init);
+        assert_eq!(refined.doubts(), [], "{refined:?}");
+        if !ROUND.contains(&OBJECTS[index / 2]) {
+            continue;
+        }
+        // A wall in the place of the object, nearer than its centre by a fifth of its diameter.
+        let center = scene.truth * scene.model.center();
+        let z = center.z - 0.2 * scene.model.diameter();
+        let (width, height) = (observation.depth().width(), observation.depth().height());
+        let wall = vec![z as f32; observation.depth().pixels().len()];
+        let wall = DepthImage::from_meters(width, height, wall).unwrap();
+        let wall = RelativeGaussian { percent: 0.3 }.apply(&mut rng(3), &wall);
+        let camera = *observation.camera();
+        let observation = Observation::new(wall, observation.mask().clone(), camera).unwrap();
+        let refined = refiner.refine(&scene.model, &observation, &start.init);
+        assert!(refined.mve < PAPER_ALPHA, "{refined:?}");
+        let found = refined.doubts();
+        assert!(matches!(found[..], [Doubt::Flat { .. }]), "{found:?}");
+    }
 }
 
 #[test]
