@@ -72,6 +72,7 @@ fn layers(root: &Path) -> Vec<String> {
         .map(|entries| {
             entries
                 .flatten()
+                .filter(|entry| entry.path().join("Cargo.toml").is_file())
                 .map(|entry| entry.file_name().to_string_lossy().into_owned())
                 .collect()
         })

@@ -47,12 +47,12 @@ def write_png(path, pixels):
 
 @pytest.fixture(scope="session")
 def ycbv():
-    """The folder of the YCB-Video frames, or a skip that says so."""
-    folder = os.environ.get("BOP_PATH") or (os.environ.get("HICP_DATA") and os.environ["HICP_DATA"] + "/bop")
-    folder = Path(folder) if folder else ROOT.parent / "shared" / "data" / "bop"
-    if not (folder / "ycbv").is_dir():
-        pytest.skip("no ycbv dataset; set BOP_PATH to the folder that holds it")
-    return folder / "ycbv"
+    """The folder of the YCB-Video frames that these tests are of, an excerpt with result files, or a skip that says so."""
+    named = [os.environ.get("BOP_PATH"), os.environ.get("HICP_DATA") and os.environ["HICP_DATA"] + "/bop"]
+    for folder in [Path(name) for name in named if name] + [ROOT.parent / "shared" / "data" / "bop"]:
+        if (folder / "ycbv" / "results").is_dir():
+            return folder / "ycbv"
+    pytest.skip("no ycbv dataset; set BOP_PATH to the folder that holds it")
 
 
 @pytest.fixture(scope="session")

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 import uuid
 from pathlib import Path
 
 MARK = "HYBRID_ICP_RAY_TEST"
+
+
+def can_start(seconds: float) -> bool:
+    """Whether Ray starts on this machine at all: where it may not start processes it fails, or waits for ever."""
+    options = "num_cpus=1, include_dashboard=False, _node_ip_address='127.0.0.1', log_to_driver=False"
+    code = f"import ray; ray.init('local', {options}); ray.shutdown()"
+    environment = os.environ | {"RAY_USAGE_STATS_ENABLED": "0"}
+    with subprocess.Popen([sys.executable, "-c", code], env=environment, start_new_session=True) as probe:
+        try:
+            return probe.wait(seconds) == 0
+        except subprocess.TimeoutExpired:
+            os.killpg(probe.pid, signal.SIGKILL)
+            return False
 
 
 def start(cpus: int) -> None:
@@ -15,7 +31,7 @@ def start(cpus: int) -> None:
 
     # Workers inherit the environment of the process that starts Ray: the mark tells ours from any others.
     os.environ.update({MARK: uuid.uuid4().hex, "RAY_USAGE_STATS_ENABLED": "0"})
-    ray.init(num_cpus=cpus, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+    ray.init("local", num_cpus=cpus, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
 
 
 def workers() -> list[int]:

@@ -31,9 +31,9 @@ def test_a_loop_of_ones_own_improves_a_dataset(dataset, tmp_path):
 
 def test_meshes_of_other_libraries_are_taken():
     said = run("03_after_a_detector.py")
-    for name, module in (("trimesh", "trimesh"), ("Open3D", "open3d")):
-        left_out = f"left out: No module named '{module}'"
-        assert f"{name}: Model(12 vertices, 20 faces" in said or left_out in said
+    # Open3D may be there and miss a library of the system.
+    left_out = [line for line in said.splitlines() if line.startswith("left out: ")]
+    assert said.count(": Model(12 vertices, 20 faces") + len(left_out) == 2
     assert "trimesh: Model" in said
 
 

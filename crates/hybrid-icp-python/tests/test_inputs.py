@@ -198,6 +198,7 @@ def test_masks_of_a_shared_image_take_no_memory_for_depth():
     image = hi.DepthImage(np.full((1500, 2000), 0.8, np.float32))
     masks = [np.zeros((1500, 2000), bool) for _ in range(20)]
     for index, mask in enumerate(masks):
+        mask[:] = False  # Memory that nobody has written to is not there yet.
         mask[10 * index : 10 * index + 8, :8] = True
 
     def resident():

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid_icp as hi
 from hybrid_icp import bop
-from ray_processes import start, workers
+from ray_processes import can_start, start, workers
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +19,8 @@ def ray():
         import ray
     except (ImportError, OSError) as error:
         pytest.skip(f"no Ray: {error}; cargo xtask python --ray installs it")
+    if not can_start(seconds=180):
+        pytest.skip("Ray does not start on this machine")
     start(cpus=2)
     yield ray
     ray.shutdown()
@@ -58,7 +60,13 @@ def test_a_killed_worker_changes_no_byte(dataset, ray, tmp_path):
             os.kill(alive[0], signal.SIGKILL)
             killed.append(alive[0])
 
-    fates = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
+    # All may be done before the first is told of.
+    for _ in range(10):
+        seen.clear()
+        fates = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
+        assert (tmp_path / "out.csv").read_bytes() == expected
+        if killed:
+            break
     assert killed, "no worker was found to kill"
     assert (tmp_path / "out.csv").read_bytes() == expected
     assert sum(fates.values()) == expected.count(b"\n") - 1 == seen[-1][0] == seen[-1][1]
