@@ -6,7 +6,8 @@ use std::sync::Arc;
 use hicp_io::bop::Dataset;
 use hybrid_icp::{DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera};
 
-/// Returns the dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project.
+/// Returns the dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has
+/// result files as the excerpt has that the tests are of.
 pub fn root() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/bop");
     let folders = [
@@ -18,7 +19,7 @@ pub fn root() -> Option<PathBuf> {
         .into_iter()
         .flatten()
         .map(|folder| folder.join("ycbv"))
-        .find(|folder| folder.is_dir())
+        .find(|folder| folder.join("results").is_dir())
 }
 
 /// An object instance in a frame, with its true pose.

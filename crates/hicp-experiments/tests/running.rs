@@ -159,7 +159,8 @@ fn rows_that_are_there_are_kept_even_their_times() {
         .rows
         .into_iter()
         .map(|r| r.measured.unwrap().cpu_ms.unwrap());
-    assert!(times.into_iter().all(|ms| ms > 0.0 && ms < 60_000.0));
+    // Zero is what a clock of coarse ticks tells.
+    assert!(times.into_iter().all(|ms| (0.0..60_000.0).contains(&ms)));
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod common;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Instant;
 
 use common::*;
@@ -58,8 +58,7 @@ fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
             .spawn()
             .unwrap();
         std::thread::sleep(longest.mul_f64(rng.random_range(0.0..0.9)));
-        let pid = child.id().to_string();
-        let _ = Command::new("kill").args([signal, &pid]).status();
+        send(signal, &child);
         let output = child.wait_with_output().unwrap();
         let ended = output.status;
         if ended.code() == Some(130) {

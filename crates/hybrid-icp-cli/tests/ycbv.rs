@@ -17,7 +17,8 @@ use hicp_io::bop::{Dataset, read_results};
 use hicp_sim::{RelativeGaussian, rng};
 use hybrid_icp::{DepthImage, Doubt, Observation, PAPER_ALPHA, Preset, Refiner};
 
-/// The dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project.
+/// The dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has result files as
+/// the excerpt has that these tests are of.
 fn root() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/bop");
     let folders = [
@@ -29,7 +30,7 @@ fn root() -> Option<PathBuf> {
         .into_iter()
         .flatten()
         .map(|f| f.join("ycbv"))
-        .find(|f| f.is_dir());
+        .find(|f| f.join("results").is_dir());
     if found.is_none() {
         println!("skipped: no ycbv dataset; set BOP_PATH to the folder that holds it");
     }

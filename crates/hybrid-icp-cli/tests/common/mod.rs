@@ -46,8 +46,21 @@ impl Run {
 /// The program in a folder, not yet running.
 pub(crate) fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid-icp"));
-    command.current_dir(folder).env("COLUMNS", "80");
     command
+        .current_dir(folder)
+        .env("COLUMNS", "80")
+        .env_remove("CLICOLOR_FORCE");
+    command
+}
+
+/// Sends a signal, `-INT` say, by the shell, which is there where no program `kill` is; returns whether the process was still there.
+pub(crate) fn send(signal: &str, child: &std::process::Child) -> bool {
+    let kill = ["-c", "kill \"$0\" \"$1\" 2>/dev/null", signal];
+    let status = Command::new("sh")
+        .args(kill)
+        .arg(child.id().to_string())
+        .status();
+    status.unwrap().success()
 }
 
 /// Runs the program in a folder; it must never panic.
