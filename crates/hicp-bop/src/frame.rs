@@ -12,6 +12,9 @@ use crate::fate::Fate;
 use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;
 
+/// Bytes of masks, one per pixel, that are held at once.
+const HELD_BYTES: usize = 1 << 28;
+
 /// An image while its rows are refined: its depth read once and shared by its observations, a mask read when a row of its object asks for it, an observation
 /// made when a row is refined in it.
 #[derive(Debug)]
@@ -19,6 +22,9 @@ pub struct Frame<'a> {
     image: Image,
     masks: Vec<Candidate<'a>>,
     faults: Vec<Fault>,
+    /// Pixels of the masks that are held, and how many may be.
+    held: usize,
+    memory: usize,
 }
 
 /// A mask that rows of an object may be refined in.
@@ -40,7 +46,7 @@ enum Source<'a> {
 /// What is known of a mask.
 #[derive(Debug)]
 enum Seen {
-    /// Nobody asked for it yet.
+    /// Nobody asked for it yet, or it was let go.
     Unread,
     /// It is not there or cannot be used.
     Unusable(Fate),
@@ -82,7 +88,19 @@ impl<'a> Frame<'a> {
             image,
             masks,
             faults: Vec::new(),
+            held: 0,
+            memory: HELD_BYTES,
         }
+    }
+
+    /// Limits the memory of masks that are held at once, bytes: 256 MiB unless told. One is held whatever its size.
+    ///
+    /// A few characters of a run-length code may stand for a whole image, so a file can name far more masks than fit into memory. Beyond
+    /// the limit all are let go and read again when they are asked for, to the same results.
+    #[must_use]
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = bytes;
+        self
     }
 
     /// The image.
@@ -144,7 +162,10 @@ impl<'a> Frame<'a> {
         {
             match Observation::new(Arc::clone(&self.image.depth), read, self.image.camera) {
                 Ok(observation) => *seen = Seen::Observed(Box::new(observation)),
-                Err(error) => self.faults.push(Fault::damaged(error.to_string())),
+                Err(error) => {
+                    self.held = self.held.saturating_sub(self.n_pixels());
+                    self.faults.push(Fault::damaged(error.to_string()));
+                }
             }
         }
         match &self.masks[mask].seen {
@@ -174,11 +195,31 @@ impl<'a> Frame<'a> {
         Observation::new(Arc::clone(depth), mask, *camera).map_err(|_| Fate::Damaged)
     }
 
+    fn n_pixels(&self) -> usize {
+        self.image.depth.pixels().len()
+    }
+
+    /// Lets all masks go that are held.
+    fn release(&mut self) {
+        for candidate in &mut self.masks {
+            if matches!(candidate.seen, Seen::Read(_) | Seen::Observed(_)) {
+                candidate.seen = Seen::Unread;
+            }
+        }
+        self.held = 0;
+    }
+
     /// Makes sure that a mask is read.
     fn read(&mut self, index: usize) -> Result<(), Fate> {
         if matches!(self.masks[index].seen, Seen::Unread) {
+            if self.held.saturating_add(self.n_pixels()) > self.memory {
+                self.release();
+            }
             let seen = match self.mask_of(self.masks[index].source) {
-                Ok(mask) => Seen::Read(mask),
+                Ok(mask) => {
+                    self.held += self.n_pixels();
+                    Seen::Read(mask)
+                }
                 Err(fault) => {
                     let fate = Fate::from(&fault);
                     self.faults.push(fault);
@@ -195,51 +236,56 @@ impl<'a> Frame<'a> {
 
     fn mask_of(&self, source: Source<'_>) -> Result<Mask, Fault> {
         let Image { scene, im_id, .. } = &self.image;
-        let (mask, name) = match source {
+        let depth = &self.image.depth;
+        let expected = (depth.width(), depth.height());
+        let (found, name) = match source {
             Source::Instance(instance) => {
                 let mask = scene.read_visible_mask(*im_id, instance);
+                let mask = mask.map_err(|e| of_mask(&e))?;
+                let found = (mask.width(), mask.height());
+                if found == expected {
+                    return Ok(mask);
+                }
                 let path = scene.visible_mask_path(*im_id, instance);
-                (mask.map_err(|e| of_mask(&e))?, path.display().to_string())
+                (found, path.display().to_string())
             }
-            Source::Code(code) => (
-                code.to_mask(),
-                format!("a segmentation of image {im_id} in --detections"),
-            ),
+            Source::Code(code) => {
+                let found = (code.width(), code.height());
+                if found == expected {
+                    return Ok(code.to_mask());
+                }
+                let name = format!("a segmentation of image {im_id} in --detections");
+                (found, name)
+            }
         };
-        let depth = &self.image.depth;
-        if (mask.width(), mask.height()) == (depth.width(), depth.height()) {
-            return Ok(mask);
-        }
         let path = scene.depth_path(*im_id);
         let path = path.map_or_else(|e| e.to_string(), |path| path.display().to_string());
         Err(Fault::damaged(format!(
             "{name} is {}x{} pixels but {path} is {}x{}, expected the same size",
-            mask.width(),
-            mask.height(),
-            depth.width(),
-            depth.height(),
+            found.0, found.1, expected.0, expected.1,
         )))
     }
 
     /// Returns how many pixels of each mask the model covers at a pose.
     fn overlaps(
-        &self,
+        &mut self,
         refiner: &mut Refiner,
         model: &Model,
         pose: &Isometry3<f64>,
         masks: &[usize],
     ) -> Vec<u64> {
-        let camera = &self.image.camera;
-        let view = refiner.workspace_mut().view(model, camera, pose);
+        let camera = self.image.camera;
+        let view = refiner.workspace_mut().view(model, &camera, pose);
         let region = view.region();
-        let masks = masks.iter().map(|index| match &self.masks[*index].seen {
-            Seen::Read(mask) => Some(mask),
-            Seen::Observed(observation) => Some(observation.mask()),
-            Seen::Unread | Seen::Unusable(_) => None,
-        });
         masks
-            .map(|mask| {
-                let Some(mask) = mask else { return 0 };
+            .iter()
+            .map(|index| {
+                let mask = match self.read(*index).map(|()| &self.masks[*index].seen) {
+                    Ok(Seen::Read(mask)) => mask,
+                    Ok(Seen::Observed(observation)) => observation.mask(),
+                    // It could be used a moment ago: its file has changed.
+                    _ => return 0,
+                };
                 let pixels = (region.v_min..region.v_max)
                     .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)));
                 let covered = pixels.zip(view.depth());

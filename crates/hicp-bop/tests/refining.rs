@@ -187,6 +187,46 @@ fn masks_are_those_of_their_source() {
     assert_eq!(none.map(|_| ()), Err(Fate::NothingMeasured));
 }
 
+/// A short run-length code may stand for a whole image: what is held of many of them is limited, and nothing else changes.
+#[test]
+fn masks_that_are_let_go_are_read_again_to_the_same_results() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = dataset(dir.path());
+    let models = models(&dataset, &[BLOCK]);
+    let model = &models.by_id[&BLOCK];
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+    let left: Vec<bool> = (0..160 * 120).map(|i| i % 160 < 80).collect();
+    let left = Mask::new(160, 120, left).unwrap();
+    let masks = [&mask(), &left, &Mask::full(160, 120), &mask()];
+    let mut detections: Vec<_> = masks.into_iter().map(|m| detection(Some(m))).collect();
+    // One that cannot be used is a fault, once, however often the others are read.
+    detections.push(detection(Some(&Mask::full(16, 12))));
+    let poses = [truth(), estimate(), truth()];
+    let mut run = |memory: Option<usize>| {
+        let mut frame = Frame::with_detections(image(&dataset), &detections);
+        if let Some(memory) = memory {
+            frame = frame.with_memory(memory);
+        }
+        let chosen = frame.choose(&mut refiner, model, BLOCK, &poses);
+        let mut seen = Vec::new();
+        for place in &chosen {
+            let observation = frame.observation(*place.as_ref().unwrap()).unwrap();
+            seen.push(observation.mask().clone());
+        }
+        // The masks and observations that stand in it.
+        let text = format!("{frame:?}");
+        let held = text.matches("Read(").count() + text.matches("Observed(").count();
+        (chosen, seen, frame.into_faults(), held)
+    };
+    let (chosen, seen, faults, all) = run(None);
+    assert_eq!((faults.len(), all), (1, 4));
+    for (memory, expected) in [(0, 1), (2 * 160 * 120, 2)] {
+        let (again, also_seen, same, held) = run(Some(memory));
+        assert_eq!((&again, &also_seen, &same), (&chosen, &seen, &faults));
+        assert!(held <= expected, "{held} are held in {memory} bytes");
+    }
+}
+
 #[test]
 fn a_mask_that_cannot_be_used_is_a_fault_of_its_own() {
     let dir = tempfile::tempdir().unwrap();

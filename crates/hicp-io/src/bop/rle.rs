@@ -189,10 +189,14 @@ impl Rle {
         let mut at = 0;
         for (index, count) in self.counts.iter().enumerate() {
             let end = at + *count as usize;
-            if index % 2 == 1 {
-                for position in at..end {
-                    pixels[position % height * width + position / height] = true;
+            // Column by column.
+            while index % 2 == 1 && at < end {
+                let (column, row) = (at / height, at % height);
+                let rows = (height - row).min(end - at);
+                for row in row..row + rows {
+                    pixels[row * width + column] = true;
                 }
+                at += rows;
             }
             at = end;
         }
