@@ -162,16 +162,15 @@ impl TriMesh {
         (b - a).cross(&(c - a))
     }
 
-    /// Returns the largest distance between neighbouring `f32` numbers among the coordinates, metres: how finely they can be stated.
+    /// Returns the largest distance between neighbouring `f32` numbers among the coordinates of the vertices that triangles use, metres: how
+    /// finely they can be stated. Cost: O(triangles).
     ///
     /// Half of it is the rounding that reading the mesh may have cost. Beyond a thousandth of the diameter it is no mesh to
     /// register: move the mesh to its origin.
     #[must_use]
     pub fn coordinate_step(&self) -> f64 {
-        let largest = self
-            .vertices
-            .iter()
-            .fold(0.0_f32, |most, p| most.max(p.coords.amax()));
+        let used = self.used_points();
+        let largest = used.fold(0.0_f32, |most, p| most.max(p.coords.amax()));
         f64::from(largest.next_up()) - f64::from(largest)
     }
 

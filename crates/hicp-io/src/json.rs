@@ -151,8 +151,13 @@ impl<'a> Node<'a> {
     }
 
     pub(crate) fn get(&self, name: &str) -> Result<Self, IoError> {
-        self.optional(name)
-            .ok_or_else(|| self.refuse(format!("an object with the key `{name}`")))
+        self.optional(name).ok_or_else(|| {
+            let expected = format!("an object with the key `{name}`");
+            match self.value.get(name) {
+                Some(_) => self.refuse_found(format!("`{name}` that is null"), expected),
+                None => self.refuse(expected),
+            }
+        })
     }
 
     /// Returns the members of an object whose keys are numbers, as BOP's are, in ascending order.

@@ -186,6 +186,9 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
+        let null = read(&format!(r#"{{"cam_R_m2c":{good},"cam_t_m2c":null}}"#));
+        let text = null.unwrap_err().to_string();
+        assert!(text.contains("found `cam_t_m2c` that is null"), "{text}");
         let reflection = r#"{"cam_R_m2c":[1,0,0,0,1,0,0,0,-1],"cam_t_m2c":[0,0,0]}"#;
         assert!(matches!(
             read(reflection),

@@ -561,3 +561,13 @@ fn limits_can_be_set() {
         })
     ));
 }
+
+#[test]
+fn a_ply_file_without_vertices_says_what_it_has() {
+    let text = ply("ascii", "3", "1", "uchar int").replace("element vertex", "element Vertex");
+    refused(
+        "a.ply",
+        format!("{text}0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        &["[\"Vertex\", \"face\"]", "expected an element `vertex`"],
+    );
+}

@@ -31,7 +31,7 @@ const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 ///
 /// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood.
 /// - OFF: text with or without normals and colours, comments, counts on the first line or the second.
-/// - PLY: ASCII and binary of either byte order, any numeric types, faces in `vertex_indices` or `vertex_index`.
+/// - PLY: ASCII and binary of either byte order, any numeric types of coordinates, integer ones of faces, which stand in `vertex_indices` or `vertex_index`.
 /// - STL: ASCII with any number of solids, and binary, also where the header starts with `solid`.
 ///
 /// Cost: the whole file is held in memory, and a small multiple of it while it is parsed, within [`ReadLimits::DEFAULT`];

@@ -74,12 +74,14 @@ fn read_counts(
     reading: &Reading<'_>,
     lines: &mut Lines<'_>,
 ) -> Result<([u64; 2], String), IoError> {
-    let keyword = "`OFF`, `COFF`, `NOFF` or `CNOFF`";
+    let keyword = "`OFF`, with `ST`, `C` and `N` in this order before it or not";
     let mut line = lines.next().ok_or_else(|| lines.ended(reading, keyword))?;
-    let rest = ["OFF", "COFF", "NOFF", "CNOFF"]
-        .iter()
-        .find_map(|word| line.strip_prefix(word));
-    let Some(rest) = rest.map(str::trim) else {
+    // Texture coordinates, colours and normals of the vertices, which stand behind their positions.
+    let mut rest = line.as_str();
+    for letters in ["ST", "C", "N"] {
+        rest = rest.strip_prefix(letters).unwrap_or(rest);
+    }
+    let Some(rest) = rest.strip_prefix("OFF").map(str::trim) else {
         return Err(lines.error(reading, &line, keyword));
     };
     let expected = "the numbers of vertices, faces and edges";
@@ -176,6 +178,8 @@ mod tests {
             "OFF 4 3 0\n",
             "OFF4 3 0\n",
             "\u{feff}COFF\r\n# made\r\n\r\n4 3\r\n",
+            "STOFF\n4 3 0\n",
+            "STCNOFF 4 3 0\n",
         ] {
             let mesh = read(&format!("{head}{BODY}")).unwrap();
             assert_eq!(
@@ -231,6 +235,8 @@ mod tests {
         for (text, at) in [
             ("", 1),
             ("OF\n4 1 0\n", 1),
+            ("CSTOFF\n4 1 0\n", 1),
+            ("4OFF\n4 1 0\n", 1),
             ("OFF", 1),
             ("OFF\n4 x 0\n", 2),
             ("OFF\n4\n", 2),

@@ -178,6 +178,17 @@ impl Header {
     }
 
     /// What to say of a mesh of no triangles.
+    /// Refuses a file of other elements; their names are case-sensitive.
+    pub(super) fn without_vertices(&self, path: &Path) -> IoError {
+        let names: Vec<&String> = self.ply.elements.keys().collect();
+        IoError::Unsupported {
+            path: path.to_owned(),
+            place: Place::Line(self.lines),
+            found: format!("the elements {names:?}"),
+            expected: "an element `vertex`",
+        }
+    }
+
     pub(super) fn without_triangles(&self, path: &Path) -> IoError {
         match self.count_of("face") {
             (place, 0) if self.ply.elements.contains_key("face") => IoError::at(

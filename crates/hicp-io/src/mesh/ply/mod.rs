@@ -37,6 +37,9 @@ pub(super) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawM
     let mut faces = Faces::default();
     let (vertices, header) = read(reading, &content, &mut faces)?;
     drop(content);
+    if !header.ply.elements.contains_key("vertex") {
+        return Err(header.without_vertices(reading.path));
+    }
     let mut mesh = RawMesh::new(Place::Line(header.lines));
     mesh.vertices = vertices.iter().map(|v| Point3::from(v.value)).collect();
     drop(vertices);
