@@ -200,6 +200,10 @@ fn overrides_reach_into_the_tree() {
             "there is no \"nothing\" in \"stage\"",
         ),
         ("stage.aligned.stages.7.metric=x", "a list of 2"),
+        (
+            "stage.switcher.alpha=0.5\nnonsense=1",
+            "is more than one TOML value",
+        ),
         ("times.more.still=1", "\"times\" is 2, expected a table"),
     ] {
         let error = parse().set(assignment).unwrap_err().to_string();
@@ -226,6 +230,10 @@ fn the_text_of_a_file_is_what_is_read_and_an_absent_one_is_named() {
     let origin = path.to_string_lossy();
     let parsed = PipelineFile::parse(Preset::Hybrid.toml(), &origin).unwrap();
     assert_eq!(PipelineFile::read(&path).unwrap(), parsed);
+    std::fs::write(&path, b"type = \"\xff\"").unwrap();
+    let error = PipelineFile::read_text(&path).unwrap_err();
+    let error = std::error::Error::source(&error).unwrap().to_string();
+    assert!(error.contains("byte 8: found what is not UTF-8"), "{error}");
     let absent = PipelineFile::read_text(folder.path().join("absent.toml"));
     assert!(absent.unwrap_err().to_string().contains("absent.toml"));
 }

@@ -81,12 +81,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 /// Runs what the header says; the lines that it makes, under the same header.
 fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
+    let texts = |values: &Vec<Value>| {
+        let texts = values.iter().map(|value| value.as_str().map(str::to_owned));
+        texts.collect::<Option<Vec<_>>>()
+    };
     let overrides = header.line["set"]
         .as_array()
-        .into_iter()
-        .flatten()
-        .map(|value| value.as_str().map(str::to_owned))
-        .collect::<Option<Vec<_>>>()
+        .and_then(texts)
         .ok_or_else(|| header.refuse("set", "a list of texts"))?;
     let origin = format!("the pipeline of {}", header.path.display());
     let pipeline = Pipeline::parse(&origin, header.text("toml")?.to_owned(), &overrides)?;

@@ -308,6 +308,16 @@ fn what_cannot_be_made_is_refused() {
     fails("--scenes 1 --out new --objects full", 1, &["car.ply"]);
     fails("--scenes 0 --out new", 2, &["--scenes", "'0'", "1.."]);
     fails(
+        "--scenes 100000 --images 100000 --out new",
+        1,
+        &["10000000000 images, expected at most 1000000 in all"],
+    );
+    fails(
+        "--scenes 1 --perturbation 1e300 --out new",
+        2,
+        &["--perturbation", "above 0 and at most 1000"],
+    );
+    fails(
         "--scenes 1 --images -1 --out new",
         2,
         &["--images", "'-1'", "1.."],

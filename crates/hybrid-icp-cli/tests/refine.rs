@@ -183,6 +183,10 @@ fn a_trace_is_replayed_to_the_last_digit() {
             "{\"event\": \"start\", \"version\": 3}",
             "\"version\" is 3, expected a text",
         ),
+        (
+            "{\"event\": \"start\", \"version\": \"0.1.0\", \"set\": \"times=1\"}",
+            "\"set\" is \"times=1\", expected a list of texts",
+        ),
     ] {
         scene.write("trace.jsonl", content);
         replay().exits(1).complains(&[expected]);

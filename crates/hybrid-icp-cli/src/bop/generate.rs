@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
     starts: u32,
     /// How far off these are, in the mean errors of a sampling-based estimator (6.2 mm and 9.5 degrees): half to one and a half
     /// times this, drawn for translation and rotation apart.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = super::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = perturbation, allow_negative_numbers = true)]
     perturbation: f64,
     /// Where the random numbers come from.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -70,6 +70,19 @@ pub(crate) struct Arguments {
 fn count() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=100_000)
 }
+
+/// The largest `--perturbation`: beyond it no object is near its place, and numbers of any size would be written.
+const MAX_PERTURBATION: f64 = 1000.0;
+
+fn perturbation(text: &str) -> Result<f64, String> {
+    super::positive(text)
+        .ok()
+        .filter(|x| *x <= MAX_PERTURBATION)
+        .ok_or_else(|| format!("expected a number above 0 and at most {MAX_PERTURBATION}"))
+}
+
+/// The largest number of images: what is told of them is held until all are there.
+const MAX_IMAGES: u64 = 1_000_000;
 
 const EXAMPLE: &str = "\
 Example:
@@ -101,6 +114,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(dir) => Objects::read(dir, arguments.objects_unit)?,
         None => Objects::household()?,
     };
+    let n_images = u64::from(arguments.scenes) * u64::from(arguments.images);
+    if n_images > MAX_IMAGES {
+        bail!(
+            "--scenes {} of --images {} are {n_images} images, expected at most {MAX_IMAGES} in all",
+            arguments.scenes,
+            arguments.images
+        );
+    }
     check_folder(&arguments.out)?;
     // Whoever sees the dataset sees all of it.
     let made = interrupt::begin_folder(&arguments.out)?;

@@ -136,7 +136,12 @@ const MAX_PIPELINE_BYTES: u64 = 1 << 20;
 fn read_small_file(path: &Path) -> std::io::Result<String> {
     let metadata = std::fs::metadata(path)?;
     if metadata.is_file() && metadata.len() <= MAX_PIPELINE_BYTES {
-        return std::fs::read_to_string(path);
+        return String::from_utf8(std::fs::read(path)?).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            std::io::Error::other(format!(
+                "byte {at}: found what is not UTF-8, expected text in UTF-8"
+            ))
+        });
     }
     let kind = match (metadata.is_file(), metadata.len()) {
         (true, bytes) => format!("a file of {bytes} bytes"),

@@ -78,10 +78,11 @@ impl Node {
         let document = parse(value.trim())
             .or_else(|_| parse(&format!("{:?}", value.trim())))
             .map_err(|_| refuse(format!("{value:?} is no TOML value")))?;
-        let mut value = document
-            .get("x")
-            .cloned()
-            .ok_or_else(|| refuse("there is no value".to_owned()))?;
+        // A line end begins something else than the value.
+        let mut value = match &document.value {
+            Value::Table(entries) if entries.len() == 1 => entries[0].1.clone(),
+            _ => return Err(refuse(format!("{value:?} is more than one TOML value"))),
+        };
         value.forget_lines();
 
         let keys: Vec<&str> = path.trim().split('.').collect();
