@@ -29,7 +29,8 @@ const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 /// multiplied by `unit` in `f64` (STL files hold `f32`) and only then rounded to `f32`. The vertices of STL files are
 /// welded where their positions are equal; in OBJ files vertices that no face uses are dropped.
 ///
-/// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood.
+/// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood; of a vertex the first three
+///   numbers are read.
 /// - OFF: text with or without normals and colours, comments, counts on the first line or the second.
 /// - PLY: ASCII and binary of either byte order, any numeric types of coordinates, integer ones of faces, which stand in `vertex_indices` or `vertex_index`.
 /// - STL: ASCII with any number of solids, and binary, also where the header starts with `solid`.

@@ -108,9 +108,8 @@ impl Records {
                 self.vertices += 1;
                 reading.check_vertices(place, self.vertices)?;
                 self.text.push('v');
-                // Three coordinates, or four with a weight; what follows is a colour.
-                let keep = if words.clone().count() == 4 { 4 } else { 3 };
-                for word in words.take(keep) {
+                // A colour, or a fourth number: a weight, which is for rational curves and not for faces, or a confidence.
+                for word in words.take(3) {
                     self.text.push(' ');
                     self.text.push_str(word);
                 }
@@ -141,19 +140,9 @@ impl Records {
                 continue;
             }
             let mut numbers = words.map_while(|word| word.parse::<f64>().ok());
-            let position = [
-                numbers.next(),
-                numbers.next(),
-                numbers.next(),
-                numbers.next(),
-            ];
-            if let [Some(x), Some(y), Some(z), weight] = position {
-                let weight = weight.unwrap_or(1.0);
-                // The reader refuses a weight of 0 itself.
-                if weight != 0.0 {
-                    let position = [x, y, z].map(|value| value / weight);
-                    reading.check_position(Place::Line(*line as usize), &position)?;
-                }
+            let position = [numbers.next(), numbers.next(), numbers.next()];
+            if let [Some(x), Some(y), Some(z)] = position {
+                reading.check_position(Place::Line(*line as usize), &[x, y, z])?;
             }
         }
         Ok(())
@@ -193,7 +182,6 @@ impl Records {
         let vertices = self.vertices;
         let expected = match error {
             E::PositionParseError => "`v` and three numbers".to_owned(),
-            E::ScalingByZeroError => "a vertex whose weight is not 0".to_owned(),
             E::FaceParseError => "`f` and vertex indices".to_owned(),
             E::FaceVertexOutOfBounds => format!(
                 "vertex indices from 1 to {vertices}, or negative ones that count back no further than the first vertex"
@@ -250,11 +238,7 @@ mod tests {
         .unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
         assert_eq!(mesh.vertices[2], Point3::new(1.0, 1.0, 0.0));
-        assert_eq!(
-            mesh.vertices[3],
-            Point3::new(0.0, 2.0, 0.0),
-            "divided by its weight"
-        );
+        assert_eq!(mesh.vertices[3], Point3::new(0.0, 1.0, 0.0));
     }
 
     #[test]
@@ -270,7 +254,6 @@ mod tests {
         for (record, at) in [
             ("v 1 2", 6),
             ("v 1 2 x", 6),
-            ("v 1 2 3 0", 6),
             ("f 1 2 x", 6),
             ("f 1 2 4", 6),
             ("f 1 2 0", 6),
@@ -289,7 +272,7 @@ mod tests {
 
     #[test]
     fn positions_that_no_mesh_can_have_are_told_by_line() {
-        for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0", "v 1 2 3 1e-30"] {
+        for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0"] {
             let text = format!("v 0 0 0\n{record}\nv 0 1 0\nf 1 2 3\n");
             assert!(
                 matches!(read(&text), Err(IoError::Line { line: 2, .. })),
