@@ -28,7 +28,7 @@ pub struct ReadLimits {
     pub max_file_bytes: u64,
     /// Bytes of a JSON file: 256 MiB.
     pub max_json_bytes: u64,
-    /// Bytes of a JSON file that states one pose or one camera: 16 MiB.
+    /// Bytes of a JSON file that states one thing, such as a pose, a camera or the configuration of a study: 16 MiB.
     pub max_small_json_bytes: u64,
     /// Vertices of a mesh or a point cloud: 10 million. `hicp_core::MAX_MESH_ELEMENTS` holds for meshes whatever stands here.
     pub max_vertices: u64,
@@ -36,7 +36,7 @@ pub struct ReadLimits {
     pub max_triangles: u64,
     /// Pixels of an image: 2²⁵, four times those of a 4K camera. `hicp_core::MAX_IMAGE_SIDE` holds whatever stands here.
     pub max_pixels: u64,
-    /// Rows of a result file: 10 million.
+    /// Rows of a result file or of a study: 10 million.
     pub max_rows: u64,
 }
 

@@ -143,17 +143,70 @@ impl ReadLimits {
     ///
     /// [`IoError`] for what is no regular file, above the limit, changed while it was read or not UTF-8.
     pub fn read_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
-        let path = path.as_ref();
-        let content = read_bytes(path, self.max_file_bytes)?;
-        match std::str::from_utf8(text_bytes(path, &content)?) {
-            Ok(text) => Ok(text.to_owned()),
-            Err(error) => Err(IoError::Bytes {
-                path: path.to_owned(),
-                offset: error.valid_up_to() as u64,
-                found: "a byte that is not UTF-8".to_owned(),
-                expected: "text in UTF-8".to_owned(),
-            }),
-        }
+        text(path.as_ref(), Limited::FileBytes, self.max_file_bytes)
+    }
+
+    /// Reads the text of a JSON file that states one thing and that the caller parses, of at most `max_small_json_bytes`; a byte order
+    /// mark is dropped.
+    ///
+    /// # Errors
+    ///
+    /// As [`ReadLimits::read_text`].
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let dir = tempfile::tempdir()?;
+    /// # let path = dir.path().join("settings.json");
+    /// std::fs::write(&path, "{\"bins\": 10}")?;
+    /// let mut limits = hicp_io::ReadLimits::default();
+    /// assert_eq!(limits.read_small_json_text(&path)?, "{\"bins\": 10}");
+    /// limits.max_small_json_bytes = 11;
+    /// let told = limits.read_small_json_text(&path).unwrap_err().to_string();
+    /// assert!(told.contains("--max-small-json-bytes"));
+    /// # Ok(()) }
+    /// ```
+    pub fn read_small_json_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
+        let limit = self.max_small_json_bytes;
+        text(path.as_ref(), Limited::SmallJsonBytes, limit)
+    }
+
+    /// Reads a file that nothing else here parses as it is, of at most `max_file_bytes`: for one that a failing machine may have cut off
+    /// or filled with zeros, of which what is whole is to be found.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError`] for what is no regular file, above the limit or changed while it was read.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let dir = tempfile::tempdir()?;
+    /// # let path = dir.path().join("rows.csv");
+    /// std::fs::write(&path, b"a,b\n1,\0\0")?;
+    /// let limits = hicp_io::ReadLimits::default();
+    /// assert_eq!(limits.read_bytes(&path)?, b"a,b\n1,\0\0");
+    /// assert!(limits.read_bytes(dir.path()).is_err()); // a folder
+    /// # Ok(()) }
+    /// ```
+    pub fn read_bytes(&self, path: impl AsRef<Path>) -> Result<Vec<u8>, IoError> {
+        read_bytes(path.as_ref(), self.max_file_bytes)
+    }
+}
+
+/// Reads a regular file of at most so many bytes as text.
+fn text(path: &Path, what: Limited, limit: u64) -> Result<String, IoError> {
+    let content = Source::open(path)?.read(what, limit)?;
+    match std::str::from_utf8(text_bytes(path, &content)?) {
+        Ok(text) => Ok(text.to_owned()),
+        Err(error) => Err(IoError::Bytes {
+            path: path.to_owned(),
+            offset: error.valid_up_to() as u64,
+            found: "a byte that is not UTF-8".to_owned(),
+            expected: "text in UTF-8".to_owned(),
+        }),
     }
 }
 
