@@ -7,8 +7,8 @@ use crate::claims::{Claim, Verdict, all_negative, plain, signed};
 const LOCAL: (f64, f64) = (0.6, 1.2);
 /// How much longer than `hybrid` `search` may take.
 const SEARCH_TIME: f64 = 3.0;
-/// The bins of the initial VSD in which `local` is to be better: those below 0.8.
-const BETTER_BINS: usize = 8;
+/// The tenths of the initial VSD in which `local` is to be better: the bins below 0.8.
+const BETTER_TENTHS: usize = 8;
 
 /// Tests the aims; those whose variants the study lacks are left out.
 pub(crate) fn aims(analysis: &Analysis) -> Vec<Claim> {
@@ -155,7 +155,9 @@ impl Judge<'_> {
             self.analysis.variant("hybrid")?,
         );
         let bins = self.analysis.groups().iter().enumerate();
-        let bins = bins.filter(|(_, g)| g.single).take(BETTER_BINS);
+        let end = BETTER_TENTHS * self.analysis.n_bins();
+        let below = |bins: &std::ops::Range<usize>| 10 * bins.end <= end;
+        let bins = bins.filter(|(_, g)| g.single && g.bins.as_ref().is_some_and(below));
         let differences: Vec<(String, Interval)> = bins
             .filter_map(|(group, described)| {
                 let terms = [(group, local, 1.0), (group, hybrid, -1.0)];
@@ -163,6 +165,9 @@ impl Judge<'_> {
                 Some((described.label.clone(), difference))
             })
             .collect();
+        if differences.is_empty() {
+            return None;
+        }
         let figures: Vec<String> = differences
             .iter()
             .map(|(label, i)| format!("{label}: {}", signed(i)))

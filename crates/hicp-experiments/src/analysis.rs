@@ -1,5 +1,7 @@
 //! Means of a study with intervals, and differences between its variants.
 
+use std::collections::{BTreeMap, HashMap};
+
 use hicp_sim::stream;
 use rand::RngExt;
 
@@ -15,10 +17,15 @@ pub const WORSE_VSD: f64 = 0.02;
 pub const ADD_SHARE: f64 = 0.1;
 /// Number of bootstrap samples.
 pub const REPLICATES: usize = 2000;
-/// The bins of the initial VSD, of ten, that count as low: below 0.3.
-const LOW_BINS: std::ops::Range<usize> = 0..3;
-/// The bins that count as high: 0.7 and above.
-const HIGH_BINS: std::ops::Range<usize> = 7..10;
+/// The bins of the initial VSD that count as low: all of the bin is below 0.3.
+fn low_bins(n_bins: usize) -> std::ops::Range<usize> {
+    0..n_bins.saturating_mul(3) / 10
+}
+
+/// The bins that count as high: all of the bin is 0.7 and above.
+fn high_bins(n_bins: usize) -> std::ops::Range<usize> {
+    n_bins.saturating_mul(7).div_ceil(10)..n_bins
+}
 
 /// Which figure of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,6 +127,7 @@ pub struct Analysis {
     variants: Vec<String>,
     groups: Vec<Group>,
     diameters_mm: Vec<f64>,
+    n_levels: usize,
     n_bins: usize,
     units: Vec<Unit>,
     /// Sums by metric, then as [`Sums`]; the first of each is of the rows as they are, the others are bootstrap samples.
@@ -152,6 +160,7 @@ impl Analysis {
             groups: groups(config.experiment, &config.levels, n_bins),
             diameters_mm: config.objects.iter().map(|o| o.diameter_mm).collect(),
             variants,
+            n_levels: config.levels.len(),
             n_bins,
             units,
             replicates: Vec::new(),
@@ -242,7 +251,9 @@ impl Analysis {
     /// Number of cases of which a variant has rows in a group. The rows of one case, under several conditions, are no
     /// independent ones.
     fn cases(&self, group: usize, variant: usize) -> usize {
-        let group = &self.groups[group];
+        let Some(group) = self.groups.get(group) else {
+            return 0;
+        };
         let seen = |unit: &&Unit| {
             let mut levels = group.levels.iter();
             group.holds(unit.bin)
@@ -254,7 +265,10 @@ impl Analysis {
     /// Figures of a variant in a group; `None` where there is no row.
     #[must_use]
     pub fn cell(&self, group: usize, variant: usize) -> Option<Cell> {
-        let group = &self.groups[group];
+        let group = self.groups.get(group)?;
+        if variant >= self.variants.len() {
+            return None;
+        }
         let rows: Vec<(&Unit, &Measured)> = self
             .units
             .iter()
@@ -295,19 +309,24 @@ impl Analysis {
 
     /// Where the sum of a metric is among the sums of a sample; its weight comes right after.
     fn slot(&self, metric: Metric, level: usize, variant: usize, bin: usize) -> usize {
-        2 * (((metric as usize * self.levels() + level) * self.variants.len() + variant)
+        2 * (((metric as usize * self.n_levels + level) * self.variants.len() + variant)
             * self.n_bins
             + bin)
     }
 
-    fn levels(&self) -> usize {
-        self.units
-            .first()
-            .map_or(0, |u| u.measured.len() / self.variants.len())
+    /// Number of bins of the initial VSD; 1 where cases are not binned.
+    pub(crate) fn n_bins(&self) -> usize {
+        self.n_bins
     }
 
     fn mean_of(&self, metric: Metric, sums: &[f64], group: usize, variant: usize) -> f64 {
-        let group = &self.groups[group];
+        let Some(group) = self
+            .groups
+            .get(group)
+            .filter(|_| variant < self.variants.len())
+        else {
+            return f64::NAN;
+        };
         let bins = group.bins.clone().unwrap_or(0..self.n_bins);
         let (mut sum, mut weight) = (0.0, 0.0);
         for level in &group.levels {
@@ -322,12 +341,8 @@ impl Analysis {
 
     /// Returns the sums of a weighting of the units.
     fn sums(&self, weights: &[f64]) -> Vec<f64> {
-        let mut sums =
-            vec![
-                0.0;
-                self.slot(Metric::Vsd, 0, 0, 0)
-                    + 2 * Metric::ALL.len() * self.levels() * self.variants.len() * self.n_bins
-            ];
+        let cells = self.n_levels * self.variants.len() * self.n_bins;
+        let mut sums = vec![0.0; 2 * Metric::ALL.len() * cells];
         for (unit, weight) in self.units.iter().zip(weights) {
             if *weight == 0.0 {
                 continue;
@@ -349,12 +364,15 @@ impl Analysis {
 
     fn bootstrap(&self, seed: u64) -> Vec<Vec<f64>> {
         // By object, then by bin, the units.
-        let mut strata: Vec<Vec<Vec<usize>>> =
-            vec![vec![Vec::new(); self.n_bins]; self.diameters_mm.len()];
+        let mut strata: BTreeMap<usize, BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
         for (index, unit) in self.units.iter().enumerate() {
-            strata[unit.object][unit.bin].push(index);
+            let bins = strata.entry(unit.object).or_default();
+            bins.entry(unit.bin).or_default().push(index);
         }
-        strata.retain(|bins| bins.iter().any(|units| !units.is_empty()));
+        let strata: Vec<Vec<Vec<usize>>> = strata
+            .into_values()
+            .map(|bins| bins.into_values().collect())
+            .collect();
         let mut replicates = vec![self.sums(&vec![1.0; self.units.len()])];
         if strata.is_empty() {
             return replicates;
@@ -380,13 +398,16 @@ impl Analysis {
 fn units(study: &Study, n_bins: usize) -> Vec<Unit> {
     let config = &study.config;
     let (variants, width) = (&config.variants, config.rows_per_case());
-    let mut places = std::collections::BTreeMap::new();
+    let mut places = HashMap::new();
+    let objects: HashMap<&str, usize> = indices(config.objects.iter().map(|o| &*o.name));
+    let levels = indices(config.levels.iter().map(|l| &**l));
+    let names = indices(variants.iter().map(|v| &*v.name));
     let mut units: Vec<Unit> = Vec::new();
     for row in &study.rows {
         let find = (
-            config.objects.iter().position(|o| o.name == row.object),
-            config.levels.iter().position(|l| *l == row.level),
-            variants.iter().position(|v| v.name == row.variant),
+            objects.get(&*row.object).copied(),
+            levels.get(&*row.level).copied(),
+            names.get(&*row.variant).copied(),
         );
         let (Some(object), Some(level), Some(variant)) = find else {
             continue;
@@ -411,6 +432,14 @@ fn units(study: &Study, n_bins: usize) -> Vec<Unit> {
     units
 }
 
+/// The index of every name.
+fn indices<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<&'a str, usize> {
+    names
+        .enumerate()
+        .map(|(index, name)| (name, index))
+        .collect()
+}
+
 /// The groups of a study.
 fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group> {
     let all: Vec<usize> = (0..levels.len()).collect();
@@ -424,21 +453,27 @@ fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group
     if matches!(experiment, Experiment::InitNoise | Experiment::Beyond) {
         // Of a study with imperfect images, the bins are those of its perfect ones.
         let all = if experiment == Experiment::Beyond {
-            vec![0]
+            all.iter().copied().take(1).collect()
         } else {
             all.clone()
+        };
+        // So many digits that no two bins are named alike.
+        let digits = match n_bins {
+            n if 10 % n == 0 => 1,
+            n if 100 % n == 0 => 2,
+            _ => 3,
         };
         for bin in 0..n_bins {
             let edge = |bin: usize| bin as f64 / n_bins as f64;
             groups.push(Group {
-                label: format!("{:.1}-{:.1}", edge(bin), edge(bin + 1)),
+                label: format!("{:.digits$}-{:.digits$}", edge(bin), edge(bin + 1)),
                 levels: all.clone(),
                 bins: Some(bin..bin + 1),
                 single: true,
             });
         }
-        groups.push(range(LOW, all.clone(), Some(LOW_BINS)));
-        groups.push(range(HIGH, all, Some(HIGH_BINS)));
+        groups.push(range(LOW, all.clone(), Some(low_bins(n_bins))));
+        groups.push(range(HIGH, all, Some(high_bins(n_bins))));
     }
     if experiment != Experiment::InitNoise {
         groups.extend(all.iter().map(|level| Group {
@@ -460,7 +495,8 @@ fn groups(experiment: Experiment, levels: &[String], n_bins: usize) -> Vec<Group
         }
     }
     if matches!(experiment, Experiment::DepthNoise | Experiment::ModelNoise) {
-        groups.push(range(NOISY, all[1..].to_vec(), None));
+        let noisy = all.iter().copied().skip(1).collect();
+        groups.push(range(NOISY, noisy, None));
     }
     groups.push(range(ALL, all, None));
     groups

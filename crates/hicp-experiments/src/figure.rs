@@ -213,7 +213,7 @@ pub(crate) fn curve(analysis: &Analysis, variant: usize, style: usize) -> Curve 
         .filter_map(|(step, (group, described))| {
             let x = match &described.bins {
                 // The middle of the bin.
-                Some(bins) => (bins.start as f64 + 0.5) / 10.0,
+                Some(bins) => (bins.start as f64 + 0.5) / analysis.n_bins() as f64,
                 None => described.label.parse().unwrap_or(step as f64),
             };
             Some((x, analysis.mean(Metric::Vsd, group, variant)?))
