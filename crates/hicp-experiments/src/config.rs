@@ -1,8 +1,10 @@
 //! What a study is, exactly: stored beside its rows.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use hicp_core::PinholeCamera;
+use hicp_io::ReadLimits;
 use hicp_sim::{
     CaseConfig, InitialPose, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, VsdBins,
 };
@@ -10,8 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ExperimentError;
 use crate::experiment::Experiment;
+use crate::stored::{Fields, MAX_BINS, MAX_CELLS, quoted, read_json};
 use crate::subject::{Subject, fingerprint};
 use crate::variant::Variant;
+
+/// Most cases per object.
+const MAX_POSES: u64 = 1_000_000;
 
 /// The exact configuration of a study. Its rows follow from it, but for the times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -104,7 +110,7 @@ impl Config {
         poses: u64,
         seed: u64,
     ) -> Result<Self, ExperimentError> {
-        if !(1..=1_000_000).contains(&poses) {
+        if !(1..=MAX_POSES).contains(&poses) {
             return Err(ExperimentError::Parameter {
                 what: "number of cases per object",
                 #[allow(clippy::cast_precision_loss)] // For a message.
@@ -165,13 +171,14 @@ impl Config {
     /// Number of cases, all objects together.
     #[must_use]
     pub fn n_cases(&self) -> usize {
-        usize::try_from(self.poses).unwrap_or(usize::MAX) * self.objects.len()
+        let poses = usize::try_from(self.poses).unwrap_or(usize::MAX);
+        poses.saturating_mul(self.objects.len())
     }
 
     /// Number of rows of a case.
     #[must_use]
     pub fn rows_per_case(&self) -> usize {
-        self.levels.len() * self.variants.len()
+        self.levels.len().saturating_mul(self.variants.len())
     }
 
     /// The variants.
@@ -223,12 +230,49 @@ impl Config {
     }
 
     /// Reads a file.
-    pub(crate) fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let text = std::fs::read_to_string(path).map_err(ExperimentError::file(path))?;
-        serde_json::from_str(&text).map_err(|source| ExperimentError::Configuration {
-            path: path.to_owned(),
-            source,
-        })
+    pub(crate) fn read(limits: &ReadLimits, path: &Path) -> Result<Self, ExperimentError> {
+        let config: Self = read_json(limits, path)?;
+        config.check(path)?;
+        Ok(config)
+    }
+
+    /// Refuses what [`Config::new`] would not have made, and what a caller cannot have changed to anything that runs; `path` is where
+    /// the configuration is from, or where it would be written to.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), ExperimentError> {
+        let fields = Fields { path };
+        fields.count("poses", self.poses, 1..=MAX_POSES)?;
+        fields.count("bins", self.bins as u64, 1..=MAX_BINS as u64)?;
+        fields.not_negative(&[
+            ("max_translation_m", self.max_translation_m),
+            ("translation_m", self.translation_m),
+            ("rotation_deg", self.rotation_deg),
+            ("axis_offset_m", self.axis_offset_m),
+        ])?;
+        fields.positive(&[("max_distance_m", self.max_distance_m)])?;
+        fields.camera(&self.camera)?;
+        let known = self.experiment.levels();
+        fields.names(
+            "levels",
+            known.len(),
+            self.levels.iter().map(String::as_str),
+        )?;
+        // What a level means follows from its index; a study may have the first of them only.
+        if let Some((index, level)) =
+            (self.levels.iter().enumerate()).find(|(i, level)| known.get(*i) != Some(*level))
+        {
+            let expected = known.get(index).map_or_else(String::new, |k| quoted(k));
+            let field = format!("levels[{index}]");
+            let expected = format!("{expected}, as in every {} study", self.experiment);
+            return Err(fields.wrong(field, quoted(level), expected));
+        }
+        let variants = self.variants.iter().map(|v| v.name.as_str());
+        fields.names("variants", MAX_CELLS, variants)?;
+        fields.objects(&self.objects)?;
+        fields.cells([
+            ("levels", self.levels.len()),
+            ("variants", self.variants.len()),
+            ("bins", self.bins),
+        ])
     }
 }
 
@@ -257,12 +301,11 @@ pub(crate) fn distinct<'a>(
         found,
         expected,
     };
-    let mut seen = Vec::new();
+    let mut seen = HashSet::new();
     for name in names {
-        if seen.contains(&name) {
+        if !seen.insert(name) {
             return Err(wrong(name, "is there twice", "different names"));
         }
-        seen.push(name);
     }
     if seen.is_empty() {
         return Err(wrong("", "is missing", "at least one"));

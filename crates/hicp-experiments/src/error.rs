@@ -72,6 +72,18 @@ pub enum ExperimentError {
         /// Why.
         source: serde_json::Error,
     },
+    /// A stored configuration that no study has.
+    #[error("{}, {field}: found {found}, expected {expected}", path.display())]
+    Field {
+        /// The file.
+        path: PathBuf,
+        /// The field, by its name in the file.
+        field: String,
+        /// What is there.
+        found: String,
+        /// What should be there.
+        expected: String,
+    },
     /// A study lacks what a report needs.
     #[error("{} holds no finished row, expected at least one", path.display())]
     Empty {

@@ -15,7 +15,7 @@
 //! let folder = tempfile::tempdir()?;
 //! let subjects = Subject::household(&[Household::Mug])?;
 //! let config = Config::new(Experiment::DepthNoise, &subjects, &Variant::paper(), 1, 7)?;
-//! let options = RunOptions { threads: 1, resume: false };
+//! let options = RunOptions { threads: 1, ..RunOptions::default() };
 //! run(&config, &subjects, folder.path(), options, &mut |_| ControlFlow::Continue(()))?;
 //!
 //! let study = Study::read(folder.path())?;
@@ -31,7 +31,8 @@
 //! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
 //! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
 //! differences), `claims` (the paper's, tested), `aims` (of what goes beyond it), `figure`, `html`, `tables`, `report`; `sequential` (the study of trajectories:
-//! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), and `clock`, `error`.
+//! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), `stored` (files
+//! on their way back in, checked), and `clock`, `error`.
 
 // Counts and indices of rows become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
@@ -49,6 +50,7 @@ mod report;
 mod row;
 mod runner;
 mod sequential;
+mod stored;
 mod streaming;
 mod study;
 mod subject;
@@ -72,6 +74,7 @@ pub use sequential::{
     TrajectoryReport, TrajectoryRow, TrajectoryStep, TrajectoryStudy, UnderlyingRecord,
     run_trajectories, watch_trajectories,
 };
+pub use stored::{MAX_BINS, MAX_CELLS, MAX_OBJECTS};
 pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
 pub use subject::Subject;
 pub use variant::Variant;

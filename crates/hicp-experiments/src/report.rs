@@ -155,7 +155,7 @@ impl Report {
                         "{}×{}, f = {:.1}",
                         c.camera.width, c.camera.height, c.camera.fx
                     );
-                    let expected = c.n_cases() * c.rows_per_case();
+                    let expected = c.n_cases().saturating_mul(c.rows_per_case());
                     let rows = match study.rows.len() {
                         rows if rows == expected => rows.to_string(),
                         rows => format!("{rows} of {expected}: not finished"),

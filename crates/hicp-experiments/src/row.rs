@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
+use hicp_io::ReadLimits;
+
+use crate::config::Config;
 use crate::error::ExperimentError;
+use crate::stored::{Order, Places, check_bin, count_in_order, each_record, measure, number, vsd};
 
 /// The columns of `cases.csv`, in order.
 pub const COLUMNS: [&str; 12] = [
@@ -92,40 +96,29 @@ impl Row {
                 COLUMNS.len()
             ));
         }
-        fn number<T: std::str::FromStr>(column: usize, text: &str) -> Result<T, String> {
-            text.parse()
-                .map_err(|_| format!("{} is {text:?}, expected a number", COLUMNS[column]))
-        }
-        fn finite(column: usize, text: &str) -> Result<f64, String> {
-            let value: f64 = number(column, text)?;
-            if value.is_finite() && value >= 0.0 {
-                Ok(value)
-            } else {
-                Err(format!(
-                    "{} is {text:?}, expected a number of at least 0",
-                    COLUMNS[column]
-                ))
-            }
-        }
         let optional = |column: usize| Some(&record[column]).filter(|text| !text.is_empty());
         let measured = if &record[9] == NOT_MADE {
             None
         } else {
             Some(Measured {
-                vsd_initial: finite(5, &record[5])?,
-                vsd_final: finite(6, &record[6])?,
-                add_final_mm: finite(7, &record[7])?,
-                iterations: number(8, &record[8])?,
+                vsd_initial: vsd(COLUMNS[5], &record[5])?,
+                vsd_final: vsd(COLUMNS[6], &record[6])?,
+                add_final_mm: measure(COLUMNS[7], &record[7])?,
+                iterations: number(COLUMNS[8], &record[8])?,
                 termination: record[9].to_owned(),
-                cpu_ms: optional(10).map(|text| finite(10, text)).transpose()?,
+                cpu_ms: optional(10)
+                    .map(|text| measure(COLUMNS[10], text))
+                    .transpose()?,
             })
         };
         Ok(Self {
             object: record[0].to_owned(),
-            case: number(1, &record[1])?,
+            case: number(COLUMNS[1], &record[1])?,
             variant: record[2].to_owned(),
             level: record[3].to_owned(),
-            bin: optional(4).map(|text| number(4, text)).transpose()?,
+            bin: optional(4)
+                .map(|text| number(COLUMNS[4], text))
+                .transpose()?,
             measured,
             note: record[11].to_owned(),
         })
@@ -147,28 +140,66 @@ pub(crate) fn header() -> Vec<u8> {
     to_csv([COLUMNS.map(str::to_owned)])
 }
 
-/// Reads the rows of a file.
-pub(crate) fn read(path: &Path) -> Result<Vec<Row>, ExperimentError> {
-    let bytes = std::fs::read(path).map_err(ExperimentError::file(path))?;
-    let wrong = |line: usize, what: String| ExperimentError::Row {
-        path: path.to_owned(),
-        line,
-        what,
-    };
-    if !bytes.starts_with(&header()) {
-        return Err(wrong(
-            1,
-            format!("expected the columns {}", COLUMNS.join(",")),
-        ));
-    }
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
-    let records = reader.records().zip(2..);
-    records
-        .map(|(record, line)| {
-            let record = record.map_err(|e| wrong(line, e.to_string()))?;
-            Row::parse(&record).map_err(|what| wrong(line, what))
-        })
-        .collect()
+/// Reads the rows of a study from a file.
+pub(crate) fn read(
+    limits: &ReadLimits,
+    path: &Path,
+    config: &Config,
+) -> Result<Vec<Row>, ExperimentError> {
+    let mut rows = Vec::new();
+    let text = limits.read_text(path)?;
+    each(limits, path, &text, config, |row, _| {
+        rows.push(row);
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// Counts the rows that a run is to go on with; others than the first ones of the study are refused.
+pub(crate) fn count(
+    limits: &ReadLimits,
+    path: &Path,
+    text: &str,
+    config: &Config,
+) -> Result<u64, ExperimentError> {
+    let mut rows = 0;
+    each(limits, path, text, config, |_, place| {
+        count_in_order(&mut rows, place)
+    })?;
+    Ok(rows)
+}
+
+/// Reads the rows of a study from the text of a file; those that the study cannot have are refused.
+fn each(
+    limits: &ReadLimits,
+    path: &Path,
+    text: &str,
+    config: &Config,
+    mut take: impl FnMut(Row, u64) -> Result<(), String>,
+) -> Result<(), ExperimentError> {
+    let columns = [
+        ("object", config.objects.iter().map(|o| &*o.name).collect()),
+        ("level", config.levels.iter().map(|l| &**l).collect()),
+        (
+            "variant",
+            config.variants.iter().map(|v| &*v.name).collect(),
+        ),
+    ];
+    let mut places = Places::new(columns, ("case", config.poses), Order::Objects);
+    let levels = 0..config.levels.len();
+    let binned: Vec<bool> = levels
+        .map(|level| config.experiment.condition(level, 0).binned)
+        .collect();
+    let bins = config.bins.max(1) as u64;
+    each_record(path, text, &header(), limits.max_rows, |record| {
+        let row = Row::parse(record)?;
+        let ([_, level, _], place) =
+            places.take([&row.object, &row.level, &row.variant], row.case)?;
+        let bin = usize::try_from(row.case % bins).ok();
+        let bin = bin.filter(|_| binned.get(level) == Some(&true));
+        check_bin(row.bin, bin, row.measured.is_some())?;
+        take(row, place)
+    })
 }
 
 #[cfg(test)]

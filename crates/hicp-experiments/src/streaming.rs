@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use hicp_io::{is_absent, write_atomically};
+use hicp_io::{IoError, ReadLimits, is_absent, write_atomically};
 
 use crate::error::ExperimentError;
 use crate::study::{CONFIG_FILE, RunOptions};
@@ -31,7 +31,9 @@ pub(crate) struct Sheet<'a> {
     /// The configuration as text.
     pub(crate) config: String,
     /// Reads the text of a stored configuration, as this version would write it.
-    pub(crate) stored: fn(&Path) -> Result<String, ExperimentError>,
+    pub(crate) stored: fn(&ReadLimits, &Path) -> Result<String, ExperimentError>,
+    /// Counts the rows in the text of a file; rows that the study cannot have are refused.
+    pub(crate) check: &'a (dyn Fn(&Path, &str) -> Result<u64, ExperimentError> + Sync),
 }
 
 impl Sheet<'_> {
@@ -48,7 +50,7 @@ impl Sheet<'_> {
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(), ExperimentError> {
         std::fs::create_dir_all(self.folder).map_err(ExperimentError::file(self.folder))?;
-        let (mut file, first) = self.open(options.resume)?;
+        let (mut file, first) = self.open(options)?;
         if progress(first).is_break() {
             return Err(ExperimentError::Stopped { cases: first });
         }
@@ -111,7 +113,7 @@ impl Sheet<'_> {
     }
 
     /// Opens the file of rows at its end; returns the first case that is not in it.
-    fn open(&self, resume: bool) -> Result<(File, usize), ExperimentError> {
+    fn open(&self, options: RunOptions) -> Result<(File, usize), ExperimentError> {
         let (path, stored) = (self.path(), self.folder.join(CONFIG_FILE));
         if is_absent(&path) {
             write_atomically(&stored, |w| w.write_all(self.config.as_bytes()))?;
@@ -120,18 +122,27 @@ impl Sheet<'_> {
                 .map_err(ExperimentError::file(&path))?;
             return Ok((file, 0));
         }
-        if !resume {
+        if !options.resume {
             return Err(ExperimentError::AlreadyThere { path });
         }
-        if let Some(difference) = difference(&self.config, &(self.stored)(&stored)?) {
+        if let Some(difference) =
+            difference(&self.config, &(self.stored)(&options.limits, &stored)?)
+        {
             return Err(ExperimentError::OtherConfiguration {
                 path: stored,
                 difference,
             });
         }
-        let bytes = std::fs::read(&path).map_err(ExperimentError::file(&path))?;
-        self.check_header(&bytes)?;
+        let bytes = options.limits.read_bytes(&path)?;
+        if let Err(foreign) = self.check_header(&bytes) {
+            // Text in another encoding is told as such.
+            return match options.limits.read_text(&path) {
+                Err(error @ IoError::Encoding { .. }) => Err(error.into()),
+                _ => Err(foreign),
+            };
+        }
         let (whole, cases) = self.whole_cases(&bytes);
+        self.check_rows(&bytes[..whole], cases)?;
         let mut file = OpenOptions::new()
             .write(true)
             .open(&path)
@@ -173,6 +184,33 @@ impl Sheet<'_> {
                 first_line(&self.header)
             ),
         })
+    }
+
+    /// Refuses rows that the study cannot have, before anything is computed: they would be kept.
+    fn check_rows(&self, whole: &[u8], cases: usize) -> Result<(), ExperimentError> {
+        if whole.is_empty() {
+            return Ok(());
+        }
+        let path = self.path();
+        let lines = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == b'\n').count();
+        let (line, what) = match std::str::from_utf8(whole) {
+            Ok(text) => {
+                let rows = (self.check)(&path, text)?;
+                let expected = cases.saturating_mul(self.rows_per_case) as u64;
+                if rows == expected {
+                    return Ok(());
+                }
+                let what =
+                    format!("found {rows} rows up to here, expected {expected}: one per line");
+                (lines(whole), what)
+            }
+            Err(error) => {
+                let before = &whole[..error.valid_up_to()];
+                let what = "found a byte that is not UTF-8, expected text in UTF-8".to_owned();
+                (1 + lines(before), what)
+            }
+        };
+        Err(ExperimentError::Row { path, line, what })
     }
 
     /// Returns where the last whole case ends, and how many cases are whole; 0 bytes when not even the header is.

@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use hicp_io::ReadLimits;
+
 use crate::config::Config;
 use crate::error::ExperimentError;
 use crate::row::{self, Row};
@@ -16,12 +18,14 @@ pub const CASES_FILE: &str = "cases.csv";
 pub const CONFIG_FILE: &str = "config.json";
 
 /// How a study is run; none of it changes its rows, but for the times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunOptions {
-    /// Number of threads, at least 1.
+    /// Number of threads; 0 counts as 1.
     pub threads: usize,
     /// Go on with what the folder holds.
     pub resume: bool,
+    /// How much of what the folder holds is read.
+    pub limits: ReadLimits,
 }
 
 /// A study that has been run: what it was, and its rows.
@@ -42,7 +46,8 @@ pub struct Study {
 ///
 /// # Errors
 ///
-/// [`ExperimentError`] when the folder holds another study, a file cannot be written, or a pipeline cannot be built. A case that
+/// [`ExperimentError`] when the configuration could not be read back, the folder holds another study or rows that the study cannot have, a
+/// file cannot be written, or a pipeline cannot be built. A case that
 /// cannot be made (a bin that cannot be filled, a reconstruction of nothing) is no error: its rows say `not_made`, and why.
 pub fn run(
     config: &Config,
@@ -51,6 +56,7 @@ pub fn run(
     options: RunOptions,
     progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
 ) -> Result<(), ExperimentError> {
+    config.check(&folder.join(CONFIG_FILE))?;
     let reconstructions = Reconstructions::new(subjects.len());
     let sheet = Sheet {
         folder,
@@ -59,7 +65,8 @@ pub fn run(
         rows_per_case: config.rows_per_case(),
         cases: config.n_cases(),
         config: config.to_json(),
-        stored: |path| Ok(Config::read(path)?.to_json()),
+        stored: |limits, path| Ok(Config::read(limits, path)?.to_json()),
+        check: &|path, text| row::count(&options.limits, path, text, config),
     };
     sheet.fill(
         options,
@@ -83,13 +90,22 @@ impl Study {
     ///
     /// # Errors
     ///
-    /// [`ExperimentError`] when a file is missing or is not what [`run`] wrote.
+    /// [`ExperimentError`] when a file is missing, is above the default limits, or is not what [`run`] wrote: the field of the
+    /// configuration or the line of the rows is named.
     pub fn read(folder: &Path) -> Result<Self, ExperimentError> {
+        Self::read_within(&ReadLimits::DEFAULT, folder)
+    }
+
+    /// Reads a study from its folder, within limits of one's own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Study::read`].
+    pub fn read_within(limits: &ReadLimits, folder: &Path) -> Result<Self, ExperimentError> {
         let path: PathBuf = folder.join(CASES_FILE);
-        let study = Self {
-            config: Config::read(&folder.join(CONFIG_FILE))?,
-            rows: row::read(&path)?,
-        };
+        let config = Config::read(limits, &folder.join(CONFIG_FILE))?;
+        let rows = row::read(limits, &path, &config)?;
+        let study = Self { config, rows };
         if study.rows.iter().all(|row| row.measured.is_none()) {
             return Err(ExperimentError::Empty { path });
         }

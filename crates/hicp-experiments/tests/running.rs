@@ -26,7 +26,11 @@ fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
 }
 
 fn go(config: &Config, folder: &Path, threads: usize, resume: bool) -> Result<(), ExperimentError> {
-    let options = RunOptions { threads, resume };
+    let options = RunOptions {
+        threads,
+        resume,
+        ..RunOptions::default()
+    };
     run(config, &subjects(), folder, options, &mut |_| {
         ControlFlow::Continue(())
     })
@@ -83,7 +87,7 @@ fn a_stopped_study_keeps_whole_cases_and_goes_on() {
     go(&config, whole.path(), 1, false).unwrap();
     let options = RunOptions {
         threads: 2,
-        resume: false,
+        ..RunOptions::default()
     };
     let told = run(&config, &subjects(), stopped.path(), options, &mut |done| {
         if done == 2 {

@@ -37,7 +37,11 @@ fn go(
     threads: usize,
     resume: bool,
 ) -> Result<(), ExperimentError> {
-    let options = RunOptions { threads, resume };
+    let options = RunOptions {
+        threads,
+        resume,
+        ..RunOptions::default()
+    };
     run_trajectories(config, &subjects(), folder, options, &mut |_| {
         ControlFlow::Continue(())
     })

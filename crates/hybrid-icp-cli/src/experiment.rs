@@ -13,7 +13,7 @@ use hybrid_icp::{Preset, UnknownPreset};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::interrupt;
-use crate::limits::pipeline_limits;
+use crate::limits::{limits, pipeline_limits};
 use crate::terminal::say;
 
 /// Rerun the paper's studies, on its kind of objects or on any meshes.
@@ -153,6 +153,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let options = RunOptions {
         threads,
         resume: arguments.resume,
+        limits: limits(),
     };
     let bar = ProgressBar::new(config.n_cases() as u64);
     if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} cases, {eta} left")
@@ -201,7 +202,8 @@ fn report(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     let mut studies = Vec::new();
     for folder in folders {
         let name = folder.file_name().unwrap_or(folder.as_os_str());
-        studies.push((name.to_string_lossy().into_owned(), Study::read(folder)?));
+        let study = Study::read_within(&limits(), folder)?;
+        studies.push((name.to_string_lossy().into_owned(), study));
     }
     let report = Report::of(studies);
     report.write(out)?;

@@ -16,7 +16,7 @@ pub(crate) struct Limits {
     /// Bytes of a JSON file, of which several dozen times as many are needed in memory. 256 MiB if not given.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_json_bytes: Option<u64>,
-    /// Bytes of a JSON file that states one pose or one camera. 16 MiB if not given.
+    /// Bytes of a JSON file that states one pose, one camera or the configuration of a study. 16 MiB if not given.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_small_json_bytes: Option<u64>,
     /// Vertices of a mesh. 10 million if not given; never more than 50 million.
@@ -28,7 +28,7 @@ pub(crate) struct Limits {
     /// Pixels of an image. 2^25 if not given; sides are never longer than 32768.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_pixels: Option<u64>,
-    /// Rows of a result file. 10 million if not given.
+    /// Rows of a result file or of a study. 10 million if not given.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_rows: Option<u64>,
     /// Iterations that a pipeline may ask for in all, at worst; ranked hypotheses and steps of a solver count. 1 million if not given.

@@ -12,6 +12,7 @@ use hybrid_icp::Preset;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::interrupt;
+use crate::limits::limits;
 use crate::terminal::say;
 
 /// Fusing estimates while the camera moves: trajectories toward an object, six methods and more (§VI-C).
@@ -83,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .threads
             .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)),
         resume: arguments.resume,
+        limits: limits(),
     };
     let bar = ProgressBar::new(config.n_trajectories() as u64);
     let template = "{msg} {bar:40} {pos}/{len} trajectories, {eta} left";
@@ -106,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     bar.finish_and_clear();
     ran?;
-    let report = TrajectoryReport::of(TrajectoryStudy::read(out)?);
+    let report = TrajectoryReport::of(TrajectoryStudy::read_within(&limits(), out)?);
     report.write(out)?;
     for claim in report.claims() {
         say(format_args!(

@@ -214,3 +214,73 @@ fn variants_are_names_and_files() {
     .exits(1)
     .complains(&["nowhere"]);
 }
+
+#[test]
+fn files_that_are_not_those_of_a_study_are_refused() {
+    let folder = meshes(&[Household::Book]);
+    let begun =
+        "experiment init-noise --objects meshes --poses 1 --variants hybrid --no-times --out a";
+    let begun: Vec<&str> = begun.split(' ').collect();
+    let resumed = [&begun[..], &["--resume"]].concat();
+    let report = ["experiment", "report", "--out", "r", "a"];
+    run(folder.path(), &begun).exits(0);
+    run(folder.path(), report).exits(0);
+    let out = folder.path().join("a");
+    let (config, cases) = (read(&out, "config.json"), read(&out, "cases.csv"));
+    let refused = |file: &str, text: String, parts: &[&str]| {
+        std::fs::write(out.join(file), text).unwrap();
+        for words in [&report[..], &resumed] {
+            let told = run(folder.path(), words).exits(1);
+            assert!(told.err.starts_with("error: "), "{}", told.err);
+            told.complains(&[&[file], parts].concat());
+        }
+    };
+    for (found, bins) in [("0", "0"), ("4000000000", "4000000000")] {
+        refused(
+            "config.json",
+            config.replace("\"bins\": 10", &format!("\"bins\": {bins}")),
+            &[&format!("bins: found {found}, expected 1 to 1000")],
+        );
+    }
+    let mut other: serde_json::Value = serde_json::from_str(&config).unwrap();
+    other["objects"] = serde_json::json!([]);
+    refused(
+        "config.json",
+        other.to_string(),
+        &["objects: found none, expected 1 to 10000"],
+    );
+    other["objects"] = serde_json::json!(1);
+    refused(
+        "config.json",
+        other.to_string(),
+        &["is not the configuration of a study", "line 1"],
+    );
+    std::fs::write(out.join("config.json"), &config).unwrap();
+    refused(
+        "cases.csv",
+        cases.replace("book", "mug"),
+        &["line 2: object is \"mug\", expected one of config.json: \"book\""],
+    );
+    refused(
+        "cases.csv",
+        cases.replace(",hybrid,", ",local,"),
+        &["line 2: variant is \"local\""],
+    );
+    // The limits are those of the command line.
+    std::fs::write(out.join("cases.csv"), &cases).unwrap();
+    for words in [&report[..], &resumed] {
+        run(folder.path(), [words, &["--max-file-bytes", "20"]].concat())
+            .exits(1)
+            .complains(&["cases.csv", "--max-file-bytes"]);
+        run(
+            folder.path(),
+            [words, &["--max-small-json-bytes", "20"]].concat(),
+        )
+        .exits(1)
+        .complains(&["config.json", "--max-small-json-bytes"]);
+    }
+    // A last line that was cut off is none of this.
+    std::fs::write(out.join("cases.csv"), &cases[..cases.len() - 9]).unwrap();
+    run(folder.path(), &resumed).exits(0);
+    assert_eq!(read(&out, "cases.csv"), cases);
+}

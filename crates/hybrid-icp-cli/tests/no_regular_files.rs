@@ -238,3 +238,50 @@ fn meshes_and_pipelines_of_an_experiment() {
     }
     assert_eq!(names(folder), ["meshes"]);
 }
+
+#[test]
+fn files_of_studies() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let words =
+        "experiment init-noise --household tuning --poses 1 --variants hybrid --resume --out a";
+    std::fs::create_dir(folder.join("a")).unwrap();
+    std::fs::write(folder.join("a/config.json"), "{}").unwrap();
+    std::fs::write(folder.join("a/cases.csv"), "object").unwrap();
+    each_is_told(folder, words, "a/config.json");
+    each_is_told(folder, "experiment report --out r a", "a/config.json");
+    let config = hicp_experiments::Config::new(
+        hicp_experiments::Experiment::InitNoise,
+        &hicp_experiments::Subject::household(&hicp_sim::Household::TUNING).unwrap(),
+        &[hicp_experiments::Variant::preset(
+            hybrid_icp::Preset::Hybrid,
+        )],
+        1,
+        1,
+    )
+    .unwrap();
+    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
+    std::fs::write(folder.join("a/config.json"), text).unwrap();
+    each_is_told(folder, words, "a/cases.csv");
+    each_is_told(folder, "experiment report --out r a", "a/cases.csv");
+
+    let words = "experiment sequential --resume --out s";
+    std::fs::create_dir(folder.join("s")).unwrap();
+    std::fs::write(folder.join("s/config.json"), "{}").unwrap();
+    std::fs::write(folder.join("s/trajectories.csv"), "object").unwrap();
+    each_is_told(folder, words, "s/config.json");
+    let config = hicp_experiments::TrajectoryConfig::new(
+        &hicp_experiments::Subject::household(&hicp_sim::Household::TEST).unwrap(),
+        &[
+            hybrid_icp::Preset::Hybrid,
+            hybrid_icp::Preset::ProjectiveCascadePointPlane,
+        ],
+        1,
+        1,
+    )
+    .unwrap();
+    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
+    std::fs::write(folder.join("s/config.json"), text).unwrap();
+    each_is_told(folder, words, "s/trajectories.csv");
+    assert!(!folder.join("r").exists());
+}

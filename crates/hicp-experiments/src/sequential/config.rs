@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use hicp_core::PinholeCamera;
+use hicp_io::ReadLimits;
 use hicp_sim::{AxialPolynomial, Reconstruction, ReconstructionNoise, SimError, VsdBins};
 use hybrid_icp::Preset;
 use serde::{Deserialize, Serialize};
@@ -11,11 +12,20 @@ use super::rule::FusionRule;
 use crate::claims::TABLE_I;
 use crate::config::{CameraRecord, ObjectRecord, distinct};
 use crate::error::ExperimentError;
+use crate::stored::{Fields, MAX_BINS, quoted, read_json};
 use crate::subject::Subject;
 use crate::variant::Variant;
 
+/// What `experiment` says in the file.
+const SEQUENTIAL: &str = "sequential";
+/// Most trajectories per object and bin.
+const MAX_TRAJECTORIES: u64 = 100_000;
+/// Most underlying pipelines: each has a panel of the figure.
+const MAX_UNDERLYING: usize = 40;
+/// Most methods.
+const MAX_METHODS: usize = 100;
+
 /// The exact configuration of a sequential study. Its rows follow from it.
-///
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectoryConfig {
@@ -107,7 +117,7 @@ impl TrajectoryConfig {
         trajectories: u64,
         seed: u64,
     ) -> Result<Self, ExperimentError> {
-        if !(1..=100_000).contains(&trajectories) {
+        if !(1..=MAX_TRAJECTORIES).contains(&trajectories) {
             return Err(ExperimentError::Parameter {
                 what: "number of trajectories per object and bin",
                 #[allow(clippy::cast_precision_loss)] // For a message.
@@ -119,7 +129,7 @@ impl TrajectoryConfig {
         distinct("object", subjects.iter().map(|s| s.name.as_str()))?;
         let noise = AxialPolynomial::d435_ahn2019_axial();
         let config = Self {
-            experiment: "sequential".to_owned(),
+            experiment: SEQUENTIAL.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed,
             trajectories,
@@ -167,13 +177,16 @@ impl TrajectoryConfig {
     /// Number of trajectories, all objects and bins together.
     #[must_use]
     pub fn n_trajectories(&self) -> usize {
-        usize::try_from(self.trajectories).unwrap_or(usize::MAX) * self.bins * self.objects.len()
+        let per_bin = usize::try_from(self.trajectories).unwrap_or(usize::MAX);
+        per_bin
+            .saturating_mul(self.bins)
+            .saturating_mul(self.objects.len())
     }
 
     /// Number of rows of a trajectory.
     #[must_use]
     pub fn rows_per_trajectory(&self) -> usize {
-        self.underlying.len() * self.methods.len()
+        self.underlying.len().saturating_mul(self.methods.len())
     }
 
     /// How far the camera moves between the images of an underlying pipeline, metres.
@@ -243,12 +256,66 @@ impl TrajectoryConfig {
     }
 
     /// Reads a file.
-    pub(crate) fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let text = std::fs::read_to_string(path).map_err(ExperimentError::file(path))?;
-        serde_json::from_str(&text).map_err(|source| ExperimentError::Configuration {
-            path: path.to_owned(),
-            source,
-        })
+    pub(crate) fn read(limits: &ReadLimits, path: &Path) -> Result<Self, ExperimentError> {
+        let config: Self = read_json(limits, path)?;
+        config.check(path)?;
+        Ok(config)
+    }
+
+    /// Refuses what [`TrajectoryConfig::new`] would not have made, and what a caller cannot have changed to anything that runs; `path` is
+    /// where the configuration is from, or where it would be written to.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), ExperimentError> {
+        let fields = Fields { path };
+        if self.experiment != SEQUENTIAL {
+            let expected = quoted(SEQUENTIAL);
+            return Err(fields.wrong("experiment", quoted(&self.experiment), expected));
+        }
+        fields.count("trajectories", self.trajectories, 1..=MAX_TRAJECTORIES)?;
+        fields.count("bins", self.bins as u64, 1..=MAX_BINS as u64)?;
+        fields.not_negative(&[
+            ("max_translation_m", self.max_translation_m),
+            ("path_m", self.path_m),
+            ("axis_offset_m", self.axis_offset_m),
+            ("target_offset_m", self.target_offset_m),
+            (
+                "reconstruction_translation_m",
+                self.reconstruction_translation_m,
+            ),
+            (
+                "reconstruction_rotation_deg",
+                self.reconstruction_rotation_deg,
+            ),
+        ])?;
+        fields.positive(&[
+            ("start_distance_m", self.start_distance_m),
+            ("speed_m_s", self.speed_m_s),
+            ("reconstruction_voxel_m", self.reconstruction_voxel_m),
+            (
+                "reconstruction_max_distance_m",
+                self.reconstruction_max_distance_m,
+            ),
+        ])?;
+        fields.camera(&self.camera)?;
+        let underlying = self.underlying.iter().map(|u| u.name.as_str());
+        fields.names("underlying", MAX_UNDERLYING, underlying)?;
+        for (index, underlying) in self.underlying.iter().enumerate() {
+            let field = format!("underlying[{index}].seconds_per_estimate");
+            fields.positive(&[(&field, underlying.seconds_per_estimate)])?;
+        }
+        let methods = self.methods.iter().map(String::as_str);
+        fields.names("methods", MAX_METHODS, methods)?;
+        for (index, method) in self.methods.iter().enumerate() {
+            if FusionRule::from_name(method).is_none() {
+                let field = format!("methods[{index}]");
+                return Err(fields.wrong(field, quoted(method), FusionRule::EXPECTED));
+            }
+        }
+        fields.objects(&self.objects)?;
+        fields.cells([
+            ("underlying", self.underlying.len()),
+            ("methods", self.methods.len()),
+            ("bins", self.bins),
+        ])
     }
 }
 

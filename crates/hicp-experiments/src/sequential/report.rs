@@ -231,7 +231,7 @@ impl TrajectoryReport {
     fn what_was_run(&self) -> Table {
         let c = &self.study.config;
         let objects: Vec<&str> = c.objects.iter().map(|o| o.name.as_str()).collect();
-        let expected = c.n_trajectories() * c.rows_per_trajectory();
+        let expected = c.n_trajectories().saturating_mul(c.rows_per_trajectory());
         let rows = match self.study.rows.len() {
             rows if rows == expected => rows.to_string(),
             rows => format!("{rows} of {expected}: not finished"),

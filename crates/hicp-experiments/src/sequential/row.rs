@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
+use hicp_io::ReadLimits;
+
+use super::config::TrajectoryConfig;
 use crate::error::ExperimentError;
+use crate::stored::{Order, Places, check_bin, count_in_order, each_record, measure, number, vsd};
 
 /// The columns of `trajectories.csv`, in order.
 pub const TRAJECTORY_COLUMNS: [&str; 11] = [
@@ -98,28 +102,7 @@ impl TrajectoryRow {
 
     /// Reads a row back; the error says which field is wrong.
     fn parse(record: &csv::StringRecord) -> Result<Self, String> {
-        fn number<T: std::str::FromStr>(
-            record: &csv::StringRecord,
-            column: usize,
-        ) -> Result<T, String> {
-            record[column].parse().map_err(|_| {
-                format!(
-                    "{} is {:?}, expected a number",
-                    TRAJECTORY_COLUMNS[column], &record[column]
-                )
-            })
-        }
-        let finite = |column: usize| {
-            let value: f64 = number(record, column)?;
-            if value.is_finite() && value >= 0.0 {
-                Ok(value)
-            } else {
-                Err(format!(
-                    "{} is {value}, expected a number of at least 0",
-                    TRAJECTORY_COLUMNS[column]
-                ))
-            }
-        };
+        const COLUMNS: [&str; 11] = TRAJECTORY_COLUMNS;
         if record.len() != TRAJECTORY_COLUMNS.len() {
             return Err(format!(
                 "{} fields, expected {}",
@@ -131,24 +114,24 @@ impl TrajectoryRow {
             None
         } else {
             Some(Travelled {
-                vsd_initial: finite(5)?,
-                vsd_final: finite(6)?,
-                add_final_mm: finite(7)?,
-                n_estimates: number(record, 8)?,
+                vsd_initial: vsd(COLUMNS[5], &record[5])?,
+                vsd_final: vsd(COLUMNS[6], &record[6])?,
+                add_final_mm: measure(COLUMNS[7], &record[7])?,
+                n_estimates: number(COLUMNS[8], &record[8])?,
                 mahalanobis_squared: if record[9].is_empty() {
                     None
                 } else {
-                    Some(finite(9)?)
+                    Some(measure(COLUMNS[9], &record[9])?)
                 },
             })
         };
         Ok(Self {
             object: record[0].to_owned(),
-            trajectory: number(record, 1)?,
+            trajectory: number(COLUMNS[1], &record[1])?,
             bin: if record[2].is_empty() {
                 None
             } else {
-                Some(number(record, 2)?)
+                Some(number(COLUMNS[2], &record[2])?)
             },
             underlying: record[3].to_owned(),
             method: record[4].to_owned(),
@@ -173,24 +156,58 @@ pub(crate) fn header() -> Vec<u8> {
     to_csv([TRAJECTORY_COLUMNS.map(str::to_owned)])
 }
 
-/// Reads the rows of a file.
-pub(crate) fn read(path: &Path) -> Result<Vec<TrajectoryRow>, ExperimentError> {
-    let bytes = std::fs::read(path).map_err(ExperimentError::file(path))?;
-    let wrong = |line: usize, what: String| ExperimentError::Row {
-        path: path.to_owned(),
-        line,
-        what,
-    };
-    if !bytes.starts_with(&header()) {
-        let what = format!("expected the columns {}", TRAJECTORY_COLUMNS.join(","));
-        return Err(wrong(1, what));
-    }
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
-    let records = reader.records().zip(2..);
-    records
-        .map(|(record, line)| {
-            let record = record.map_err(|e| wrong(line, e.to_string()))?;
-            TrajectoryRow::parse(&record).map_err(|what| wrong(line, what))
-        })
-        .collect()
+/// Reads the rows of a study from a file.
+pub(crate) fn read(
+    limits: &ReadLimits,
+    path: &Path,
+    config: &TrajectoryConfig,
+) -> Result<Vec<TrajectoryRow>, ExperimentError> {
+    let mut rows = Vec::new();
+    let text = limits.read_text(path)?;
+    each(limits, path, &text, config, |row, _| {
+        rows.push(row);
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// Counts the rows that a run is to go on with; others than the first ones of the study are refused.
+pub(crate) fn count(
+    limits: &ReadLimits,
+    path: &Path,
+    text: &str,
+    config: &TrajectoryConfig,
+) -> Result<u64, ExperimentError> {
+    let mut rows = 0;
+    each(limits, path, text, config, |_, place| {
+        count_in_order(&mut rows, place)
+    })?;
+    Ok(rows)
+}
+
+/// Reads the rows of a study from the text of a file; those that the study cannot have are refused.
+fn each(
+    limits: &ReadLimits,
+    path: &Path,
+    text: &str,
+    config: &TrajectoryConfig,
+    mut take: impl FnMut(TrajectoryRow, u64) -> Result<(), String>,
+) -> Result<(), ExperimentError> {
+    let underlying = config.underlying.iter();
+    let columns = [
+        ("object", config.objects.iter().map(|o| &*o.name).collect()),
+        ("underlying", underlying.map(|u| &*u.name).collect()),
+        ("method", config.methods.iter().map(|m| &**m).collect()),
+    ];
+    let bins = config.bins.max(1) as u64;
+    let trajectories = config.trajectories.saturating_mul(bins);
+    let mut places = Places::new(columns, ("trajectory", trajectories), Order::Cases);
+    each_record(path, text, &header(), limits.max_rows, |record| {
+        let row = TrajectoryRow::parse(record)?;
+        let (_, place) =
+            places.take([&row.object, &row.underlying, &row.method], row.trajectory)?;
+        let bin = usize::try_from(row.trajectory % bins).ok();
+        check_bin(row.bin, bin, row.measured.is_some())?;
+        take(row, place)
+    })
 }

@@ -36,6 +36,10 @@ impl FusionRule {
         Self::Calibrated(FusionMethod::MostConfident),
     ];
 
+    /// What a message says that a name should have been.
+    pub(crate) const EXPECTED: &str =
+        "a method of the paper, or one of those that gated- and calibrated- are put before";
+
     /// Name in tables; `gated-` or `calibrated-` before that of the method.
     #[must_use]
     pub fn name(self) -> String {

@@ -75,7 +75,7 @@ impl<'a> TrajectoryRunner<'a> {
                 what: "fusion method",
                 name: name.clone(),
                 found: "is not known",
-                expected: "a method of the paper, or one of those that gated- and calibrated- are put before",
+                expected: FusionRule::EXPECTED,
             })
         });
         Ok(Self {

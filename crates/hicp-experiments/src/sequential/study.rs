@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use hicp_io::ReadLimits;
+
 use super::config::TrajectoryConfig;
 use super::row::{self, TrajectoryRow};
 use super::runner::{Models, TrajectoryRunner};
@@ -35,8 +37,8 @@ pub struct TrajectoryStudy {
 ///
 /// # Errors
 ///
-/// [`ExperimentError`] when the folder holds another study, a file cannot be written, or a pipeline cannot be built. A trajectory
-/// that cannot be made is no error: its rows have no figures, and say why.
+/// [`ExperimentError`] when the configuration could not be read back, the folder holds another study or rows that the study cannot have, a
+/// file cannot be written, or a pipeline cannot be built. A trajectory that cannot be made is no error: its rows have no figures, and say why.
 pub fn run_trajectories(
     config: &TrajectoryConfig,
     subjects: &[Subject],
@@ -45,6 +47,9 @@ pub fn run_trajectories(
     progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
 ) -> Result<(), ExperimentError> {
     let models = Models::new(subjects.len());
+    // What names no pipeline or method is told as such, before there is a file.
+    TrajectoryRunner::new(config, subjects, &models)?;
+    config.check(&folder.join(CONFIG_FILE))?;
     let sheet = Sheet {
         folder,
         name: TRAJECTORIES_FILE,
@@ -52,7 +57,8 @@ pub fn run_trajectories(
         rows_per_case: config.rows_per_trajectory(),
         cases: config.n_trajectories(),
         config: config.to_json(),
-        stored: |path| Ok(TrajectoryConfig::read(path)?.to_json()),
+        stored: |limits, path| Ok(TrajectoryConfig::read(limits, path)?.to_json()),
+        check: &|path, text| row::count(&options.limits, path, text, config),
     };
     sheet.fill(
         options,
@@ -71,13 +77,22 @@ impl TrajectoryStudy {
     ///
     /// # Errors
     ///
-    /// [`ExperimentError`] when a file is missing or is not what [`run_trajectories`] wrote.
+    /// [`ExperimentError`] when a file is missing, is above the default limits, or is not what [`run_trajectories`] wrote: the field
+    /// of the configuration or the line of the rows is named.
     pub fn read(folder: &Path) -> Result<Self, ExperimentError> {
+        Self::read_within(&ReadLimits::DEFAULT, folder)
+    }
+
+    /// Reads a study from its folder, within limits of one's own.
+    ///
+    /// # Errors
+    ///
+    /// As [`TrajectoryStudy::read`].
+    pub fn read_within(limits: &ReadLimits, folder: &Path) -> Result<Self, ExperimentError> {
         let path = folder.join(TRAJECTORIES_FILE);
-        let study = Self {
-            config: TrajectoryConfig::read(&folder.join(CONFIG_FILE))?,
-            rows: row::read(&path)?,
-        };
+        let config = TrajectoryConfig::read(limits, &folder.join(CONFIG_FILE))?;
+        let rows = row::read(limits, &path, &config)?;
+        let study = Self { config, rows };
         if study.rows.iter().all(|row| row.measured.is_none()) {
             return Err(ExperimentError::Empty { path });
         }
@@ -106,7 +121,7 @@ impl TrajectoryStudy {
             experiment: Experiment::InitNoise,
             version: c.version.clone(),
             seed: c.seed,
-            poses: c.trajectories * c.bins as u64,
+            poses: c.trajectories.saturating_mul(c.bins as u64),
             times: false,
             bins: c.bins,
             max_translation_m: c.max_translation_m,
