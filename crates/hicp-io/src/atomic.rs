@@ -14,7 +14,8 @@ use crate::error::IoError;
 /// anything fails the temporary file is removed and what was at `path` stays as it was; nobody ever sees half a file.
 /// A new file gets the permissions a newly created one gets (0666 without the umask on Unix), a replaced one keeps its own;
 /// a file that may not be written to is not replaced; a symbolic link is followed, also one to a file that is still to be made.
-/// What is not a regular file (a pipe, `/dev/stdout`) cannot be replaced and is written in place.
+/// What is no regular file (a pipe, a device) cannot be replaced and is written in place. So is an open descriptor
+/// ([`is_stream`]), whatever it leads to: what its file holds stays, and what is written comes after it.
 ///
 /// # Errors
 ///
@@ -34,10 +35,16 @@ where
 {
     let path = path.as_ref();
     let written = match target_of(path)? {
-        Target::Stream => fs::OpenOptions::new()
+        // Opened anew they would have another position: what the program says next would be written over this.
+        Target::Descriptor(Descriptor::Output) => stream(io::stdout(), write),
+        Target::Descriptor(Descriptor::Error) => stream(io::stderr(), write),
+        Target::Descriptor(Descriptor::Other) => {
+            appending(path).and_then(|file| stream(file, write))
+        }
+        Target::Device => fs::OpenOptions::new()
             .write(true)
             .open(path)
-            .and_then(|file| fill(file, write).map(|_| ())),
+            .and_then(|file| stream(file, write)),
         Target::New(file) => replace(&file, None, write),
         Target::Old(file, permissions) => replace(&file, Some(permissions), write),
     };
@@ -58,7 +65,7 @@ where
 pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
     let path = path.as_ref();
     let folder = match target_of(path)? {
-        Target::Stream => return Ok(()),
+        Target::Descriptor(_) | Target::Device => return Ok(()),
         Target::New(file) | Target::Old(file, _) => folder_of(&file).to_owned(),
     };
     // The temporary file is gone when this returns.
@@ -68,29 +75,72 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
     }
 }
 
+/// Returns whether [`write_atomically`] writes to a path in place, because what is there is not to be replaced.
+///
+/// That is a pipe or a device, and an open descriptor, whether the path names it (`/dev/stdout`, `/dev/stderr`, `/dev/fd/3`,
+/// `/proc/self/fd/3`) or links lead to it: a shell has opened it, often to write more to it, and it need not lead to a file at all.
+/// Where it leads to a regular file, replacing that would lose what the file holds.
+///
+/// ```
+/// assert!(!hicp_io::is_stream("result.json"));
+/// # #[cfg(target_os = "linux")]
+/// assert!(hicp_io::is_stream("/dev/stdout"));
+/// ```
+#[must_use]
+pub fn is_stream(path: impl AsRef<Path>) -> bool {
+    matches!(
+        target_of(path.as_ref()),
+        Ok(Target::Descriptor(_) | Target::Device)
+    )
+}
+
 /// Most links that are followed one after the other; systems follow fewer.
 const LINKS: usize = 64;
 
 /// What a path to be written leads to.
 enum Target {
+    /// An open descriptor, whatever it leads to.
+    Descriptor(Descriptor),
     /// A pipe, a device: it cannot be replaced.
-    Stream,
+    Device,
     /// Nothing yet: where it will be, with links followed.
     New(PathBuf),
     /// A regular file, with links followed, and its permissions.
     Old(PathBuf, fs::Permissions),
 }
 
+/// What an open descriptor is to this program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Descriptor {
+    /// Its standard output.
+    Output,
+    /// Its standard error.
+    Error,
+    /// Another one, or one of another program.
+    Other,
+}
+
 fn target_of(path: &Path) -> Result<Target, IoError> {
     let failed = |e| IoError::write(path, e);
-    match fs::metadata(path) {
-        Ok(metadata) if metadata.is_dir() => Err(failed(io::ErrorKind::IsADirectory.into())),
-        Ok(metadata) if !metadata.is_file() => Ok(Target::Stream),
+    let found = fs::metadata(path);
+    if found.as_ref().is_ok_and(fs::Metadata::is_dir) {
+        return Err(failed(io::ErrorKind::IsADirectory.into()));
+    }
+    if let Some(descriptor) = descriptor_of(path) {
+        // One that is not open has no name there. A file must let itself be opened anew; opening a pipe may wait.
+        return found
+            .and_then(|metadata| match descriptor {
+                Descriptor::Other if metadata.is_file() => appending(path).map(|_| ()),
+                _ => Ok(()),
+            })
+            .map(|()| Target::Descriptor(descriptor))
+            .map_err(failed);
+    }
+    match found {
+        Ok(metadata) if !metadata.is_file() => Ok(Target::Device),
         Ok(metadata) => {
             // Renaming would replace a file that may not be written to: ask first.
-            fs::OpenOptions::new()
-                .append(true)
-                .open(path)
+            appending(path)
                 .and_then(|_| fs::canonicalize(path))
                 .map(|file| Target::Old(file, metadata.permissions()))
                 .map_err(failed)
@@ -106,6 +156,41 @@ fn target_of(path: &Path) -> Result<Target, IoError> {
             }
         }
     }
+}
+
+/// Which open descriptor a path names, or links lead to.
+///
+/// The links are followed one at a time, for the last one, that of the descriptor itself, leads on to the file.
+fn descriptor_of(path: &Path) -> Option<Descriptor> {
+    let mut file = path.to_owned();
+    for _ in 0..LINKS {
+        let folder = fs::canonicalize(folder_of(&file)).ok()?;
+        if let Some(is_own) = descriptors_in(&folder) {
+            return match file.file_name()?.to_str()?.parse::<u32>().ok()? {
+                1 if is_own => Some(Descriptor::Output),
+                2 if is_own => Some(Descriptor::Error),
+                _ => Some(Descriptor::Other),
+            };
+        }
+        file = folder.join(fs::read_link(&file).ok()?);
+    }
+    None
+}
+
+/// Whether a folder, with links followed, is one of open descriptors, and then whether they are those of this program.
+fn descriptors_in(folder: &Path) -> Option<bool> {
+    if folder == Path::new("/dev/fd") {
+        return Some(true);
+    }
+    let below = folder.strip_prefix("/proc").ok()?;
+    let names: Vec<_> = below.iter().map(|name| name.to_string_lossy()).collect();
+    let is_number = |name: &str| name.bytes().all(|byte| byte.is_ascii_digit());
+    match names.iter().map(AsRef::as_ref).collect::<Vec<&str>>()[..] {
+        [process, "fd"] if is_number(process) => {}
+        [process, "task", thread, "fd"] if is_number(process) && is_number(thread) => {}
+        _ => return None,
+    }
+    Some(fs::canonicalize("/proc/self").is_ok_and(|own| folder.starts_with(own)))
 }
 
 /// Where a path leads at which there is no file, which is what `error` said: renaming would replace a link instead of following it.
@@ -151,6 +236,20 @@ fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)
+}
+
+/// Opens what is there, so that nothing in it is written over.
+fn appending(path: &Path) -> io::Result<fs::File> {
+    fs::OpenOptions::new().append(true).open(path)
+}
+
+/// Writes to what is open.
+fn stream<W, F>(target: W, write: F) -> io::Result<()>
+where
+    W: Write,
+    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+{
+    fill(target, write)?.flush()
 }
 
 fn fill<W, F>(target: W, write: F) -> io::Result<W>
@@ -266,6 +365,66 @@ mod tests {
         write_atomically(&link, |writer| writer.write_all(b"through")).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read_to_string(&atomic).unwrap(), "through");
+    }
+
+    /// Standard output and standard error have tests that run the program.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn open_descriptors_are_appended_to_and_never_replaced() {
+        use std::os::fd::AsRawFd;
+        use std::os::unix::fs::{MetadataExt, symlink};
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        fs::write(at("log"), "precious\n").unwrap();
+        let log = fs::File::options().append(true).open(at("log")).unwrap();
+        let (number, inode) = (log.as_raw_fd(), log.metadata().unwrap().ino());
+        symlink(format!("/dev/fd/{number}"), at("first")).unwrap();
+        symlink("first", at("second")).unwrap();
+        symlink("/proc/self/fd", at("folder")).unwrap();
+        let mut expected = "precious\n".to_owned();
+        for path in [
+            PathBuf::from(format!("/dev/fd/{number}")),
+            format!("/proc/self/fd/{number}").into(),
+            format!("/proc/thread-self/fd/{number}").into(),
+            format!("/proc/{}/fd/{number}", std::process::id()).into(),
+            at("second"),
+            at("folder").join(number.to_string()),
+        ] {
+            assert!(is_stream(&path), "{}", path.display());
+            check_writable(&path).unwrap();
+            assert_eq!(fs::read_to_string(at("log")).unwrap(), expected);
+            write_atomically(&path, |writer| writeln!(writer, "{}", path.display())).unwrap();
+            expected += &format!("{}\n", path.display());
+            assert_eq!(fs::read_to_string(at("log")).unwrap(), expected);
+        }
+        assert_eq!(fs::metadata(at("log")).unwrap().ino(), inode);
+        assert_eq!(names(dir.path()).len(), 4, "no temporary file");
+        // By its own name it is a file like any other.
+        assert!(!is_stream(at("log")));
+        assert_eq!(
+            ["/dev/stdout", "/dev/stderr", "/proc/self/fd/1", "/dev/fd/2"]
+                .map(|path| descriptor_of(Path::new(path))),
+            [
+                Descriptor::Output,
+                Descriptor::Error,
+                Descriptor::Output,
+                Descriptor::Error
+            ]
+            .map(Some)
+        );
+        // That of another program is none of this one's.
+        assert_eq!(descriptors_in(Path::new("/proc/0/fd")), Some(false));
+        for folder in ["/proc/0", "/proc/self-made/fd", "/proc/0/task/fd", "/fd"] {
+            assert_eq!(descriptors_in(Path::new(folder)), None, "{folder}");
+        }
+        // What is not open, or no descriptor, is nothing to write to.
+        for path in ["/dev/fd/54321", "/proc/self/fd/new"] {
+            assert!(!is_stream(path));
+            assert!(matches!(
+                check_writable(path),
+                Err(IoError::Write { .. } | IoError::MissingFolder { .. })
+            ));
+        }
     }
 
     #[cfg(unix)]

@@ -9,7 +9,8 @@ pub(crate) type Named<'a> = (&'static str, &'a Path);
 
 /// Checks that every output can be written, and that none takes the place of an input or of another output.
 ///
-/// `in_place` lists pairs of options that may name the same file, because the output has the form of the input.
+/// `in_place` lists pairs of options that may name the same file, because the output has the form of the input. What is written to
+/// a stream is added to what is there: several may share one, and none takes the place of its input.
 pub(crate) fn check(
     outputs: &[Named<'_>],
     inputs: &[Named<'_>],
@@ -17,9 +18,12 @@ pub(crate) fn check(
 ) -> anyhow::Result<()> {
     for (index, (option, path)) in outputs.iter().enumerate() {
         hicp_io::check_writable(path)?;
-        let others = outputs[..index].iter().chain(inputs);
-        for (other, other_path) in others {
-            if same_file(path, other_path) && !in_place.contains(&(option, other)) {
+        let is_stream = hicp_io::is_stream(path);
+        let earlier = outputs[..index].iter();
+        let earlier = earlier.filter(|(_, other)| !(is_stream && hicp_io::is_stream(other)));
+        for (other, other_path) in earlier.chain(inputs) {
+            let is_in_place = !is_stream && in_place.contains(&(option, other));
+            if same_file(path, other_path) && !is_in_place {
                 bail!(
                     "{option} and {other} both name {}, expected different files: it would be overwritten",
                     path.display()

@@ -297,10 +297,9 @@ impl Arguments {
         outputs::check(&written, &inputs, &[("--output", "--results")])
     }
 
-    /// Where the journal is. There is none for what is not a file.
+    /// Where the journal is. There is none for what is not a file, or is the file of an open descriptor.
     fn journal_path(&self) -> Option<PathBuf> {
-        let file = !self.output.exists() || self.output.is_file();
-        file.then(|| Journal::path_of(&self.output))
+        (!hicp_io::is_stream(&self.output)).then(|| Journal::path_of(&self.output))
     }
 
     /// Reads the rows that are to be refined and written.
