@@ -173,7 +173,10 @@ fn no_input_is_overwritten() {
             "set/initial_synthetic-test.csv",
             "test_targets_bop19.toml",
             "set",
-            &["--out and --dataset both name set/test_targets_bop19.json"],
+            &[
+                "--out names set/test_targets_bop19.json",
+                "belongs to the dataset set",
+            ],
         ),
     ] {
         let words =

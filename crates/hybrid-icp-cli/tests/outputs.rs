@@ -6,14 +6,16 @@ mod common;
 #[path = "common/world.rs"]
 mod world;
 
-use std::fs::{File, read_to_string};
-use std::os::unix::fs::{MetadataExt, symlink};
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::fs::read_to_string;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
 
 use common::*;
 use hicp_io::bop::write_results;
-use serde_json::Value;
 use world::*;
+#[cfg(target_os = "linux")]
+use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
 
 /// Runs the program with its standard output, or its standard error, in a file; returns what it said on the other one.
 #[cfg(target_os = "linux")]
@@ -121,4 +123,193 @@ fn redirected_streams_of_the_commands_over_datasets() {
         .exits(1)
         .complains(&["--output and --results both name /dev/stdout"]);
     assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), input);
+}
+
+/// Every file below a folder with what it holds.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            let content = std::fs::read(&path).unwrap();
+            found.insert(path, content);
+        }
+    }
+    found
+}
+
+/// A dataset in the folder `set`, with files as they come with one, and results of it beside.
+fn dataset() -> World {
+    let world = World::new();
+    for name in ["train_pbr/000007", "models_eval", "models_fine", "results"] {
+        std::fs::create_dir_all(world.path(name)).unwrap();
+    }
+    let targets = r#"[{"scene_id": 3, "im_id": 40, "obj_id": 1, "inst_count": 2}]"#;
+    std::fs::write(world.path("test_targets_bop19.json"), targets).unwrap();
+    for name in [
+        "camera_uw.json",
+        "dataset_info.md",
+        "train_pbr/notes",
+        "train_pbr/000007/scene_gt.json",
+        "models_eval/models_info.json",
+        "models_fine/obj_000001.ply",
+        "results/old.json",
+        "old.json",
+    ] {
+        std::fs::write(world.path(name), "{}").unwrap();
+    }
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    world
+}
+
+/// Every command with a dataset, but for the path of one of its outputs.
+const COMMANDS: [(&str, &str); 7] = [
+    ("bop refine --dataset . --results in.csv", "--output"),
+    (
+        "bop refine --dataset . --results in.csv --output new.csv",
+        "--rows",
+    ),
+    ("bop eval --dataset . --results in.csv", "--json"),
+    ("bop eval --dataset . --results in.csv", "--errors"),
+    (
+        "bop show --dataset . --scene 3 --image 40 --results in.csv",
+        "--out",
+    ),
+    (
+        "bop sequence --dataset . --scene 3 --object 1 --init in.csv",
+        "--output",
+    ),
+    (
+        "bop sequence --dataset . --scene 3 --object 1 --init in.csv --output new.jsonl",
+        "--results",
+    ),
+];
+
+#[test]
+fn files_of_the_dataset_are_spared_by_every_command() {
+    let world = dataset();
+    let folder = world.folder.path();
+    symlink("test/000003/scene_gt.json", world.path("link.json")).unwrap();
+    let before = files(folder);
+    for (command, option) in COMMANDS {
+        for path in [
+            "models/obj_000002.ply",
+            "models_eval/models_info.json",
+            "test/000003/depth/000000.png",
+            "results/../test/000003/scene_camera.json",
+            "test_targets_bop19.json",
+            "link.json",
+        ] {
+            let words = format!("{command} {option} {path}");
+            let told = run(folder, words.split(' ')).exits(1);
+            let names = format!("error: {option} names {path}, which is there and belongs to");
+            assert_eq!(told.complains(&[&names, "overwritten"]).out, "");
+        }
+        assert_eq!(files(folder), before, "{command} {option}");
+    }
+    let words = "bop compare --dataset . --init in.csv --pipelines scene_gt.toml --out test/000003";
+    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
+    std::fs::write(world.path("scene_gt.toml"), pipeline).unwrap();
+    run(folder, words.split(' '))
+        .exits(1)
+        .complains(&["--out names test/000003/scene_gt.json", "its scenes"]);
+}
+
+#[test]
+fn what_belongs_to_a_dataset_and_what_does_not() {
+    let world = dataset();
+    let folder = world.folder.path();
+    let before = files(folder);
+    let eval = |json: &str| {
+        let words = "bop eval --dataset . --results in.csv --json";
+        run(folder, words.split(' ').chain([json]))
+    };
+    // Whatever lies in a folder of the dataset, also of another split, and what comes with one beside them.
+    for path in [
+        "camera_uw.json",
+        "dataset_info.md",
+        "train_pbr/notes",
+        "train_pbr/000007/scene_gt.json",
+        "models_fine/obj_000001.ply",
+    ] {
+        eval(path)
+            .exits(1)
+            .complains(&[path, "belongs to the dataset"]);
+    }
+    assert_eq!(files(folder), before);
+    std::fs::remove_dir_all(world.path("models_eval")).unwrap();
+    // What a run has left in the dataset's folder or beside its others is written anew, and where nothing is, nothing is lost.
+    for path in [
+        "old.json",
+        "results/old.json",
+        "test/../results/old.json",
+        "new.json",
+        "models/new.json",
+        "test/000003/new.json",
+    ] {
+        eval(path).exits(0);
+        let text = read_to_string(world.path(path)).unwrap();
+        assert!(text.contains("\"ar\""), "{path}");
+    }
+    // The dataset's folder as a split has scenes, and not all there is.
+    for path in ["7/scene_gt.json", "obj_000001.ply"] {
+        std::fs::create_dir_all(world.path(path).parent().unwrap()).unwrap();
+        std::fs::write(world.path(path), "{}").unwrap();
+        let words = format!("bop eval --dataset . --split . --results in.csv --json {path}");
+        run(folder, words.split(' '))
+            .exits(1)
+            .complains(&["belongs to the dataset"]);
+    }
+    let words = "bop eval --dataset . --split . --results in.csv --json old.json";
+    let told = run(folder, words.split(' ')).exits(1);
+    assert!(!told.err.contains("belongs"), "{}", told.err);
+}
+
+/// Splits, scenes and meshes are often links into another disk: neither name of such a file may be written to.
+#[test]
+fn links_do_not_hide_a_dataset() {
+    let world = dataset();
+    let folder = world.folder.path();
+    std::fs::create_dir(world.path("disk")).unwrap();
+    for (name, aside) in [
+        ("test/000012", "disk/twelve"),
+        ("models/obj_000001.ply", "disk/mesh"),
+        ("train_pbr", "disk/train"),
+        ("test_targets_bop19.json", "disk/targets"),
+    ] {
+        std::fs::rename(world.path(name), world.path(aside)).unwrap();
+        symlink(world.path(aside), world.path(name)).unwrap();
+    }
+    symlink(".", world.path("again")).unwrap();
+    let before = files(&world.path("disk"));
+    for path in [
+        "test/000012/scene_gt.json",
+        "disk/twelve/scene_gt.json",
+        "again/test/000012/depth/000000.png",
+        "models/obj_000001.ply",
+        "disk/mesh",
+        "train_pbr/notes",
+        "disk/train/000007/scene_gt.json",
+        "test_targets_bop19.json",
+        "disk/targets",
+    ] {
+        let words = "bop show --dataset again --scene 3 --image 40 --results in.csv --out";
+        run(folder, words.split(' ').chain([path]))
+            .exits(1)
+            .complains(&[path, "belongs to the dataset again"]);
+    }
+    assert_eq!(files(&world.path("disk")), before);
+}
+
+#[test]
+fn a_result_file_in_a_split_is_refined_in_place() {
+    let world = dataset();
+    let path = world.path("test/in.csv");
+    write_results(&path, &world.rows()[..2]).unwrap();
+    let before = std::fs::read(&path).unwrap();
+    let words = "bop refine --dataset . --results test/in.csv --output ./test/in.csv";
+    run(world.folder.path(), words.split(' ')).exits(0);
+    assert_ne!(std::fs::read(&path).unwrap(), before);
 }

@@ -124,24 +124,21 @@ impl Arguments {
         let in_out = |name: &str| self.out.join(name);
         let mut written = vec![in_out(&format!("{INITIAL}.json"))];
         written.extend(FORMS.map(|ending| in_out(&format!("{COMPARISON}.{ending}"))));
+        let mut journals = Vec::new();
         for pipeline in &self.pipelines {
             let name = pipeline.short_name();
             let results = in_out(&format!("{name}.csv"));
-            let journal = Journal::path_of(&results);
-            written.extend([results, journal, in_out(&format!("{name}.json"))]);
+            journals.push(Journal::path_of(&results));
+            written.extend([results, in_out(&format!("{name}.json"))]);
         }
-        let written: Vec<_> = written.iter().map(|path| ("--out", &**path)).collect();
+        let by_out = |path| ("--out", PathBuf::as_path(path));
+        let written: Vec<_> = written.iter().map(by_out).collect();
+        let journals: Vec<_> = journals.iter().map(by_out).collect();
 
-        let of_dataset = [
-            "test_targets_bop19.json",
-            "models/models_info.json",
-            "models_eval/models_info.json",
-        ];
-        let of_dataset = of_dataset.map(|name| self.dataset.join(name));
         let mut read = vec![("--init", self.init.as_path())];
-        read.extend(of_dataset.iter().map(|path| ("--dataset", &**path)));
         let files = self.pipelines.iter().filter_map(Source::file);
         read.extend(files.map(|path| ("--pipelines", path.as_path())));
-        outputs::check(&written, &read, &[])
+        outputs::check(&[&written[..], &journals].concat(), &read, &[])?;
+        outputs::check_dataset(&written, (&self.dataset, &self.split))
     }
 }

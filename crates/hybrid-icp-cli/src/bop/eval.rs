@@ -122,6 +122,7 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let mut read = vec![("--results", arguments.results.as_path())];
     read.extend(arguments.targets.as_deref().map(|p| ("--targets", p)));
     outputs::check(&written, &read, &[])?;
+    outputs::check_dataset(&written, (&arguments.dataset, &arguments.split))?;
 
     let rows = limits().read_results(&arguments.results)?;
     let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());

@@ -294,7 +294,18 @@ impl Arguments {
         let mut written = vec![("--output", self.output.as_path())];
         written.extend(journal.as_deref().map(|p| ("the journal of --output", p)));
         written.extend(self.rows.as_deref().map(|p| ("--rows", p)));
-        outputs::check(&written, &inputs, &[("--output", "--results")])
+        outputs::check(&written, &inputs, &[("--output", "--results")])?;
+        // What is refined in place is a result file wherever it is, and what is no journal is refused as one.
+        written.retain(|(option, _)| match *option {
+            "--output" => !self.is_in_place(),
+            option => option == "--rows",
+        });
+        outputs::check_dataset(&written, (&self.dataset, &self.split))
+    }
+
+    /// Whether the output takes the place of the result file.
+    fn is_in_place(&self) -> bool {
+        outputs::same_file(&self.output, &self.results)
     }
 
     /// Where the journal is. There is none for what is not a file, or is the file of an open descriptor.

@@ -82,7 +82,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut read = vec![("--results", arguments.results.as_path())];
     read.extend(arguments.against.as_deref().map(|p| ("--against", p)));
     read.extend(arguments.detections.as_deref().map(|p| ("--detections", p)));
-    outputs::check(&[("--out", &arguments.out)], &read, &[])?;
+    let written = [("--out", arguments.out.as_path())];
+    outputs::check(&written, &read, &[])?;
+    outputs::check_dataset(&written, (&arguments.dataset, &arguments.split))?;
     let files = arguments.files()?;
     let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
     dataset.scene_ids(&arguments.split)?;

@@ -178,7 +178,8 @@ impl Arguments {
         written.extend(self.results.as_deref().map(|p| ("--results", p)));
         let mut read = vec![("--init", self.init.as_path())];
         read.extend(self.pipeline.file().map(|p| ("--pipeline", p.as_path())));
-        outputs::check(&written, &read, &[])
+        outputs::check(&written, &read, &[])?;
+        outputs::check_dataset(&written, (&self.dataset, &self.split))
     }
 
     fn estimator(
