@@ -313,3 +313,43 @@ fn a_result_file_in_a_split_is_refined_in_place() {
     run(world.folder.path(), words.split(' ')).exits(0);
     assert_ne!(std::fs::read(&path).unwrap(), before);
 }
+
+/// A run in place writes every row or none.
+#[test]
+fn rows_that_are_left_out_are_not_lost_in_place() {
+    let world = dataset();
+    let folder = world.folder.path();
+    symlink("in.csv", world.path("link.csv")).unwrap();
+    let before = std::fs::read(world.path("in.csv")).unwrap();
+    // Ten rows: three of every image with a hammer, and two targets.
+    for (option, left_out) in [
+        ("--limit 4", "--limit leaves out 6 of its 10 rows"),
+        ("--top-k 1", "--top-k leaves out 4 of its 10 rows"),
+        (
+            "--targets test_targets_bop19.json",
+            "--targets leaves out 8 of its 10 rows",
+        ),
+        ("--shard 1/2", "--shard leaves out 4 of its 10 rows"),
+        (
+            "--limit 9 --shard 1/1",
+            "--limit with --shard leaves out 1 of its 10 rows",
+        ),
+    ] {
+        for output in ["in.csv", "./in.csv", "link.csv"] {
+            let words =
+                format!("bop refine --dataset . --results in.csv --output {output} {option}");
+            let told = run(folder, words.split(' ')).exits(1);
+            let both = format!("--output and --results both name {output}, and {left_out}");
+            told.complains(&[&both, "they would be lost"]);
+            assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), before);
+            assert!(!world.path("in.csv.journal").exists());
+        }
+    }
+    // Options that leave nothing out do no harm.
+    let words =
+        "bop refine --dataset . --results in.csv --output in.csv --limit 10 --shard 1/1 --top-k 2";
+    run(folder, words.split(' ')).exits(0);
+    let rows = hicp_io::bop::read_results(world.path("in.csv")).unwrap();
+    assert_eq!(rows.len(), 10);
+    assert_ne!(std::fs::read(world.path("in.csv")).unwrap(), before);
+}

@@ -315,7 +315,33 @@ impl Arguments {
 
     /// Reads the rows that are to be refined and written.
     fn read_rows(&self) -> anyhow::Result<Vec<ResultRow>> {
-        let mut rows = limits().read_results(&self.results)?;
+        let rows = limits().read_results(&self.results)?;
+        let count = rows.len();
+        let rows = self.choose_rows(rows)?;
+        if rows.len() < count && self.is_in_place() {
+            bail!(
+                "--output and --results both name {}, and {} leaves out {} of its {count} rows, expected different files: they would be lost",
+                self.output.display(),
+                self.leaving_out().join(" with "),
+                count - rows.len()
+            );
+        }
+        Ok(rows)
+    }
+
+    /// The options given that may leave rows out.
+    fn leaving_out(&self) -> Vec<&'static str> {
+        let options = [
+            ("--limit", self.limit.is_some()),
+            ("--top-k", self.top_k.is_some()),
+            ("--targets", self.targets.is_some()),
+            ("--shard", self.shard.is_some()),
+        ];
+        let given = options.into_iter().filter(|(_, is_given)| *is_given);
+        given.map(|(option, _)| option).collect()
+    }
+
+    fn choose_rows(&self, mut rows: Vec<ResultRow>) -> anyhow::Result<Vec<ResultRow>> {
         if let Some(limit) = self.limit {
             rows.truncate(limit as usize);
         }
