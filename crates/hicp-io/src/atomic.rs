@@ -94,6 +94,36 @@ pub fn is_stream(path: impl AsRef<Path>) -> bool {
     )
 }
 
+/// Returns where [`write_atomically`] writes, with links and `..` followed, whether or not a file is there yet.
+///
+/// Paths with the same destination name the same file, so that a program can tell that one of its outputs would take the place of
+/// another, or of an input. Two names of one file (hard links) are two files here, as they are to a writer that replaces.
+///
+/// # Errors
+///
+/// [`IoError::MissingFolder`] when the parent folder does not exist, [`IoError::Write`] when a link cannot be followed.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let dir = tempfile::tempdir()?;
+/// let folder = dir.path();
+/// let (plain, odd) = (folder.join("a.json"), folder.join("./a.json"));
+/// assert_eq!(hicp_io::destination(plain)?, hicp_io::destination(odd)?);
+/// # Ok(()) }
+/// ```
+pub fn destination(path: impl AsRef<Path>) -> Result<PathBuf, IoError> {
+    let path = path.as_ref();
+    fs::canonicalize(path).or_else(|error| {
+        let failed = |e| IoError::write(path, e);
+        let file = end_of_links(path, error).map_err(failed)?;
+        let folder = existing_folder_of(path, &file)?;
+        match file.file_name() {
+            Some(name) => Ok(fs::canonicalize(folder).map_err(failed)?.join(name)),
+            None => Err(failed(io::ErrorKind::NotFound.into())),
+        }
+    })
+}
+
 /// Most links that are followed one after the other; systems follow fewer.
 const LINKS: usize = 64;
 
@@ -147,14 +177,20 @@ fn target_of(path: &Path) -> Result<Target, IoError> {
         }
         Err(error) => {
             let file = end_of_links(path, error).map_err(failed)?;
-            match folder_of(&file) {
-                folder if folder.is_dir() => Ok(Target::New(file)),
-                folder => Err(IoError::MissingFolder {
-                    path: path.to_owned(),
-                    folder: folder.to_owned(),
-                }),
-            }
+            existing_folder_of(path, &file)?;
+            Ok(Target::New(file))
         }
+    }
+}
+
+/// The folder of a file that is still to be made, to which `path` leads.
+fn existing_folder_of<'a>(path: &Path, file: &'a Path) -> Result<&'a Path, IoError> {
+    match folder_of(file) {
+        folder if folder.is_dir() => Ok(folder),
+        folder => Err(IoError::MissingFolder {
+            path: path.to_owned(),
+            folder: folder.to_owned(),
+        }),
     }
 }
 
@@ -447,7 +483,30 @@ mod tests {
         assert!(made.is_file());
         assert_eq!(fs::read(at("first")).unwrap(), b"through");
 
+        // Wherever one begins, the destination is one.
+        let real = fs::canonicalize(dir.path()).unwrap();
+        symlink("below/../fresh", at("third")).unwrap();
+        for (path, end) in [
+            ("first", "below/new"),
+            ("below/second", "below/new"),
+            ("below/../below/new", "below/new"),
+            ("third", "fresh"),
+            ("below/../third", "fresh"),
+            ("./fresh", "fresh"),
+        ] {
+            assert_eq!(destination(at(path)).unwrap(), real.join(end), "{path}");
+        }
+        assert!(!at("fresh").exists());
+
         symlink("no/new", at("nowhere")).unwrap();
+        assert!(matches!(
+            destination(at("nowhere")),
+            Err(IoError::MissingFolder { path, folder }) if path == at("nowhere") && folder == at("no")
+        ));
+        assert!(matches!(
+            destination(at("below/new/..")),
+            Err(IoError::Write { .. } | IoError::MissingFolder { .. })
+        ));
         assert!(matches!(
             check_writable(at("nowhere")),
             Err(IoError::MissingFolder { path, folder }) if path == at("nowhere") && folder == at("no")
@@ -455,6 +514,7 @@ mod tests {
         symlink("ring", at("ring")).unwrap();
         for result in [
             check_writable(at("ring")),
+            destination(at("ring")).map(|_| ()),
             write_atomically(at("ring"), |_| Ok(())),
         ] {
             assert!(matches!(result, Err(IoError::Write { path, .. }) if path == at("ring")));

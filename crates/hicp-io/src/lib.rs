@@ -40,7 +40,7 @@ pub use source::is_absent;
 
 mod atomic;
 mod atomic_folder;
-pub use atomic::{check_writable, is_stream, write_atomically};
+pub use atomic::{check_writable, destination, is_stream, write_atomically};
 pub use atomic_folder::NewFolder;
 pub use error::{IoError, Place};
 

@@ -147,17 +147,8 @@ fn places(path: &Path) -> Vec<PathBuf> {
 
 /// Whether two paths lead to the same file, which may still have to be made.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    let resolved = |path: &Path| {
-        path.canonicalize().or_else(|error| {
-            // A file that is still to be made: where its folder leads.
-            let name = path.file_name().ok_or(error)?;
-            let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-            Ok::<_, std::io::Error>(folder.unwrap_or(Path::new(".")).canonicalize()?.join(name))
-        })
-    };
-    match (resolved(a), resolved(b)) {
-        // Devices take anything any number of times.
-        (Ok(a), Ok(b)) => a == b && (a.is_file() || !a.exists()),
-        _ => false,
-    }
+    // Devices take anything any number of times.
+    let is_device = a.metadata().is_ok_and(|found| !found.is_file());
+    let destinations = (hicp_io::destination(a), hicp_io::destination(b));
+    !is_device && matches!(destinations, (Ok(a), Ok(b)) if a == b)
 }

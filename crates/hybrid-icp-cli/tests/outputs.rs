@@ -353,3 +353,22 @@ fn rows_that_are_left_out_are_not_lost_in_place() {
     assert_eq!(rows.len(), 10);
     assert_ne!(std::fs::read(world.path("in.csv")).unwrap(), before);
 }
+
+/// Links to a file that is still to be made lead to that file.
+#[test]
+fn outputs_that_meet_behind_links_are_refused() {
+    let mut scene = Scene::new().with("--trace", "target.json");
+    std::fs::create_dir(scene.path("below")).unwrap();
+    symlink("target.json", scene.path("link")).unwrap();
+    symlink("../link", scene.path("below/link")).unwrap();
+    for output in ["link", "below/link", "below/../link"] {
+        scene = scene.with("--output", output);
+        let told = scene.run().exits(1);
+        let both = "--trace and --output both name target.json, expected different files";
+        assert_eq!(told.complains(&[both]).out, "");
+        assert!(!scene.path("target.json").exists());
+    }
+    // A link to another file is another file.
+    symlink("other.json", scene.path("third")).unwrap();
+    scene.with("--output", "third").run().exits(0);
+}
