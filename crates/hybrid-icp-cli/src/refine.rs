@@ -164,8 +164,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
     let mut refiner = pipeline.refiner();
-    let header = || trace_lines::header(inputs, depth_scale, &pipeline);
-    let mut trace = TraceLines::new(arguments.trace.as_ref().map(|_| header()));
+    let header = match &arguments.trace {
+        Some(_) => Some(trace_lines::header(inputs, depth_scale, &pipeline)?),
+        None => None,
+    };
+    let mut trace = TraceLines::new(header);
     let start = Instant::now();
     let observation = inputs.observe(depth, mask, camera)?;
     let refined = refiner.refine_observed(&model, &observation, &init, &mut trace);
@@ -213,6 +216,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn check_outputs(arguments: &Arguments) -> anyhow::Result<()> {
+    if arguments.trace.is_some() {
+        trace_lines::check_paths(&arguments.inputs)?;
+    }
     let outputs: Vec<_> = [
         ("--output", &arguments.output),
         ("--overlay", &arguments.overlay),

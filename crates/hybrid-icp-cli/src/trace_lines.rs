@@ -1,7 +1,9 @@
 //! A trace of every iteration, one JSON object per line.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 
+use anyhow::anyhow;
 use hybrid_icp::{Isometry3, IterationEvent, Observer, RegimeEvent, StageEvent, Trace};
 use serde_json::{Value, json};
 
@@ -33,7 +35,7 @@ impl TraceLines {
     }
 
     /// Writes the lines.
-    pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), hicp_io::IoError> {
         hicp_io::write_atomically(path, |file| {
             self.lines()
                 .iter()
@@ -47,7 +49,13 @@ impl TraceLines {
 }
 
 /// The first line of a trace: everything that the others follow from.
-pub(crate) fn header(inputs: &Inputs, depth_scale: f64, pipeline: &Pipeline) -> Value {
+///
+/// Paths that are no text cannot stand there: fails as [`check_paths`] does.
+pub(crate) fn header(
+    inputs: &Inputs,
+    depth_scale: f64,
+    pipeline: &Pipeline,
+) -> anyhow::Result<Value> {
     let mut line = json!({
         "event": "start",
         "version": env!("CARGO_PKG_VERSION"),
@@ -58,9 +66,24 @@ pub(crate) fn header(inputs: &Inputs, depth_scale: f64, pipeline: &Pipeline) -> 
         "depth_scale": depth_scale,
     });
     for (option, path) in inputs.files() {
-        line[option.trim_start_matches('-')] = json!(path);
+        line[option.trim_start_matches('-')] = json!(text_of(option, path)?);
     }
-    line
+    Ok(line)
+}
+
+/// Checks that a trace can name the files: JSON is text, and a path on Unix need not be.
+pub(crate) fn check_paths(inputs: &Inputs) -> anyhow::Result<()> {
+    let mut files = inputs.files().into_iter();
+    files.try_for_each(|(option, path)| text_of(option, path).map(|_| ()))
+}
+
+fn text_of<'a>(option: &str, path: &'a Path) -> anyhow::Result<&'a str> {
+    path.to_str().ok_or_else(|| {
+        anyhow!(
+            "{option} names {}, which is not UTF-8: --trace cannot name it, expected another name or no --trace",
+            path.display()
+        )
+    })
 }
 
 fn with_pose(mut line: Value, pose: &Isometry3<f64>) -> Value {

@@ -467,6 +467,19 @@ fn names_that_are_not_utf_8_are_names() {
         .with("--overlay", name(b"\xfd.png"));
     scene.run().exits(0);
     assert!(scene.folder.path().join(name(b"o\xfe.json")).is_file());
+    // Only a trace has to name its inputs as text; its own name does not matter.
+    let scene = scene.with("--trace", "trace.jsonl");
+    let told = scene.run().exits(1);
+    assert_eq!(told.out, "");
+    told.complains(&["--model names m\u{fffd}.ply", "not UTF-8", "--trace"]);
+    assert!(!scene.path("trace.jsonl").exists());
+    let odd = scene.folder.path().join(name(b"m\xff.ply"));
+    std::fs::copy(odd, scene.path("mesh.ply")).unwrap();
+    let scene = scene
+        .with("--model", "mesh.ply")
+        .with("--trace", name(b"t\xfc.jsonl"));
+    scene.run().exits(0);
+    let scene = scene.without("--trace");
     scene
         .with("--init", name(b"no\xff.json"))
         .run()
