@@ -177,18 +177,22 @@ impl Header {
             .unwrap_or((announced, property))
     }
 
-    /// What to say of a mesh of no triangles.
-    /// Refuses a file of other elements; their names are case-sensitive.
+    /// What to say of a file without an element `vertex`; the names of elements are case-sensitive.
     pub(super) fn without_vertices(&self, path: &Path) -> IoError {
+        self.of_elements(path, "an element `vertex`")
+    }
+
+    fn of_elements(&self, path: &Path, expected: &'static str) -> IoError {
         let names: Vec<&String> = self.ply.elements.keys().collect();
         IoError::Unsupported {
             path: path.to_owned(),
             place: Place::Line(self.lines),
             found: format!("the elements {names:?}"),
-            expected: "an element `vertex`",
+            expected,
         }
     }
 
+    /// What to say of a mesh of no triangles.
     pub(super) fn without_triangles(&self, path: &Path) -> IoError {
         match self.count_of("face") {
             (place, 0) if self.ply.elements.contains_key("face") => IoError::at(
@@ -197,15 +201,10 @@ impl Header {
                 "element face 0",
                 "a face of three corners or more: vertices alone are a point cloud, no mesh",
             ),
-            (_, 0) => {
-                let names: Vec<&String> = self.ply.elements.keys().collect();
-                IoError::Unsupported {
-                    path: path.to_owned(),
-                    place: Place::Line(self.lines),
-                    found: format!("the elements {names:?}"),
-                    expected: "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh",
-                }
-            }
+            (_, 0) => self.of_elements(
+                path,
+                "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh",
+            ),
             (place, count) => IoError::at(
                 path,
                 place,
