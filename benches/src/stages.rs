@@ -2,15 +2,16 @@
 
 use hybrid_icp::{
     BoxedStage, DataAssociation, ErrorMetric, Generalized, Icp, IterationLimit, MaxDistance,
-    Motion, PointToPlane, PointToPoint, Projective, Stride, VisibleSurface, WarmNearestNeighbor,
+    PointToPlane, PointToPoint, Projective, SmallMotion, Stride, VisibleSurface,
+    WarmNearestNeighbor,
 };
 
 /// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
 pub const GATE_METERS: f32 = 0.03;
 
 /// When a stage ends: the next increment is below 0.1 mm and 0.01°, or after 100 evaluations.
-pub const STOP: (Motion, IterationLimit) = (
-    Motion {
+pub const STOP: (SmallMotion, IterationLimit) = (
+    SmallMotion {
         translation_meters: 1e-4,
         rotation_degrees: 0.01,
     },

@@ -3,8 +3,8 @@
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hybrid_icp::{
     BoundaryTargets, Context, Correspondences, DataAssociation, ErrorMetric, Icp, IterationLimit,
-    Motion, Observation, OutlierFilter, Pair, PinholeCamera, PointSelection, Problem, Rasterizer,
-    Repeat, Session, Stage, Surfel, Vector6, Workspace, sandwich_covariance, se3,
+    Observation, OutlierFilter, Pair, PinholeCamera, PointSelection, Problem, Rasterizer, Repeat,
+    Session, SmallMotion, Stage, Surfel, Vector6, Workspace, sandwich_covariance, se3,
 };
 
 use crate::render;
@@ -85,7 +85,7 @@ where
         filter: filter.iter().copied().collect::<Vec<_>>(),
         metric: metric.clone(),
         stop: (
-            Motion {
+            SmallMotion {
                 translation_meters: 1e-6,
                 rotation_degrees: 1e-4,
             },

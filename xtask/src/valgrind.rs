@@ -11,7 +11,13 @@ use crate::{Findings, process};
 const TESTS: [(&[&str], &str); 2] = [
     (&["--package", "hicp-core", "--lib"], "vectorized"),
     (
-        &["--package", "hicp-tests", "--test", "fuzz_regressions"],
+        &[
+            "--package",
+            "hicp-tests",
+            "--test",
+            "it",
+            "fuzz_regressions",
+        ],
         "every_target_holds_on_its_seeds",
     ),
 ];

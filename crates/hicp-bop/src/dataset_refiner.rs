@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict, doubts};
+use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict, warnings};
 
-use crate::fate::Fate;
-use crate::frame::Frame;
+use crate::bop_image::BopImage;
 use crate::frames::FrameKey;
 use crate::mask_source::MaskSource;
 use crate::models::Models;
 use crate::result::{FrameResult, RowResult};
+use crate::row_status::RowStatus;
 use crate::scenes::Scenes;
 
 /// What all images of a dataset share: its models, its scenes, and where masks come from. Threads may share it, each with a
@@ -30,7 +30,7 @@ impl DatasetRefiner {
     /// Refines the rows of one image: `indices` are their places in `rows`, ascending ([`crate::frames_of`]).
     ///
     /// The rows of an object compete for its masks ([`crate::assign_masks`]); without segmentation each has its own
-    /// ([`crate::BoxMask`]). Never fails: a row that cannot be refined has a [`Fate`] that says why, and what is missing or
+    /// ([`crate::BoxMask`]). Never fails: a row that cannot be refined has a [`RowStatus`] that says why, and what is missing or
     /// damaged is in the faults. But for the time, the result depends on the arguments alone. Memory: the image, the masks of
     /// the objects that its rows name, and an observation per mask that is used.
     pub fn frame(
@@ -43,8 +43,8 @@ impl DatasetRefiner {
         let image = match self.scenes.read(key) {
             Ok(image) => image,
             Err(fault) => {
-                let fate = Fate::from(&fault);
-                let unrefined = indices.iter().map(|i| RowResult::unrefined(*i, fate));
+                let status = RowStatus::from(&fault);
+                let unrefined = indices.iter().map(|i| RowResult::unrefined(*i, status));
                 return FrameResult {
                     rows: unrefined.collect(),
                     faults: vec![fault],
@@ -66,9 +66,9 @@ impl DatasetRefiner {
         for (obj_id, of_object) in by_object {
             match (self.models.by_id.get(&obj_id), &self.masks) {
                 (None, _) if self.models.broken.contains_key(&obj_id) => {
-                    work.leave(&of_object, Fate::Damaged);
+                    work.leave(&of_object, RowStatus::Damaged);
                 }
-                (None, _) => work.leave(&of_object, Fate::MissingModel),
+                (None, _) => work.leave(&of_object, RowStatus::MissingModel),
                 (Some(model), MaskSource::Box(by)) => {
                     for (index, init) in of_object {
                         let start = Instant::now();
@@ -78,7 +78,7 @@ impl DatasetRefiner {
                                 let row = refine(work.refiner, model, &observed, (index, &init));
                                 work.done(start, row);
                             }
-                            Err(fate) => work.leave(&[(index, init)], fate),
+                            Err(status) => work.leave(&[(index, init)], status),
                         }
                     }
                 }
@@ -94,7 +94,7 @@ impl DatasetRefiner {
 
 /// An image at work.
 struct Work<'a, 'r> {
-    frame: Frame<'a>,
+    frame: BopImage<'a>,
     refiner: &'r mut Refiner,
     result: FrameResult,
 }
@@ -110,15 +110,15 @@ impl Work<'_, '_> {
             match mask.and_then(|mask| self.frame.observation(mask)) {
                 Ok(observation) => {
                     if !std::mem::replace(&mut looked, true) {
-                        let doubts = doubts(model, observation, init).into_iter();
-                        self.result.doubts.extend(doubts.map(|d| (obj_id, d)));
+                        let warnings = warnings(model, observation, init).into_iter();
+                        self.result.warnings.extend(warnings.map(|d| (obj_id, d)));
                     }
                     let row = refine(self.refiner, model, observation, (*index, init));
                     self.done(start, row);
                     // The choice is counted once, with the first row that it is for.
                     start = Instant::now();
                 }
-                Err(fate) => self.leave(&[(*index, *init)], fate),
+                Err(status) => self.leave(&[(*index, *init)], status),
             }
         }
     }
@@ -128,10 +128,10 @@ impl Work<'_, '_> {
         self.result.rows.push(row);
     }
 
-    fn leave(&mut self, rows: &[(usize, Isometry3<f64>)], fate: Fate) {
+    fn leave(&mut self, rows: &[(usize, Isometry3<f64>)], status: RowStatus) {
         let left = rows
             .iter()
-            .map(|(index, _)| RowResult::unrefined(*index, fate));
+            .map(|(index, _)| RowResult::unrefined(*index, status));
         self.result.rows.extend(left);
     }
 }
@@ -145,15 +145,15 @@ fn refine(
 ) -> RowResult {
     let refinement = refiner.refine(model, observation, init);
     let outcome = &refinement.outcome;
-    let (fate, pose) = match outcome.verdict {
-        Verdict::Refined => (Fate::Refined, Some(outcome.camera_from_object)),
-        Verdict::KeptInitial(reason) => (Fate::Kept(reason), None),
+    let (status, pose) = match outcome.verdict {
+        Verdict::Refined => (RowStatus::Refined, Some(outcome.camera_from_object)),
+        Verdict::KeptInitial(reason) => (RowStatus::Kept(reason), None),
     };
     RowResult {
         index,
-        fate,
+        status,
         pose,
         mve: Some((refinement.mve_initial, refinement.mve)),
-        relief: refinement.relief,
+        flatness: refinement.flatness,
     }
 }

@@ -29,39 +29,35 @@
 //! ```
 //!
 //! Nothing here starts threads, prints or writes. What is missing or damaged costs the rows that need it and is told in the
-//! result ([`Fate`], [`Fault`]).
-//!
-//! Modules in reading order, by file: `dataset_refiner` (the refinement of an image's rows), `result`, `fate`, `fault` (what
-//! comes of them), `frames`, `best_rows`, `shard` (which rows), `models`, `scenes` (what is read), `mask_source`, `frame`,
-//! `assignment`, `box_mask` (in which mask).
+//! result ([`RowStatus`], [`Fault`]).
 
 // Counts of pixels become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
 mod assignment;
 mod best_rows;
+mod bop_image;
 mod box_mask;
 mod dataset_refiner;
-mod fate;
 mod fault;
-mod frame;
 mod frames;
 mod mask_source;
 mod models;
 mod result;
+mod row_status;
 mod scenes;
 mod shard;
 
 pub use assignment::assign_masks;
 pub use best_rows::best_rows;
+pub use bop_image::BopImage;
 pub use box_mask::BoxMask;
 pub use dataset_refiner::DatasetRefiner;
-pub use fate::Fate;
 pub use fault::{Fault, FaultKind, chain};
-pub use frame::Frame;
 pub use frames::{FrameKey, FrameRows, Targets, detections_by_frame, frames_of};
 pub use mask_source::MaskSource;
 pub use models::{ModelFolder, Models};
 pub use result::{FrameResult, Rescore, RowResult};
+pub use row_status::RowStatus;
 pub use scenes::{Image, Scenes};
 pub use shard::{Part, Shard};

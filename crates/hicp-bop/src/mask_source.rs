@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use hicp_io::bop::Detection;
 
+use crate::bop_image::BopImage;
 use crate::box_mask::BoxMask;
-use crate::frame::Frame;
 use crate::frames::{FrameKey, detections_by_frame};
 use crate::scenes::Image;
 
@@ -30,14 +30,14 @@ impl MaskSource {
 
     /// Finds the masks of an image.
     #[must_use]
-    pub fn frame(&self, key: FrameKey, image: Image) -> Frame<'_> {
+    pub fn frame(&self, key: FrameKey, image: Image) -> BopImage<'_> {
         match self {
-            Self::Visible => Frame::with_visible_masks(image),
+            Self::Visible => BopImage::with_visible_masks(image),
             Self::Detections(by_frame) => {
                 let of_frame = by_frame.get(&key).map_or(&[][..], Vec::as_slice);
-                Frame::with_detections(image, of_frame)
+                BopImage::with_detections(image, of_frame)
             }
-            Self::Box(_) => Frame::without_masks(image),
+            Self::Box(_) => BopImage::without_masks(image),
         }
     }
 }

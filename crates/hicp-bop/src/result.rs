@@ -1,10 +1,10 @@
 //! What a refinement of rows returns, and how it is entered into the file's rows.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Doubt, Isometry3, Relief, doubts_of_result};
+use hybrid_icp::{Flatness, Isometry3, Warning, warnings_of_result};
 
-use crate::fate::Fate;
 use crate::fault::Fault;
+use crate::row_status::RowStatus;
 
 /// What became of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,34 +12,34 @@ pub struct RowResult {
     /// Its place among the rows that were given.
     pub index: usize,
     /// What became of it.
-    pub fate: Fate,
+    pub status: RowStatus,
     /// `camera_from_object`, metres, where it is another than the row's.
     pub pose: Option<Isometry3<f64>>,
     /// MVE of the row's pose and of the result's; `None` if it did not get as far as the pipeline.
     pub mve: Option<(f64, f64)>,
-    /// How flat the surfaces are at the result's pose ([`hybrid_icp::Refinement::relief`]).
-    pub relief: Option<Relief>,
+    /// How flat the surfaces are at the result's pose ([`hybrid_icp::Refinement::flatness`]).
+    pub flatness: Option<Flatness>,
 }
 
 impl RowResult {
-    /// Returns why the pose is not to be trusted ([`hybrid_icp::doubts_of_result`]); nothing where no score says so, or there is none.
+    /// Returns why the pose is not to be trusted ([`hybrid_icp::warnings_of_result`]); nothing where no score says so, or there is none.
     #[must_use]
-    pub fn doubts(&self) -> Vec<Doubt> {
+    pub fn warnings(&self) -> Vec<Warning> {
         match self.mve {
-            Some((before, after)) => doubts_of_result(before, after, self.relief),
+            Some((before, after)) => warnings_of_result(before, after, self.flatness),
             None => Vec::new(),
         }
     }
 
     /// A row that did not get as far as the pipeline.
     #[must_use]
-    pub fn unrefined(index: usize, fate: Fate) -> Self {
+    pub fn unrefined(index: usize, status: RowStatus) -> Self {
         Self {
             index,
-            fate,
+            status,
             pose: None,
             mve: None,
-            relief: None,
+            flatness: None,
         }
     }
 }
@@ -53,8 +53,8 @@ pub struct FrameResult {
     pub seconds: Option<f64>,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
-    /// What looks wrong about the inputs ([`hybrid_icp::doubts`]), by object: of the first row of each that got as far as a mask.
-    pub doubts: Vec<(u32, Doubt)>,
+    /// What looks wrong about the inputs ([`hybrid_icp::warnings`]), by object: of the first row of each that got as far as a mask.
+    pub warnings: Vec<(u32, Warning)>,
 }
 
 /// What becomes the score of a row.

@@ -152,12 +152,12 @@ impl FromIterator<Pair> for Correspondences {
 
 /// A rigid motion in `f32`, for moving many surfels.
 #[derive(Clone, Copy, Debug)]
-pub struct Mover {
+pub struct RigidTransform {
     rotation: Matrix3<f32>,
     translation: Vector3<f32>,
 }
 
-impl Mover {
+impl RigidTransform {
     /// Prepares a pose.
     #[must_use]
     pub fn new(pose: &Isometry3<f64>) -> Self {
@@ -178,7 +178,7 @@ impl Mover {
         Point3::from(self.rotation * point.coords + self.translation)
     }
 
-    /// Returns many moved points, given and returned as `[x, y, z]` of each; the bits of [`Mover::point`].
+    /// Returns many moved points, given and returned as `[x, y, z]` of each; the bits of [`RigidTransform::point`].
     #[must_use]
     #[inline(always)]
     pub fn points<const N: usize>(&self, points: &[[f32; N]; 3]) -> [[f32; N]; 3] {
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn many_move_as_one_does() {
-        let mover = Mover::new(&Isometry3::new(
+        let mover = RigidTransform::new(&Isometry3::new(
             Vector3::new(0.1, -0.2, 0.7),
             Vector3::new(1.3, -0.4, 0.9),
         ));

@@ -20,9 +20,6 @@
 //! assert_eq!(observation.n_surfels(), 64 * 48);
 //! # Ok(()) }
 //! ```
-//!
-//! Modules in reading order, by file: `so3`, `rotation_grid`, `se3` (rigid motions), `camera`, `image`, `region`, `surfel`, `observation` and
-//! its `normals`, `mesh`, `sampling`, `symmetry`, `model`, `derived` (shared caches), `render`, `problem`, `correspondences`, `vectorized` (loops for AVX2), `error`.
 
 // Counts and pixel coordinates become floating point numbers all over this crate; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
@@ -54,7 +51,7 @@ mod vectorized;
 mod work;
 
 pub use camera::{MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters};
-pub use correspondences::{Correspondences, Mover, Pair};
+pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
 pub use diameter::diameter;
 pub use error::{CameraError, ImageError, MeshError, RotationError, SymmetryError};

@@ -1,7 +1,7 @@
 //! What the presets that go beyond the paper aim at, held against a study.
 
 use crate::analysis::{Analysis, FAULTY_MASK, Interval, Metric};
-use crate::claims::{Claim, Verdict, all_negative, plain, signed};
+use crate::claims::{Claim, ClaimVerdict, all_negative, plain, signed};
 
 /// What `local` may have of the mean VSD of `hybrid`, and how much longer it may take.
 const LOCAL: (f64, f64) = (0.6, 1.2);
@@ -180,7 +180,7 @@ impl Judge<'_> {
     }
 }
 
-fn claim(text: String, verdict: Verdict, figures: String) -> Claim {
+fn claim(text: String, verdict: ClaimVerdict, figures: String) -> Claim {
     Claim {
         section: "aim",
         text,

@@ -6,7 +6,7 @@ use crate::experiment::Experiment;
 
 /// Whether a claim holds in a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum ClaimVerdict {
     /// It holds, and the intervals exclude the opposite.
     Holds,
     /// It does not, and the intervals exclude that it does.
@@ -15,7 +15,7 @@ pub enum Verdict {
     NotSignificant,
 }
 
-impl Verdict {
+impl ClaimVerdict {
     /// In words.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -35,7 +35,7 @@ pub struct Claim {
     /// In words, with what was tested.
     pub text: String,
     /// What became of it.
-    pub verdict: Verdict,
+    pub verdict: ClaimVerdict,
     /// The figures that decided.
     pub figures: String,
 }
@@ -104,14 +104,14 @@ pub fn claims(analysis: &Analysis) -> Vec<Claim> {
 }
 
 /// The verdict on "all of these are negative".
-pub(crate) fn all_negative(contrasts: impl IntoIterator<Item = Interval>) -> Verdict {
-    let mut verdict = Verdict::Holds;
+pub(crate) fn all_negative(contrasts: impl IntoIterator<Item = Interval>) -> ClaimVerdict {
+    let mut verdict = ClaimVerdict::Holds;
     for contrast in contrasts {
         if contrast.low > 0.0 {
-            return Verdict::DoesNotHold;
+            return ClaimVerdict::DoesNotHold;
         }
         if contrast.high >= 0.0 {
-            verdict = Verdict::NotSignificant;
+            verdict = ClaimVerdict::NotSignificant;
         }
     }
     verdict
@@ -174,7 +174,7 @@ impl Tester<'_> {
         group: usize,
         a: usize,
         others: &[usize],
-    ) -> Option<(Verdict, String)> {
+    ) -> Option<(ClaimVerdict, String)> {
         let mut differences: Vec<(usize, Interval)> = others
             .iter()
             .filter_map(|b| Some((*b, self.difference(Metric::Vsd, group, a, *b)?)))
@@ -245,9 +245,9 @@ impl Tester<'_> {
                 "hybrid is the lowest, or within the interval of the lowest, at every step of {along}"
             ),
             verdict: if behind.is_empty() {
-                Verdict::Holds
+                ClaimVerdict::Holds
             } else {
-                Verdict::DoesNotHold
+                ClaimVerdict::DoesNotHold
             },
             figures: format!(
                 "lowest at {first} of {}{}{}",
@@ -356,11 +356,11 @@ impl Tester<'_> {
             return None;
         }
         let verdict = if differences.iter().any(|(_, i)| i.high < 0.0) {
-            Verdict::DoesNotHold
+            ClaimVerdict::DoesNotHold
         } else if differences.iter().all(|(_, i)| i.estimate >= 0.0) {
-            Verdict::Holds
+            ClaimVerdict::Holds
         } else {
-            Verdict::NotSignificant
+            ClaimVerdict::NotSignificant
         };
         let figures = differences
             .iter()
@@ -524,9 +524,9 @@ impl Tester<'_> {
             section: "§IV-A",
             text: "α = 0.4 is not significantly worse than the best threshold".to_owned(),
             verdict: if loss.low <= 0.0 {
-                Verdict::Holds
+                ClaimVerdict::Holds
             } else {
-                Verdict::DoesNotHold
+                ClaimVerdict::DoesNotHold
             },
             figures: format!(
                 "the minimum, {}, is at α = {}; at 0.4 {}, that is {} more; not distinguishable from the minimum: {}",

@@ -27,12 +27,6 @@
 //! report.write(folder.path())?; // report.html, figure.svg, summary.csv, …
 //! # Ok(()) }
 //! ```
-//!
-//! Modules in reading order: `experiment` (which studies, which conditions), `subject` and `variant` (objects and pipelines), `config`
-//! (all of it, as stored), `runner` (the rows of one case), `row`, `study` (running, resuming, reading), `analysis` (means, intervals,
-//! differences), `claims` (the paper's, tested), `aims` (of what goes beyond it), `figure`, `html`, `tables`, `report`; `sequential` (the study of trajectories:
-//! [`run_trajectories`], [`TrajectoryReport`]), `streaming` (rows into files), `stored` (files
-//! on their way back in, checked), and `clock`, `error`.
 
 // Counts and indices of rows become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
@@ -61,7 +55,7 @@ pub use analysis::{
     ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, FAULTY_MASK, Group, HIGH, Interval, LOW, Metric,
     NOISY, NOISY_DEPTH, NOISY_MODEL, REPLICATES, WORSE_VSD, never_seen,
 };
-pub use claims::{Claim, TABLE_I, Verdict, claims};
+pub use claims::{Claim, ClaimVerdict, TABLE_I, claims};
 pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};
 pub use error::ExperimentError;
 pub use experiment::{Condition, Experiment, MaskFault};

@@ -28,10 +28,6 @@
 //!
 //! Conventions: `camera_from_object`; twists ξ = [ρ; φ], translation first, metres and radians; covariances are those of left
 //! perturbations T = exp(ξ^) T̄, in the camera frame.
-//!
-//! Modules in reading order, by file: `estimate` (a pose with its covariance), `motion` (of the camera), `fusion` (the algorithm),
-//! `fuser` (trait), `config`, `single`, `batch`, `recursive` (the six methods), `method` (by name), `gate`, `symmetry_aware`, `shared_error`,
-//! `unit` and `covariance` (where covariances come from), `tails` (what they say of errors), `error`.
 
 mod batch;
 mod config;

@@ -25,10 +25,6 @@
 //! assert_eq!(hicp_io::pose_to_bop(&camera_from_object).1, [0.0, 0.0, 800.0]);
 //! # Ok(()) }
 //! ```
-//!
-//! Modules in reading order: `error` (what can go wrong), `limits` (how much is read), `source` (whole files into memory, within limits), `atomic` and `atomic_folder`
-//! (writing), `unit`, `mesh` (OBJ, OFF, PLY, STL), `point_cloud`, `image` (PNG), `json` (values with their key path),
-//! `pose`, `camera`, and [`bop`] (datasets, detections, results).
 
 mod error;
 

@@ -42,55 +42,17 @@
 //!
 //! **What the pairs determine** is read from [`ErrorMetric::system`]: [`NormalEquations::observability`],
 //! [`NormalEquations::information`] and [`NormalEquations::covariance`].
-//!
-//! Modules in reading order: `metric` (trait); `point_to_point`, `point_to_plane`, `plane_to_point`, `symmetric`, `generalized`,
-//! `weighted_sum`; `normal_equations` over `row_sums`, `row_blocks`, `point_blocks`, `pair_block` and `moments`, and what they are asked: `degeneracy` (solving), `freedom` (held components),
-//! `observability`, `covariance`; the decorators `kernel` and `robust`, `pose_prior`, `conditioned`, `frozen`, `moved` with
-//! `gauss_newton` and `levenberg_marquardt`, `metric_schedule`.
 
-mod conditioned;
-mod covariance;
-mod degeneracy;
-mod freedom;
-mod frozen;
-mod gauss_newton;
-mod generalized;
-mod kernel;
-mod levenberg_marquardt;
+mod decorator;
 mod metric;
-mod metric_schedule;
-mod moments;
-mod moved;
-mod normal_equations;
-mod observability;
-mod pair_block;
-mod plane_to_point;
-mod point_blocks;
-mod point_to_plane;
-mod point_to_point;
-mod pose_prior;
-mod robust;
-mod row_blocks;
-mod row_sums;
-mod symmetric;
-mod weighted_sum;
+mod system;
 
-pub use conditioned::Conditioned;
-pub use covariance::sandwich_covariance;
-pub use degeneracy::Degeneracy;
-pub use frozen::{Frame, Frozen};
-pub use gauss_newton::GaussNewton;
-pub use generalized::Generalized;
-pub use kernel::Kernel;
-pub use levenberg_marquardt::LevenbergMarquardt;
-pub use metric::{ErrorMetric, Step};
-pub use metric_schedule::MetricSchedule;
-pub use normal_equations::NormalEquations;
-pub use observability::Observability;
-pub use plane_to_point::PlaneToPoint;
-pub use point_to_plane::PointToPlane;
-pub use point_to_point::PointToPoint;
-pub use pose_prior::{PosePrior, Prior};
-pub use robust::{Robust, Scale};
-pub use symmetric::Symmetric;
-pub use weighted_sum::WeightedSum;
+pub use decorator::{
+    Conditioned, Frame, Frozen, GaussNewton, Kernel, LevenbergMarquardt, MetricSchedule, PosePrior,
+    Prior, Robust, Scale,
+};
+pub use metric::{
+    ErrorMetric, Generalized, PlaneToPoint, PointToPlane, PointToPoint, Step, Symmetric,
+    WeightedSum,
+};
+pub use system::{Degeneracy, NormalEquations, Observability, sandwich_covariance};

@@ -47,12 +47,6 @@
 //! assert!(view.region().area() < 250 * 250); // only what the triangle can cover
 //! # Ok(()) }
 //! ```
-//!
-//! # Modules, in reading order
-//!
-//! `rasterizer` (the triangle loop), `projection` (vertices to pixels), `region` (what a mesh can cover), `fixed` (the
-//! sub-pixel grid), `edge` (exact coverage), `clip` (near plane and guard band), `fill` (depth of covered pixels),
-//! `image` (a whole image in one call).
 
 mod clip;
 mod edge;

@@ -16,9 +16,6 @@
 //! assert_eq!(errors[2], 0.0); // … and right at 15 mm.
 //! # Ok(()) }
 //! ```
-//!
-//! Modules in reading order: `score` (trait), `mean_vsd`, `sampled_mve`, `relief`, `vsd`, `tolerances`, `bop_vsd`, `pose_error`, `model_points`,
-//! `recall`, `calibration`, `error`.
 
 // Counts become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
@@ -27,12 +24,12 @@ mod agreement;
 mod bop_vsd;
 mod calibration;
 mod error;
+mod flatness;
 mod mean_vsd;
 mod model_points;
 mod nearest;
 mod pose_error;
 mod recall;
-mod relief;
 mod sampled_mve;
 mod score;
 mod tolerances;
@@ -41,13 +38,13 @@ mod vsd;
 pub use bop_vsd::{bop_vsd, spheres_overlap};
 pub use calibration::{Judgement, ReliabilityBin, reliability, roc_area};
 pub use error::ScoreError;
+pub use flatness::Flatness;
 pub use mean_vsd::{MeanVsd, VISIBILITY_TOLERANCE_METERS};
 pub use model_points::ModelPoints;
 pub use pose_error::{add, adi, mspd, mssd};
 pub use recall::{
     N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates,
 };
-pub use relief::Relief;
 pub use sampled_mve::SampledMve;
 pub use score::Score;
 pub use tolerances::{N_TOLERANCES, tolerances};

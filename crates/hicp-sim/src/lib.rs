@@ -14,11 +14,6 @@
 //! assert!((angle.to_degrees() - 9.5).abs() < 1e-9 && (distance - 0.0062).abs() < 1e-12);
 //! # Ok(()) }
 //! ```
-//!
-//! Modules in reading order: `household` (objects), `shapes`, `solid` and
-//! `profile` (what they are made of), `stream` (random numbers), `sampling` (poses, perturbations), `case`
-//! (one image and a start), `clutter` (many objects on a table), `noise`, `sensor`, `mask`, `corruption` (what makes an image imperfect), `tsdf`, `meshing`, `components`,
-//! `reconstruction` (noisy models), `error`.
 
 // Counts of profile points become floating point numbers.
 #![allow(clippy::cast_precision_loss)]

@@ -16,16 +16,14 @@
 //!     }
 //! }
 //! ```
-//!
-//! Modules in reading order: `switcher` (trait), `threshold`, `switch` (stages), `alternate`.
 
-mod alternate;
 mod switch;
+mod switch_until_stall;
 mod switcher;
 mod threshold;
 
-pub use alternate::Alternate;
 pub use hicp_icp::{Regime, RegimeEvent};
 pub use switch::{Switch, SwitchAmong};
+pub use switch_until_stall::SwitchUntilStall;
 pub use switcher::Switcher;
 pub use threshold::{PAPER_ALPHA, Threshold, Thresholds};

@@ -1,7 +1,8 @@
 //! The laws of data associations.
 
 use hybrid_icp::{
-    Correspondences, DataAssociation, Isometry3, Mover, Observation, Pair, Point3, Problem, Surfel,
+    Correspondences, DataAssociation, Isometry3, Observation, Pair, Point3, Problem,
+    RigidTransform, Surfel,
 };
 
 use crate::law::{BOXED, NAMED, PURE, Subject, bits};
@@ -113,7 +114,7 @@ fn contract(
     observation: &Observation,
     pairs: &Correspondences,
 ) {
-    let mover = Mover::new(pairs.camera_from_object());
+    let mover = RigidTransform::new(pairs.camera_from_object());
     for pair in pairs.as_slice() {
         let found = || format!("{pair:?}");
         subject.holds("pairs are finite", input, finite(pair), found);

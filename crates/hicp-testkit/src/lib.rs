@@ -45,15 +45,11 @@
 //! *A warm run makes no heap allocation.* Counting allocations takes a global allocator, which is the program's and not a
 //! library's to choose. In a test binary of its own, install one that counts per thread and passes every call on to
 //! `std::alloc::System`; refine twice with one `Refiner`, and compare the count before and after the second time.
-//! `tests/tests/allocations_custom.rs` in the repository is such a test, to be copied.
+//! `tests/tests/it/allocations_custom.rs` in the repository is such a test, to be copied.
 //!
 //! *Observers* have one law, that looking changes nothing, and it is the engine that keeps it.
 //!
-//! `tests/tests/custom_*.rs` in the repository show a component for every extension point, checked and in a whole pipeline.
-//!
-//! Modules in reading order: `law` (messages), `scenes` and `pairs` (inputs), then one per extension point: `selection`,
-//! `association`, `filter`, `metric`, `stop`, `score` (and switchers), `stage`,
-//! `fuser`, `renderer`.
+//! `tests/tests/it/custom_*.rs` in the repository show a component for every extension point, checked and in a whole pipeline.
 
 // A test kit reports by panicking, and its own scenes are valid by construction.
 #![allow(clippy::panic, clippy::expect_used)]

@@ -1,8 +1,8 @@
 //! The laws of error metrics.
 
 use hybrid_icp::{
-    Correspondences, ErrorMetric, Isometry3, Mover, NormalEquations, Pair, Step, Surfel, Vector3,
-    se3,
+    Correspondences, ErrorMetric, Isometry3, NormalEquations, Pair, RigidTransform, Step, Surfel,
+    Vector3, se3,
 };
 
 use crate::law::{BOXED, NAMED, PURE, Subject};
@@ -265,7 +265,7 @@ impl Check<'_> {
 
     /// The sources, and the targets too if asked, moved in the camera frame.
     fn moved(&self, motion: &Isometry3<f64>, targets: bool) -> Correspondences {
-        let mover = Mover::new(motion);
+        let mover = RigidTransform::new(motion);
         let mut set = Correspondences::new();
         let pose = motion * self.pairs.camera_from_object();
         set.begin(&pose, self.pairs.n_candidates());

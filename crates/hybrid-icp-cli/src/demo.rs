@@ -18,7 +18,7 @@ use crate::choice::PipelineArguments;
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report;
 use crate::terminal::{say, warn};
-use crate::{doubts, outputs};
+use crate::{outputs, warnings};
 
 /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
 ///
@@ -132,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     picture.outline(&mut refiner, &model, &observation, &pose, AFTER);
     picture.write(&arguments.picture)?;
 
-    let reason = doubts::reason(&refined, &model, &observation, &init);
+    let reason = warnings::reason(&refined, &model, &observation, &init);
     let _ = writeln!(text, "\n{}", report::trace_table(&trace.stages));
     let _ = writeln!(text, "{}", report::summary(&refined, &reason));
     let _ = writeln!(
@@ -143,6 +143,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "{text}{}: the model's outline before (orange) and after (blue)",
         arguments.picture.display()
     ))?;
-    doubts::about_result(&refined).iter().for_each(warn);
+    warnings::about_result(&refined).iter().for_each(warn);
     Ok(())
 }

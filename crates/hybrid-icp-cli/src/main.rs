@@ -6,7 +6,6 @@ mod bop;
 mod choice;
 mod contour;
 mod demo;
-mod doubts;
 mod experiment;
 mod inspect;
 mod interrupt;
@@ -22,6 +21,7 @@ mod sequential;
 mod terminal;
 mod text;
 mod trace_lines;
+mod warnings;
 
 use std::process::ExitCode;
 

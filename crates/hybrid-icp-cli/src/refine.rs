@@ -9,13 +9,13 @@ use hicp_io::{CameraFile, IoError, LengthUnit, PoseFile};
 use hybrid_icp::{DepthImage, Mask, Model, Observation, PinholeCamera};
 
 use crate::choice::PipelineArguments;
-use crate::doubts::{self, Names};
 use crate::limits::limits;
 use crate::outputs::{self, Named};
 use crate::overlay::{AFTER, BEFORE, Picture};
 use crate::report::{self, Report};
 use crate::terminal::{say, warn};
 use crate::trace_lines::{self, TraceLines};
+use crate::warnings::{self, Names};
 
 /// What a refinement reads.
 #[derive(Debug, Args)]
@@ -174,7 +174,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let refined = refiner.refine_observed(&model, &observation, &init, &mut trace);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
 
-    let reason = doubts::reason(&refined, &model, &observation, &init);
+    let reason = warnings::reason(&refined, &model, &observation, &init);
     let summary = report::summary(&refined, &reason);
     let names = Names {
         model: inputs.model.display(),
@@ -184,8 +184,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         mask: inputs.mask.display(),
         init: inputs.init.display(),
     };
-    let mut warnings = doubts::about_units(&model, &observation, &init, &names);
-    warnings.extend(doubts::about_result(&refined));
+    let mut warnings = warnings::about_units(&model, &observation, &init, &names);
+    warnings.extend(warnings::about_result(&refined));
     let report = Report::new(
         pipeline.name(),
         &init_file,

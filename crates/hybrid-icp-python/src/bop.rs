@@ -147,7 +147,7 @@ impl PyDatasetRefiner {
     /// -------
     /// lines : list of str
     ///     The refined rows in the order given, without line ends.
-    /// fates : list of str
+    /// statuses : list of str
     ///     What became of each.
     /// faults : list of str
     ///     Files that are damaged.
@@ -180,7 +180,11 @@ impl PyDatasetRefiner {
                 .filter(|fault| fault.kind == FaultKind::Damaged);
             Ok((
                 rows.iter().map(ToString::to_string).collect(),
-                result.rows.iter().map(|row| row.fate.to_string()).collect(),
+                result
+                    .rows
+                    .iter()
+                    .map(|row| row.status.to_string())
+                    .collect(),
                 damaged.map(|fault| fault.text.clone()).collect(),
             ))
         })

@@ -211,7 +211,7 @@ impl PyPipeline {
     ) -> PyResult<PyResultOf> {
         let init = array::motion(T_co, "T_co")?;
         let (model, observation) = (model.get(), observation.get());
-        doubt(py, model, observation, [&init].into_iter())?;
+        warning(py, model, observation, [&init].into_iter())?;
         let mut watch = Watch::new(observer)?;
         let mut refiner = self.take()?;
         let refinement = py.detach(|| {
@@ -264,7 +264,7 @@ impl PyPipeline {
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let (model, observation) = (model.get(), observation.get());
-        doubt(py, model, observation, inits.iter())?;
+        warning(py, model, observation, inits.iter())?;
         let poses: Vec<Isometry3<f64>> = inits.iter().map(|init| init.isometry).collect();
         let mut refiners = (0..threads.min(poses.len()))
             .map(|_| self.take())
@@ -360,7 +360,7 @@ impl PyPipeline {
 }
 
 /// Warns where no pose goes together with the image.
-fn doubt<'a>(
+fn warning<'a>(
     py: Python<'_>,
     model: &PyModel,
     observation: &PyObservation,

@@ -79,9 +79,9 @@ impl PyResultOf {
     /// Why the pose is not to be trusted, in words: it does not explain the image, got worse, was found where the initial pose explained
     /// nothing, or lies on a surface that is flat where the model is not. Empty where the scores say nothing against it.
     #[getter]
-    fn doubts(&self) -> Vec<String> {
-        let doubts = self.refinement.doubts();
-        doubts.iter().map(ToString::to_string).collect()
+    fn warnings(&self) -> Vec<String> {
+        let warnings = self.refinement.warnings();
+        warnings.iter().map(ToString::to_string).collect()
     }
 
     /// "refined", or "kept_initial" when the initial pose is returned.
@@ -178,7 +178,7 @@ impl PyResultOf {
         dict.set_item("T_co", list(Some(self.T_co(py)?))?)?;
         dict.set_item("mve", self.mve())?;
         dict.set_item("mve_initial", self.mve_initial())?;
-        dict.set_item("doubts", self.doubts())?;
+        dict.set_item("warnings", self.warnings())?;
         dict.set_item("outcome", self.outcome())?;
         dict.set_item("termination", self.termination())?;
         dict.set_item("iterations", self.iterations())?;

@@ -38,8 +38,8 @@ def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
     assert refiner.missing_models == [] and refiner.broken_models == {}
     lines = {}
     for _, _, indices, rows in reversed(images):
-        refined, fates, faults = refiner.refine(rows)
-        assert len(fates) == len(indices) and not faults
+        refined, statuses, faults = refiner.refine(rows)
+        assert len(statuses) == len(indices) and not faults
         lines.update(zip(indices, refined))
     bop.write_results(tmp_path / "out.csv", (lines[i] for i in sorted(lines)))
     assert (tmp_path / "out.csv").read_bytes() == expected
@@ -63,13 +63,13 @@ def test_a_killed_worker_changes_no_byte(dataset, ray, tmp_path):
     # All may be done before the first is told of.
     for _ in range(10):
         seen.clear()
-        fates = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
+        statuses = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
         assert (tmp_path / "out.csv").read_bytes() == expected
         if killed:
             break
     assert killed, "no worker was found to kill"
     assert (tmp_path / "out.csv").read_bytes() == expected
-    assert sum(fates.values()) == expected.count(b"\n") - 1 == seen[-1][0] == seen[-1][1]
+    assert sum(statuses.values()) == expected.count(b"\n") - 1 == seen[-1][0] == seen[-1][1]
     assert not (tmp_path / "out.csv.journal").exists()
 
 

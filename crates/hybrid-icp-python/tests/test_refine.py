@@ -23,7 +23,7 @@ def test_a_rough_pose_becomes_a_better_one(scene):
     assert result.mve < 0.01 and result.mve_initial > 0.3
     assert result.T_co.shape == (4, 4) and result.T_co.dtype == np.float64
     assert result.mve == hi.mve(scene.model, scene.observation, result.T_co)
-    assert result.doubts == []
+    assert result.warnings == []
 
 
 def test_poses_five_centimetres_off_come_within_half_a_millimetre_in_a_noisy_image(scene):
@@ -52,7 +52,7 @@ def test_a_pose_that_cannot_be_refined_is_given_back_as_it_was(scene):
     rough[0, 0] += 1e-9  # Orthogonal to its digits only.
     result = hi.Pipeline.preset("hybrid").refine(scene.model, empty, rough)
     assert (result.outcome, result.termination) == ("kept_initial", "no_pairs")
-    assert result.doubts == ["MVE 1.000: the pose does not explain the image, do not trust it"]
+    assert result.warnings == ["MVE 1.000: the pose does not explain the image, do not trust it"]
     assert np.array_equal(result.T_co, rough)
     assert result.covariance is None and result.mean_loss is None and result.n_pairs == 0
 

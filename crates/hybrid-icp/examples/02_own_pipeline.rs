@@ -6,7 +6,7 @@ use std::error::Error;
 
 use hybrid_icp::{
     AtResolution, Cascade, Divergence, Guard, Icp, IterationLimit, MaxDistance, MaxNormalAngle,
-    MeanVsd, Motion, Projective, Symmetric, VisibleSurface,
+    MeanVsd, Projective, SmallMotion, Symmetric, VisibleSurface,
 };
 
 mod scene;
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         metric: Symmetric,
         stop: (
             Divergence::count_aware(),
-            Motion::default(),
+            SmallMotion::default(),
             IterationLimit(50),
         ),
     };

@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use hybrid_icp::{
-    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit, Motion,
-    Mover, Pair, PointToPlane, Surfel, VisibleSurface,
+    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit, Pair,
+    PointToPlane, RigidTransform, SmallMotion, Surfel, VisibleSurface,
 };
 
 mod scene;
@@ -25,7 +25,7 @@ impl DataAssociation for SamePixelSameWay {
         pairs: &mut Correspondences,
     ) {
         let observation = context.problem.observation;
-        let mover = Mover::new(camera_from_object);
+        let mover = RigidTransform::new(camera_from_object);
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel); // In the camera frame now, as pairs are.
             let Some(pixel) = observation.camera().project(&source.point.cast()) else {
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         metric: PointToPlane,
         stop: (
             Divergence::count_aware(),
-            Motion::default(),
+            SmallMotion::default(),
             IterationLimit(50),
         ),
     })

@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use hybrid_icp::{
-    Divergence, ErrorMetric, Icp, IterationLimit, Motion, NormalEquations, Pair, PointToPlane,
-    Projective, Vector3, VisibleSurface, WeightedSum,
+    Divergence, ErrorMetric, Icp, IterationLimit, NormalEquations, Pair, PointToPlane, Projective,
+    SmallMotion, Vector3, VisibleSurface, WeightedSum,
 };
 
 mod scene;
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         },
         stop: (
             Divergence::count_aware(),
-            Motion::default(),
+            SmallMotion::default(),
             IterationLimit(50),
         ),
     })

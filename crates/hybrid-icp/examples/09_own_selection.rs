@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use hybrid_icp::{
-    Context, Divergence, Icp, Isometry3, IterationLimit, Motion, PointSelection, PointToPlane,
-    Projective, Surfel, VisibleSurface,
+    Context, Divergence, Icp, Isometry3, IterationLimit, PointSelection, PointToPlane, Projective,
+    SmallMotion, Surfel, VisibleSurface,
 };
 
 mod scene;
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         metric: PointToPlane,
         stop: (
             Divergence::count_aware(),
-            Motion::default(),
+            SmallMotion::default(),
             IterationLimit(50),
         ),
     })

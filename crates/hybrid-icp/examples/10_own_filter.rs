@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use hybrid_icp::{
-    Correspondences, Icp, IterationLimit, MaxNormalAngle, Motion, NearestNeighbor, OutlierFilter,
-    PointToPlane, Problem, VisibleSurface,
+    Correspondences, Icp, IterationLimit, MaxNormalAngle, NearestNeighbor, OutlierFilter,
+    PointToPlane, Problem, SmallMotion, VisibleSurface,
 };
 
 mod scene;
@@ -41,6 +41,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         association: NearestNeighbor::default(),
         filter: (narrowing, MaxNormalAngle::degrees(45.0)), // Filters chain.
         metric: PointToPlane,
-        stop: (Motion::default(), IterationLimit(50)),
+        stop: (SmallMotion::default(), IterationLimit(50)),
     })
 }

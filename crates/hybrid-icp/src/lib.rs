@@ -40,7 +40,6 @@
 //! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `calibration` (its uncertainty), `trace` (what ran).
 
 mod calibration;
-mod doubt;
 pub mod pipeline;
 mod preset;
 pub mod presets;
@@ -48,11 +47,9 @@ mod refiner;
 mod sequential;
 mod suggest;
 mod trace;
+mod warning;
 
 pub use calibration::Calibration;
-pub use doubt::{
-    Doubt, EXPLAINS_NOTHING, doubt_of_diameter, doubts, doubts_of_model, doubts_of_result,
-};
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
@@ -65,8 +62,8 @@ pub use hicp_association::{
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
     ImageError, Isometry3, MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Mask, Matrix3, Matrix6, MeshError,
-    MeshSurvey, Model, ModelConfig, Mover, NO_TRIANGLE, Observation, Pair, PinholeCamera,
-    PixelCenters, PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer,
+    MeshSurvey, Model, ModelConfig, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters,
+    PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer, RigidTransform,
     RotationError, Surfel, Symmetries, SymmetryAxis, SymmetryError, Translation3, TriMesh,
     UnitQuaternion, UnitVector3, Vector3, Vector6, Work, rotation_from_matrix, rotation_grid, se3,
     so3,
@@ -75,8 +72,8 @@ pub use hicp_fusion as fusion;
 pub use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
     Evaluation, Guard, HypothesisSearch, Icp, IterationEvent, IterationLimit, KeepBest, LossRule,
-    Motion, Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat,
-    Rotations, SearchOptions, Session, Stage, StageEvent, StopRule, Termination, TimeLimit,
+    Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Rotations,
+    SearchOptions, Session, SmallMotion, Stage, StageEvent, StopRule, Termination, TimeLimit,
     Verdict, Workspace,
 };
 pub use hicp_metric::{
@@ -87,19 +84,22 @@ pub use hicp_metric::{
 };
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
-    Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
-    ReliabilityBin, Relief, SampledMve, Score, ScoreError, TargetErrors,
-    VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances, most_visible, mspd, mssd,
-    reliability, roc_area, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
+    Flatness, Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
+    ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd,
+    add, adi, bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area,
+    spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
 };
 pub use hicp_switch::{
-    Alternate, PAPER_ALPHA, Switch, SwitchAmong, Switcher, Threshold, Thresholds,
+    PAPER_ALPHA, Switch, SwitchAmong, SwitchUntilStall, Switcher, Threshold, Thresholds,
 };
 pub use pipeline::{PipelineError, PipelineFile, PipelineLimits};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::{SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
+pub use warning::{
+    EXPLAINS_NOTHING, Warning, warning_of_diameter, warnings, warnings_of_model, warnings_of_result,
+};
 
 /// Compiles the README's examples.
 #[cfg(doctest)]

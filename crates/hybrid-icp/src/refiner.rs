@@ -3,10 +3,10 @@
 use hicp_core::{Isometry3, Model, Observation, Problem};
 use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
-use hicp_score::{MeanVsd, Relief, Score};
+use hicp_score::{Flatness, MeanVsd, Score};
 
-use crate::doubt::{Doubt, doubts_of_result};
 use crate::preset::{BoxedStage, Preset};
+use crate::warning::{Warning, warnings_of_result};
 
 /// What a refinement returns: a pose, how it came about, and how well it explains the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,18 +18,18 @@ pub struct Refinement {
     /// The mean VSD estimate of the returned pose.
     ///
     /// Above about 0.4 the pose is not to be trusted; above `mve_initial` the refinement made it worse; where `mve_initial` is 0.9 or more it
-    /// may be the pose of another object ([`Self::doubts`]).
+    /// may be the pose of another object ([`Self::warnings`]).
     pub mve: f64,
     /// How flat the measured and the rendered surface are at the returned pose: whether a plane would explain the depth better. `None` where
     /// fewer than 64 pixels show both.
-    pub relief: Option<Relief>,
+    pub flatness: Option<Flatness>,
 }
 
 impl Refinement {
-    /// Returns why the pose is not to be trusted ([`doubts_of_result`]); nothing where no score says so.
+    /// Returns why the pose is not to be trusted ([`warnings_of_result`]); nothing where no score says so.
     #[must_use]
-    pub fn doubts(&self) -> Vec<Doubt> {
-        doubts_of_result(self.mve_initial, self.mve, self.relief)
+    pub fn warnings(&self) -> Vec<Warning> {
+        warnings_of_result(self.mve_initial, self.mve, self.flatness)
     }
 }
 
@@ -116,7 +116,7 @@ impl Refiner {
             outcome,
             mve_initial,
             mve: self.mve(model, observation, pose),
-            relief: Relief::at(&mut self.workspace.context(&problem), pose),
+            flatness: Flatness::at(&mut self.workspace.context(&problem), pose),
         }
     }
 

@@ -4,7 +4,7 @@ use super::config::TrajectoryConfig;
 use super::rule::FusionRule;
 use super::study::variant;
 use crate::analysis::{Analysis, HIGH, Interval, LOW, Metric};
-use crate::claims::{Claim, Verdict};
+use crate::claims::{Claim, ClaimVerdict};
 
 /// The methods of the paper that make no use of uncertainty, with those that are the same but for it.
 const WEIGHTED: [(&str, &str); 2] = [
@@ -73,7 +73,7 @@ impl Tester<'_> {
         Some(mean.estimate)
     }
 
-    fn claim(&self, text: &str, verdict: Verdict, figures: Vec<String>) -> Claim {
+    fn claim(&self, text: &str, verdict: ClaimVerdict, figures: Vec<String>) -> Claim {
         Claim {
             section: SECTION,
             text: format!("{}: {text}", self.underlying),
@@ -103,9 +103,9 @@ impl Tester<'_> {
         Some(self.claim(
             "no method is clearly best (better than each other one, its interval excluding zero)",
             if clear {
-                Verdict::DoesNotHold
+                ClaimVerdict::DoesNotHold
             } else {
-                Verdict::Holds
+                ClaimVerdict::Holds
             },
             figures,
         ))
@@ -205,27 +205,27 @@ fn pipelines(
 }
 
 /// The verdict on all differences being below zero.
-fn below(differences: &[Interval]) -> Verdict {
+fn below(differences: &[Interval]) -> ClaimVerdict {
     if differences.iter().all(|i| i.high < 0.0) {
-        Verdict::Holds
+        ClaimVerdict::Holds
     } else if differences.iter().any(|i| i.low > 0.0) {
-        Verdict::DoesNotHold
+        ClaimVerdict::DoesNotHold
     } else {
-        Verdict::NotSignificant
+        ClaimVerdict::NotSignificant
     }
 }
 
 /// The verdict on no difference being above zero, with the figures.
-fn not_above(differences: &[(String, Interval)]) -> Option<(Verdict, Vec<String>)> {
+fn not_above(differences: &[(String, Interval)]) -> Option<(ClaimVerdict, Vec<String>)> {
     if differences.is_empty() {
         return None;
     }
     let verdict = if differences.iter().all(|(_, i)| i.high <= 0.0) {
-        Verdict::Holds
+        ClaimVerdict::Holds
     } else if differences.iter().any(|(_, i)| i.low > 0.0) {
-        Verdict::DoesNotHold
+        ClaimVerdict::DoesNotHold
     } else {
-        Verdict::NotSignificant
+        ClaimVerdict::NotSignificant
     };
     let figures = differences
         .iter()
@@ -248,19 +248,19 @@ mod tests {
             low: estimate - 0.1,
             high: estimate + 0.1,
         };
-        assert_eq!(below(&[at(-0.2), at(-0.3)]), Verdict::Holds);
-        assert_eq!(below(&[at(-0.2), at(0.05)]), Verdict::NotSignificant);
-        assert_eq!(below(&[at(-0.2), at(0.2)]), Verdict::DoesNotHold);
+        assert_eq!(below(&[at(-0.2), at(-0.3)]), ClaimVerdict::Holds);
+        assert_eq!(below(&[at(-0.2), at(0.05)]), ClaimVerdict::NotSignificant);
+        assert_eq!(below(&[at(-0.2), at(0.2)]), ClaimVerdict::DoesNotHold);
         let named = |x: f64| ("a".to_owned(), at(x));
         let verdict = |all: &[(String, Interval)]| not_above(all).map(|(verdict, _)| verdict);
-        assert_eq!(verdict(&[named(-0.2)]), Some(Verdict::Holds));
+        assert_eq!(verdict(&[named(-0.2)]), Some(ClaimVerdict::Holds));
         assert_eq!(
             verdict(&[named(-0.2), named(0.0)]),
-            Some(Verdict::NotSignificant)
+            Some(ClaimVerdict::NotSignificant)
         );
         assert_eq!(
             verdict(&[named(0.2), named(-0.2)]),
-            Some(Verdict::DoesNotHold)
+            Some(ClaimVerdict::DoesNotHold)
         );
         assert_eq!(verdict(&[]), None);
     }

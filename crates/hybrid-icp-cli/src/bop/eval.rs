@@ -133,7 +133,7 @@ pub(super) fn evaluate(arguments: &Arguments) -> anyhow::Result<Evaluation> {
     let scenes = Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1);
     let models_dir = dataset.eval_models_dir()?;
     let models = pool.install(|| models::read(&models_dir, &objects))?;
-    let diameters = pool.install(|| models::doubted_diameters(&models, &models_dir));
+    let diameters = pool.install(|| models::diameter_warnings(&models, &models_dir));
 
     let judge = Judge {
         objects: EvaluatedObject::of_models(&models, arguments.symmetric.as_deref()),

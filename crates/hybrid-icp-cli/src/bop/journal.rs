@@ -213,7 +213,7 @@ mod tests {
     fn what_was_appended_is_read_back_bit_for_bit_wherever_the_file_was_cut() {
         // The fewer bytes, the fewer places to cut.
         let result = || FrameResult {
-            doubts: Vec::new(),
+            warnings: Vec::new(),
             ..result()
         };
         let dir = tempfile::tempdir().unwrap();

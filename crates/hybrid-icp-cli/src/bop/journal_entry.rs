@@ -1,7 +1,7 @@
 //! A line of the journal of `bop refine`: what became of an image.
 
-use hicp_bop::{Fate, Fault, FaultKind, FrameResult, RowResult};
-use hybrid_icp::{Doubt, Isometry3, Relief, UnitQuaternion, Vector3};
+use hicp_bop::{Fault, FaultKind, FrameResult, RowResult, RowStatus};
+use hybrid_icp::{Flatness, Isometry3, UnitQuaternion, Vector3, Warning};
 use serde::{Deserialize, Serialize};
 
 use super::digest;
@@ -36,18 +36,18 @@ struct Entry {
     /// Of which kind, and what it says.
     problems: Vec<(String, String)>,
     /// Of which object, which, and its numbers.
-    doubts: Vec<(u32, String, Vec<u64>)>,
+    warnings: Vec<(u32, String, Vec<u64>)>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Row {
     index: usize,
-    fate: String,
+    status: String,
     /// Bits of the translation and of the quaternion i, j, k, w.
     pose: Option<[u64; 7]>,
     mve: Option<[u64; 2]>,
-    /// Bits of the residual, the measured and the rendered relief, and the diameter.
-    relief: Option<[u64; 4]>,
+    /// Bits of the residual, the measured and the rendered flatness, and the diameter.
+    flatness: Option<[u64; 4]>,
 }
 
 const KINDS: [FaultKind; 3] = [
@@ -68,13 +68,13 @@ impl Entry {
     fn of(frame: usize, result: &FrameResult) -> Self {
         let row = |row: &RowResult| Row {
             index: row.index,
-            fate: row.fate.to_string(),
+            status: row.status.to_string(),
             pose: row.pose.map(|pose| bits_of(&pose)),
             mve: row.mve.map(|(a, b)| [a, b].map(f64::to_bits)),
-            relief: row.relief.map(bits_of_relief),
+            flatness: row.flatness.map(bits_of_flatness),
         };
         let problems = result.faults.iter();
-        let doubts = result.doubts.iter();
+        let warnings = result.warnings.iter();
         Self {
             frame,
             seconds: result.seconds.map(f64::to_bits),
@@ -82,9 +82,9 @@ impl Entry {
             problems: problems
                 .map(|p| (name_of(p.kind).to_owned(), p.text.clone()))
                 .collect(),
-            doubts: doubts
-                .filter_map(|(object, doubt)| {
-                    let (name, numbers) = parts_of(doubt)?;
+            warnings: warnings
+                .filter_map(|(object, warning)| {
+                    let (name, numbers) = parts_of(warning)?;
                     Some((*object, name.to_owned(), numbers))
                 })
                 .collect(),
@@ -96,14 +96,14 @@ impl Entry {
         let row = |row: Row| {
             Some(RowResult {
                 index: row.index,
-                fate: Fate::parse(&row.fate)?,
+                status: RowStatus::parse(&row.status)?,
                 pose: known(row.pose, pose_of)?,
                 mve: known(row.mve, |[a, b]| Some((finite(a)?, finite(b)?)))?,
-                relief: known(row.relief, relief_of)?,
+                flatness: known(row.flatness, flatness_of)?,
             })
         };
-        let doubt = |(object, name, numbers): (u32, String, Vec<u64>)| {
-            Some((object, doubt_of(&name, &numbers)?))
+        let warning = |(object, name, numbers): (u32, String, Vec<u64>)| {
+            Some((object, warning_of(&name, &numbers)?))
         };
         let problems = self.problems.into_iter();
         Some(FrameResult {
@@ -115,7 +115,11 @@ impl Entry {
                     Some(Fault { kind, text })
                 })
                 .collect::<Option<_>>()?,
-            doubts: self.doubts.into_iter().map(doubt).collect::<Option<_>>()?,
+            warnings: self
+                .warnings
+                .into_iter()
+                .map(warning)
+                .collect::<Option<_>>()?,
         })
     }
 }
@@ -137,18 +141,18 @@ fn bits_of(pose: &Isometry3<f64>) -> [u64; 7] {
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }
 
-fn bits_of_relief(relief: Relief) -> [u64; 4] {
-    let Relief {
+fn bits_of_flatness(flatness: Flatness) -> [u64; 4] {
+    let Flatness {
         residual,
         measured,
         rendered,
         diameter,
-    } = relief;
+    } = flatness;
     [residual, measured, rendered, diameter].map(f64::to_bits)
 }
 
-fn relief_of([residual, measured, rendered, diameter]: [u64; 4]) -> Option<Relief> {
-    Some(Relief {
+fn flatness_of([residual, measured, rendered, diameter]: [u64; 4]) -> Option<Flatness> {
+    Some(Flatness {
         residual: finite(residual)?,
         measured: finite(measured)?,
         rendered: finite(rendered)?,
@@ -165,24 +169,24 @@ fn pose_of(bits: [u64; 7]) -> Option<Isometry3<f64>> {
     (finite && unit).then(|| Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation))
 }
 
-/// The name and the numbers of a doubt that an image is needed for; those about models are raised by every run anew.
-fn parts_of(doubt: &Doubt) -> Option<(&'static str, Vec<u64>)> {
+/// The name and the numbers of a warning that an image is needed for; those about models are raised by every run anew.
+fn parts_of(warning: &Warning) -> Option<(&'static str, Vec<u64>)> {
     let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let of_mask = |pixels: usize, numbers: [f64; 3]| {
         let mut all = vec![pixels as u64];
         all.extend(bits(&numbers));
         all
     };
-    match *doubt {
-        Doubt::NoDepth => Some(("no depth", Vec::new())),
-        Doubt::Depth { measured, expected } => Some(("depth", bits(&[measured, expected]))),
-        Doubt::Mask {
+    match *warning {
+        Warning::NoDepth => Some(("no depth", Vec::new())),
+        Warning::Depth { measured, expected } => Some(("depth", bits(&[measured, expected]))),
+        Warning::Mask {
             pixels,
             at_most,
             diameter,
             distance,
         } => Some(("mask", of_mask(pixels, [at_most, diameter, distance]))),
-        Doubt::Sliver {
+        Warning::Sliver {
             pixels,
             at_least,
             diameter,
@@ -192,22 +196,22 @@ fn parts_of(doubt: &Doubt) -> Option<(&'static str, Vec<u64>)> {
     }
 }
 
-fn doubt_of(name: &str, numbers: &[u64]) -> Option<Doubt> {
+fn warning_of(name: &str, numbers: &[u64]) -> Option<Warning> {
     let real = |index: usize| numbers.get(index).map(|bits| f64::from_bits(*bits));
     let pixels = || usize::try_from(*numbers.first()?).ok();
     match name {
-        "no depth" => Some(Doubt::NoDepth),
-        "depth" => Some(Doubt::Depth {
+        "no depth" => Some(Warning::NoDepth),
+        "depth" => Some(Warning::Depth {
             measured: real(0)?,
             expected: real(1)?,
         }),
-        "mask" => Some(Doubt::Mask {
+        "mask" => Some(Warning::Mask {
             pixels: pixels()?,
             at_most: real(1)?,
             diameter: real(2)?,
             distance: real(3)?,
         }),
-        "sliver" => Some(Doubt::Sliver {
+        "sliver" => Some(Warning::Sliver {
             pixels: pixels()?,
             at_least: real(1)?,
             diameter: real(2)?,
@@ -224,24 +228,29 @@ pub(super) mod tests {
 
     pub(crate) fn result() -> FrameResult {
         let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.7), Vector3::new(0.3, 2.0, -1.0));
-        let relief = Relief {
+        let flatness = Flatness {
             residual: 0.1 + 0.2,
             measured: 1.0 / 3.0,
             rendered: 0.7 / 3.0,
             diameter: 1e9 / 3.0,
         };
-        let row = |index, fate, pose, mve: Option<(f64, f64)>| RowResult {
+        let row = |index, status, pose, mve: Option<(f64, f64)>| RowResult {
             index,
-            fate,
+            status,
             pose,
             mve,
-            relief: mve.map(|_| relief),
+            flatness: mve.map(|_| flatness),
         };
         let (pixels, diameter, distance) = (123_456, 0.1 + 0.2, 1.0 / 3.0);
         FrameResult {
             rows: vec![
-                row(4, Fate::Refined, Some(pose), Some((0.1 + 0.2, 1.0 / 3.0))),
-                row(9, Fate::NoMask, None, None),
+                row(
+                    4,
+                    RowStatus::Refined,
+                    Some(pose),
+                    Some((0.1 + 0.2, 1.0 / 3.0)),
+                ),
+                row(9, RowStatus::NoMask, None, None),
             ],
             seconds: Some(0.7 / 3.0),
             faults: KINDS
@@ -250,18 +259,18 @@ pub(super) mod tests {
                     text: "a\n\"b\"".to_owned(),
                 })
                 .into(),
-            doubts: vec![
-                (1, Doubt::NoDepth),
+            warnings: vec![
+                (1, Warning::NoDepth),
                 (
                     1,
-                    Doubt::Depth {
+                    Warning::Depth {
                         measured: f64::INFINITY,
                         expected: 0.1 + 0.2,
                     },
                 ),
                 (
                     7,
-                    Doubt::Mask {
+                    Warning::Mask {
                         pixels,
                         at_most: 0.7 / 3.0,
                         diameter,
@@ -270,7 +279,7 @@ pub(super) mod tests {
                 ),
                 (
                     7,
-                    Doubt::Sliver {
+                    Warning::Sliver {
                         pixels,
                         at_least: 1e9 / 3.0,
                         diameter,
@@ -315,13 +324,13 @@ pub(super) mod tests {
         assert!(with(&|entry| entry.seconds = Some(nan)).is_none());
         assert!(with(&|entry| entry.rows[0].mve = Some([nan, 0])).is_none());
         for number in 0..4 {
-            let told = with(&|entry| entry.rows[0].relief.as_mut().unwrap()[number] = nan);
+            let told = with(&|entry| entry.rows[0].flatness.as_mut().unwrap()[number] = nan);
             assert!(told.is_none(), "{number}");
         }
-        assert!(with(&|entry| entry.rows[0].fate = "lost".to_owned()).is_none());
+        assert!(with(&|entry| entry.rows[0].status = "lost".to_owned()).is_none());
         assert!(with(&|entry| entry.problems[1].0 = "lost".to_owned()).is_none());
-        assert!(with(&|entry| entry.doubts[1].2.truncate(1)).is_none());
-        assert!(with(&|entry| entry.doubts[1].1 = "mood".to_owned()).is_none());
+        assert!(with(&|entry| entry.warnings[1].2.truncate(1)).is_none());
+        assert!(with(&|entry| entry.warnings[1].1 = "mood".to_owned()).is_none());
         for number in 0..7 {
             for wrong in [f64::NAN, f64::INFINITY, 1e300] {
                 let told = with(&|entry| {

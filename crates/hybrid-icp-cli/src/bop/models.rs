@@ -6,7 +6,7 @@ use std::path::Path;
 use hicp_bop::{ModelFolder, Models};
 use hicp_io::IoError;
 use hicp_io::bop::Dataset;
-use hybrid_icp::{Model, doubt_of_diameter};
+use hybrid_icp::{Model, warning_of_diameter};
 use rayon::prelude::*;
 
 use crate::limits::limits;
@@ -23,25 +23,25 @@ pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoErro
 }
 
 /// Tells of which objects the folder's `models_info.json` states another diameter than the mesh has, on all threads.
-pub(crate) fn doubted_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
+pub(crate) fn diameter_warnings(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
     let models: Vec<_> = models.by_id.iter().collect();
     let doubted = models
         .par_iter()
-        .filter_map(|(id, model)| Some((**id, doubted_diameter(**id, model, dir)?)));
+        .filter_map(|(id, model)| Some((**id, diameter_warning(**id, model, dir)?)));
     doubted.collect()
 }
 
 /// Tells if the folder's `models_info.json` states another diameter of an object than its mesh has: masks, pairs, the MVE and recalls are
 /// judged by it, and all of them go on working with a wrong one.
-pub(crate) fn doubted_diameter(obj_id: u32, model: &Model, dir: &Path) -> Option<String> {
+pub(crate) fn diameter_warning(obj_id: u32, model: &Model, dir: &Path) -> Option<String> {
     let info = dir.join("models_info.json");
     // Without the file the mesh's own diameter was taken.
     if hicp_io::is_absent(&info) {
         return None;
     }
-    let doubt = doubt_of_diameter(model)?;
+    let warning = warning_of_diameter(model)?;
     Some(format!(
-        "{}: object {obj_id}: {doubt}: poses, the MVE and recalls depend on it, check both",
+        "{}: object {obj_id}: {warning}: poses, the MVE and recalls depend on it, check both",
         info.display()
     ))
 }

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::journal::Journal;
 use super::refine_summary::{Doubted, Told, mean_seconds, report_faults, warn_of_distrust};
 use super::{
-    models, progress_bar, refine_doubts, refine_rows, refine_settings, targets, thread_pool,
+    models, progress_bar, refine_rows, refine_settings, refine_warnings, targets, thread_pool,
 };
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
@@ -150,7 +150,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     let settings = refine_settings::of(arguments, &pipeline, &rows, &masks, &models_dir);
     let objects = rows.iter().map(|row| row.obj_id).collect();
     let models = pool.install(|| models::read(&models_dir, &objects))?;
-    pool.install(|| refine_doubts::about_models(&models, &models_dir));
+    pool.install(|| refine_warnings::about_models(&models, &models_dir));
     let shared = DatasetRefiner {
         models,
         scenes: Scenes::new(&dataset, &arguments.split, pool.current_num_threads() + 1),
@@ -203,7 +203,7 @@ pub(super) fn refine(arguments: &Arguments) -> anyhow::Result<Option<f64>> {
     // What is wrong is told on the other stream, whatever becomes of this one.
     let doubted = Doubted::of(&results);
     let said = say(told.summary(&results, &shared.models, &doubted));
-    refine_doubts::about_images(&results, &rows);
+    refine_warnings::about_images(&results, &rows);
     warn_of_distrust(&arguments.output, &doubted, &arguments.which());
     let images = arguments.dataset.join(&arguments.split);
     let files = (

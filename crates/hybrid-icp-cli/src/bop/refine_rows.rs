@@ -12,10 +12,10 @@ const HEADER: [&str; 8] = [
     "im_id",
     "obj_id",
     "row",
-    "fate",
+    "status",
     "mve_initial",
     "mve",
-    "doubts",
+    "warnings",
 ];
 
 /// Writes a line per row of the output, in its order: what became of it, its MVE before and after, empty where it did not get as far as the
@@ -46,17 +46,17 @@ fn write_lines<'a>(
     let mut lines = csv::Writer::from_writer(file);
     lines.write_record(HEADER)?;
     for (row, result) in rows {
-        let doubts: Vec<String> = result.doubts().iter().map(ToString::to_string).collect();
+        let warnings: Vec<String> = result.warnings().iter().map(ToString::to_string).collect();
         let number = |mve: Option<f64>| mve.map_or_else(String::new, |mve| mve.to_string());
         lines.write_record([
             row.scene_id.to_string(),
             row.im_id.to_string(),
             row.obj_id.to_string(),
             result.index.to_string(),
-            result.fate.to_string(),
+            result.status.to_string(),
             number(result.mve.map(|(before, _)| before)),
             number(result.mve.map(|(_, after)| after)),
-            doubts.join("; "),
+            warnings.join("; "),
         ])?;
     }
     lines.flush()
@@ -65,8 +65,8 @@ fn write_lines<'a>(
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
-    use hicp_bop::Fate;
-    use hybrid_icp::{Isometry3, Relief};
+    use hicp_bop::RowStatus;
+    use hybrid_icp::{Flatness, Isometry3};
 
     use super::*;
 
@@ -75,28 +75,33 @@ mod tests {
         let rows: Vec<ResultRow> = (5..8)
             .map(|obj_id| ResultRow::new(1, 2, obj_id, Isometry3::identity()))
             .collect();
-        let relief = Relief {
+        let flatness = Flatness {
             residual: 0.01,
             measured: 0.001,
             rendered: 0.01,
             diameter: 0.2,
         };
-        let row = |index, fate, mve, relief| RowResult {
+        let row = |index, status, mve, flatness| RowResult {
             index,
-            fate,
+            status,
             pose: None,
             mve,
-            relief,
+            flatness,
         };
         let frame = |rows| FrameResult {
             rows,
             ..FrameResult::default()
         };
         let results = [
-            frame(vec![row(2, Fate::Refined, Some((0.95, 0.1)), Some(relief))]),
+            frame(vec![row(
+                2,
+                RowStatus::Refined,
+                Some((0.95, 0.1)),
+                Some(flatness),
+            )]),
             frame(vec![
-                row(1, Fate::NoMask, None, None),
-                row(0, Fate::Refined, Some((0.5, 0.25)), None),
+                row(1, RowStatus::NoMask, None, None),
+                row(0, RowStatus::Refined, Some((0.5, 0.25)), None),
             ]),
         ];
         let folder = tempfile::tempdir().unwrap();
@@ -104,7 +109,7 @@ mod tests {
         write(&path, &rows, &results).unwrap();
         assert_eq!(
             std::fs::read_to_string(path).unwrap(),
-            "scene_id,im_id,obj_id,row,fate,mve_initial,mve,doubts\n\
+            "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings\n\
              1,2,5,0,refined,0.5,0.25,\n\
              1,2,6,1,kept: no mask of the object,,,\n\
              1,2,7,2,refined,0.95,0.1,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::bail;
-use hicp_bop::{Fate, FrameResult, Models};
-use hybrid_icp::{Doubt, EXPLAINS_NOTHING, PAPER_ALPHA};
+use hicp_bop::{FrameResult, Models, RowStatus};
+use hybrid_icp::{EXPLAINS_NOTHING, PAPER_ALPHA, Warning};
 
 use super::{median, models, problem};
 use crate::terminal::warn;
@@ -41,13 +41,13 @@ impl Told<'_> {
         if self.resumed > 0 {
             let _ = write!(text, ", {} frames from the journal", self.resumed);
         }
-        let mut counts: BTreeMap<Fate, usize> = BTreeMap::new();
+        let mut counts: BTreeMap<RowStatus, usize> = BTreeMap::new();
         for row in rows() {
-            *counts.entry(row.fate).or_default() += 1;
+            *counts.entry(row.status).or_default() += 1;
         }
-        for (fate, count) in &counts {
-            let _ = write!(text, "\n  {count:>7}  {fate}");
-            if *fate == Fate::MissingModel {
+        for (status, count) in &counts {
+            let _ = write!(text, "\n  {count:>7}  {status}");
+            if *status == RowStatus::MissingModel {
                 let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
                 let _ = write!(text, " (object {})", ids.join(", "));
             }
@@ -87,11 +87,11 @@ impl Doubted {
         };
         for row in rows.filter(|row| row.mve.is_some()) {
             doubted.rows += 1;
-            for doubt in row.doubts() {
-                match doubt {
-                    Doubt::Unexplained { .. } => doubted.unexplained += 1,
-                    Doubt::FoundElsewhere { .. } => doubted.elsewhere += 1,
-                    Doubt::Flat { .. } => doubted.flat += 1,
+            for warning in row.warnings() {
+                match warning {
+                    Warning::Unexplained { .. } => doubted.unexplained += 1,
+                    Warning::FoundElsewhere { .. } => doubted.elsewhere += 1,
+                    Warning::Flat { .. } => doubted.flat += 1,
                     // Of single rows: a few that got a little worse are no reason to look at the whole.
                     _ => {}
                 }
@@ -152,7 +152,7 @@ pub(super) fn report_faults(
         );
     }
     let mut rows = results.iter().flat_map(|result| &result.rows);
-    if !results.is_empty() && rows.all(|row| row.fate == Fate::MissingFrame) {
+    if !results.is_empty() && rows.all(|row| row.status == RowStatus::MissingFrame) {
         bail!(
             "{}: none of its frames is in {}, expected --dataset and --split to name the images that it was made for",
             input.display(),

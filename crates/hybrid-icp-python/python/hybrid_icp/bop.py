@@ -6,7 +6,7 @@ Each image is a piece of work that depends on nothing else, and equal input give
     refiner = DatasetRefiner("bop/ycbv", "test", Pipeline.preset("hybrid"), object_ids(images))
     lines = {}
     for scene_id, im_id, indices, rows in images:  # On whatever machine.
-        refined, fates, faults = refiner.refine(rows)
+        refined, statuses, faults = refiner.refine(rows)
         lines.update(zip(indices, refined))
     write_results("refined_ycbv-test.csv", (lines[i] for i in sorted(lines)))
 

@@ -37,16 +37,16 @@ class _Worker:
     def __call__(self, batch: dict[str, Any]) -> dict[str, Any]:
         done = []
         for task in batch["task"]:
-            fates: dict[str, int] = {}
+            statuses: dict[str, int] = {}
             lines: list[str] = []
             faults: list[str] = []
             for rows in json.loads(task):
                 refined, of_rows, broken = self._refiner.refine(rows)
                 lines += refined
                 faults += broken
-                for fate in of_rows:
-                    fates[fate] = fates.get(fate, 0) + 1
-            done.append(json.dumps({"lines": lines, "fates": fates, "faults": faults}))
+                for status in of_rows:
+                    statuses[status] = statuses.get(status, 0) + 1
+            done.append(json.dumps({"lines": lines, "statuses": statuses, "faults": faults}))
         return {"place": batch["place"], "done": done}
 
 
@@ -150,20 +150,20 @@ def refine(
                 progress(count, total)
 
     lines = [""] * total
-    fates: dict[str, int] = {}
+    statuses: dict[str, int] = {}
     faults: list[str] = []
     for place, task in enumerate(tasks):
         done = journal.done[place]
         for index, line in zip((i for image in task for i in image[2]), done["lines"]):
             lines[index] = line
-        for fate, number in done["fates"].items():
-            fates[fate] = fates.get(fate, 0) + number
+        for status, number in done["statuses"].items():
+            statuses[status] = statuses.get(status, 0) + number
         faults += done["faults"]
     bop.write_results(output, lines)
     journal.remove()
     if faults:
         raise InputError(f"{len(faults)} files could not be used, and their rows are in {output} unchanged; the first: {faults[0]}")
-    return fates
+    return statuses
 
 
 def _tasks(images: list[_Image], rows_per_task: int) -> Iterator[list[_Image]]:

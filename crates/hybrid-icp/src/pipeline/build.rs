@@ -11,7 +11,7 @@ use hicp_association::{
 };
 use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Divergence, Guard,
-    HypothesisSearch, Icp, IterationLimit, KeepBest, LossRule, Motion, Oscillation, Repeat,
+    HypothesisSearch, Icp, IterationLimit, KeepBest, LossRule, Oscillation, Repeat, SmallMotion,
     StopRule, TimeLimit,
 };
 use hicp_metric::{
@@ -20,7 +20,7 @@ use hicp_metric::{
     Robust, Scale, Symmetric, WeightedSum,
 };
 use hicp_score::{MeanVsd, SampledMve, Score};
-use hicp_switch::{Alternate, Switch, SwitchAmong, Switcher, Threshold, Thresholds};
+use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Switcher, Threshold, Thresholds};
 
 use super::catalog::PartKind;
 use super::error::PipelineError;
@@ -68,7 +68,7 @@ pub(crate) fn stage(part: &Reader<'_>) -> Result<BoxedStage, PipelineError> {
             switcher: switcher(&part.part("switcher")?)?,
             stages: many("stages")?,
         }),
-        "alternate" => Box::new(Alternate {
+        "alternate" => Box::new(SwitchUntilStall {
             score: score(&part.part("score")?)?,
             alpha: part.number("alpha")?,
             aligned: one("aligned")?,
@@ -381,7 +381,7 @@ fn stop(part: &Reader<'_>) -> Result<Stop, PipelineError> {
         }),
         "motion" => {
             let (translation_meters, rotation_degrees) = motion()?;
-            Box::new(Motion {
+            Box::new(SmallMotion {
                 translation_meters,
                 rotation_degrees,
             })

@@ -14,7 +14,7 @@ use hicp_icp::{
 };
 use hicp_metric::{ErrorMetric, PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
-use hicp_switch::{Alternate, PAPER_ALPHA, Switch, Threshold};
+use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
 use super::PaperStop;
 
@@ -112,14 +112,14 @@ pub fn hybrid_visible() -> impl Stage + Send + Clone {
 
 /// `local`: local refinement that never returns a pose with a higher MVE than the initial one.
 ///
-/// Up to six steps by [`Alternate`] until the MVE stalls or is at most 0.1, the best pose by it kept: the projective cascade where
+/// Up to six steps by [`SwitchUntilStall`] until the MVE stalls or is at most 0.1, the best pose by it kept: the projective cascade where
 /// the estimate agrees with the image, else observed points matched to the model, point-to-point and then the symmetric metric. A
 /// polish of twice as many points follows, which is accepted only if the MVE improves.
 #[must_use]
 pub fn local() -> impl Stage + Send + Clone {
     let far = (300, 5000);
     Cascade((
-        Alternate {
+        SwitchUntilStall {
             score: MeanVsd::default(),
             alpha: PAPER_ALPHA,
             aligned: near(2000),
@@ -140,7 +140,7 @@ pub fn local() -> impl Stage + Send + Clone {
 
 /// What hypotheses are refined by: two steps of fewer points.
 fn explore() -> impl Stage + Send + Clone {
-    Alternate {
+    SwitchUntilStall {
         score: MeanVsd::default(),
         alpha: PAPER_ALPHA,
         aligned: near(1000),

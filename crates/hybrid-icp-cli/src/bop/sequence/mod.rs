@@ -14,12 +14,12 @@ use clap::{Arg, Args, ValueEnum};
 use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, ResultRow, Scene, write_results};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
-use hybrid_icp::{Calibration, Doubt, Isometry3, Model, SequentialEstimator};
+use hybrid_icp::{Calibration, Isometry3, Model, SequentialEstimator, Warning};
 
 use self::camera_path::CameraPath;
 use self::lines::Line;
 use self::tracker::Tracker;
-use super::refine_doubts::Kind;
+use super::refine_warnings::Kind;
 use super::{median, models, progress_bar};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
@@ -143,14 +143,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     ))?;
-    let diameter = models::doubted_diameter(arguments.object, &model, &models_dir);
+    let diameter = models::diameter_warning(arguments.object, &model, &models_dir);
     if let Some(text) = &diameter {
         warn(text);
     }
-    for (im_id, doubt) in tracker.doubts() {
-        // One doubt about the same number is enough.
-        if diameter.is_none() || !matches!(doubt, Doubt::Diameter { .. }) {
-            warn(arguments.in_words(im_id, doubt, &models_dir));
+    for (im_id, warning) in tracker.warnings() {
+        // One warning about the same number is enough.
+        if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
+            warn(arguments.in_words(im_id, warning, &models_dir));
         }
     }
     if !lines.iter().any(|line| line.what.is_accepted()) {
@@ -201,14 +201,14 @@ impl Arguments {
     }
 
     /// What looks wrong about the inputs, and where to look for the cause.
-    fn in_words(&self, im_id: u32, doubt: &Doubt, models_dir: &Path) -> String {
-        let advice = match (Kind::of(doubt), doubt) {
+    fn in_words(&self, im_id: u32, warning: &Warning, models_dir: &Path) -> String {
+        let advice = match (Kind::of(warning), warning) {
             (Some(kind), _) => kind.advice("--init"),
-            (None, Doubt::BehindCamera { .. }) => format!("check {}", self.init.display()),
+            (None, Warning::BehindCamera { .. }) => format!("check {}", self.init.display()),
             (None, _) => format!("check that {} is in mm", models_dir.display()),
         };
         let (scene, object) = (self.scene, self.object);
-        format!("object {object} in image {im_id} of scene {scene}: {doubt}: {advice}")
+        format!("object {object} in image {im_id} of scene {scene}: {warning}: {advice}")
     }
 
     fn write(&self, lines: &[Line]) -> anyhow::Result<()> {

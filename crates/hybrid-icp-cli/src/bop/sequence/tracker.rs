@@ -5,8 +5,8 @@ use hicp_io::IoError;
 use hicp_io::bop::Scene;
 use hybrid_icp::fusion::CameraMotion;
 use hybrid_icp::{
-    DepthImage, Doubt, Isometry3, Mask, Model, Observation, PinholeCamera, SequentialEstimator,
-    doubts, render_depth_image,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, SequentialEstimator, Warning,
+    render_depth_image, warnings,
 };
 
 use super::lines::Line;
@@ -25,7 +25,7 @@ pub(super) struct Tracker<'a> {
     /// What is wrong with files, each once.
     damaged: Vec<String>,
     /// What looks wrong in the first image that was registered: units and scales are those of all of them.
-    doubts: Option<(u32, Vec<Doubt>)>,
+    warnings: Option<(u32, Vec<Warning>)>,
 }
 
 impl<'a> Tracker<'a> {
@@ -41,14 +41,14 @@ impl<'a> Tracker<'a> {
             object,
             estimator,
             damaged: Vec::new(),
-            doubts: None,
+            warnings: None,
         }
     }
 
     /// What looks wrong about the inputs, and the image that it was seen in.
-    pub(super) fn doubts(&self) -> impl Iterator<Item = (u32, &Doubt)> {
-        let doubts = self.doubts.iter();
-        doubts.flat_map(|(im_id, doubts)| doubts.iter().map(|doubt| (*im_id, doubt)))
+    pub(super) fn warnings(&self) -> impl Iterator<Item = (u32, &Warning)> {
+        let warnings = self.warnings.iter();
+        warnings.flat_map(|(im_id, warnings)| warnings.iter().map(|warning| (*im_id, warning)))
     }
 
     /// Messages about files that could not be used.
@@ -61,8 +61,8 @@ impl<'a> Tracker<'a> {
         let predicted = motion.apply(&self.estimator.camera_from_object());
         match self.observe(im_id, &predicted) {
             Ok((instance, observation)) => {
-                self.doubts
-                    .get_or_insert_with(|| (im_id, doubts(self.model, &observation, &predicted)));
+                self.warnings
+                    .get_or_insert_with(|| (im_id, warnings(self.model, &observation, &predicted)));
                 let step = self.estimator.step(self.model, &observation, motion);
                 let mut line = Line::registered(im_id, instance, step);
                 line.off = self.off(&line);

@@ -116,7 +116,7 @@ pub(super) const PARTS: &[Part] = &[
     Part {
         kind: PartKind::Stage,
         name: "alternate",
-        rust: "Alternate",
+        rust: "SwitchUntilStall",
         summary: "dynamic switching until the score stalls, the other stage tried once; the best pose by the score",
         source: "§IV-A.2, repeated",
         cost: "max_steps × (a stage and a score)",

@@ -85,7 +85,7 @@ pub(super) const PARTS: &[Part] = &[
     Part {
         kind: PartKind::Stop,
         name: "motion",
-        rust: "Motion",
+        rust: "SmallMotion",
         summary: "ends when the next increment would hardly move the object",
         source: "-",
         cost: "O(1)",

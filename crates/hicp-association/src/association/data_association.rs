@@ -1,0 +1,78 @@
+//! The trait of data associations.
+
+use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
+
+/// Pairs model points with observed points: Algorithm 1, line 1 (and the transform of line 2).
+///
+/// # Contract
+///
+/// - `source` holds the selected surfels in the object frame; `pairs` arrives empty.
+/// - Every pair pushed holds the source *moved by* `camera_from_object` and its target, both in the camera frame in metres,
+///   with finite coordinates and a finite weight that is not negative (1 unless the association knows better).
+/// - `source_index` is the index of the point in `source` and `target_index` that of the observed surfel; a point may have no
+///   pair, or several.
+/// - Pure: equal inputs give equal pairs in equal order; `&mut self` is scratch. What depends on the observation or the
+///   model alone belongs into their `derived()` caches, where all threads share it.
+///
+/// Called once per iteration on the whole batch, so a boxed association costs one virtual call per iteration.
+///
+/// ```
+/// use hicp_association::DataAssociation;
+/// use hicp_core::{Context, Correspondences, Isometry3, RigidTransform, Pair, Surfel};
+///
+/// /// Pairs every model point with the observed point that it would hide, if it lies on the same pixel.
+/// #[derive(Debug)]
+/// struct SamePixel;
+///
+/// impl DataAssociation for SamePixel {
+///     fn associate(
+///         &mut self,
+///         context: &mut Context<'_>,
+///         source: &[Surfel],
+///         camera_from_object: &Isometry3<f64>,
+///         pairs: &mut Correspondences,
+///     ) {
+///         let observation = context.problem.observation;
+///         let mover = RigidTransform::new(camera_from_object);
+///         for (source_index, surfel) in (0..).zip(source) {
+///             let source = mover.surfel(surfel);
+///             let Some(pixel) = observation.camera().project(&source.point.cast()) else { continue };
+///             let Some(target_index) = observation.index_near(pixel.x as f32, pixel.y as f32) else { continue };
+///             if let Some(target) = observation.surfel(target_index) {
+///                 pairs.push(Pair::new(source_index, source, target_index, *target));
+///             }
+///         }
+///     }
+/// }
+/// ```
+pub trait DataAssociation {
+    /// Fills `pairs`.
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    );
+
+    /// Name in traces.
+    fn name(&self) -> &'static str {
+        type_label::<Self>()
+    }
+}
+
+impl<T: DataAssociation + ?Sized> DataAssociation for Box<T> {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        (**self).associate(context, source, camera_from_object, pairs);
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+}

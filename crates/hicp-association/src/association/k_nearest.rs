@@ -1,0 +1,75 @@
+//! Association with several observed points.
+
+use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
+
+use crate::association::data_association::DataAssociation;
+use crate::scratch::Scratch;
+use crate::search::box_tree::Found;
+use crate::search::observed_points::ObservedPoints;
+use crate::search::point_tree::PointTree;
+use crate::stride::Stride;
+
+/// Pairs every model point with each of its k closest observed points, at a weight of 1/k each.
+///
+/// The soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec (2002): the k matches
+/// average out part of the noise of single ones, at the price of a bias toward the middle of the neighbourhood. A model
+/// point has a total weight of 1, also where fewer than k points were observed. Pairs of one point are in order of distance,
+/// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k²) at most per point, for k is meant to be small.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KNearest {
+    /// How many observed points every model point is paired with; 0 counts as 1.
+    pub k: usize,
+    /// Which observed pixels are searched.
+    pub targets: Stride,
+    found: Scratch<Vec<Found>>,
+}
+
+impl KNearest {
+    /// Makes the association.
+    #[must_use]
+    pub fn new(k: usize, targets: Stride) -> Self {
+        Self {
+            k,
+            targets,
+            found: Scratch::default(),
+        }
+    }
+}
+
+impl Default for KNearest {
+    /// Three of about 4,000 observed points.
+    fn default() -> Self {
+        Self::new(3, Stride::AboutPoints(4000))
+    }
+}
+
+impl DataAssociation for KNearest {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let mover = RigidTransform::new(camera_from_object);
+        let found = &mut self.found.0;
+        pairs.reserve(source.len().saturating_mul(self.k.max(1).min(index.len())));
+        for (source_index, surfel) in (0..).zip(source) {
+            let source = mover.surfel(surfel);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            let weight = 1.0 / found.len() as f32;
+            for neighbor in &*found {
+                let (target_index, target) = index.get(neighbor.element);
+                pairs.push(Pair {
+                    weight,
+                    ..Pair::new(source_index, source, target_index, target)
+                });
+            }
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "k-nearest"
+    }
+}

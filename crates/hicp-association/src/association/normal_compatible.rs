@@ -1,0 +1,78 @@
+//! Nearest neighbours of a similar orientation.
+
+use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
+
+use crate::association::data_association::DataAssociation;
+use crate::filter::max_normal_angle::min_cosine;
+use crate::scratch::Scratch;
+use crate::search::box_tree::Found;
+use crate::search::observed_points::ObservedPoints;
+use crate::search::point_tree::PointTree;
+use crate::stride::Stride;
+
+/// Pairs every model point with the closest observed point whose normal is compatible (Godin et al. 1994; Pulli 1999).
+///
+/// Among the k closest observed points, the closest with n·m ≥ cos θ_max; no pair when none is. Where two sheets of the
+/// surface run side by side (a mug's wall, a thin plate) the plain nearest neighbour sits on the wrong one, and rejecting it
+/// afterwards leaves the point without a pair; this finds the one behind it. Cost: O(log n + k²) at most per point, for k is meant to be small.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalCompatible {
+    /// Largest angle between the two normals, degrees; NaN and negative values pair nothing.
+    pub max_angle_degrees: f32,
+    /// How many of the closest observed points are looked at; 0 counts as 1.
+    pub k: usize,
+    /// Which observed pixels are searched.
+    pub targets: Stride,
+    found: Scratch<Vec<Found>>,
+}
+
+impl NormalCompatible {
+    /// Makes the association.
+    #[must_use]
+    pub fn new(max_angle_degrees: f32, k: usize, targets: Stride) -> Self {
+        Self {
+            max_angle_degrees,
+            k,
+            targets,
+            found: Scratch::default(),
+        }
+    }
+}
+
+impl Default for NormalCompatible {
+    /// Within 45° (Pulli 1999), among the 10 closest of about 4,000 observed points.
+    fn default() -> Self {
+        Self::new(45.0, 10, Stride::AboutPoints(4000))
+    }
+}
+
+impl DataAssociation for NormalCompatible {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let mover = RigidTransform::new(camera_from_object);
+        let min_cosine = min_cosine(self.max_angle_degrees);
+        let found = &mut self.found.0;
+        pairs.reserve(source.len());
+        for (source_index, surfel) in (0..).zip(source) {
+            let source = mover.surfel(surfel);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            let compatible = found
+                .iter()
+                .map(|neighbor| index.get(neighbor.element))
+                .find(|(_, target)| source.normal.dot(&target.normal) >= min_cosine);
+            if let Some((target_index, target)) = compatible {
+                pairs.push(Pair::new(source_index, source, target_index, target));
+            }
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "normal-compatible"
+    }
+}

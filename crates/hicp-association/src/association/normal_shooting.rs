@@ -1,0 +1,96 @@
+//! Association along the normal.
+
+use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
+
+use crate::association::data_association::DataAssociation;
+use crate::length::Length;
+use crate::scratch::Scratch;
+use crate::search::box_tree::Found;
+use crate::search::observed_points::ObservedPoints;
+use crate::search::point_tree::PointTree;
+use crate::stride::Stride;
+
+/// Pairs every model point with the observed point closest to the line along its normal (Chen & Medioni 1991).
+///
+/// The intersection of the line (p, n) with the observed surface, in the form for point sets: among the k observed points
+/// closest to p, the one with the smallest distance |(c − p) − n (n·(c − p))| to the line; of equally distant ones the one
+/// closest to p. Both directions of the line count. Settles faster than the nearest neighbour on smooth surfaces, and is
+/// less stable on noisy or complex ones (Rusinkiewicz & Levoy 2001). Cost: O(n log n) once per observation, then O(log n +
+/// k) per point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalShooting {
+    /// How many of the closest observed points are looked at; 0 counts as 1. With too few, the line's intersection is not
+    /// among them when the surfaces are far apart.
+    pub k: usize,
+    /// Pairs whose target is further from the line than this are not made; `None` makes all. NaN and negative lengths make
+    /// none.
+    pub max_offset: Option<Length>,
+    /// Which observed pixels are searched.
+    pub targets: Stride,
+    found: Scratch<Vec<Found>>,
+}
+
+impl NormalShooting {
+    /// Makes the association.
+    #[must_use]
+    pub fn new(k: usize, max_offset: Option<Length>, targets: Stride) -> Self {
+        Self {
+            k,
+            max_offset,
+            targets,
+            found: Scratch::default(),
+        }
+    }
+}
+
+impl Default for NormalShooting {
+    /// Among the 10 closest of about 4,000 observed points, at any distance from the line.
+    fn default() -> Self {
+        Self::new(10, None, Stride::AboutPoints(4000))
+    }
+}
+
+impl DataAssociation for NormalShooting {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let mover = RigidTransform::new(camera_from_object);
+        let limit = self
+            .max_offset
+            .map_or(f32::INFINITY, |length| length.meters(context.problem.model));
+        let found = &mut self.found.0;
+        pairs.reserve(source.len());
+        for (source_index, surfel) in (0..).zip(source) {
+            let source = mover.surfel(surfel);
+            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            let mut best: Option<(f32, u32, Surfel)> = None;
+            for neighbor in &*found {
+                let (target_index, target) = index.get(neighbor.element);
+                let offset = distance_to_line(&source, &target);
+                if best.is_none_or(|(smallest, _, _)| offset < smallest) {
+                    best = Some((offset, target_index, target));
+                }
+            }
+            if let Some((offset, target_index, target)) = best
+                && offset <= limit
+            {
+                pairs.push(Pair::new(source_index, source, target_index, target));
+            }
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "normal-shooting"
+    }
+}
+
+/// Returns the distance of the target's point from the line through the source's point along its normal.
+fn distance_to_line(source: &Surfel, target: &Surfel) -> f32 {
+    let (normal, difference) = (source.normal.as_ref(), target.point - source.point);
+    (difference - normal * normal.dot(&difference)).norm()
+}

@@ -1,0 +1,102 @@
+//! Projective association between the pixels.
+
+use hicp_core::{
+    Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel, UnitVector3,
+};
+
+use crate::association::data_association::DataAssociation;
+use crate::association::pixel_projection::PixelProjection;
+
+/// Pairs a model point with the observed surface at the exact position that it projects to, interpolated between four pixels.
+///
+/// Inverse depth is interpolated bilinearly, which is exact for a plane at any tilt, and so is the normal, which is brought
+/// back to unit length; the target lies on the ray of the model point. Not across depth edges: unless all four pixels have
+/// a surfel with a depth within `max_step` of that of the pixel that contains the projection, that pixel gives the target
+/// as in [`crate::Projective`]. So does it where the four normals cancel. The pair's `target_index` is that pixel in either
+/// case. Takes away the steps of up to half a pixel that the plain look-up makes along slanted surfaces. Cost: constant per
+/// point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProjectiveInterpolated {
+    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. 0, negative
+    /// values and NaN interpolate only between equal depths or nowhere.
+    pub max_step: f32,
+}
+
+impl Default for ProjectiveInterpolated {
+    /// 2 % of the depth: a surface tilted by 85° at a focal length of 570 pixels.
+    fn default() -> Self {
+        Self { max_step: 0.02 }
+    }
+}
+
+impl DataAssociation for ProjectiveInterpolated {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let observation = context.problem.observation;
+        let projection = PixelProjection::new(observation.camera());
+        let mover = RigidTransform::new(camera_from_object);
+        pairs.reserve(source.len());
+        for (source_index, surfel) in (0..).zip(source) {
+            let source = mover.surfel(surfel);
+            let Some((u, v)) = projection.project(&source.point) else {
+                continue;
+            };
+            let Some(target_index) = observation.index_near(u, v) else {
+                continue;
+            };
+            let Some(nearest) = observation.surfel(target_index) else {
+                continue;
+            };
+            let target = interpolate(observation, &projection, u, v, nearest, self.max_step)
+                .unwrap_or(*nearest);
+            pairs.push(Pair::new(source_index, source, target_index, target));
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "projective-interpolated"
+    }
+}
+
+/// Returns the surface at (u, v), or `None` when its four pixels are not of one surface.
+fn interpolate(
+    observation: &Observation,
+    projection: &PixelProjection,
+    u: f32,
+    v: f32,
+    nearest: &Surfel,
+    max_step: f32,
+) -> Option<Surfel> {
+    let (left, top) = (u.floor(), v.floor());
+    let (right_share, bottom_share) = (u - left, v - top);
+    if left < 0.0 || top < 0.0 {
+        return None;
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // The position is inside the image, and the sign was checked.
+    let (left, top) = (left as u32, top as u32);
+    let gate = max_step * nearest.point.z;
+    let mut inverse_depth = 0.0;
+    let mut normal = nearest.normal.into_inner() * 0.0;
+    for (du, u_share) in [(0, 1.0 - right_share), (1, right_share)] {
+        for (dv, v_share) in [(0, 1.0 - bottom_share), (1, bottom_share)] {
+            let surfel = observation.surfel_at(left + du, top + dv)?;
+            let step = (surfel.point.z - nearest.point.z).abs();
+            // A NaN gate parts everything.
+            if gate.is_nan() || step > gate {
+                return None;
+            }
+            let share = u_share * v_share;
+            inverse_depth += share / surfel.point.z;
+            normal += surfel.normal.into_inner() * share;
+        }
+    }
+    let point = projection.unproject(u, v, 1.0 / inverse_depth);
+    let normal = UnitVector3::try_new(normal, 1e-3)?;
+    Some(Surfel { point, normal })
+}

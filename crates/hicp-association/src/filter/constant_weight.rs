@@ -1,0 +1,35 @@
+//! The same weight for all.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::outlier_filter::OutlierFilter;
+
+/// Multiplies every weight by a constant.
+///
+/// A step does not depend on it where one stage minimises on its own; losses do, and so does whatever adds several sets of
+/// pairs. Cost: O(pairs).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantWeight {
+    /// The factor; negative values, NaN and infinity count as 0.
+    pub weight: f32,
+}
+
+impl Default for ConstantWeight {
+    /// 1: changes nothing.
+    fn default() -> Self {
+        Self { weight: 1.0 }
+    }
+}
+
+impl OutlierFilter for ConstantWeight {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let weight = if self.weight.is_finite() {
+            self.weight.max(0.0)
+        } else {
+            0.0
+        };
+        for pair in pairs.as_mut_slice() {
+            pair.weight *= weight;
+        }
+    }
+}

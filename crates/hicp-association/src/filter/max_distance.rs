@@ -1,0 +1,44 @@
+//! Rejection by distance.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::outlier_filter::OutlierFilter;
+use crate::length::Length;
+
+/// Removes pairs further apart than τ_max (§III-A.1; Turk & Levoy 1994), and those at a distance that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaxDistance(Length);
+
+impl MaxDistance {
+    /// A limit of either kind. NaN or a negative limit removes every pair.
+    #[must_use]
+    pub fn new(limit: Length) -> Self {
+        Self(limit)
+    }
+
+    /// A limit in metres. NaN or a negative limit removes every pair.
+    #[must_use]
+    pub fn meters(limit: f32) -> Self {
+        Self(Length::Meters(limit))
+    }
+
+    /// A limit as a fraction of the model's diameter, so that it fits objects of any size.
+    #[must_use]
+    pub fn diameters(fraction: f32) -> Self {
+        Self(Length::Diameters(fraction))
+    }
+}
+
+impl OutlierFilter for MaxDistance {
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+        keep_within(pairs, self.0.meters(problem.model));
+    }
+}
+
+/// Keeps the pairs at most `limit` metres apart, and none at a distance that is not finite.
+pub(crate) fn keep_within(pairs: &mut Correspondences, limit: f32) {
+    pairs.retain(|pair| {
+        let distance = pair.distance();
+        distance.is_finite() && distance <= limit
+    });
+}

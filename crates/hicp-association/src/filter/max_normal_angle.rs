@@ -1,0 +1,40 @@
+//! Rejection by the angle between normals.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::outlier_filter::OutlierFilter;
+
+/// Removes pairs whose normals differ by more than θ_max (§III-A.1; Pulli 1999).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaxNormalAngle {
+    min_cosine: f32,
+}
+
+impl MaxNormalAngle {
+    /// A limit in degrees; 180 and more keeps everything, NaN or a negative limit removes every pair.
+    #[must_use]
+    pub fn degrees(limit: f32) -> Self {
+        Self {
+            min_cosine: min_cosine(limit),
+        }
+    }
+}
+
+impl OutlierFilter for MaxNormalAngle {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        pairs.retain(|pair| pair.source.normal.dot(&pair.target.normal) >= self.min_cosine);
+    }
+}
+
+/// Returns the least n·m of unit normals that differ by at most `degrees`; more than any for NaN and negative angles.
+pub(crate) fn min_cosine(degrees: f32) -> f32 {
+    if degrees >= 180.0 {
+        // Rounding may leave the cosine of opposite normals just below −1 …
+        -2.0
+    } else if degrees >= 0.0 {
+        // … and that of equal ones just below 1.
+        degrees.to_radians().cos() - 1e-6
+    } else {
+        f32::INFINITY
+    }
+}

@@ -1,0 +1,46 @@
+//! Rejection by a multiple of the median distance.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::distances::{collect_finite, median};
+use crate::filter::max_distance::keep_within;
+use crate::filter::outlier_filter::OutlierFilter;
+use crate::scratch::Scratch;
+
+/// Removes pairs further apart than `factor` times the median distance (Diebel, Reutersward, Thrun, Davis & Gupta 2004).
+///
+/// Follows the alignment without a length to be set: generous while the object is far off, strict in the end. Pairs at the
+/// limit are kept, so that equal distances all stay at a factor of 1 and more. The median is the upper of the two middle
+/// values of an even number. Distances that are not finite count for nothing and go. Cost: O(pairs).
+#[derive(Clone, Debug, PartialEq)]
+pub struct MedianDistance {
+    /// Largest distance over the median; NaN and negative values remove every pair.
+    pub factor: f32,
+    distances: Scratch<Vec<f32>>,
+}
+
+impl MedianDistance {
+    /// Makes the filter.
+    #[must_use]
+    pub fn new(factor: f32) -> Self {
+        Self {
+            factor,
+            distances: Scratch::default(),
+        }
+    }
+}
+
+impl Default for MedianDistance {
+    /// Three times the median.
+    fn default() -> Self {
+        Self::new(3.0)
+    }
+}
+
+impl OutlierFilter for MedianDistance {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let distances = &mut self.distances.0;
+        collect_finite(pairs, distances);
+        keep_within(pairs, self.factor * median(distances).unwrap_or(0.0));
+    }
+}

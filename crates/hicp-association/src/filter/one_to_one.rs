@@ -1,0 +1,55 @@
+//! One pair per observed point.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::outlier_filter::OutlierFilter;
+use crate::scratch::Scratch;
+
+/// Keeps for every observed point the pair with the closest model point (Zinßer, Schmidt & Niemann 2003, Picky ICP).
+///
+/// Model points without a counterpart share the targets of others; the closest of them has the best claim. Of equally close
+/// ones the first stays. The order of the pairs is kept. Distances that are not finite go. Cost: O(n log n) for n pairs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OneToOne {
+    scratch: Scratch<Buffers>,
+}
+
+#[derive(Debug, Default)]
+struct Buffers {
+    /// Target, distance and position of every pair.
+    claims: Vec<(u32, f32, usize)>,
+    kept: Vec<bool>,
+}
+
+impl OneToOne {
+    /// Makes the filter.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+impl OutlierFilter for OneToOne {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let Buffers { claims, kept } = &mut self.scratch.0;
+        claims.clear();
+        claims.extend(
+            (pairs.as_slice().iter().enumerate())
+                .map(|(position, pair)| (pair.target_index, pair.distance(), position))
+                .filter(|(_, distance, _)| distance.is_finite()),
+        );
+        claims.sort_unstable_by(|a, b| {
+            (a.0.cmp(&b.0))
+                .then_with(|| a.1.total_cmp(&b.1))
+                .then_with(|| a.2.cmp(&b.2))
+        });
+        claims.dedup_by_key(|(target, _, _)| *target);
+        kept.clear();
+        kept.resize(pairs.len(), false);
+        for (_, _, position) in claims {
+            kept[*position] = true;
+        }
+        let mut kept = kept.iter();
+        pairs.retain(|_| kept.next() == Some(&true));
+    }
+}

@@ -1,0 +1,43 @@
+//! Filters that change from iteration to iteration.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::outlier_filter::OutlierFilter;
+
+/// Applies one filter per iteration: the k-th in the k-th iteration of a stage, and the last from then on.
+///
+/// A gate that narrows, as in `Schedule::new(vec![MaxDistance::diameters(0.5), MaxDistance::diameters(0.25), MaxDistance::diameters(0.1)])`,
+/// catches from afar and ends precisely (Zhang 1994 narrows by the distances found). Without filters all pairs are kept.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Schedule<F> {
+    /// The filters by iteration.
+    pub filters: Vec<F>,
+    iteration: usize,
+}
+
+impl<F> Schedule<F> {
+    /// Makes the schedule.
+    #[must_use]
+    pub fn new(filters: Vec<F>) -> Self {
+        Self {
+            filters,
+            iteration: 0,
+        }
+    }
+}
+
+impl<F: OutlierFilter> OutlierFilter for Schedule<F> {
+    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let last = self.filters.len().saturating_sub(1);
+        if let Some(filter) = self.filters.get_mut(self.iteration.min(last)) {
+            filter.filter(problem, pairs);
+        }
+    }
+
+    fn begin(&mut self, iteration: usize) {
+        self.iteration = iteration;
+        for filter in &mut self.filters {
+            filter.begin(iteration);
+        }
+    }
+}

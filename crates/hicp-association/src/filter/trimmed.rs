@@ -1,0 +1,48 @@
+//! Rejection of a fixed share.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::distances::{collect_finite, nth_smallest, share_of};
+use crate::filter::max_distance::keep_within;
+use crate::filter::outlier_filter::OutlierFilter;
+use crate::scratch::Scratch;
+
+/// Keeps the closest share of the pairs (trimmed ICP, Chetverikov, Stepanov & Krsek 2005).
+///
+/// Keeps the pairs at most as far apart as the ⌈keep·n⌉-th smallest of the n finite distances; whatever ties with it is
+/// kept too, so the result does not depend on the order of the pairs. Distances that are not finite go. Cost: O(pairs).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trimmed {
+    /// The share that is kept: the expected overlap. 1 and more keeps all; 0, negative values and NaN remove every pair.
+    pub keep: f32,
+    distances: Scratch<Vec<f32>>,
+}
+
+impl Trimmed {
+    /// Makes the filter.
+    #[must_use]
+    pub fn new(keep: f32) -> Self {
+        Self {
+            keep,
+            distances: Scratch::default(),
+        }
+    }
+}
+
+impl Default for Trimmed {
+    /// Keeps 85 %.
+    fn default() -> Self {
+        Self::new(0.85)
+    }
+}
+
+impl OutlierFilter for Trimmed {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let distances = &mut self.distances.0;
+        collect_finite(pairs, distances);
+        let limit = share_of(self.keep, distances.len())
+            .checked_sub(1)
+            .and_then(|rank| nth_smallest(distances, rank));
+        keep_within(pairs, limit.unwrap_or(f32::NAN));
+    }
+}

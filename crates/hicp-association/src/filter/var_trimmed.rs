@@ -1,0 +1,70 @@
+//! Rejection of a share that the distances decide.
+
+use hicp_core::{Correspondences, Problem};
+
+use crate::filter::distances::{collect_finite, share_of};
+use crate::filter::max_distance::keep_within;
+use crate::filter::outlier_filter::OutlierFilter;
+use crate::scratch::Scratch;
+
+/// Keeps the closest share f of the pairs, with the f that minimises the fractional RMSD (Phillips, Liu & Tomasi 2007).
+///
+/// FRMSD(f) = f^−λ·√(Σ of the f·n smallest d² / (f·n)) over f = i/n between `min_keep` and `max_keep`: the overlap need not be
+/// known. Of equally good shares the largest is taken, and whatever ties with the largest distance kept is kept too: equal
+/// distances all stay. Distances that are not finite go. Cost: O(n log n) for n pairs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VarTrimmed {
+    /// Smallest share considered; clamped to 0 … 1, and at least one pair. NaN counts as 0.
+    pub min_keep: f32,
+    /// Largest share considered; clamped to `min_keep` … 1. NaN counts as 0.
+    pub max_keep: f32,
+    /// Exponent λ: the larger, the more pairs are kept. NaN keeps the largest share.
+    pub lambda: f32,
+    distances: Scratch<Vec<f32>>,
+}
+
+impl VarTrimmed {
+    /// Makes the filter.
+    #[must_use]
+    pub fn new(min_keep: f32, max_keep: f32, lambda: f32) -> Self {
+        Self {
+            min_keep,
+            max_keep,
+            lambda,
+            distances: Scratch::default(),
+        }
+    }
+}
+
+impl Default for VarTrimmed {
+    /// Shares from 5 % to 99 %, λ = 0.95 as Phillips et al. advise for points in three dimensions.
+    fn default() -> Self {
+        Self::new(0.05, 0.99, 0.95)
+    }
+}
+
+impl OutlierFilter for VarTrimmed {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let distances = &mut self.distances.0;
+        collect_finite(pairs, distances);
+        distances.sort_unstable_by(f32::total_cmp);
+        let n = distances.len();
+        let fewest = share_of(self.min_keep, n).max(1);
+        let most = share_of(self.max_keep, n).max(fewest);
+        let lambda = f64::from(self.lambda);
+        let mut sum = 0.0;
+        let mut best = (f64::INFINITY, f32::NAN);
+        for (kept, distance) in (1..).zip(distances.iter().take(most)) {
+            sum += f64::from(*distance).powi(2);
+            if kept >= fewest {
+                let fraction = kept as f64 / n as f64;
+                let rmsd = (sum / kept as f64).sqrt() * fraction.powf(-lambda);
+                // Rounding must not tell equal values apart. A NaN never is the better one, but the last one stands if all are.
+                if rmsd <= best.0 * (1.0 + 1e-12) || rmsd.is_nan() {
+                    best = (rmsd.min(best.0), *distance);
+                }
+            }
+        }
+        keep_within(pairs, best.1);
+    }
+}

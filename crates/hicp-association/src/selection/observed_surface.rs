@@ -1,0 +1,53 @@
+//! Selection of what the camera saw.
+
+use hicp_core::{Context, Isometry3, RigidTransform, Surfel, se3};
+
+use crate::selection::point_selection::PointSelection;
+use crate::stride::Stride;
+
+/// Selects the observed surfels, brought into the object frame at the stage's initial estimate.
+///
+/// For associations of your own that start from the observation and search the model: `source[i]` is the i-th surfel of
+/// [`hicp_core::Observation::surfels`] at this stride, moved by the inverse of the initial estimate; moved back by it, it is
+/// where it was seen. Under an association that searches the observation every point would find itself. Nothing is selected at
+/// an estimate that is not finite. Cost: O(pixels of the grid).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObservedSurface {
+    /// Spacing of the selected pixels.
+    pub stride: Stride,
+}
+
+impl Default for ObservedSurface {
+    /// Keeps about 2,000 points.
+    fn default() -> Self {
+        Self {
+            stride: Stride::AboutPoints(2000),
+        }
+    }
+}
+
+impl PointSelection for ObservedSurface {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        let object_from_camera = camera_from_object.inverse();
+        if !se3::is_finite(&object_from_camera) {
+            return;
+        }
+        let mover = RigidTransform::new(&object_from_camera);
+        let observation = context.problem.observation;
+        let stride = self.stride.pixels(observation.n_surfels());
+        source.extend(
+            observation
+                .surfels(stride)
+                .map(|(_, surfel)| mover.surfel(surfel)),
+        );
+    }
+
+    fn name(&self) -> &'static str {
+        "observed-surface"
+    }
+}

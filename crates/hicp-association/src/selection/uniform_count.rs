@@ -1,0 +1,49 @@
+//! Evenly spaced subsets.
+
+use hicp_core::{Context, Isometry3, Surfel};
+
+use crate::selection::all_samples::AllSamples;
+use crate::selection::keep::{keep_positions, spread};
+use crate::selection::point_selection::PointSelection;
+
+/// Keeps `count` points of another selection, evenly spaced in its order (the uniform subsampling of Turk & Levoy 1994).
+///
+/// The order of the model's samples follows the surface area and that of a rendered surface the image, so even spacing in
+/// the order is an even spread: the i-th point kept is the one at position ⌊(i + ½)·n/count⌋ of n. All are kept when there
+/// are not more. Cost: the inner selection, and O(count).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UniformCount<P> {
+    /// The selection to choose from.
+    pub inner: P,
+    /// How many points are kept.
+    pub count: usize,
+}
+
+impl Default for UniformCount<AllSamples> {
+    /// 500 of the model's samples.
+    fn default() -> Self {
+        Self {
+            inner: AllSamples,
+            count: 500,
+        }
+    }
+}
+
+impl<P: PointSelection> PointSelection for UniformCount<P> {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        self.inner.select(context, camera_from_object, source);
+        let (count, length) = (self.count, source.len());
+        if count < length {
+            keep_positions(source, (0..count).map(|i| spread(i, count, length)));
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "uniform-count"
+    }
+}

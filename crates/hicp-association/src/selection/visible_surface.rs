@@ -1,0 +1,78 @@
+//! Selection of what the camera would see.
+
+use hicp_core::{Context, Isometry3, Point3, Surfel, UnitVector3};
+
+use crate::selection::point_selection::PointSelection;
+use crate::stride::Stride;
+
+/// Selects the points of the model that are visible at the stage's initial estimate: the vertex map V_O of §III-A.1.
+///
+/// The model is rendered at the initial estimate (from the render cache when the score has already asked for it) and every
+/// rendered pixel on a grid anchored at the image's corner becomes a surfel, with the normal of its face turned toward the camera.
+/// Nothing is selected when the object is behind the camera or outside the image. Cost: one render, and O(rendered pixels).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VisibleSurface {
+    /// Spacing of the selected pixels.
+    pub stride: Stride,
+}
+
+impl Default for VisibleSurface {
+    /// Keeps about 2,000 points.
+    fn default() -> Self {
+        Self {
+            stride: Stride::AboutPoints(2000),
+        }
+    }
+}
+
+impl PointSelection for VisibleSurface {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        let problem = context.problem;
+        let (mesh, camera) = (problem.model.mesh(), problem.observation.camera());
+        let view = context.view(camera_from_object);
+        let region = view.region();
+        let rendered = view.n_rendered();
+        if rendered == 0 {
+            return;
+        }
+        let stride = self.stride.pixels(rendered);
+        let object_from_camera = camera_from_object.inverse();
+        let eye = Point3::from(object_from_camera.translation.vector);
+        for v in (region.v_min.next_multiple_of(stride)..region.v_max).step_by(stride as usize) {
+            for u in (region.u_min.next_multiple_of(stride)..region.u_max).step_by(stride as usize)
+            {
+                let Some(index) = region.index(u, v) else {
+                    continue;
+                };
+                let depth = view.depth()[index];
+                if depth <= 0.0 {
+                    continue;
+                }
+                let Some(normal) = mesh.normal(view.triangles()[index] as usize) else {
+                    continue;
+                };
+                let point = object_from_camera
+                    * camera.unproject(f64::from(u), f64::from(v), f64::from(depth));
+                let toward_camera = normal.cast::<f64>().dot(&(eye - point)) >= 0.0;
+                let normal = normal.into_inner();
+                source.push(Surfel {
+                    point: point.cast::<f32>(),
+                    normal: UnitVector3::new_unchecked(if toward_camera {
+                        normal
+                    } else {
+                        -normal
+                    }),
+                });
+            }
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "visible-surface"
+    }
+}

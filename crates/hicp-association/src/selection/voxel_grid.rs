@@ -1,0 +1,92 @@
+//! One point per cell of a grid.
+
+use hicp_core::{Context, Isometry3, Surfel};
+
+use crate::length::Length;
+use crate::scratch::Scratch;
+use crate::selection::all_samples::AllSamples;
+use crate::selection::keep::keep_positions;
+use crate::selection::point_selection::PointSelection;
+
+/// Keeps one point of another selection in every cell of a cubic grid: the one closest to the cell's centre.
+///
+/// Thins out dense regions only, so a rendered surface keeps its slanted parts, which a pixel grid samples sparsely per
+/// area. Chosen points are points of the surface with their own normals, unlike averages. The grid is anchored at the
+/// object's origin; the order of the inner selection is kept, and of equally central points the first. A cell size that is
+/// not positive keeps every point. Cost: the inner selection, and O(n log n).
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoxelGrid<P> {
+    /// The selection to choose from.
+    pub inner: P,
+    /// Edge of a cell.
+    pub cell: Length,
+    scratch: Scratch<Vec<Entry>>,
+}
+
+/// A point's cell, its squared distance from the cell's centre in units of cells, and its position in the selection.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    cell: [i64; 3],
+    off_center: f32,
+    position: usize,
+}
+
+impl<P> VoxelGrid<P> {
+    /// Makes the selection.
+    #[must_use]
+    pub fn new(inner: P, cell: Length) -> Self {
+        Self {
+            inner,
+            cell,
+            scratch: Scratch::default(),
+        }
+    }
+}
+
+impl Default for VoxelGrid<AllSamples> {
+    /// Cells of 5 % of the diameter: some 500 to 1,000 on the surface of a compact object.
+    fn default() -> Self {
+        Self::new(AllSamples, Length::Diameters(0.05))
+    }
+}
+
+impl<P: PointSelection> PointSelection for VoxelGrid<P> {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        self.inner.select(context, camera_from_object, source);
+        let edge = self.cell.meters(context.problem.model);
+        if edge.is_nan() || edge <= 0.0 {
+            return;
+        }
+        let entries = &mut self.scratch.0;
+        entries.clear();
+        entries.extend(source.iter().enumerate().map(|(position, surfel)| {
+            let scaled = surfel.point / edge;
+            let corner = scaled.map(f32::floor);
+            #[allow(clippy::cast_possible_truncation)]
+            // Casts saturate; so fine a grid has no cells to share.
+            let cell = corner.coords.map(|x| x as i64).into();
+            Entry {
+                cell,
+                off_center: (scaled - corner).add_scalar(-0.5).norm_squared(),
+                position,
+            }
+        }));
+        entries.sort_unstable_by(|a, b| {
+            (a.cell.cmp(&b.cell))
+                .then_with(|| a.off_center.total_cmp(&b.off_center))
+                .then_with(|| a.position.cmp(&b.position))
+        });
+        entries.dedup_by_key(|entry| entry.cell);
+        entries.sort_unstable_by_key(|entry| entry.position);
+        keep_positions(source, entries.iter().map(|entry| entry.position));
+    }
+
+    fn name(&self) -> &'static str {
+        "voxel-grid"
+    }
+}

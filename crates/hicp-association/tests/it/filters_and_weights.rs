@@ -1,0 +1,511 @@
+//! Filters and weights against their definitions.
+
+// References are written as the definition reads; the numbers of a test are small.
+
+use std::sync::OnceLock;
+
+use crate::common::{Random, Scene, ball_scene, box_mesh, scene_of};
+use hicp_association::{
+    BoundaryTargets, ConstantWeight, DistanceWeight, Length, MadDistance, MaxDistance,
+    MaxNormalAngle, MedianDistance, MinPairs, NormalWeight, OneToOne, OutlierFilter, SensorNoise,
+    SensorNoiseWeight, Stride, Trimmed, VarTrimmed,
+};
+use hicp_core::{
+    DepthImage, Mask, Observation, Pair, PinholeCamera, Point3, Surfel, UnitVector3, Vector3,
+};
+use proptest::prelude::*;
+
+fn scene() -> &'static Scene {
+    static SCENE: OnceLock<Scene> = OnceLock::new();
+    SCENE.get_or_init(ball_scene)
+}
+
+fn run(mut filter: impl OutlierFilter, pairs: &[Pair]) -> Vec<Pair> {
+    scene().filter(&mut filter, pairs)
+}
+
+/// Pairs at the given distances, each with its own source and target index and a weight of 2.
+fn pairs_at(distances: &[f32]) -> Vec<Pair> {
+    (0..)
+        .zip(distances)
+        .map(|(i, distance)| {
+            let target = Surfel {
+                point: Point3::new(0.0, 0.0, 0.5),
+                normal: -Vector3::z_axis(),
+            };
+            // Off the axis of z, where the sum of squares keeps small distances exact.
+            let source = Surfel {
+                point: Point3::new(*distance, 0.0, 0.5),
+                ..target
+            };
+            Pair {
+                weight: 2.0,
+                ..Pair::new(i, source, i, target)
+            }
+        })
+        .collect()
+}
+
+fn indices(pairs: &[Pair]) -> Vec<u32> {
+    pairs.iter().map(|p| p.source_index).collect()
+}
+
+/// Filters that look at distances, at their defaults.
+fn distance_filters() -> Vec<Box<dyn OutlierFilter>> {
+    vec![
+        Box::new(MaxDistance::new(Length::Meters(f32::INFINITY))),
+        Box::new(MedianDistance::default()),
+        Box::new(MadDistance::default()),
+        Box::new(MadDistance::new(3.0, 0.0)),
+        Box::new(Trimmed::default()),
+        Box::new(VarTrimmed::default()),
+        Box::new(OneToOne::new()),
+        Box::new(DistanceWeight::default()),
+    ]
+}
+
+fn all_filters() -> Vec<Box<dyn OutlierFilter>> {
+    let mut filters = distance_filters();
+    filters.push(Box::new(MaxNormalAngle::degrees(60.0)));
+    filters.push(Box::new(BoundaryTargets::default()));
+    filters.push(Box::new(MinPairs::default()));
+    filters.push(Box::new(ConstantWeight::default()));
+    filters.push(Box::new(NormalWeight));
+    filters.push(Box::new(SensorNoiseWeight::default()));
+    filters
+}
+
+#[test]
+fn equal_distances_all_stay() {
+    for distances in [
+        vec![0.0; 30],
+        vec![0.003; 30],
+        vec![0.7; 1],
+        vec![0.0],
+        vec![],
+    ] {
+        for mut filter in distance_filters() {
+            let kept = scene().filter(&mut filter, &pairs_at(&distances));
+            assert_eq!(kept.len(), distances.len(), "{distances:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_finite_goes_and_counts_for_nothing() {
+    let distances = [
+        0.002,
+        f32::NAN,
+        0.001,
+        f32::INFINITY,
+        0.0015,
+        f32::INFINITY,
+        f32::NAN,
+        0.0011,
+    ];
+    let finite: Vec<f32> = distances.into_iter().filter(|d| d.is_finite()).collect();
+    for mut filter in distance_filters() {
+        let kept = scene().filter(&mut filter, &pairs_at(&distances));
+        let expected = scene().filter(&mut filter, &pairs_at(&finite));
+        let of = |pairs: &[Pair]| pairs.iter().map(Pair::distance).collect::<Vec<_>>();
+        assert_eq!(of(&kept), of(&expected));
+        assert!(!kept.is_empty());
+        let kept = scene().filter(&mut filter, &pairs_at(&[f32::INFINITY; 5]));
+        assert!(kept.is_empty());
+    }
+}
+
+#[test]
+fn weights_stay_weights_whatever_comes() {
+    let mut random = Random::new(3);
+    let mut pairs: Vec<Pair> = (0..50)
+        .map(|i| Pair::new(i, random.surfel(0.5), i % 7, random.surfel(0.5)))
+        .collect();
+    pairs[3].source.point.x = f32::NAN;
+    pairs[4].target.point.z = f32::INFINITY;
+    pairs[5].target.point.z = f32::NAN;
+    pairs[6].target.normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
+    let noise = SensorNoise {
+        constant: f32::NAN,
+        linear: f32::INFINITY,
+        ..SensorNoise::stereo()
+    };
+    let mut filters = all_filters();
+    filters.push(Box::new(SensorNoiseWeight { noise }));
+    filters.push(Box::new(ConstantWeight { weight: f32::NAN }));
+    filters.push(Box::new(ConstantWeight { weight: -1.0 }));
+    for (name, mut filter) in filters.into_iter().enumerate() {
+        for list in [&pairs[..], &pairs[..1], &[]] {
+            let first = scene().filter(&mut filter, list);
+            for pair in &first {
+                assert!(
+                    pair.weight.is_finite() && pair.weight >= 0.0,
+                    "{name} {pair:?}"
+                );
+            }
+            assert_eq!(
+                format!("{:?}", scene().filter(&mut filter, list)),
+                format!("{first:?}")
+            );
+        }
+    }
+}
+
+/// The given distances sorted.
+fn sorted(distances: &[f32]) -> Vec<f32> {
+    let mut sorted = distances.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    sorted
+}
+
+fn within(pairs: &[Pair], limit: f32) -> Vec<Pair> {
+    let near = pairs.iter().filter(|p| p.distance() <= limit);
+    near.copied().collect()
+}
+
+fn distances() -> impl Strategy<Value = Vec<f32>> {
+    // Whole millimetres, so that many tie.
+    prop::collection::vec((0_u16..40).prop_map(|mm| f32::from(mm) * 0.001), 1..120)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn median_and_mad_follow_their_definitions(d in distances(), factor in 0.0_f32..4.0, floor in 0.0_f32..0.01) {
+        let pairs = pairs_at(&d);
+        let median = |values: &[f32]| sorted(values)[values.len() / 2];
+        let center = median(&d);
+        prop_assert_eq!(run(MedianDistance::new(factor), &pairs), within(&pairs, factor * center));
+        let spread: Vec<f32> = d.iter().map(|d| (d - center).abs()).collect();
+        let limit = center + factor * (1.4826 * median(&spread)).max(floor);
+        prop_assert_eq!(run(MadDistance::new(factor, floor), &pairs), within(&pairs, limit));
+    }
+
+    #[test]
+    fn trimmed_keeps_the_closest_share(d in distances(), percent in 0_u8..110) {
+        let pairs = pairs_at(&d);
+        let kept = run(Trimmed::new(f32::from(percent) / 100.0), &pairs);
+        // In integers: ⌈percent·n/100⌉
+        let count = (usize::from(percent.min(100)) * d.len()).div_ceil(100);
+        let limit = count.checked_sub(1).map_or(f32::NAN, |rank| sorted(&d)[rank]);
+        prop_assert_eq!(&kept, &within(&pairs, limit));
+        prop_assert!(kept.len() >= count);
+    }
+
+    #[test]
+    fn var_trimmed_minimises_the_fractional_rmsd(d in distances(), lambda in 0.1_f32..3.0) {
+        let pairs = pairs_at(&d);
+        let kept = run(VarTrimmed::new(0.1, 0.9, lambda), &pairs);
+        let (sorted, n) = (sorted(&d), d.len() as f64);
+        let frmsd = |k: usize| {
+            let sum: f64 = sorted[..k].iter().map(|d| f64::from(*d).powi(2)).sum();
+            (k as f64 / n).powf(-f64::from(lambda)) * (sum / k as f64).sqrt()
+        };
+        let fewest = d.len().div_ceil(10);
+        let most = (9 * d.len()).div_ceil(10).max(fewest);
+        let best = (fewest..=most).map(frmsd).fold(f64::INFINITY, f64::min);
+        let chosen = (fewest..=most).rev().find(|k| frmsd(*k) <= best * (1.0 + 1e-12)).unwrap();
+        prop_assert_eq!(kept, within(&pairs, sorted[chosen - 1]));
+    }
+
+    #[test]
+    fn one_to_one_keeps_the_closest_of_every_target(d in distances(), seed: u64) {
+        let mut random = Random::new(seed);
+        let mut pairs = pairs_at(&d);
+        for pair in &mut pairs {
+            pair.target_index = random.below(20) as u32;
+        }
+        let expected: Vec<Pair> = pairs.iter().enumerate().filter(|(i, pair)| {
+            pairs.iter().enumerate().all(|(j, other)| {
+                other.target_index != pair.target_index
+                    || pair.distance() < other.distance()
+                    || (pair.distance() == other.distance() && *i <= j)
+            })
+        }).map(|(_, pair)| *pair).collect();
+        prop_assert_eq!(run(OneToOne::new(), &pairs), expected);
+    }
+
+    #[test]
+    fn the_order_of_the_pairs_changes_nothing_but_theirs(d in distances(), seed: u64) {
+        let pairs = pairs_at(&d);
+        let mut shuffled = pairs.clone();
+        Random::new(seed).shuffle(&mut shuffled);
+        for mut filter in all_filters() {
+            let plain = scene().filter(&mut filter, &pairs);
+            let mut other = scene().filter(&mut filter, &shuffled);
+            let mut in_order = shuffled.iter().map(|p| p.source_index).filter(|i| indices(&plain).contains(i));
+            prop_assert!(other.iter().all(|p| Some(p.source_index) == in_order.next()));
+            other.sort_by_key(|p| p.source_index);
+            for (a, b) in plain.iter().zip(&other) {
+                prop_assert_eq!(a.source_index, b.source_index);
+                prop_assert!((a.weight - b.weight).abs() < 1e-5);
+            }
+            prop_assert_eq!(plain.len(), other.len());
+        }
+    }
+}
+
+#[test]
+fn parameters_out_of_range_do_what_is_documented() {
+    let pairs = pairs_at(&[0.001, 0.002, 0.003, 0.004]);
+    for nothing in [f32::NAN, -1.0] {
+        assert!(run(MedianDistance::new(nothing), &pairs).is_empty());
+        assert!(run(Trimmed::new(nothing), &pairs).is_empty());
+        assert!(run(MaxDistance::meters(nothing), &pairs).is_empty());
+        let weights = run(
+            DistanceWeight {
+                max: Length::Meters(nothing),
+            },
+            &pairs,
+        );
+        assert!(weights.len() == 4 && weights.iter().all(|p| p.weight == 0.0));
+    }
+    assert!(run(MadDistance::new(f32::NAN, 0.0), &pairs).is_empty());
+    assert_eq!(run(MadDistance::new(0.0, f32::NAN), &pairs).len(), 3);
+    assert!(run(Trimmed::new(0.0), &pairs).is_empty());
+    assert_eq!(run(Trimmed::new(7.0), &pairs).len(), 4);
+    assert_eq!(run(Trimmed::new(1.0e-6), &pairs).len(), 1);
+    assert_eq!(run(VarTrimmed::new(0.5, 0.1, 0.95), &pairs).len(), 2);
+    assert_eq!(
+        run(VarTrimmed::new(f32::NAN, f32::NAN, 0.95), &pairs).len(),
+        1
+    );
+    assert_eq!(run(VarTrimmed::new(0.1, 1.0, f32::NAN), &pairs).len(), 4);
+}
+
+#[test]
+fn too_few_pairs_are_none() {
+    let pairs = pairs_at(&[0.001; 5]);
+    assert_eq!(run(MinPairs { count: 5 }, &pairs), pairs);
+    assert!(run(MinPairs { count: 6 }, &pairs).is_empty());
+    assert!(run(MinPairs { count: 1 }, &[]).is_empty());
+    let chain = (
+        MaxDistance::meters(1.0),
+        (),
+        (),
+        None::<()>,
+        (),
+        (),
+        (),
+        MinPairs { count: 6 },
+    );
+    assert!(run(chain, &pairs).is_empty());
+}
+
+#[test]
+fn weights_multiply() {
+    let pairs = pairs_at(&[0.0, 0.01, 0.02, 0.05]);
+    let weights = |filtered: Vec<Pair>| filtered.iter().map(|p| p.weight).collect::<Vec<_>>();
+    assert_eq!(
+        weights(run(ConstantWeight { weight: 0.25 }, &pairs)),
+        [0.5; 4]
+    );
+    assert_eq!(
+        weights(run(
+            ConstantWeight {
+                weight: f32::INFINITY
+            },
+            &pairs
+        )),
+        [0.0; 4]
+    );
+    let max = Length::Meters(0.02);
+    assert_eq!(
+        weights(run(DistanceWeight { max }, &pairs)),
+        [2.0, 1.0, 0.0, 0.0]
+    );
+    // A twentieth of the diameter and the same in metres.
+    let meters = 0.05 * scene().model.diameter() as f32;
+    assert_eq!(
+        run(
+            DistanceWeight {
+                max: Length::Diameters(0.05)
+            },
+            &pairs
+        ),
+        run(
+            DistanceWeight {
+                max: Length::Meters(meters)
+            },
+            &pairs
+        )
+    );
+    let mut turned = pairs.clone();
+    let at = |degrees: f32| {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        UnitVector3::new_normalize(Vector3::new(sine, 0.0, -cosine))
+    };
+    for (pair, degrees) in turned.iter_mut().zip([0.0, 60.0, 90.1, 180.0]) {
+        pair.source.normal = at(degrees);
+    }
+    let found = weights(run(NormalWeight, &turned));
+    for (found, expected) in found.iter().zip([2.0, 1.0, 0.0, 0.0]) {
+        assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+    }
+}
+
+#[test]
+fn sensor_noise_follows_its_formula() {
+    // The published values at half a metre, one and two, in millimetres.
+    let ahn = SensorNoise::d435_ahn2019_axial();
+    let facing = |z: f32, degrees: f32| {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        Surfel {
+            point: Point3::new(0.0, 0.0, z),
+            normal: UnitVector3::new_normalize(Vector3::new(0.0, sine, -cosine)),
+        }
+    };
+    for (z, millimetres) in [(0.5, 2.41), (1.0, 5.74), (2.0, 18.3)] {
+        let sigma = ahn.sigma(&facing(z, 40.0)) * 1000.0;
+        assert!((sigma - millimetres).abs() < 0.01 * millimetres, "{sigma}");
+    }
+    let tilted = SensorNoise { tilt: 0.022, ..ahn };
+    for (degrees, millimetres) in [
+        (0.0, 0.0),
+        (20.0, 1.8),
+        (40.0, 7.1),
+        (60.0, 30.0),
+        (75.0, 149.0),
+        (89.0, 149.0),
+    ] {
+        let extra =
+            (tilted.sigma(&facing(0.5, degrees)) - ahn.sigma(&facing(0.5, degrees))) * 1000.0;
+        assert!(
+            (extra - millimetres).abs() <= 0.03 * millimetres,
+            "{degrees} {extra}"
+        );
+    }
+    let mut pairs = pairs_at(&[0.01; 3]);
+    for (pair, z) in pairs.iter_mut().zip([0.4, 0.8, 0.8]) {
+        pair.target.point.z = z;
+    }
+    let weighted = run(
+        SensorNoiseWeight {
+            noise: SensorNoise::stereo(),
+        },
+        &pairs,
+    );
+    // 1/z⁴ over its mean, times the weight that was there.
+    let mean = (1.0 + 2.0 / 16.0) / 3.0;
+    for (pair, expected) in weighted.iter().zip([1.0, 1.0 / 16.0, 1.0 / 16.0]) {
+        assert!((pair.weight - 2.0 * expected / mean).abs() < 1e-5);
+    }
+    assert_eq!(
+        run(SensorNoiseWeight::default(), &pairs[1..])[0].weight,
+        2.0
+    );
+}
+
+#[test]
+fn boundary_targets_follow_their_definition() {
+    for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
+        let (observation, region) = (&scene.observation, scene.observation.region());
+        let pairs: Vec<Pair> = observation
+            .surfels(1)
+            .map(|(index, target)| Pair::new(0, *target, index, *target))
+            .collect();
+        let depth = |u: i64, v: i64| -> Option<f32> {
+            let (u, v) = (u32::try_from(u).ok()?, u32::try_from(v).ok()?);
+            let masked = observation.mask().get(u, v)?;
+            observation.depth().get(u, v).filter(|z| masked && *z > 0.0)
+        };
+        let focal = observation.camera().fx().min(observation.camera().fy());
+        for (width, max_tilt_degrees) in [
+            (0, 60.0),
+            (1, 60.0),
+            (2, 60.0),
+            (1, 85.0),
+            (1, 90.0),
+            (1, f32::NAN),
+        ] {
+            let slope = f64::from(max_tilt_degrees).to_radians().tan();
+            let max_step = (slope / focal) as f32;
+            let reach = i64::from(width);
+            let expected: Vec<Pair> = pairs
+                .iter()
+                .filter(|pair| {
+                    let columns = region.width() as u32;
+                    let u = i64::from(region.u_min + pair.target_index % columns);
+                    let v = i64::from(region.v_min + pair.target_index / columns);
+                    let center = depth(u, v).unwrap();
+                    (-reach..=reach).all(|dv| {
+                        (-reach..=reach).all(|du| {
+                            let r = du.abs().max(dv.abs()) as f32;
+                            depth(u + du, v + dv).is_some_and(|z| {
+                                r == 0.0 || (z - center).abs() <= max_step * r * z.min(center)
+                            })
+                        })
+                    })
+                })
+                .copied()
+                .collect();
+            let mut filter = BoundaryTargets {
+                width,
+                max_tilt_degrees,
+            };
+            let kept = scene.filter(&mut filter, &pairs);
+            assert_eq!(kept, expected);
+            assert_eq!(kept.len() == pairs.len(), width == 0);
+            assert_eq!(kept.is_empty(), max_step.is_nan());
+        }
+        // An index that there is not counts as boundary.
+        let beyond = Pair {
+            target_index: u32::MAX,
+            ..pairs[0]
+        };
+        assert!(
+            scene
+                .filter(&mut BoundaryTargets::default(), &[beyond])
+                .is_empty()
+        );
+    }
+}
+
+#[test]
+fn strides_and_lengths_take_any_value() {
+    assert_eq!(Stride::Pixels(0).pixels(100), 1);
+    assert_eq!(Stride::AboutPoints(0).pixels(0), 1);
+    let model = &scene().model;
+    assert_eq!(Length::Meters(-1.0).meters(model), -1.0);
+    assert!(Length::Diameters(f32::NAN).meters(model).is_nan());
+}
+
+/// A limit in depth per pixel that fits one camera takes slanted surface for an edge in the next, with a quarter of the pixels.
+#[test]
+fn what_is_an_edge_does_not_depend_on_the_resolution() {
+    for zoom in [0.25, 1.0, 4.0] {
+        let camera = PinholeCamera::new(120.0 * zoom, 120.0 * zoom, 31.5, 23.5, 64, 48).unwrap();
+        // A plane through (0, 0, 0.5), tilted by 80° about the image's vertical; then one by 88°.
+        for (degrees, is_edge) in [(80.0_f64, false), (88.0, true)] {
+            let slope = degrees.to_radians().tan();
+            let depth = |u: f64| 0.5 / (1.0 - slope * (u - 31.5) / (120.0 * zoom));
+            // Near the axis alone: further out the rays meet the plane at another angle.
+            let columns = 30..34;
+            let pixels = (0..48).flat_map(|_| {
+                (0..64).map(|u| {
+                    if columns.contains(&u) {
+                        depth(f64::from(u)) as f32
+                    } else {
+                        0.0
+                    }
+                })
+            });
+            let depth = DepthImage::from_meters(64, 48, pixels.collect()).unwrap();
+            let scene = Scene {
+                observation: Observation::new(depth, Mask::full(64, 48), camera).unwrap(),
+                ..ball_scene()
+            };
+            let target = Surfel {
+                point: Point3::new(0.0, 0.0, 0.5),
+                normal: -Vector3::z_axis(),
+            };
+            // Columns 31 and 32 of row 24 have neighbours on both sides.
+            let region = scene.observation.region();
+            let index = |u: u32| (24 - region.v_min) * region.width() as u32 + u - region.u_min;
+            let pairs = [31, 32].map(|u| Pair::new(0, target, index(u), target));
+            let kept = scene.filter(&mut BoundaryTargets::default(), &pairs);
+            assert_eq!(kept.len(), if is_edge { 0 } else { 2 }, "{zoom} {degrees}");
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Rotations from matrices that somebody wrote down (pitfall 17).
+
+use std::f64::consts::PI;
+
+use crate::support::Numbers;
+use hicp_core::{Matrix3, ROTATION_TOLERANCE, RotationError, Vector3, rotation_from_matrix, so3};
+
+fn rounded(matrix: &Matrix3<f64>, digits: i32) -> Matrix3<f64> {
+    let scale = 10_f64.powi(digits);
+    matrix.map(|x| (x * scale).round() / scale)
+}
+
+#[test]
+fn exact_rotations_come_back() {
+    let mut numbers = Numbers(21);
+    for _ in 0..200 {
+        let rotation = numbers.rotation();
+        let found = rotation_from_matrix(rotation.to_rotation_matrix().matrix()).unwrap();
+        assert!(so3::angle(&(found * rotation.inverse())) < 8.0 * f64::EPSILON);
+    }
+}
+
+#[test]
+fn roundings_to_nine_and_to_five_digits_are_accepted_and_stay_as_near() {
+    let mut numbers = Numbers(22);
+    for digits in [5, 9] {
+        for _ in 0..200 {
+            let rotation = numbers.rotation();
+            let matrix = rounded(rotation.to_rotation_matrix().matrix(), digits);
+            let found = rotation_from_matrix(&matrix).unwrap();
+            // Nine entries off by at most half a digit: |ΔR|_F ≤ 1.5 · 10⁻ᵈ, and |ΔR|_F = √2 · angle for the nearest rotation.
+            let angle = so3::angle(&(found * rotation.inverse()));
+            assert!(angle <= 1.5 * 10_f64.powi(-digits), "{angle}");
+            assert!((found.norm() - 1.0).abs() < 4.0 * f64::EPSILON);
+        }
+    }
+}
+
+#[test]
+fn the_rotation_found_is_the_nearest() {
+    let mut numbers = Numbers(23);
+    for _ in 0..50 {
+        let noise = Matrix3::from_fn(|_, _| numbers.between(-1e-4, 1e-4));
+        let matrix = numbers.rotation().to_rotation_matrix().into_inner() + noise;
+        let found = rotation_from_matrix(&matrix).unwrap();
+        let distance = |r: &hicp_core::UnitQuaternion<f64>| {
+            (r.to_rotation_matrix().into_inner() - matrix).norm_squared()
+        };
+        let best = distance(&found);
+        for _ in 0..20 {
+            // A turn by h costs h² · 2 more; 1e-5 is far above the rounding of `best` (1e-8 · ε).
+            let nudged = so3::exp(&(numbers.direction() * 1e-5)) * found;
+            assert!(distance(&nudged) > best);
+        }
+    }
+}
+
+#[test]
+fn pitfall_17_half_turns_and_nearly_half_turns_are_exact() {
+    let mut numbers = Numbers(24);
+    let mut axes = vec![Vector3::x(), Vector3::y(), Vector3::z()];
+    axes.extend((0..100).map(|_| numbers.direction()));
+    for axis in axes {
+        for angle in [PI, PI - 1e-9, PI - 1e-7, PI - 1e-4, PI - 0.01] {
+            // From the definition R = I + sin a P + (1 − cos a) P², not through a quaternion.
+            let p = so3::hat(&axis);
+            let matrix = Matrix3::identity() + p * angle.sin() + p * p * (1.0 - angle.cos());
+            let found = rotation_from_matrix(&matrix).unwrap();
+            let error = (found.to_rotation_matrix().into_inner() - matrix).amax();
+            assert!(error < 8.0 * f64::EPSILON, "{axis} {angle}: {error}");
+        }
+    }
+    // nalgebra's report: an entry a rounding below −1.
+    let matrix = Matrix3::from_diagonal(&Vector3::new(-1.0 - 2.3e-16, -1.0, 1.0));
+    let found = rotation_from_matrix(&matrix).unwrap();
+    assert!((so3::angle(&found) - PI).abs() < 1e-15);
+}
+
+#[test]
+fn reflections_are_refused() {
+    let mut numbers = Numbers(25);
+    for _ in 0..50 {
+        let matrix = -numbers.rotation().to_rotation_matrix().into_inner();
+        assert!(matches!(
+            rotation_from_matrix(&matrix),
+            Err(RotationError::Determinant { determinant, tolerance })
+                if (determinant + 1.0).abs() < 1e-12 && tolerance == ROTATION_TOLERANCE
+        ));
+    }
+}
+
+#[test]
+fn pitfall_17_shears_of_determinant_one_and_scales_are_refused() {
+    let shear: Matrix3<f64> = Matrix3::new(1.0, 0.01, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    assert!(f64::abs(shear.determinant() - 1.0) < 1e-15);
+    for matrix in [
+        shear,
+        Matrix3::identity() * 0.118,
+        Matrix3::identity() * 1000.0,
+        Matrix3::zeros(),
+        Matrix3::from_element(1e200),
+        Matrix3::new(1e200, -1e200, 0.0, 1e200, 1e200, 0.0, 0.0, 0.0, 1.0),
+    ] {
+        assert!(
+            matches!(
+                rotation_from_matrix(&matrix),
+                Err(RotationError::NotOrthogonal { .. })
+            ),
+            "{matrix}"
+        );
+    }
+}
+
+#[test]
+fn the_tolerance_is_still_tolerated() {
+    // Rows (1, s, 0) and (0, 1, 0) have the product s, to the bit.
+    let shear = |s: f64| Matrix3::new(1.0, s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    for sign in [-1.0, 1.0] {
+        let found = rotation_from_matrix(&shear(sign * ROTATION_TOLERANCE)).unwrap();
+        // The polar factor of a shear by s turns by atan(s/2).
+        let angle = so3::angle(&found) - (0.5 * ROTATION_TOLERANCE).atan();
+        assert!(angle.abs() < 4.0 * f64::EPSILON, "{angle}");
+        let beyond = ROTATION_TOLERANCE.next_up();
+        assert!(matches!(
+            rotation_from_matrix(&shear(sign * beyond)),
+            Err(RotationError::NotOrthogonal { deviation, tolerance })
+                if deviation == beyond && tolerance == ROTATION_TOLERANCE
+        ));
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_named() {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for row in 0..3 {
+            for column in 0..3 {
+                let mut matrix = Matrix3::identity();
+                matrix[(row, column)] = value;
+                let Err(RotationError::NotFinite {
+                    row: r,
+                    column: c,
+                    value: v,
+                }) = rotation_from_matrix(&matrix)
+                else {
+                    panic!("accepted {value}");
+                };
+                assert_eq!((r, c, v.to_bits()), (row, column, value.to_bits()));
+            }
+        }
+    }
+}

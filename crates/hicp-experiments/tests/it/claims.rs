@@ -1,0 +1,395 @@
+//! Means, intervals and claims on rows made by hand.
+
+use hicp_experiments::{
+    Analysis, ClaimVerdict, Config, Experiment, Figure, HIGH, LOW, Measured, Metric, NOISY, Report,
+    Row, Study, Subject, Variant, claims, never_seen,
+};
+use hicp_sim::Household;
+
+/// A study whose figures are given by functions of (variant, level, case) and an offset per object.
+fn study(
+    experiment: Experiment,
+    poses: u64,
+    vsd: impl Fn(&str, &str, u64) -> f64,
+    cpu_ms: impl Fn(&str) -> f64,
+) -> Study {
+    let subjects = Subject::household(&Household::TEST[..4]).unwrap();
+    let variants = if experiment == Experiment::Alpha {
+        &Variant::paper()[..1]
+    } else {
+        &Variant::paper()[..]
+    };
+    let config = Config::new(experiment, &subjects, variants, poses, 1).unwrap();
+    let mut rows = Vec::new();
+    for (number, object) in config.objects.iter().enumerate() {
+        for case in 0..poses {
+            for level in &config.levels {
+                for variant in &config.variants {
+                    let bin = experiment.is_binned().then_some((case % 10) as usize);
+                    rows.push(Row {
+                        object: object.name.clone(),
+                        case,
+                        variant: variant.name.clone(),
+                        level: level.clone(),
+                        bin,
+                        measured: Some(Measured {
+                            vsd_initial: bin.map_or(0.2, |b| 0.05 + b as f64 / 10.0),
+                            // Objects and cases differ, the same for all variants.
+                            vsd_final: vsd(&variant.name, level, case)
+                                + 0.01 * number as f64
+                                + 0.002 * (case % 3) as f64,
+                            add_final_mm: 1.0 + case as f64,
+                            iterations: 10,
+                            termination: "converged".to_owned(),
+                            cpu_ms: Some(cpu_ms(&variant.name)),
+                        }),
+                        note: String::new(),
+                    });
+                }
+            }
+        }
+    }
+    Study { config, rows }
+}
+
+fn verdict(analysis: &Analysis, part: &str) -> ClaimVerdict {
+    let found: Vec<_> = claims(analysis)
+        .into_iter()
+        .filter(|c| c.text.contains(part))
+        .collect();
+    assert_eq!(found.len(), 1, "{part}: {found:?}");
+    found[0].verdict
+}
+
+/// Projective good while the bin is low, nearest neighbours the same everywhere, hybrid the better of both.
+fn as_in_the_paper(variant: &str, _: &str, case: u64) -> f64 {
+    let bin = (case % 10) as f64 / 10.0;
+    let metric = f64::from(u8::from(variant.ends_with("point-to-plane"))) * 0.05;
+    match variant {
+        "hybrid" => bin.min(0.35) * 0.9,
+        "nn-point-to-point" => 0.38,
+        v if v.starts_with("nn-") => 0.4 + metric,
+        _ => 0.01 + bin + metric,
+    }
+}
+
+#[test]
+fn means_and_differences_are_what_was_put_in() {
+    let analysis = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0));
+    let (hybrid, nn) = (
+        analysis.variant("hybrid").unwrap(),
+        analysis.variant("nn-point-to-point").unwrap(),
+    );
+    let first = analysis.group("0.0-0.1").unwrap();
+    assert_eq!(analysis.groups()[first].label, "0.0-0.1");
+    // Cases 0 and 10: 0.002 · (0 + 1)/2; objects: 0.01 · 1.5.
+    let mean = analysis.mean(Metric::Vsd, first, nn).unwrap();
+    assert!(
+        (mean.estimate - (0.38 + 0.001 + 0.015)).abs() < 1e-12,
+        "{mean:?}"
+    );
+    assert!(mean.low < mean.estimate && mean.estimate < mean.high);
+    // Objects spread by 0.03: so does the interval of the mean, and no more.
+    assert!(mean.low >= 0.38 && mean.high <= 0.38 + 0.034, "{mean:?}");
+    // What objects and cases have in common is not in a paired difference.
+    let difference = analysis
+        .contrast(Metric::Vsd, &[(first, hybrid, 1.0), (first, nn, -1.0)])
+        .unwrap();
+    for value in [difference.estimate, difference.low, difference.high] {
+        assert!((value + 0.38).abs() < 1e-12, "{difference:?}");
+    }
+    // Every case is above 0.3 or none is.
+    let failed = |group, variant| {
+        analysis
+            .mean(Metric::Failure, group, variant)
+            .unwrap()
+            .estimate
+    };
+    assert_eq!((failed(first, hybrid), failed(first, nn)), (0.0, 1.0));
+    let cell = analysis.cell(analysis.overall(), hybrid).unwrap();
+    assert_eq!(
+        (cell.count, cell.iterations, cell.cpu_deviation_ms),
+        (80, 10.0, Some(0.0))
+    );
+    assert!((cell.add_median_mm - 10.5).abs() < 1e-12);
+    assert!((cell.vsd_initial - 0.5).abs() < 1e-12);
+    assert_eq!(
+        analysis
+            .cell(analysis.group(LOW).unwrap(), hybrid)
+            .unwrap()
+            .count,
+        24
+    );
+    assert_eq!(
+        analysis
+            .cell(analysis.group(HIGH).unwrap(), hybrid)
+            .unwrap()
+            .count,
+        24
+    );
+}
+
+#[test]
+fn the_interval_covers_what_is_not_known() {
+    // One object is unlike the others: which one is drawn decides.
+    let mut study = study(Experiment::InitNoise, 10, |_, _, _| 0.1, |_| 1.0);
+    for row in study
+        .rows
+        .iter_mut()
+        .filter(|r| r.object == "bowl" && r.variant == "hybrid")
+    {
+        row.measured.as_mut().unwrap().vsd_final += 0.4;
+    }
+    let analysis = Analysis::of(&study);
+    let all = analysis.overall();
+    let difference = analysis
+        .contrast(Metric::Vsd, &[(all, 0, 1.0), (all, 1, -1.0)])
+        .unwrap();
+    assert!((difference.estimate - 0.1).abs() < 1e-12);
+    // Of four objects, none is the bowl with probability 0.32, at least three are with 0.05.
+    assert!(
+        difference.low.abs() < 1e-12 && difference.high >= 0.2,
+        "{difference:?}"
+    );
+}
+
+#[test]
+fn claims_of_the_initial_pose_are_told_from_their_opposites() {
+    let holding = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 1.0));
+    let opposite =
+        |variant: &str, level: &str, case: u64| 0.9 - as_in_the_paper(variant, level, case);
+    let failing = Analysis::of(&study(Experiment::InitNoise, 20, opposite, |_| 1.0));
+    let same = Analysis::of(&study(Experiment::InitNoise, 20, |_, _, _| 0.3, |_| 1.0));
+    for part in [
+        "lower mean VSD than each",
+        "at low initial VSD (below 0.3) a projective",
+        "nn-point-to-point (",
+        "even at low",
+    ] {
+        assert_eq!(verdict(&holding, part), ClaimVerdict::Holds, "{part}");
+        assert_eq!(verdict(&failing, part), ClaimVerdict::DoesNotHold, "{part}");
+        assert_eq!(verdict(&same, part), ClaimVerdict::NotSignificant, "{part}");
+    }
+    assert_eq!(verdict(&holding, "every step"), ClaimVerdict::Holds);
+    assert_eq!(verdict(&failing, "every step"), ClaimVerdict::DoesNotHold);
+    assert_eq!(
+        verdict(&holding, "every projective variant fails"),
+        ClaimVerdict::Holds
+    );
+    assert_eq!(
+        verdict(&failing, "every projective variant fails"),
+        ClaimVerdict::DoesNotHold
+    );
+    assert_eq!(
+        verdict(&holding, "cascading is no better"),
+        ClaimVerdict::Holds
+    );
+    assert_eq!(
+        verdict(&failing, "cascading is no better"),
+        ClaimVerdict::DoesNotHold
+    );
+}
+
+#[test]
+fn claims_of_depth_noise_are_told_from_their_opposites() {
+    let with = |sign: f64| {
+        move |variant: &str, level: &str, case: u64| {
+            let percent: f64 = level.parse().unwrap();
+            let plane = variant.ends_with("point-to-plane") || variant.contains("cascade");
+            let little = if plane && percent == 1.0 {
+                -0.03 * sign
+            } else {
+                0.0
+            };
+            let rise = if variant.starts_with("nn-") {
+                0.02 * sign
+            } else {
+                0.0
+            };
+            // A variant's own luck with a case, and the same on average.
+            let luck = if plane {
+                0.001 * (case % 2) as f64
+            } else {
+                0.0
+            };
+            let hybrid = if variant == "hybrid" {
+                -0.05 * sign
+            } else {
+                0.0
+            };
+            0.3 + little + rise * percent + luck + hybrid
+        }
+    };
+    let holding = Analysis::of(&study(Experiment::DepthNoise, 12, with(1.0), |_| 1.0));
+    let failing = Analysis::of(&study(Experiment::DepthNoise, 12, with(-1.0), |_| 1.0));
+    assert!(holding.group(NOISY).is_some());
+    for part in [
+        "every step of depth noise",
+        "lower mean VSD than each",
+        "less susceptible",
+        "projective-point-to-plane improves",
+        "nn-cascade-plane-point improves",
+    ] {
+        assert_eq!(verdict(&holding, part), ClaimVerdict::Holds, "{part}");
+        assert_eq!(verdict(&failing, part), ClaimVerdict::DoesNotHold, "{part}");
+    }
+}
+
+#[test]
+fn the_order_of_table_one_is_checked_pair_by_pair() {
+    let paper = |variant: &str| {
+        hicp_experiments::TABLE_I
+            .iter()
+            .find(|(n, ..)| *n == variant)
+            .unwrap()
+            .1
+    };
+    let holding = Analysis::of(&study(
+        Experiment::Timing,
+        4,
+        |_, _, _| 0.1,
+        |v| 1e3 * paper(v),
+    ));
+    assert_eq!(verdict(&holding, "order of Table I"), ClaimVerdict::Holds);
+    assert_eq!(
+        verdict(&holding, "every projective variant is faster"),
+        ClaimVerdict::Holds
+    );
+    let swapped = Analysis::of(&study(
+        Experiment::Timing,
+        4,
+        |_, _, _| 0.1,
+        |v| match v {
+            "hybrid" => 300.0,
+            v => 1e3 * paper(v),
+        },
+    ));
+    assert_eq!(
+        verdict(&swapped, "order of Table I"),
+        ClaimVerdict::DoesNotHold
+    );
+    let figures = &claims(&swapped)[1].figures;
+    assert!(figures.starts_with("35 of 36 pairs"), "{figures}");
+}
+
+#[test]
+fn the_minimum_of_alpha_is_found_and_held_against_the_papers() {
+    let valley = |at: f64| {
+        move |_: &str, level: &str, _: u64| 0.1 + (level.parse::<f64>().unwrap() - at).abs()
+    };
+    let at = |alpha: f64| {
+        claims(&Analysis::of(&study(
+            Experiment::Alpha,
+            10,
+            valley(alpha),
+            |_| 1.0,
+        )))
+        .remove(0)
+    };
+    let paper = at(0.4);
+    assert_eq!(paper.verdict, ClaimVerdict::Holds);
+    assert!(
+        paper.figures.contains("is at α = 0.40;"),
+        "{}",
+        paper.figures
+    );
+    let other = at(0.75);
+    assert_eq!(other.verdict, ClaimVerdict::DoesNotHold);
+    assert!(
+        other.figures.contains("is at α = 0.75;"),
+        "{}",
+        other.figures
+    );
+}
+
+#[test]
+fn a_report_holds_figures_tables_and_what_could_not_be_made() {
+    let mut study = study(Experiment::InitNoise, 10, as_in_the_paper, |_| 1.0);
+    let unmade = study
+        .rows
+        .iter_mut()
+        .find(|r| r.object == "can" && r.case == 9)
+        .unwrap();
+    unmade.measured = None;
+    unmade.note = "bin 9 <was> empty".to_owned();
+    let folder = tempfile::tempdir().unwrap();
+    let report = Report::of(vec![("by-hand".to_owned(), study)]);
+    report.write(folder.path()).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for part in [
+        "<svg",
+        "by-hand",
+        "holds",
+        "bin 9 &lt;was&gt; empty",
+        "0.380",
+        "bowl, can, tape, book",
+    ] {
+        assert!(page.contains(part), "no {part:?}");
+    }
+    // Nothing is fetched from anywhere.
+    assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("<script"));
+    let claims = std::fs::read_to_string(folder.path().join("claims.csv")).unwrap();
+    assert_eq!(claims.lines().count(), 1 + report.claims().len());
+    let summary = std::fs::read_to_string(folder.path().join("summary.csv")).unwrap();
+    assert_eq!(summary.lines().count(), 1 + 13 * 9);
+    let differences = std::fs::read_to_string(folder.path().join("differences.csv")).unwrap();
+    assert_eq!(differences.lines().count(), 1 + 13 * 8);
+    let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("figure.png")).unwrap();
+    assert!(width > 1000 && height > 300 && rgb.iter().any(|b| *b != 255));
+    assert!(!folder.path().join("alpha.svg").exists());
+}
+
+#[test]
+fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
+    let init = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0));
+    let depth = Analysis::of(&study(Experiment::DepthNoise, 12, as_in_the_paper, |_| 2.0));
+    let figure = Figure::of([&init, &depth]);
+    assert!(!figure.is_empty() && figure.rows.len() == 2);
+    for row in &figure.rows {
+        // Nearest neighbours, projective, and the rest with the best of either.
+        assert_eq!(row.len(), 3);
+        assert_eq!(row[0].curves.len(), 4);
+        assert_eq!(row[1].curves.len(), 4);
+        assert!(row[2].curves.iter().any(|curve| curve.label == "hybrid"));
+    }
+    let timing = Analysis::of(&study(Experiment::Timing, 4, as_in_the_paper, |_| 2.0));
+    assert!(Figure::of([&timing]).is_empty());
+}
+
+/// A bootstrap over cases that are all alike is a point; what none of them shows may still happen.
+#[test]
+fn a_share_that_no_case_shows_keeps_an_interval() {
+    let wrong = |name: &str| f64::from(u8::from(name.starts_with("nn-")));
+    let study = study(
+        Experiment::DepthNoise,
+        5,
+        |name, _, _| 0.9 * wrong(name),
+        |_| 1.0,
+    );
+    let analysis = Analysis::of(&study);
+    let all = analysis.overall();
+    let of = |name: &str| (all, analysis.variant(name).unwrap());
+    let failing = |terms: &[(&str, f64)]| {
+        let terms: Vec<_> = terms
+            .iter()
+            .map(|(name, f)| (of(name).0, of(name).1, *f))
+            .collect();
+        let found = analysis.contrast(Metric::Failure, &terms).unwrap();
+        (found.estimate, found.low, found.high)
+    };
+    // Five cases of four objects, however many conditions each was seen under.
+    let unseen = never_seen(20);
+    assert!((unseen - (1.0 - 0.05_f64.powf(0.05))).abs() < 1e-12);
+    assert_eq!(failing(&[("hybrid", 1.0)]), (0.0, 0.0, unseen));
+    assert_eq!(
+        failing(&[("nn-point-to-point", 1.0)]),
+        (1.0, 1.0 - unseen, 1.0)
+    );
+    let neither = [("hybrid", 1.0), ("projective-point-to-plane", -1.0)];
+    assert_eq!(failing(&neither), (0.0, -unseen, unseen));
+    let one = [("hybrid", 1.0), ("nn-point-to-point", -1.0)];
+    assert_eq!(failing(&one), (-1.0, -1.0, unseen - 1.0));
+    // The rule of three; and nothing is known of nothing.
+    assert!((never_seen(1000) - 0.003).abs() < 1e-4);
+    assert_eq!(never_seen(0), 1.0);
+}

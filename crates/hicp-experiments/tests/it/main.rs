@@ -1,0 +1,9 @@
+//! Integration tests of `hicp-experiments`: one program, so that it is linked once.
+
+#![allow(clippy::panic, clippy::unwrap_used, reason = "helpers of tests")]
+
+mod claims;
+mod running;
+mod sequential;
+mod sizes_and_names;
+mod stored_studies;

@@ -1,0 +1,337 @@
+//! Running studies: streamed, resumed, paired, and the same on any number of threads.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use hicp_experiments::{
+    CASES_FILE, Config, Experiment, ExperimentError, RunOptions, Study, Subject, Variant, run,
+};
+use hicp_sim::Household;
+use hybrid_icp::Preset;
+
+fn subjects() -> Vec<Subject> {
+    Subject::household(&[Household::Mug, Household::Book]).unwrap()
+}
+
+/// A study without times, seen by a small camera.
+fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
+    let variants: Vec<Variant> = presets.iter().copied().map(Variant::preset).collect();
+    let mut config = Config::new(experiment, &subjects(), &variants, poses, 3).unwrap();
+    config.times = false;
+    let camera = &mut config.camera;
+    (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
+    (camera.width, camera.height) = (160, 120);
+    config
+}
+
+fn go(config: &Config, folder: &Path, threads: usize, resume: bool) -> Result<(), ExperimentError> {
+    let options = RunOptions {
+        threads,
+        resume,
+        ..RunOptions::default()
+    };
+    run(config, &subjects(), folder, options, &mut |_| {
+        ControlFlow::Continue(())
+    })
+}
+
+fn bytes(folder: &Path) -> Vec<u8> {
+    std::fs::read(folder.join(CASES_FILE)).unwrap()
+}
+
+const TWO: [Preset; 2] = [Preset::Hybrid, Preset::ProjectivePointToPlane];
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let config = config(Experiment::DepthNoise, &TWO, 3);
+    let (one, three) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    go(&config, one.path(), 1, false).unwrap();
+    go(&config, three.path(), 3, false).unwrap();
+    assert_eq!(bytes(one.path()), bytes(three.path()));
+    let rows = bytes(one.path()).iter().filter(|b| **b == b'\n').count();
+    assert_eq!(rows, 1 + 2 * 3 * 6 * 2);
+}
+
+#[test]
+fn a_study_cut_anywhere_goes_on_to_the_same_bytes() {
+    let config = config(Experiment::InitNoise, &TWO, 4);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 1, false).unwrap();
+    let whole = bytes(folder.path());
+    let file = folder.path().join(CASES_FILE);
+    let second_line = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
+    for cut in [
+        0,
+        7,
+        second_line,
+        second_line + 5,
+        whole.len() / 2,
+        whole.len() - 1,
+        whole.len(),
+    ] {
+        std::fs::write(&file, &whole[..cut]).unwrap();
+        go(&config, folder.path(), 2, true).unwrap();
+        assert!(
+            bytes(folder.path()) == whole,
+            "cut at {cut} of {}",
+            whole.len()
+        );
+    }
+}
+
+#[test]
+fn a_stopped_study_keeps_whole_cases_and_goes_on() {
+    let config = config(Experiment::DepthNoise, &TWO, 2);
+    let (whole, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    go(&config, whole.path(), 1, false).unwrap();
+    let options = RunOptions {
+        threads: 2,
+        ..RunOptions::default()
+    };
+    let told = run(&config, &subjects(), stopped.path(), options, &mut |done| {
+        if done == 2 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    assert!(
+        matches!(told, Err(ExperimentError::Stopped { cases: 2 })),
+        "{told:?}"
+    );
+    let part = bytes(stopped.path());
+    assert!(part.len() < bytes(whole.path()).len() && bytes(whole.path()).starts_with(&part));
+    assert_eq!(Study::read(stopped.path()).unwrap().rows.len(), 2 * 6 * 2);
+    go(&config, stopped.path(), 1, true).unwrap();
+    assert_eq!(bytes(stopped.path()), bytes(whole.path()));
+}
+
+#[test]
+fn a_file_that_is_not_of_the_study_is_not_written_over() {
+    let config = config(Experiment::InitNoise, &TWO, 1);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 1, false).unwrap();
+    let whole = bytes(folder.path());
+    let path = folder.path().join(CASES_FILE);
+    let end = whole.iter().position(|byte| *byte == b'\n').unwrap();
+    let mut other_column = whole.clone();
+    other_column[end - 1] ^= 1;
+    for foreign in [
+        &b"a,b\n1,2\n"[..],
+        b"a",
+        b"\n",
+        b"\0\0a",
+        &other_column,
+        &[&whole[..end], b"\r\n"].concat(),
+    ] {
+        std::fs::write(&path, foreign).unwrap();
+        let told = go(&config, folder.path(), 1, true).unwrap_err();
+        assert!(
+            matches!(&told, ExperimentError::Row { path: p, line: 1, .. } if *p == path),
+            "{told}"
+        );
+        assert_eq!(bytes(folder.path()), foreign, "{told}");
+    }
+    for left in [&b"\0\0\0"[..], &[&whole[..end / 2], b"\0\0"].concat()] {
+        std::fs::write(&path, left).unwrap();
+        go(&config, folder.path(), 1, true).unwrap();
+        assert!(bytes(folder.path()) == whole);
+    }
+}
+
+#[test]
+fn rows_that_are_there_are_kept_even_their_times() {
+    let mut config = config(Experiment::InitNoise, &TWO, 2);
+    config.times = true;
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 1, false).unwrap();
+    let whole = bytes(folder.path());
+    let half = whole.len() / 2;
+    std::fs::write(folder.path().join(CASES_FILE), &whole[..half]).unwrap();
+    go(&config, folder.path(), 1, true).unwrap();
+    // Four cases of two rows: the first two cases are whole before the middle.
+    let kept: usize = whole
+        .split_inclusive(|b| *b == b'\n')
+        .take(3)
+        .map(<[u8]>::len)
+        .sum();
+    assert!(kept < half);
+    assert_eq!(bytes(folder.path())[..kept], whole[..kept]);
+    let times = Study::read(folder.path())
+        .unwrap()
+        .rows
+        .into_iter()
+        .map(|r| r.measured.unwrap().cpu_ms.unwrap());
+    // Zero is what a clock of coarse ticks tells.
+    assert!(times.into_iter().all(|ms| (0.0..60_000.0).contains(&ms)));
+}
+
+#[test]
+fn another_study_in_the_folder_is_refused() {
+    let config = config(Experiment::InitNoise, &TWO, 1);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 1, false).unwrap();
+    let told = go(&config, folder.path(), 1, false)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        told.contains("cases.csv") && told.contains("--resume"),
+        "{told}"
+    );
+    let other = Config { seed: 4, ..config };
+    let told = go(&other, folder.path(), 1, true).unwrap_err().to_string();
+    assert!(
+        told.contains("\"seed\": 3 there, \"seed\": 4 now"),
+        "{told}"
+    );
+}
+
+#[test]
+fn every_variant_and_level_gets_the_same_start() {
+    let config = config(Experiment::DepthNoise, &Preset::PAPER, 2);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = Study::read(folder.path()).unwrap();
+    let mut differing = 0;
+    for case in study.rows.chunks_exact(6 * 9) {
+        let first = case[0].measured.as_ref().unwrap();
+        for row in case {
+            assert_eq!((&row.object, row.case), (&case[0].object, case[0].case));
+            let measured = row.measured.as_ref().unwrap();
+            assert_eq!(measured.vsd_initial, first.vsd_initial);
+            differing += usize::from(measured.vsd_final != first.vsd_final);
+        }
+    }
+    // The variants and levels are not one and the same.
+    assert!(differing > 100, "{differing}");
+
+    // What a variant makes of a case does not depend on who else was run, and the noise-free level is the image without noise.
+    let alone = config_of(&study, &[Preset::NnPointToPlane]);
+    let other = tempfile::tempdir().unwrap();
+    go(&alone, other.path(), 1, false).unwrap();
+    let together: Vec<_> = study
+        .rows
+        .into_iter()
+        .filter(|r| r.variant == "nn-point-to-plane")
+        .collect();
+    assert_eq!(Study::read(other.path()).unwrap().rows, together);
+}
+
+fn config_of(study: &Study, presets: &[Preset]) -> Config {
+    config(study.config.experiment, presets, study.config.poses)
+}
+
+#[test]
+fn cases_go_through_the_bins_in_turn() {
+    let config = config(Experiment::InitNoise, &[Preset::ProjectivePointToPoint], 10);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 2, false).unwrap();
+    for row in Study::read(folder.path()).unwrap().rows {
+        let measured = row.measured.unwrap();
+        let bin = row.bin.unwrap();
+        assert_eq!(bin as u64, row.case);
+        let low = bin as f64 / 10.0;
+        assert!(
+            (low..=low + 0.1).contains(&measured.vsd_initial),
+            "{}",
+            measured.vsd_initial
+        );
+    }
+}
+
+#[test]
+fn a_case_that_cannot_be_made_says_why_and_the_others_go_on() {
+    let mut config = config(Experiment::InitNoise, &TWO, 2);
+    // Every initial pose is the true one, and falls into the first bin.
+    config.max_translation_m = 0.0;
+    (config.camera.width, config.camera.height) = (32, 24);
+    (
+        config.camera.fx,
+        config.camera.fy,
+        config.camera.cx,
+        config.camera.cy,
+    ) = (28.0, 28.0, 15.5, 11.5);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 2, false).unwrap();
+    let rows = Study::read(folder.path()).unwrap().rows;
+    assert_eq!(rows.len(), 2 * 2 * 2);
+    for row in rows {
+        assert_eq!(row.measured.is_some(), row.case == 0, "{row:?}");
+        assert_eq!(
+            row.note.contains("could not be filled"),
+            row.case == 1,
+            "{row:?}"
+        );
+    }
+}
+
+#[test]
+fn thresholds_decide_what_hybrid_does() {
+    let config = config(Experiment::Alpha, &[Preset::Hybrid], 6);
+    let folder = tempfile::tempdir().unwrap();
+    go(&config, folder.path(), 2, false).unwrap();
+    let rows = Study::read(folder.path()).unwrap().rows;
+    assert_eq!(rows.len(), 2 * 6 * 21);
+    let of = |level: &str| -> Vec<f64> {
+        let rows = rows.iter().filter(|r| r.level == level);
+        rows.map(|r| r.measured.as_ref().unwrap().vsd_final)
+            .collect()
+    };
+    assert_ne!(of("0.00"), of("1.00"));
+    // At 0 every start takes nearest neighbours first: what the first stage does there is what a threshold of 0.05 does to bad starts.
+    let bad = |level: &str| of(level)[5];
+    assert_eq!(bad("0.00"), bad("0.05"));
+}
+
+#[test]
+fn folders_and_names_are_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = Subject::read_folder(folder.path()).unwrap_err().to_string();
+    assert!(told.contains("holds no mesh"), "{told}");
+    let mug = Household::Mug.solid().to_mesh().unwrap();
+    hicp_io::write_ply(
+        folder.path().join("b.PLY"),
+        &mug,
+        hicp_io::LengthUnit::Meters,
+    )
+    .unwrap();
+    hicp_io::write_obj(
+        folder.path().join("a.obj"),
+        &mug,
+        hicp_io::LengthUnit::Meters,
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("notes.txt"), "").unwrap();
+    let read = Subject::read_folder(folder.path()).unwrap();
+    assert_eq!(
+        read.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
+        ["a", "b"]
+    );
+
+    let variants = [
+        Variant::preset(Preset::Hybrid),
+        Variant::preset(Preset::Hybrid),
+    ];
+    let told = Config::new(Experiment::Timing, &read, &variants, 1, 1)
+        .unwrap_err()
+        .to_string();
+    assert!(told.contains("variant \"hybrid\" is there twice"), "{told}");
+    let told = Config::new(Experiment::Timing, &read, &variants[..1], 0, 1)
+        .unwrap_err()
+        .to_string();
+    assert!(told.contains("number of cases per object is 0"), "{told}");
+    let fixed = [Variant::preset(Preset::NnPointToPoint)];
+    assert!(Config::new(Experiment::Alpha, &read, &fixed, 1, 1).is_err());
+    let mut large = subjects();
+    large[0].model = hicp_core::Model::new(
+        hicp_core::TriMesh::new(
+            mug.vertices().iter().map(|p| p * 10.0).collect(),
+            mug.triangles().to_vec(),
+        )
+        .unwrap(),
+    );
+    let told = Config::new(Experiment::Timing, &large, &variants[..1], 1, 1)
+        .unwrap_err()
+        .to_string();
+    assert!(told.contains("mug has a diameter of"), "{told}");
+}

@@ -1,0 +1,189 @@
+//! The sequential study end to end: streamed, resumed, paired, and the same on any number of threads.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use hicp_experiments::{
+    ExperimentError, FusionRule, Metric, RunOptions, Subject, TRAJECTORIES_FILE, TrajectoryClock,
+    TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run_trajectories,
+};
+use hicp_sim::Household;
+use hybrid_icp::Preset;
+
+const BOTH: [Preset; 2] = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
+
+fn subjects() -> Vec<Subject> {
+    Subject::household(&[Household::Mug]).unwrap()
+}
+
+/// One trajectory per bin, a short one, seen by a small camera; a coarse reconstruction from few images.
+fn config() -> TrajectoryConfig {
+    let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3).unwrap();
+    let camera = &mut config.camera;
+    (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
+    (camera.width, camera.height) = (160, 120);
+    config.start_distance_m = 0.6;
+    config.path_m = 0.12;
+    config.underlying[1].seconds_per_estimate = 0.4;
+    config.reconstruction_images = 20;
+    config.reconstruction_voxel_m = 0.004;
+    config
+}
+
+fn go(
+    config: &TrajectoryConfig,
+    folder: &Path,
+    threads: usize,
+    resume: bool,
+) -> Result<(), ExperimentError> {
+    let options = RunOptions {
+        threads,
+        resume,
+        ..RunOptions::default()
+    };
+    run_trajectories(config, &subjects(), folder, options, &mut |_| {
+        ControlFlow::Continue(())
+    })
+}
+
+fn bytes(folder: &Path) -> Vec<u8> {
+    std::fs::read(folder.join(TRAJECTORIES_FILE)).unwrap()
+}
+
+#[test]
+fn a_small_study_runs_to_its_report() {
+    let (config, folder) = (config(), tempfile::tempdir().unwrap());
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    assert_eq!(study.rows.len(), 10 * 2 * FusionRule::ALL.len());
+    for row in &study.rows {
+        let (vsd_initial, vsd_final) = row.vsd().unwrap();
+        // The bin is that of the start, and all rows of a trajectory have the same start.
+        let bin = usize::try_from(row.trajectory).unwrap();
+        assert_eq!(row.bin, Some(bin));
+        assert!((vsd_initial * 10.0 - bin as f64 - 0.5).abs() <= 0.5 + 1e-4);
+        assert!((0.0..=1.0).contains(&vsd_final), "{row:?}");
+        // 12 cm at 0.1 m/s and 0.542 s: images after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
+        let images = if row.underlying == "hybrid" { 3 } else { 4 };
+        assert_eq!(config.n_images(usize::from(images == 4)), images);
+        assert!(row.n_estimates() <= images, "{row:?}");
+        // Whoever has an estimate states a covariance.
+        let distance = row.mahalanobis_squared();
+        assert_eq!(distance.is_some(), row.n_estimates() > 0, "{row:?}");
+        assert!(distance.is_none_or(|squared| squared >= 0.0));
+    }
+    // Methods do differ, and from good starts the object is found all the same.
+    let differ = study.rows.chunks(FusionRule::ALL.len());
+    let differ = differ.filter(|rows| rows.iter().any(|r| r.vsd() != rows[0].vsd()));
+    assert!(differ.count() > 0);
+    let report = TrajectoryReport::of(study);
+    let analysis = report.analysis();
+    let average = analysis.variant("hybrid/average").unwrap();
+    let first = analysis.mean(Metric::Vsd, 0, average).unwrap();
+    assert!(first.estimate < 0.3, "{first:?}");
+    assert_eq!(report.claims().len(), 2 * 6 + 2);
+    // A panel per underlying pipeline with the paper's six methods, and one for the gated ones.
+    let row = &report.figure().rows[0];
+    assert_eq!(row.len(), 2 + 1);
+    assert_eq!((row[0].curves.len(), row[1].curves.len()), (6, 6));
+    report.write(folder.path()).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for part in [
+        "<svg",
+        "post-trajectory VSD",
+        "gated-weighted-average",
+        "calibrated-weighted-average",
+        "average is at least as good",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    for file in [
+        "figure.svg",
+        "figure.png",
+        "summary.csv",
+        "differences.csv",
+        "claims.csv",
+        "calibration.csv",
+    ] {
+        assert!(folder.path().join(file).metadata().unwrap().len() > 100);
+    }
+}
+
+#[test]
+fn threads_and_interruptions_do_not_show() {
+    let (config, one) = (config(), tempfile::tempdir().unwrap());
+    go(&config, one.path(), 1, false).unwrap();
+    let whole = bytes(one.path());
+    let two = tempfile::tempdir().unwrap();
+    go(&config, two.path(), 2, false).unwrap();
+    assert_eq!(bytes(two.path()), whole);
+    // Cut in the header, between trajectories, and within one.
+    let file = two.path().join(TRAJECTORIES_FILE);
+    for cut in [5, whole.len() / 2, whole.len() - 7] {
+        std::fs::write(&file, &whole[..cut]).unwrap();
+        go(&config, two.path(), 2, true).unwrap();
+        assert_eq!(bytes(two.path()), whole, "cut at {cut}");
+    }
+    // What is there is not overwritten, and another study does not go on from it.
+    let again = go(&config, two.path(), 1, false);
+    assert!(matches!(again, Err(ExperimentError::AlreadyThere { .. })));
+    let mut other = config.clone();
+    other.underlying[0].seconds_per_estimate = 0.3;
+    let other = go(&other, two.path(), 1, true);
+    assert!(matches!(
+        other,
+        Err(ExperimentError::OtherConfiguration { .. })
+    ));
+}
+
+#[test]
+fn pipelines_of_one_study_share_paths_and_starts() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let both = config();
+    go(&both, folders[0].path(), 2, false).unwrap();
+    let mut alone = both.clone();
+    alone.underlying.remove(0);
+    go(&alone, folders[1].path(), 2, false).unwrap();
+    let [both, alone] = folders.map(|f| TrajectoryStudy::read(f.path()).unwrap().rows);
+    let expected: Vec<_> = both
+        .into_iter()
+        .filter(|row| row.underlying == BOTH[1].name())
+        .collect();
+    assert_eq!(alone, expected);
+}
+
+#[test]
+fn by_a_real_clock_every_method_has_images_of_its_own() {
+    let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
+    config.clock = TrajectoryClock::Real;
+    config.methods = vec!["last-estimate".to_owned(), "average".to_owned()];
+    // So fast that a path ends after some images, whatever the machine.
+    config.speed_m_s = 20.0;
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    assert_eq!(study.config.clock, TrajectoryClock::Real);
+    assert_eq!(study.rows.len(), 10 * 2 * 2);
+    for row in &study.rows {
+        // At least the first image, from the start that both have.
+        assert!(
+            row.vsd()
+                .is_some_and(|(_, last)| (0.0..=1.0).contains(&last)),
+            "{row:?}"
+        );
+    }
+    assert!(study.rows.iter().any(|row| row.n_estimates() > 0));
+    TrajectoryReport::of(study).write(folder.path()).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(html.contains("no run repeats this one"));
+}
+
+#[test]
+fn what_cannot_be_run_is_refused() {
+    let refused = |subjects: &[Subject], n, presets: &[Preset]| {
+        TrajectoryConfig::new(subjects, presets, n, 1)
+    };
+    assert!(refused(&subjects(), 0, &BOTH).is_err());
+    assert!(refused(&subjects(), 1, &[]).is_err());
+    assert!(refused(&subjects(), 1, &[BOTH[0], BOTH[0]]).is_err());
+    assert!(refused(&[], 1, &BOTH).is_err());
+}

@@ -1,0 +1,668 @@
+//! Files of studies that no run wrote: each is refused, with its name and the field or the line, and nothing panics or takes memory without end.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use hicp_experiments::{
+    Analysis, CASES_FILE, COLUMNS, CONFIG_FILE, Config, Experiment, ExperimentError, FusionRule,
+    HIGH, LOW, MAX_BINS, MAX_CELLS, MAX_OBJECTS, Metric, Report, RunOptions, Study, Subject,
+    TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryConfig, TrajectoryReport, TrajectoryStudy,
+    Variant, run, run_trajectories,
+};
+use hicp_io::{IoError, ReadLimits};
+use hicp_sim::Household;
+use hybrid_icp::Preset;
+use serde_json::{Value, json};
+
+/// A folder with the two files of a study.
+struct Stored {
+    folder: tempfile::TempDir,
+    rows: &'static str,
+}
+
+impl Stored {
+    /// A study of two objects, two cases and two variants.
+    fn single() -> Self {
+        let presets = [Preset::Hybrid, Preset::NnPointToPoint].map(Variant::preset);
+        let config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
+        let mut text = COLUMNS.join(",") + "\n";
+        for object in ["mug", "book"] {
+            for case in 0..2 {
+                for variant in ["hybrid", "nn-point-to-point"] {
+                    text += &format!(
+                        "{object},{case},{variant},0,{case},0.{case}5,0.04,1.5,9,converged,2.5,\n"
+                    );
+                }
+            }
+        }
+        let stored = Self {
+            folder: tempfile::tempdir().unwrap(),
+            rows: CASES_FILE,
+        };
+        stored.write(
+            CONFIG_FILE,
+            serde_json::to_string_pretty(&config).unwrap() + "\n",
+        );
+        stored.write(CASES_FILE, text);
+        stored
+    }
+
+    /// A sequential study of two objects and one trajectory per bin.
+    fn sequential() -> Self {
+        let presets = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
+        let mut config = TrajectoryConfig::new(&subjects(), &presets, 1, 3).unwrap();
+        config.methods.truncate(2);
+        let mut text = TRAJECTORY_COLUMNS.join(",") + "\n";
+        for trajectory in 0..3 {
+            for object in ["mug", "book"] {
+                for underlying in presets {
+                    for method in &config.methods {
+                        text += &format!(
+                            "{object},{trajectory},{trajectory},{underlying},{method},0.{trajectory}5,0.04,1.5,2,3.5,\n"
+                        );
+                    }
+                }
+            }
+        }
+        let stored = Self {
+            folder: tempfile::tempdir().unwrap(),
+            rows: TRAJECTORIES_FILE,
+        };
+        stored.write(
+            CONFIG_FILE,
+            serde_json::to_string_pretty(&config).unwrap() + "\n",
+        );
+        stored.write(TRAJECTORIES_FILE, text);
+        stored
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Reads the study and analyses it, as a report does.
+    fn read(&self) -> Result<usize, ExperimentError> {
+        let folder = self.folder.path();
+        if self.rows == CASES_FILE {
+            let study = Study::read(folder)?;
+            let rows = study.rows.len();
+            assert_eq!(
+                Report::of(vec![("it".to_owned(), study)]).analyses().len(),
+                1
+            );
+            return Ok(rows);
+        }
+        let study = TrajectoryStudy::read(folder)?;
+        let rows = study.rows.len();
+        assert!(TrajectoryReport::of(study).analysis().variants().len() > 1);
+        Ok(rows)
+    }
+
+    /// Changes the value at a JSON pointer, reads, and puts the file back; returns what was told, with the field.
+    #[track_caller]
+    fn with(&self, pointer: &str, value: Value) -> (String, String, String) {
+        let before = self.text(CONFIG_FILE);
+        let mut config: Value = serde_json::from_str(&before).unwrap();
+        *config.pointer_mut(pointer).unwrap() = value;
+        self.write(CONFIG_FILE, config.to_string());
+        let told = self.read();
+        self.write(CONFIG_FILE, before);
+        match told {
+            Err(ExperimentError::Field {
+                path,
+                field,
+                found,
+                expected,
+            }) => {
+                assert_eq!(path, self.path(CONFIG_FILE));
+                (field, found, expected)
+            }
+            told => panic!("{pointer}: {told:?}"),
+        }
+    }
+
+    /// Changes the rows, reads, and puts the file back; returns the line and what was told of it.
+    #[track_caller]
+    fn with_rows(&self, change: impl FnOnce(&str) -> String) -> (usize, String) {
+        let before = self.text(self.rows);
+        let after = change(&before);
+        assert_ne!(before, after);
+        self.write(self.rows, after);
+        let told = self.read();
+        self.write(self.rows, before);
+        match told {
+            Err(ExperimentError::Row { path, line, what }) => {
+                assert_eq!(path, self.path(self.rows));
+                (line, what)
+            }
+            told => panic!("{told:?}"),
+        }
+    }
+}
+
+fn subjects() -> Vec<Subject> {
+    Subject::household(&[Household::Mug, Household::Book]).unwrap()
+}
+
+#[test]
+fn what_is_changed_here_reads_before_it_is_changed() {
+    assert_eq!(Stored::single().read().unwrap(), 8);
+    assert_eq!(Stored::sequential().read().unwrap(), 24);
+}
+
+#[test]
+fn fields_of_a_configuration_are_checked() {
+    let stored = Stored::single();
+    let one = json!({"name": "mug", "source": "", "triangles": 1, "diameter_mm": 100.0, "symmetric": false, "fingerprint": ""});
+    let variant = json!({"name": "hybrid", "pipeline": ""});
+    for (pointer, value, field, part) in [
+        ("/bins", json!(0), "bins", "1 to 1000"),
+        ("/bins", json!(4_000_000_000_u64), "bins", "1 to 1000"),
+        (
+            "/bins",
+            json!(1_000_000_000_000_000_000_u64),
+            "bins",
+            "1 to 1000",
+        ),
+        ("/bins", json!(MAX_BINS + 1), "bins", "1 to 1000"),
+        ("/poses", json!(0), "poses", "1 to 1000000"),
+        ("/poses", json!(u64::MAX), "poses", "1 to 1000000"),
+        ("/objects", json!([]), "objects", "1 to"),
+        ("/objects", json!([one, one]), "objects", "different names"),
+        (
+            "/objects",
+            json!(vec![&one; MAX_OBJECTS + 1]),
+            "objects",
+            "1 to 10000",
+        ),
+        (
+            "/objects/1/diameter_mm",
+            json!(0.0),
+            "objects[1].diameter_mm",
+            "above 0",
+        ),
+        ("/variants", json!([]), "variants", "1 to"),
+        (
+            "/variants",
+            json!([variant, variant]),
+            "variants",
+            "different names",
+        ),
+        ("/levels", json!([]), "levels", "1 to 1"),
+        (
+            "/levels",
+            json!(["1"]),
+            "levels[0]",
+            "\"0\", as in every init-noise study",
+        ),
+        ("/levels", json!(vec!["0"; 100_000]), "levels", "1 to 1"),
+        (
+            "/max_translation_m",
+            json!(-0.1),
+            "max_translation_m",
+            "at least 0",
+        ),
+        ("/max_distance_m", json!(0.0), "max_distance_m", "above 0"),
+        ("/camera/fx", json!(0.0), "camera", "a camera"),
+        ("/camera/width", json!(u32::MAX), "camera", "a camera"),
+    ] {
+        let told = stored.with(pointer, value);
+        assert_eq!(told.0, field);
+        assert!(told.2.contains(part), "{field}: {told:?}");
+    }
+    let told = stored.with("/objects", json!([one, one]));
+    assert_eq!(told.1, "\"mug\" twice");
+    // Each of these is within its limit, together they are not.
+    let many: Vec<Value> = (0..=MAX_CELLS / 10)
+        .map(|i| json!({"name": i.to_string(), "pipeline": ""}))
+        .collect();
+    let told = stored.with("/variants", json!(many));
+    assert_eq!(told.0, "levels × variants × bins");
+    assert_eq!((&*told.1, &*told.2), ("1 × 1001 × 10", "at most 10000"));
+}
+
+#[test]
+fn fields_of_a_sequential_configuration_are_checked() {
+    let stored = Stored::sequential();
+    let hybrid = json!({"name": "hybrid", "pipeline": "", "seconds_per_estimate": 0.5});
+    for (pointer, value, field, part) in [
+        (
+            "/experiment",
+            json!("init-noise"),
+            "experiment",
+            "\"sequential\"",
+        ),
+        ("/bins", json!(0), "bins", "1 to 1000"),
+        ("/bins", json!(4_000_000_000_u64), "bins", "1 to 1000"),
+        (
+            "/trajectories",
+            json!(u64::MAX),
+            "trajectories",
+            "1 to 100000",
+        ),
+        ("/objects", json!([]), "objects", "1 to"),
+        ("/underlying", json!([]), "underlying", "1 to"),
+        (
+            "/underlying",
+            json!([hybrid, hybrid]),
+            "underlying",
+            "different names",
+        ),
+        (
+            "/underlying/0/seconds_per_estimate",
+            json!(0.0),
+            "underlying[0].seconds_per_estimate",
+            "above 0",
+        ),
+        ("/methods", json!([]), "methods", "1 to"),
+        (
+            "/methods",
+            json!(["average", "average"]),
+            "methods",
+            "different names",
+        ),
+        (
+            "/methods",
+            json!(["average", "mean"]),
+            "methods[1]",
+            "a method of the paper",
+        ),
+        ("/speed_m_s", json!(0.0), "speed_m_s", "above 0"),
+        ("/path_m", json!(-1.0), "path_m", "at least 0"),
+        ("/camera/fy", json!(-1.0), "camera", "a camera"),
+    ] {
+        let told = stored.with(pointer, value);
+        assert_eq!(told.0, field);
+        assert!(told.2.contains(part), "{field}: {told:?}");
+    }
+    // Each of these is within its limit, together they are not.
+    let mut config: Value = serde_json::from_str(&stored.text(CONFIG_FILE)).unwrap();
+    config["methods"] = json!(FusionRule::ALL.map(FusionRule::name));
+    stored.write(CONFIG_FILE, config.to_string());
+    let told = stored.with("/bins", json!(MAX_BINS));
+    assert_eq!(told.0, "underlying × methods × bins");
+    assert_eq!((&*told.1, &*told.2), ("2 × 10 × 1000", "at most 10000"));
+}
+
+#[test]
+fn rows_that_the_configuration_does_not_have_are_refused() {
+    let stored = Stored::single();
+    let first = "mug,0,hybrid,0,0,0.05,0.04";
+    let instead = |row: &str| stored.with_rows(|rows| rows.replacen(first, row, 1));
+    for (row, part) in [
+        (
+            "pan,0,hybrid,0,0,0.05,0.04",
+            "object is \"pan\", expected one of config.json: \"mug\", \"book\"",
+        ),
+        (
+            "mug,0,search,0,0,0.05,0.04",
+            "variant is \"search\", expected one of config.json: \"hybrid\"",
+        ),
+        (
+            "mug,0,hybrid,7,0,0.05,0.04",
+            "level is \"7\", expected one of config.json: \"0\"",
+        ),
+        (
+            "mug,2,hybrid,0,2,0.05,0.04",
+            "case is 2, expected less than 2",
+        ),
+        ("mug,0,hybrid,0,10,0.05,0.04", "bin is 10, expected 0"),
+        ("mug,0,hybrid,0,1,0.05,0.04", "bin is 1, expected 0"),
+        ("mug,0,hybrid,0,,0.05,0.04", "bin is empty, expected 0"),
+        (
+            "mug,0,hybrid,0,0,1.5,0.04",
+            "vsd_initial is \"1.5\", expected a number from 0 to 1",
+        ),
+        ("mug,0,hybrid,0,0,0.05,1e300", "vsd_final is \"1e300\""),
+        ("mug,0,hybrid,0,0,0.05,NaN", "vsd_final is \"NaN\""),
+        ("mug,0,hybrid,0,0,0.05,0.04,1", "13 fields, expected 12"),
+    ] {
+        let (line, what) = instead(row);
+        assert!(line == 2 && what.contains(part), "{line}: {what}");
+    }
+    // The line is that of the file, whatever a field before it holds.
+    let (line, what) = stored.with_rows(|rows| {
+        let noted = rows.replacen("2.5,\n", "2.5,\"two\nlines\"\n", 1);
+        noted.replacen("book,1,hybrid", "pan,1,hybrid", 1)
+    });
+    assert!(
+        line == 9 && what.contains("object is \"pan\""),
+        "{line}: {what}"
+    );
+    let (line, what) = stored.with_rows(|rows| format!("{rows}{}", rows.lines().last().unwrap()));
+    assert_eq!(line, 10);
+    assert!(
+        what.contains("object \"book\", level \"0\", variant \"nn-point-to-point\", case 1 again"),
+        "{what}"
+    );
+    let (line, what) = stored.with_rows(|rows| rows.replacen("variant", "pipeline", 1));
+    assert!(
+        line == 1 && what.contains("found \"object,case,pipeline"),
+        "{what}"
+    );
+    // A value of a megabyte does not fill the screen.
+    let (_, what) = instead(&format!("{},0,hybrid,0,0,0.05,0.04", "x".repeat(1 << 20)));
+    assert!(what.len() < 200, "{} bytes", what.len());
+}
+
+#[test]
+fn rows_that_a_sequential_configuration_does_not_have_are_refused() {
+    let stored = Stored::sequential();
+    let first = "mug,0,0,hybrid,last-estimate,0.05,0.04";
+    for (row, part) in [
+        (
+            "pan,0,0,hybrid,last-estimate,0.05,0.04",
+            "object is \"pan\"",
+        ),
+        (
+            "mug,10,0,hybrid,last-estimate,0.05,0.04",
+            "trajectory is 10, expected less than 10",
+        ),
+        (
+            "mug,0,1,hybrid,last-estimate,0.05,0.04",
+            "bin is 1, expected 0",
+        ),
+        (
+            "mug,0,0,local,last-estimate,0.05,0.04",
+            "underlying is \"local\"",
+        ),
+        (
+            "mug,0,0,hybrid,filtering,0.05,0.04",
+            "method is \"filtering\"",
+        ),
+        (
+            "mug,0,0,hybrid,average,0.05,0.04",
+            "again, expected every row once",
+        ),
+        ("mug,0,0,hybrid,last-estimate,0.05,2", "vsd_final is \"2\""),
+    ] {
+        let (line, what) = stored.with_rows(|rows| rows.replacen(first, row, 1));
+        let expected = if part.starts_with("again") { 3 } else { 2 };
+        assert!(line == expected && what.contains(part), "{line}: {what}");
+    }
+}
+
+#[test]
+fn a_study_without_rows_is_empty() {
+    for stored in [Stored::single(), Stored::sequential()] {
+        let header = stored.text(stored.rows).lines().next().unwrap().to_owned() + "\n";
+        stored.write(stored.rows, header);
+        assert!(
+            matches!(stored.read(), Err(ExperimentError::Empty { path }) if path == stored.path(stored.rows))
+        );
+    }
+}
+
+#[test]
+fn encodings_and_limits_are_told() {
+    for stored in [Stored::single(), Stored::sequential()] {
+        let folder = stored.folder.path();
+        let within = |limits: &ReadLimits| match stored.rows {
+            CASES_FILE => Study::read_within(limits, folder).map(|_| ()),
+            _ => TrajectoryStudy::read_within(limits, folder).map(|_| ()),
+        };
+        for (limits, field) in [
+            (
+                ReadLimits {
+                    max_small_json_bytes: 50,
+                    ..ReadLimits::DEFAULT
+                },
+                "max_small_json_bytes",
+            ),
+            (
+                ReadLimits {
+                    max_file_bytes: 50,
+                    ..ReadLimits::DEFAULT
+                },
+                "max_file_bytes",
+            ),
+            (
+                ReadLimits {
+                    max_rows: 7,
+                    ..ReadLimits::DEFAULT
+                },
+                "max_rows",
+            ),
+        ] {
+            match within(&limits) {
+                Err(ExperimentError::Io(IoError::Limit { field: told, .. })) => {
+                    assert_eq!(told, field);
+                }
+                told => panic!("{field}: {told:?}"),
+            }
+        }
+        for name in [CONFIG_FILE, stored.rows] {
+            let before = stored.text(name);
+            stored.write(name, format!("\u{feff}{before}"));
+            stored.read().unwrap();
+            let utf16: Vec<u8> = before.encode_utf16().flat_map(u16::to_le_bytes).collect();
+            for bytes in [[&[0xff, 0xfe], &utf16[..]].concat(), utf16] {
+                stored.write(name, bytes);
+                match stored.read() {
+                    Err(ExperimentError::Io(IoError::Encoding { path, found })) => {
+                        assert_eq!((path, found), (stored.path(name), "UTF-16 LE"));
+                    }
+                    told => panic!("{name}: {told:?}"),
+                }
+            }
+            stored.write(name, [before.as_bytes(), b"\xff"].concat());
+            assert!(
+                matches!(stored.read(), Err(ExperimentError::Io(IoError::Bytes { path, .. })) if path == stored.path(name))
+            );
+            stored.write(name, before);
+        }
+        stored.read().unwrap();
+    }
+}
+
+/// Nothing is computed: a break comes before the first case.
+fn resume(stored: &Stored) -> Result<(), ExperimentError> {
+    let folder = stored.folder.path();
+    let config = stored.text(CONFIG_FILE);
+    let options = RunOptions {
+        resume: true,
+        ..RunOptions::default()
+    };
+    let stop = &mut |_| ControlFlow::Break(());
+    match stored.rows {
+        CASES_FILE => {
+            let config: Config = serde_json::from_str(&config).unwrap();
+            run(&config, &subjects(), folder, options, stop)
+        }
+        _ => {
+            let config: TrajectoryConfig = serde_json::from_str(&config).unwrap();
+            run_trajectories(&config, &subjects(), folder, options, stop)
+        }
+    }
+}
+
+#[test]
+fn a_study_goes_on_only_from_its_own_first_rows() {
+    for (stored, per_case) in [(Stored::single(), 2), (Stored::sequential(), 4)] {
+        let whole = stored.text(stored.rows);
+        let cases = (whole.lines().count() - 1) / per_case;
+        let stopped = |expected: usize| match resume(&stored) {
+            Err(ExperimentError::Stopped { cases }) => assert_eq!(cases, expected),
+            told => panic!("{told:?}"),
+        };
+        stopped(cases);
+        assert_eq!(stored.text(stored.rows), whole);
+        // Cut off within the last row, and filled with zeros.
+        stored.write(stored.rows, &whole[..whole.len() - 3]);
+        stopped(cases - 1);
+        stored.write(
+            stored.rows,
+            [&whole.as_bytes()[..whole.len() - 3], &[0; 100]].concat(),
+        );
+        stopped(cases - 1);
+        stored.write(stored.rows, &whole);
+
+        let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+        let mut swapped = lines.clone();
+        swapped.swap(1, 2);
+        let mut gap = lines.clone();
+        gap.drain(1..=per_case);
+        let mut blank = lines.clone();
+        blank.splice(2..2, std::iter::repeat_n("\n", per_case));
+        let changed = [
+            (whole.replacen("mug", "pan", 1), "object is \"pan\""),
+            (swapped.concat(), "found row 2 of the study, expected row 1"),
+            (gap.concat(), "expected row 1"),
+            (blank.concat(), "one per line"),
+        ];
+        for (rows, part) in changed {
+            stored.write(stored.rows, &rows);
+            match resume(&stored) {
+                Err(ExperimentError::Row { path, what, .. }) => {
+                    assert_eq!(path, stored.path(stored.rows));
+                    assert!(what.contains(part), "{what}");
+                }
+                told => panic!("{part}: {told:?}"),
+            }
+            // What is there is not written over.
+            assert_eq!(stored.text(stored.rows), rows);
+        }
+        let mut foreign = whole.clone().into_bytes();
+        let place = foreign.len() / 2;
+        foreign[place] = 0xff;
+        stored.write(stored.rows, &foreign);
+        let told = resume(&stored).unwrap_err().to_string();
+        assert!(told.contains("not UTF-8"), "{told}");
+        let utf16: Vec<u8> = whole.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        stored.write(stored.rows, &utf16);
+        assert!(matches!(
+            resume(&stored),
+            Err(ExperimentError::Io(IoError::Encoding {
+                found: "UTF-16 BE",
+                ..
+            }))
+        ));
+    }
+}
+
+#[test]
+fn what_could_not_be_read_back_is_not_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let presets = [Variant::preset(Preset::Hybrid)];
+    let mut config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
+    config.bins = 0;
+    let go = &mut |_| ControlFlow::Continue(());
+    let told = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
+    assert!(
+        told.to_string()
+            .ends_with("bins: found 0, expected 1 to 1000"),
+        "{told}"
+    );
+    let mut config = TrajectoryConfig::new(&subjects(), &[Preset::Hybrid], 1, 3).unwrap();
+    config.bins = 0;
+    let told = run_trajectories(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
+    assert!(
+        told.to_string()
+            .ends_with("bins: found 0, expected 1 to 1000"),
+        "{told}"
+    );
+    assert!(!out.exists());
+}
+
+/// The configurations beside the committed results are still read: rows are all that is missing.
+#[test]
+fn the_committed_studies_read() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/study");
+    for name in ["beyond", "sequential", "sequential/calibrated"] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::copy(
+            docs.join(name).join(CONFIG_FILE),
+            folder.path().join(CONFIG_FILE),
+        )
+        .unwrap();
+        let put =
+            |rows: &str, text: String| std::fs::write(folder.path().join(rows), text).unwrap();
+        if name == "beyond" {
+            put(
+                CASES_FILE,
+                COLUMNS.join(",") + "\nmug,3,local,depth-2,3,0.35,0.04,1.5,9,converged,2.5,\n",
+            );
+            let told = Study::read(folder.path());
+            assert!(
+                told.is_ok_and(|study| study.config.levels.len() == 14),
+                "{name}"
+            );
+        } else {
+            put(
+                TRAJECTORIES_FILE,
+                TRAJECTORY_COLUMNS.join(",") + "\nmug,3,3,hybrid,average,0.35,0.04,1.5,9,2.5,\n",
+            );
+            let told = TrajectoryStudy::read(folder.path());
+            assert!(told.is_ok_and(|study| study.config.bins == 10), "{name}");
+        }
+    }
+}
+
+#[test]
+fn ranges_of_bins_are_of_the_initial_vsd_whatever_their_number() {
+    for (bins, low, high, first) in [
+        (10, 0..3, 7..10, "0.0-0.1"),
+        (20, 0..6, 14..20, "0.00-0.05"),
+        (7, 0..2, 5..7, "0.000-0.143"),
+        (1, 0..0, 1..1, "0.0-1.0"),
+    ] {
+        let stored = Stored::single();
+        let mut study = Study::read(stored.folder.path()).unwrap();
+        study.config.bins = bins;
+        let analysis = Analysis::of(&study);
+        let range = |label| {
+            let group = analysis.group(label).unwrap();
+            analysis.groups()[group].bins.clone().unwrap()
+        };
+        assert_eq!((range(LOW), range(HIGH)), (low, high), "{bins}");
+        assert_eq!(analysis.groups()[0].label, first);
+        let all = analysis.mean(Metric::Vsd, analysis.overall(), 0).unwrap();
+        assert!((all.estimate - 0.04).abs() < 1e-12);
+        // Nobody is there: no group, no variant.
+        assert!(
+            analysis
+                .mean(Metric::Vsd, analysis.groups().len(), 0)
+                .is_none()
+        );
+        assert!(analysis.mean(Metric::Vsd, 0, 2).is_none());
+        assert!(
+            analysis.cell(analysis.groups().len(), 0).is_none() && analysis.cell(0, 2).is_none()
+        );
+        let figure = hicp_experiments::Figure::of([&analysis]);
+        let points = &figure.rows[0][0].curves[0].points;
+        assert!((points[0].0 - 0.5 / bins as f64).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn studies_made_by_hand_do_not_panic() {
+    let stored = Stored::single();
+    let study = Study::read(stored.folder.path()).unwrap();
+    type Change = fn(&mut Study);
+    let changes: [Change; 6] = [
+        |study| study.rows.clear(),
+        |study| study.config.bins = 0,
+        |study| study.config.objects.clear(),
+        |study| study.config.variants.clear(),
+        |study| study.config.levels.clear(),
+        |study| (study.config.poses, study.config.bins) = (u64::MAX, 3),
+    ];
+    for change in changes {
+        for experiment in Experiment::ALL {
+            let mut study = study.clone();
+            study.config.experiment = experiment;
+            change(&mut study);
+            let report = Report::of(vec![("it".to_owned(), study)]);
+            report.write(&stored.path("out")).unwrap();
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Random estimates, the same with every run.
+
+use hicp_core::{Isometry3, Matrix6, Vector6, se3};
+use hicp_fusion::{Fused, Fusion, FusionLimits, PoseEstimate};
+
+/// Splitmix64.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// Uniform in −1…1.
+    pub(crate) fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// Standard normal, by Box and Muller.
+    pub(crate) fn normal(&mut self) -> f64 {
+        let u = f64::midpoint(self.uniform(), 1.0).max(1e-300);
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::PI * self.uniform()).cos()
+    }
+
+    pub(crate) fn twist(&mut self, size: f64) -> Vector6<f64> {
+        Vector6::from_fn(|_, _| size * self.uniform())
+    }
+
+    pub(crate) fn pose(&mut self, size: f64) -> Isometry3<f64> {
+        se3::exp(&self.twist(size))
+    }
+
+    /// A full covariance with standard deviations of about `size`.
+    pub(crate) fn covariance(&mut self, size: f64) -> Matrix6<f64> {
+        let root = Matrix6::from_fn(|_, _| self.uniform());
+        (root * root.transpose() + Matrix6::identity() * 0.1) * (size * size)
+    }
+
+    /// Estimates scattered about a pose.
+    pub(crate) fn estimates(&mut self, count: usize, spread: f64) -> Vec<PoseEstimate> {
+        let center = self.pose(1.0);
+        (0..count)
+            .map(|_| {
+                let pose = se3::exp(&self.twist(spread)) * center;
+                estimate(pose, self.covariance(spread))
+            })
+            .collect()
+    }
+}
+
+pub(crate) fn estimate(pose: Isometry3<f64>, covariance: Matrix6<f64>) -> PoseEstimate {
+    PoseEstimate::new(pose, covariance).expect("valid")
+}
+
+/// To the last digits: what the iteration itself can reach.
+pub(crate) const EXACT: FusionLimits = FusionLimits {
+    max_iterations: 100,
+    tolerance: 1e-14,
+};
+
+pub(crate) fn fusion(estimates: &[PoseEstimate], limits: FusionLimits) -> Fusion {
+    let mut fusion = Fusion::new(limits);
+    for estimate in estimates {
+        fusion.push(estimate);
+    }
+    fusion
+}
+
+pub(crate) fn fused(estimates: &[PoseEstimate]) -> Fused {
+    let fusion = fusion(estimates, EXACT);
+    let fused = fusion
+        .solve(estimates[0].camera_from_object())
+        .expect("not empty");
+    assert!(fused.solution.converged, "{fused:?}");
+    fused
+}
+
+/// |ln(A B⁻¹)|.
+pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    se3::log(&(a * b.inverse())).norm()
+}
+
+/// Largest difference of two matrices relative to the largest entry.
+pub(crate) fn relative(found: &Matrix6<f64>, expected: &Matrix6<f64>) -> f64 {
+    (found - expected).amax() / expected.amax()
+}

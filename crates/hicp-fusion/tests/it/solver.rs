@@ -1,0 +1,152 @@
+//! How the iteration of the fusion ends: where steps raise the cost, where rounding hides the minimum, and without evaluations left.
+
+// Helpers outside of test functions may fail like tests.
+
+use crate::common::{Random, apart, estimate, fusion};
+use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
+use hicp_fusion::{Fused, FusionLimits, PoseEstimate, UnitCovariance};
+
+fn limits(max_iterations: usize) -> FusionLimits {
+    FusionLimits {
+        max_iterations,
+        ..FusionLimits::default()
+    }
+}
+
+/// Poses turned by anything, as far as half a turn from each other: full steps often raise V. The covariances are large, so that V is
+/// about 1, or as small.
+fn scattered(seed: u64) -> Vec<PoseEstimate> {
+    let mut random = Random(seed);
+    (0..3)
+        .map(|_| {
+            let pose = random.pose(2.5);
+            estimate(pose, random.covariance(3.0))
+        })
+        .collect()
+}
+
+fn solved(estimates: &[PoseEstimate], max_iterations: usize) -> Fused {
+    let start = estimates[0].camera_from_object();
+    fusion(estimates, limits(max_iterations))
+        .solve(start)
+        .unwrap()
+}
+
+#[test]
+fn the_cost_is_half_the_sum_of_the_squared_distances() {
+    let mut random = Random(41);
+    let estimates = random.estimates(4, 0.5);
+    let pose = random.pose(1.0);
+    let expected: f64 = estimates
+        .iter()
+        .map(|each| {
+            let xi = se3::log(&(pose * each.camera_from_object().inverse()));
+            0.5 * xi.dot(&(each.covariance().try_inverse().unwrap() * xi))
+        })
+        .sum();
+    let found = fusion(&estimates, limits(1)).cost(&pose);
+    assert!((found / expected - 1.0).abs() < 1e-12);
+}
+
+/// However few evaluations there are: the pose is the best so far, and its cost is the one that is stated.
+#[test]
+fn no_evaluation_makes_the_pose_worse() {
+    let mut halved = 0;
+    for seed in 0..40 {
+        let estimates = scattered(seed);
+        let mut before = f64::INFINITY;
+        for max_iterations in 1..=30 {
+            let Fused {
+                camera_from_object,
+                solution,
+                ..
+            } = solved(&estimates, max_iterations);
+            assert!(solution.iterations <= max_iterations);
+            // It ends before only where it has converged.
+            assert!(solution.converged || solution.iterations == max_iterations);
+            // By no more than rounding.
+            assert!(
+                solution.cost <= before * (1.0 + 1e-11),
+                "{seed} {max_iterations}"
+            );
+            if !solution.converged {
+                let cost = fusion(&estimates, limits(1)).cost(&camera_from_object);
+                assert!((solution.cost / cost - 1.0).abs() < 1e-9);
+                // Out of evaluations before a step was short enough.
+                halved += usize::from(solution.cost >= before);
+            }
+            before = solution.cost;
+        }
+    }
+    assert!(
+        halved > 50,
+        "the test is about steps that raise V: {halved}"
+    );
+}
+
+/// Where it says that it converged, V has no slope.
+#[test]
+fn where_it_converges_the_slope_is_zero() {
+    let mut converged = 0;
+    for seed in 0..40 {
+        let estimates = scattered(seed);
+        let found = solved(&estimates, 200);
+        if !found.solution.converged {
+            continue;
+        }
+        converged += 1;
+        let workspace = fusion(&estimates, limits(1));
+        for axis in 0..6 {
+            let at = |h: f64| {
+                let mut step = Vector6::zeros();
+                step[axis] = h;
+                workspace.cost(&(se3::exp(&step) * found.camera_from_object))
+            };
+            // V and its curvature are of the order of 1.
+            let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+            assert!(slope.abs() < 1e-7, "{seed} {axis}: {slope}");
+        }
+    }
+    assert!(converged > 30, "{converged}");
+}
+
+/// No step is shorter than nothing: what is asked for is never reached, and every evaluation is used.
+#[test]
+fn a_tolerance_of_zero_uses_every_evaluation() {
+    let here = [estimate(Isometry3::identity(), Matrix6::identity())];
+    let limits = FusionLimits {
+        max_iterations: 7,
+        tolerance: 0.0,
+    };
+    let fused = fusion(&here, limits).solve(&Isometry3::identity()).unwrap();
+    assert_eq!(fused.camera_from_object, Isometry3::identity());
+    assert_eq!(fused.solution.iterations, 7);
+    assert!(!fused.solution.converged && fused.solution.cost == 0.0);
+}
+
+/// A kilometre from an object of 10 cm, turns and shifts are all but one, and V is what is left of large numbers: no step may be found that
+/// lowers it, but it ends, and in the place where it does without rounding, which is that of the same estimates seen from nearby.
+#[test]
+fn it_ends_where_rounding_hides_the_minimum() {
+    let unit = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
+    let away = Isometry3::translation(0.0, 1000.0, 1000.0);
+    for seed in 0..40 {
+        let mut random = Random(seed);
+        let poses = [0; 5].map(|_| random.pose(0.1));
+        let seen = |camera: &Isometry3<f64>| -> Vec<PoseEstimate> {
+            let poses = poses.iter().map(|pose| camera * pose);
+            poses
+                .map(|pose| estimate(pose, unit.at(&pose) * 0.01))
+                .collect()
+        };
+        let (far, near) = (
+            solved(&seen(&away), 2000),
+            solved(&seen(&Isometry3::identity()), 50),
+        );
+        assert!(far.solution.converged, "{:?}", far.solution);
+        assert!(far.solution.iterations < 500, "{:?}", far.solution);
+        let found = away.inverse() * far.camera_from_object;
+        // V is flat at its minimum: what it loses to rounding, some 1e-10 of it, is the square of what the pose does.
+        assert!(apart(&found, &near.camera_from_object) < 1e-5);
+    }
+}

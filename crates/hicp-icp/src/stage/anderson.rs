@@ -1,0 +1,173 @@
+//! Anderson acceleration of a stage.
+
+use hicp_core::{Isometry3, Problem, Vector6, se3};
+use nalgebra::{Matrix5, Matrix6x5, Vector5};
+
+use crate::outcome::{Outcome, Termination, Verdict};
+use crate::session::Session;
+use crate::stage::stage_trait::Stage;
+
+/// How many previous steps an extrapolation is made from.
+const MEMORY: usize = 5;
+
+/// Extrapolates the poses of a stage that is run again and again (Anderson 1965; for ICP Pavlov et al. 2018, Zhang, Yao & Deng 2021).
+///
+/// The stage is one step of a fixed-point iteration T ↦ G(T): an ICP stage that ends after one increment, such as one
+/// with `IterationLimit(2)`. From the last five residuals f = G(u) − u, as twists ln(T T₀⁻¹) about the initial pose, the next
+/// start is the combination whose residual would be smallest. An extrapolation after which the stage's mean loss is not
+/// lower than before is dropped for the plain iterate, and the memory is emptied, so the loss never rises.
+///
+/// It helps where the steps creep and the points stay the same: point-to-point over nearest neighbours of all samples took 118 steps
+/// instead of 132 to the same loss over six starts (`tests/tests/it/stages.rs`). With points chosen anew at every step the map is not
+/// smooth, and the fallbacks cost more than the extrapolations gain. Cost: a 5×5 system per step beside the stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anderson<S> {
+    /// One step: a stage that makes one increment.
+    pub stage: S,
+    /// How often it is run at most.
+    pub max_steps: usize,
+    /// The iteration has converged when a step moves the object's origin by less than this, metres …
+    pub translation_meters: f64,
+    /// … and turns the object by less than this, degrees.
+    pub rotation_degrees: f64,
+}
+
+impl<S> Anderson<S> {
+    /// Makes the decorator with at most 50 steps and a tolerance of 10 µm and a thousandth of a degree.
+    #[must_use]
+    pub fn new(stage: S) -> Self {
+        Self {
+            stage,
+            max_steps: 50,
+            translation_meters: 1e-5,
+            rotation_degrees: 1e-3,
+        }
+    }
+}
+
+impl<S: Stage> Stage for Anderson<S> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let object_from_init = init.inverse();
+        let twist = |pose: &Isometry3<f64>| se3::log(&(pose * object_from_init));
+        let mut memory = Memory::default();
+        // The plain iterate accepted last, and the loss there.
+        let mut best: Option<(Outcome, f64)> = None;
+        let mut start = *init;
+        let mut extrapolated = false;
+        let mut iterations = 0;
+        let mut termination = Termination::IterationLimit;
+        for _ in 0..self.max_steps {
+            let step = self.stage.run(problem, &start, session);
+            iterations += step.iterations;
+            let loss = step.evaluation.map(|e| e.mean_loss);
+            let improves = match (&best, loss) {
+                (Some((_, before)), Some(now)) => now < *before,
+                (None, _) => true,
+                (Some(_), None) => false,
+            };
+            if !improves {
+                let Some((plain, _)) = &best else { break };
+                if !extrapolated {
+                    termination = Termination::Converged;
+                    break;
+                }
+                // The extrapolation did not pay: go on from the plain iterate, and forget what led astray.
+                start = plain.camera_from_object;
+                extrapolated = false;
+                memory = Memory::default();
+                continue;
+            }
+            let Some(loss) = loss.filter(|_| step.verdict == Verdict::Refined) else {
+                termination = step.termination;
+                if best.is_none() {
+                    best = Some((step, f64::INFINITY));
+                }
+                break;
+            };
+            let (angle, distance) = se3::pose_distance(&step.camera_from_object, &start);
+            let still =
+                distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
+            let next = memory.extrapolate(&twist(&start), &twist(&step.camera_from_object));
+            best = Some((step, loss));
+            if still {
+                termination = Termination::Converged;
+                break;
+            }
+            let next = se3::exp(&next) * init;
+            extrapolated = se3::is_finite(&next);
+            start = if extrapolated {
+                next
+            } else {
+                step.camera_from_object
+            };
+        }
+        match best {
+            Some((outcome, _)) => Outcome {
+                iterations,
+                termination,
+                verdict: if outcome.camera_from_object == *init {
+                    Verdict::KeptInitial(termination)
+                } else {
+                    Verdict::Refined
+                },
+                ..outcome
+            },
+            None => Outcome::kept(init, termination),
+        }
+    }
+}
+
+/// Differences of the last residuals and iterates, newest overwriting oldest.
+#[derive(Default)]
+struct Memory {
+    last: Option<(Vector6<f64>, Vector6<f64>)>,
+    residual_differences: Matrix6x5<f64>,
+    iterate_differences: Matrix6x5<f64>,
+    written: usize,
+}
+
+impl Memory {
+    /// Takes u and g = G(u), and returns g − ΔG θ with θ = argmin ‖f − ΔF θ‖.
+    fn extrapolate(&mut self, u: &Vector6<f64>, g: &Vector6<f64>) -> Vector6<f64> {
+        let f = g - u;
+        if let Some((last_f, last_g)) = self.last.replace((f, *g)) {
+            let column = self.written % MEMORY;
+            self.residual_differences.set_column(column, &(f - last_f));
+            self.iterate_differences.set_column(column, &(g - last_g));
+            self.written += 1;
+        }
+        let transposed = self.residual_differences.transpose();
+        let normal = transposed * self.residual_differences;
+        // Columns not yet written are zero; the ridge gives them a coefficient of zero.
+        let ridge = 1e-12 * normal.trace() + f64::MIN_POSITIVE;
+        let theta: Option<Vector5<f64>> = (normal + Matrix5::identity() * ridge)
+            .cholesky()
+            .map(|c| c.solve(&(transposed * f)));
+        theta.map_or(*g, |theta| g - self.iterate_differences * theta)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_linear_iteration_is_solved_as_soon_as_its_directions_are_known() {
+        // u ↦ A u + b with two directions: two differences determine the fixed point exactly.
+        let step =
+            |u: &Vector6<f64>| Vector6::new(0.9 * u[0] + 0.1, 0.5 * u[1] - 0.2, 0.0, 0.0, 0.0, 0.0);
+        let mut memory = Memory::default();
+        let mut u = Vector6::zeros();
+        for _ in 0..3 {
+            let g = step(&u);
+            u = memory.extrapolate(&u, &g);
+        }
+        let fixed = Vector6::new(1.0, -0.4, 0.0, 0.0, 0.0, 0.0);
+        assert!((u - fixed).norm() < 1e-6, "{u}");
+    }
+}

@@ -1,0 +1,91 @@
+//! Stages made of stages.
+
+use hicp_core::{Isometry3, Problem};
+
+use crate::outcome::{Outcome, Verdict};
+use crate::session::Session;
+use crate::stage::stage_trait::Stage;
+
+/// Runs stages one after the other, each from where the one before ended (Cascading ICP, §IV-B).
+///
+/// A stage that diverges hands on the last pose before it did, so a cascade whose first stage diverges starts the second
+/// from the initial pose, and one in which all diverge returns it. Losses are never compared across stages.
+///
+/// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cascade<S>(pub S);
+
+macro_rules! cascade {
+    ($first:ident $(, $next:ident)*) => {
+        impl<$first: Stage, $($next: Stage),*> Stage for Cascade<($first, $($next,)*)> {
+            #[allow(non_snake_case)]
+            fn run(
+                &mut self,
+                problem: &Problem<'_>,
+                init: &Isometry3<f64>,
+                session: &mut Session<'_>,
+            ) -> Outcome {
+                let ($first, $($next,)*) = &mut self.0;
+                let outcome = $first.run(problem, init, session);
+                $(
+                    let outcome = outcome.then($next.run(problem, &outcome.camera_from_object, session));
+                )*
+                outcome
+            }
+        }
+    };
+}
+cascade!(A);
+cascade!(A, B);
+cascade!(A, B, C);
+cascade!(A, B, C, D);
+
+/// A cascade of any number of stages of one type, as read from a file. An empty one keeps the initial pose.
+impl<T: Stage> Stage for Cascade<Vec<T>> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let mut outcome: Option<Outcome> = None;
+        for stage in &mut self.0 {
+            let start = outcome.map_or(*init, |o| o.camera_from_object);
+            let next = stage.run(problem, &start, session);
+            outcome = Some(outcome.map_or(next, |o| o.then(next)));
+        }
+        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+    }
+}
+
+/// Runs a stage a number of times, each from where the last ended: the outer iterations of Hybrid ICP (§IV-C).
+///
+/// A stage is pure, so a pass that kept its initial pose would only be repeated; the loop ends there. 0 times keeps the
+/// initial pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Repeat<S> {
+    /// How many times at most.
+    pub times: usize,
+    /// What is repeated.
+    pub stage: S,
+}
+
+impl<S: Stage> Stage for Repeat<S> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let mut outcome: Option<Outcome> = None;
+        for _ in 0..self.times {
+            let start = outcome.map_or(*init, |o| o.camera_from_object);
+            let next = self.stage.run(problem, &start, session);
+            outcome = Some(outcome.map_or(next, |o| o.then(next)));
+            if next.verdict != Verdict::Refined {
+                break;
+            }
+        }
+        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+    }
+}

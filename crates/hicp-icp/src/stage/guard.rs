@@ -1,0 +1,92 @@
+//! Stages that answer to a score.
+
+use hicp_core::{Isometry3, Problem};
+use hicp_score::Score;
+
+use crate::outcome::{Outcome, Termination, Verdict};
+use crate::session::Session;
+use crate::stage::stage_trait::Stage;
+
+/// Runs a stage and accepts its pose only if a score improves; otherwise the initial pose is returned, with
+/// [`Termination::ScoreNotImproved`].
+///
+/// With the MVE as the score this is the contract that a refinement never leaves a pose that explains the image worse.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Guard<S, C> {
+    /// What is run.
+    pub stage: S,
+    /// The judge; lower is better.
+    pub score: C,
+}
+
+impl<S: Stage, C: Score> Stage for Guard<S, C> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let outcome = self.stage.run(problem, init, session);
+        if outcome.verdict != Verdict::Refined {
+            return outcome;
+        }
+        let mut context = session.workspace.context(problem);
+        let before = self.score.score(&mut context, init);
+        let after = self.score.score(&mut context, &outcome.camera_from_object);
+        if after < before {
+            outcome
+        } else {
+            Outcome {
+                iterations: outcome.iterations,
+                ..Outcome::kept(init, Termination::ScoreNotImproved)
+            }
+        }
+    }
+}
+
+/// Repeats a stage, each time from where it ended, and returns the best pose met, the initial one included, by a score.
+///
+/// Ends early when the stage keeps its pose. Ties go to the earlier pose, so a stage that gains nothing moves nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct KeepBest<S, C> {
+    /// How many times at most.
+    pub times: usize,
+    /// What is repeated.
+    pub stage: S,
+    /// The judge; lower is better.
+    pub score: C,
+}
+
+impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let first = self
+            .score
+            .score(&mut session.workspace.context(problem), init);
+        let mut best = (first, Outcome::kept(init, Termination::ScoreNotImproved));
+        let mut last = Outcome::kept(init, Termination::IterationLimit);
+        for time in 0..self.times {
+            let next = self.stage.run(problem, &last.camera_from_object, session);
+            last = if time == 0 { next } else { last.then(next) };
+            if last.verdict != Verdict::Refined {
+                return last;
+            }
+            if next.verdict != Verdict::Refined {
+                break;
+            }
+            let mut context = session.workspace.context(problem);
+            let score = self.score.score(&mut context, &last.camera_from_object);
+            if score < best.0 {
+                best = (score, last);
+            }
+        }
+        Outcome {
+            iterations: last.iterations,
+            ..best.1
+        }
+    }
+}

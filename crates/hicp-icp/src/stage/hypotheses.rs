@@ -1,0 +1,208 @@
+//! Poses from which a search starts: rotations from a set, each placed so that what it shows lies where something was observed.
+
+use hicp_core::{
+    Isometry3, Model, Observation, Point3, Problem, Surfel, Translation3, UnitQuaternion,
+    UnitVector3, Vector3, rotation_grid, se3, so3,
+};
+
+use crate::stop::motion::Bound;
+
+/// Which rotations a search tries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Rotations {
+    /// An even grid of SO(3); with a bound, as many within it.
+    #[default]
+    Even,
+    /// The initial one, turned about the ray to what was observed.
+    ViewAxis,
+    /// The initial one, turned about the declared symmetries of the object: for objects that are nearly symmetric. None for an
+    /// object without.
+    Symmetry,
+}
+
+/// Points of the model that place a hypothesis.
+const PLACING_SAMPLES: usize = 250;
+
+/// Makes the hypotheses of one search.
+pub(crate) struct Hypotheses<'a> {
+    model: &'a Model,
+    init: Isometry3<f64>,
+    bound: Option<Bound>,
+    /// Mean of the observed points.
+    centroid: Point3<f64>,
+    /// Direction from the camera to it.
+    ray: Vector3<f64>,
+    oriented: bool,
+}
+
+impl<'a> Hypotheses<'a> {
+    /// `None` where nothing was observed or the initial pose is not finite.
+    pub(crate) fn new(
+        problem: &Problem<'a>,
+        init: &Isometry3<f64>,
+        bound: Option<Bound>,
+    ) -> Option<Self> {
+        let centroid = centroid(problem.observation)?;
+        let ray = centroid.coords.try_normalize(f64::EPSILON)?;
+        se3::is_finite(init).then(|| Self {
+            model: problem.model,
+            init: *init,
+            bound,
+            centroid,
+            ray,
+            oriented: problem.model.mesh().is_closed(),
+        })
+    }
+
+    /// The neighbours of a pose: itself, half turns about the axes of the object's frame, and quarter turns about the ray, each
+    /// placed anew; outside of the bound they are left out.
+    pub(crate) fn neighbors(
+        &self,
+        pose: &Isometry3<f64>,
+    ) -> impl Iterator<Item = Isometry3<f64>> + use<'_> {
+        let rotation = pose.rotation;
+        let half = std::f64::consts::PI;
+        let ray = UnitVector3::new_unchecked(self.ray);
+        let about_object = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
+            .map(|axis| rotation * UnitQuaternion::from_axis_angle(&axis, half));
+        let about_ray = [0.5, 1.0, 1.5]
+            .map(|turn| UnitQuaternion::from_axis_angle(&ray, turn * half) * rotation);
+        std::iter::once(rotation)
+            .chain(about_object)
+            .chain(about_ray)
+            .filter_map(|rotation| self.place(&rotation))
+    }
+
+    /// The hypotheses of a set of rotations, `None` for a rotation that is outside of the bound: whoever has a time limit looks at the clock
+    /// there too.
+    pub(crate) fn of(
+        &self,
+        rotations: Rotations,
+        count: usize,
+    ) -> impl Iterator<Item = Option<Isometry3<f64>>> + use<'_> {
+        let symmetries = self.model.symmetries();
+        // Of a bounded search as many hypotheses fall into the bound.
+        let grid = match (rotations, self.bound) {
+            (Rotations::Even, Some(bound)) => enlarged(count, bound.rotation_degrees.to_radians()),
+            (Rotations::Symmetry, _) if symmetries.continuous.is_empty() => {
+                count.min(symmetries.discrete.len())
+            }
+            _ => count,
+        };
+        (0..grid).map(move |index| {
+            self.rotation(rotations, index, grid)
+                .and_then(|rotation| self.place(&rotation))
+        })
+    }
+
+    fn rotation(
+        &self,
+        rotations: Rotations,
+        index: usize,
+        count: usize,
+    ) -> Option<UnitQuaternion<f64>> {
+        let initial = self.init.rotation;
+        #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+        let turn = |index: usize, count: usize| std::f64::consts::TAU * index as f64 / count as f64;
+        match rotations {
+            Rotations::Even => Some(rotation_grid(index, count)),
+            Rotations::ViewAxis => {
+                let ray = UnitVector3::new_unchecked(self.ray);
+                Some(UnitQuaternion::from_axis_angle(&ray, turn(index, count)) * initial)
+            }
+            Rotations::Symmetry => {
+                let symmetries = self.model.symmetries();
+                let discrete = symmetries.discrete.len();
+                if let Some(motion) = symmetries.discrete.get(index) {
+                    return Some(initial * motion.rotation);
+                }
+                let axes = symmetries.continuous.len();
+                let axis = symmetries
+                    .continuous
+                    .get((index - discrete) % axes.max(1))?;
+                let steps = (count - discrete).div_ceil(axes);
+                let angle = turn((index - discrete) / axes, steps);
+                Some(initial * axis.rotation(angle).rotation)
+            }
+        }
+    }
+
+    /// Places a rotation so that the centroid of what it shows is that of what was observed, and within the bound; `None` where
+    /// the rotation is outside.
+    fn place(&self, rotation: &UnitQuaternion<f64>) -> Option<Isometry3<f64>> {
+        // Before the rotation is placed: most of a bounded search's grid ends here.
+        if let Some(bound) = self.bound {
+            let away = rotation * self.init.rotation.inverse();
+            if so3::angle(&away).to_degrees() > bound.rotation_degrees {
+                return None;
+            }
+        }
+        let mut translation = self.centroid - rotation * self.shown(rotation);
+        if let Some(bound) = self.bound {
+            let initial = self.init.translation.vector;
+            let step = translation - initial;
+            let limit = bound.translation_meters;
+            if step.norm() > limit {
+                translation = initial + step * (limit / step.norm());
+            }
+        }
+        Some(Isometry3::from_parts(
+            Translation3::from(translation),
+            *rotation,
+        ))
+    }
+
+    /// The centroid of the surface that faces the camera, as much of it as is seen, in the object frame.
+    fn shown(&self, rotation: &UnitQuaternion<f64>) -> Point3<f64> {
+        let samples = self.model.samples();
+        let toward = rotation.inverse() * self.ray;
+        let step = samples.len().div_ceil(PLACING_SAMPLES).max(1);
+        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
+        for Surfel { point, normal } in samples.iter().step_by(step) {
+            let facing = -normal.cast::<f64>().dot(&toward);
+            let weight = if self.oriented {
+                facing.max(0.0)
+            } else {
+                facing.abs()
+            };
+            sum += point.coords.cast::<f64>() * weight;
+            weights += weight;
+        }
+        if weights > 0.0 {
+            Point3::from(sum / weights)
+        } else {
+            self.model.center()
+        }
+    }
+}
+
+/// The mean of the observed points, about 1000 of them.
+fn centroid(observation: &Observation) -> Option<Point3<f64>> {
+    let stride = (1_u32..)
+        .find(|s| observation.n_surfels() <= 1000 * (*s as usize).pow(2))
+        .unwrap_or(1);
+    let mean = |stride: u32| {
+        let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+        for (_, surfel) in observation.surfels(stride) {
+            sum += surfel.point.coords.cast::<f64>();
+            count += 1.0;
+        }
+        (count > 0.0).then(|| Point3::from(sum / count))
+    };
+    mean(stride).or_else(|| mean(1))
+}
+
+/// The size of a grid of which about `count` rotations lie within an angle of any one of them: the share of SO(3) there is
+/// (β − sin β) / π.
+fn enlarged(count: usize, angle: f64) -> usize {
+    let angle = angle.clamp(0.0, std::f64::consts::PI);
+    let share = (angle - angle.sin()) / std::f64::consts::PI;
+    #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+    let wanted = count as f64 / share.max(1e-9);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Clamped.
+    let wanted = wanted.ceil().clamp(0.0, MAX_GRID) as usize;
+    wanted
+}
+
+/// The largest grid that is gone through to find the rotations within a bound.
+const MAX_GRID: f64 = 100_000.0;

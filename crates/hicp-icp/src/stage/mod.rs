@@ -1,0 +1,19 @@
+//! Stages: generic ICP, and stages composed of stages.
+
+pub(crate) mod anderson;
+pub(crate) mod compose;
+pub(crate) mod guard;
+pub(crate) mod hypotheses;
+pub(crate) mod icp;
+pub(crate) mod resolution;
+pub(crate) mod search;
+pub(crate) mod stage_trait;
+
+pub use anderson::Anderson;
+pub use compose::{Cascade, Repeat};
+pub use guard::{Guard, KeepBest};
+pub use hypotheses::Rotations;
+pub use icp::{Icp, MAX_ITERATIONS};
+pub use resolution::AtResolution;
+pub use search::{HypothesisSearch, SearchOptions};
+pub use stage_trait::Stage;

@@ -1,0 +1,36 @@
+//! Running a stage on a coarser image.
+
+use hicp_core::{Isometry3, Problem};
+
+use crate::outcome::Outcome;
+use crate::session::Session;
+use crate::stage::stage_trait::Stage;
+
+/// Runs a stage on every `factor`-th pixel of the observation.
+///
+/// The coarse camera is phase-aligned with the fine one, so the pose needs no conversion. Coarse-to-fine is a cascade:
+/// `Cascade((AtResolution { factor: 4, stage }, AtResolution { factor: 2, stage }, stage))`. The coarse observation is made
+/// once per observation and shared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AtResolution<S> {
+    /// Every how many pixels; 0 and 1 are the full resolution.
+    pub factor: u32,
+    /// What is run.
+    pub stage: S,
+}
+
+impl<S: Stage> Stage for AtResolution<S> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        if self.factor <= 1 {
+            return self.stage.run(problem, init, session);
+        }
+        let coarse = problem.observation.decimated(self.factor);
+        let problem = Problem::new(problem.model, &coarse);
+        self.stage.run(&problem, init, session)
+    }
+}

@@ -1,0 +1,85 @@
+//! The divergence rules of Cascading ICP.
+
+use std::ops::ControlFlow;
+
+use crate::outcome::Termination;
+use crate::stop::stop_rule::{Progress, StopRule};
+
+/// When a rising mean loss counts as divergence (rule 3 of §IV-B).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LossRule {
+    /// Whenever it rises: the rule as written.
+    #[default]
+    Strict,
+    /// Only when the number of pairs did not grow: pairs found anew enter with large residuals, which is progress.
+    CountAware,
+}
+
+/// The paper's three rules by which a stage is judged to diverge (§IV-B):
+///
+/// 1. no pairs ([`Termination::NoPairs`], which the engine itself finds);
+/// 2. fewer pairs than at the first *or* the previous iteration, by more than 5 %;
+/// 3. the mean loss rose against the previous iteration.
+///
+/// The stage then returns the last pose before it began to diverge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Divergence {
+    /// Largest share of the pairs that may be lost.
+    pub pairs_lost: f64,
+    /// What rule 3 demands.
+    pub loss_rule: LossRule,
+    /// Relative rise of the mean loss that is left to the convergence rule.
+    // Deviation: rule 3 as written fires on a rise in the last digit, so every stage that converges would end as diverged;
+    // a rise within the convergence threshold is convergence.
+    pub rise_tolerance: f64,
+}
+
+impl Divergence {
+    /// The rules as the paper states them.
+    #[must_use]
+    pub fn strict() -> Self {
+        Self {
+            pairs_lost: 0.05,
+            loss_rule: LossRule::Strict,
+            rise_tolerance: 1e-3,
+        }
+    }
+
+    /// Rule 3 only where the number of pairs did not grow.
+    #[must_use]
+    pub fn count_aware() -> Self {
+        Self {
+            loss_rule: LossRule::CountAware,
+            ..Self::strict()
+        }
+    }
+}
+
+impl Default for Divergence {
+    fn default() -> Self {
+        Self::strict()
+    }
+}
+
+impl StopRule for Divergence {
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        let Some(previous) = progress.previous else {
+            return ControlFlow::Continue(());
+        };
+        let n_pairs = progress.current.n_pairs;
+        #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+        let lost = |before: usize| (n_pairs as f64) < (1.0 - self.pairs_lost) * before as f64;
+        if lost(progress.first.n_pairs) || lost(previous.n_pairs) {
+            return ControlFlow::Break(Termination::PairsLost);
+        }
+        let judged = match self.loss_rule {
+            LossRule::Strict => true,
+            LossRule::CountAware => n_pairs <= previous.n_pairs,
+        };
+        let rose = progress.current.mean_loss > previous.mean_loss * (1.0 + self.rise_tolerance);
+        if judged && rose {
+            return ControlFlow::Break(Termination::LossIncreased);
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,248 @@
+//! Stop rules on how the pose moves.
+
+use std::ops::ControlFlow;
+
+use hicp_core::{Isometry3, se3};
+
+use crate::outcome::Termination;
+use crate::stop::stop_rule::{Progress, StopRule};
+
+/// Ends a stage as converged when the next increment would move the object by less than a distance *and* turn it by less
+/// than an angle, each in its own unit. The distance is that of the object's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmallMotion {
+    /// Distance, metres.
+    pub translation_meters: f64,
+    /// Angle, degrees.
+    pub rotation_degrees: f64,
+}
+
+impl Default for SmallMotion {
+    /// A tenth of a millimetre and a hundredth of a degree.
+    fn default() -> Self {
+        Self {
+            translation_meters: 1e-4,
+            rotation_degrees: 0.01,
+        }
+    }
+}
+
+impl StopRule for SmallMotion {
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        let next = progress.increment * progress.camera_from_object;
+        let (angle, distance) = se3::pose_distance(&next, progress.camera_from_object);
+        let still =
+            distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
+        if still {
+            ControlFlow::Break(Termination::Converged)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+/// Rejects a pose further from the stage's initial one than a distance or an angle: a wrong match must not carry a good
+/// detection away. The distance is that of the object's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// Distance, metres.
+    pub translation_meters: f64,
+    /// Angle, degrees.
+    pub rotation_degrees: f64,
+}
+
+impl Default for Bound {
+    /// Ten centimetres and 45°.
+    fn default() -> Self {
+        Self {
+            translation_meters: 0.1,
+            rotation_degrees: 45.0,
+        }
+    }
+}
+
+impl Bound {
+    /// Returns whether a pose lies within the bound about another.
+    #[must_use]
+    pub fn contains(&self, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
+        let (angle, distance) = se3::pose_distance(pose, init);
+        distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees
+    }
+}
+
+impl StopRule for Bound {
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        if self.contains(progress.init, progress.camera_from_object) {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(Termination::OutOfBounds)
+        }
+    }
+}
+
+/// Ends a stage whose pose returns to where it was two or three iterations before: correspondences that flip to and fro.
+///
+/// Ends with [`Termination::Oscillating`]; the pose just evaluated is accepted. The distance is that of the object's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Oscillation {
+    /// Distance within which two poses are the same, metres.
+    pub translation_meters: f64,
+    /// Angle within which two poses are the same, degrees.
+    pub rotation_degrees: f64,
+    /// The last poses, the newest first.
+    recent: [Option<Isometry3<f64>>; 3],
+}
+
+impl Oscillation {
+    /// Makes the rule.
+    #[must_use]
+    pub fn new(translation_meters: f64, rotation_degrees: f64) -> Self {
+        Self {
+            translation_meters,
+            rotation_degrees,
+            recent: [None; 3],
+        }
+    }
+
+    fn same(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        let (angle, distance) = se3::pose_distance(a, b);
+        distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees
+    }
+}
+
+impl Default for Oscillation {
+    /// A hundredth of a millimetre and a thousandth of a degree.
+    fn default() -> Self {
+        Self::new(1e-5, 1e-3)
+    }
+}
+
+impl StopRule for Oscillation {
+    fn start(&mut self) {
+        self.recent = [None; 3];
+    }
+
+    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+        let pose = progress.camera_from_object;
+        let [last, older @ ..] = &self.recent;
+        // A pose that stands still is converged, not oscillating.
+        let moved = last.is_some_and(|last| !self.same(&last, pose));
+        let returned = older.iter().flatten().any(|before| self.same(before, pose));
+        self.recent.rotate_right(1);
+        self.recent[0] = Some(*pose);
+        if moved && returned {
+            ControlFlow::Break(Termination::Oscillating)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Evaluation;
+
+    fn at(x: f64) -> Isometry3<f64> {
+        Isometry3::translation(x, 0.0, 0.5)
+    }
+
+    fn check(
+        rule: &mut dyn StopRule,
+        pose: &Isometry3<f64>,
+        increment: &Isometry3<f64>,
+    ) -> ControlFlow<Termination> {
+        let current = Evaluation {
+            n_pairs: 10,
+            mean_loss: 1.0,
+        };
+        rule.check(&Progress {
+            iteration: 0,
+            current,
+            first: current,
+            previous: None,
+            camera_from_object: pose,
+            init: &at(0.0),
+            increment,
+        })
+    }
+
+    #[test]
+    fn motion_needs_both_to_be_small() {
+        let mut rule = SmallMotion::default();
+        let turn = Isometry3::rotation(hicp_core::Vector3::z() * 1e-3);
+        let judge = |rule: &mut SmallMotion, increment| check(rule, &at(0.0), &increment);
+        assert!(judge(&mut rule, Isometry3::translation(0.9e-4, 0.0, 0.0)).is_break());
+        assert!(judge(&mut rule, Isometry3::translation(1.1e-4, 0.0, 0.0)).is_continue());
+        assert!(judge(&mut rule, turn).is_continue());
+        // The angle is judged by itself: a turn about the object's origin moves that origin nowhere.
+        let about =
+            Isometry3::translation(0.0, 0.0, 0.5) * turn * Isometry3::translation(0.0, 0.0, -0.5);
+        assert!(judge(&mut rule, about).is_continue());
+    }
+
+    /// Lengths compared with squares of lengths, cosines with angles: thresholds that are off by orders of magnitude.
+    #[test]
+    fn limits_are_metres_and_degrees_not_their_squares_or_cosines() {
+        let origin = Isometry3::identity();
+        let turn =
+            |degrees: f64| Isometry3::rotation(hicp_core::Vector3::y() * degrees.to_radians());
+        let shift = |meters: f64| Isometry3::translation(0.0, meters, 0.0);
+        for (meters, degrees) in [(1e-4, 0.01), (0.02, 3.0), (0.5, 170.0)] {
+            let mut motion = SmallMotion {
+                translation_meters: meters,
+                rotation_degrees: degrees,
+            };
+            let mut bound = Bound {
+                translation_meters: meters,
+                rotation_degrees: degrees,
+            };
+            let mut oscillation = Oscillation::new(meters, degrees);
+            for (by, small) in [(0.999, true), (1.001, false)] {
+                for moved in [shift(meters * by), turn(degrees * by)] {
+                    assert_eq!(check(&mut motion, &origin, &moved).is_break(), small);
+                    // The initial pose is `at(0.0)`.
+                    let pose = at(0.0) * moved;
+                    assert_eq!(check(&mut bound, &pose, &origin).is_continue(), small);
+                    // There, far away, and back to almost there.
+                    oscillation.start();
+                    assert!(check(&mut oscillation, &origin, &origin).is_continue());
+                    assert!(check(&mut oscillation, &at(10.0), &origin).is_continue());
+                    assert_eq!(check(&mut oscillation, &moved, &origin).is_break(), small);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_reject_what_is_outside() {
+        let mut rule = Bound::default();
+        let still = Isometry3::identity();
+        assert!(check(&mut rule, &at(0.1), &still).is_continue());
+        let verdict = check(&mut rule, &at(0.101), &still);
+        assert_eq!(verdict, ControlFlow::Break(Termination::OutOfBounds));
+        assert!(Termination::OutOfBounds.is_rollback());
+    }
+
+    #[test]
+    fn to_and_fro_is_oscillation_and_standing_still_is_not() {
+        let still = Isometry3::identity();
+        let run = |rule: &mut Oscillation, poses: &[f64]| {
+            rule.start();
+            poses
+                .iter()
+                .map(|x| check(rule, &at(*x), &still).is_break())
+                .collect::<Vec<_>>()
+        };
+        let mut rule = Oscillation::default();
+        let to_and_fro = [false, false, true];
+        assert_eq!(run(&mut rule, &[0.0, 0.01, 0.0]), to_and_fro);
+        assert_eq!(
+            run(&mut rule, &[0.0, 0.01, 0.02, 0.0]),
+            [false, false, false, true]
+        );
+        assert_eq!(run(&mut rule, &[0.0, 0.0, 0.0]), [false; 3]);
+        // A new stage remembers nothing.
+        assert_eq!(run(&mut rule, &[0.0, 0.01, 0.0]), to_and_fro);
+    }
+}

@@ -1,0 +1,274 @@
+//! PNG files as they should not be: refused by name, or read as what they are.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use hicp_io::{IoError, ReadLimits, read_depth_png, read_mask_png, read_rgb_png, write_depth_png};
+use png::{BitDepth, ColorType, Compression, Encoder};
+
+fn told(error: &IoError) -> String {
+    match error.source() {
+        Some(source) => format!("{error}: {source}"),
+        None => error.to_string(),
+    }
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+        })
+    })
+}
+
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let body = [&kind[..], data].concat();
+    [
+        &u32::try_from(data.len()).unwrap().to_be_bytes()[..],
+        &body,
+        &crc32(&body).to_be_bytes(),
+    ]
+    .concat()
+}
+
+/// Rows as stored blocks of a zlib stream.
+fn stored(rows: &[u8]) -> Vec<u8> {
+    let mut data = vec![0x78, 1];
+    let mut blocks = rows.chunks(65_535).peekable();
+    while let Some(block) = blocks.next() {
+        let length = u16::try_from(block.len()).unwrap();
+        data.push(u8::from(blocks.peek().is_none()));
+        data.extend(length.to_le_bytes());
+        data.extend((!length).to_le_bytes());
+        data.extend(block);
+    }
+    let (a, b) = rows.iter().fold((1_u32, 0_u32), |(a, b), byte| {
+        let a = (a + u32::from(*byte)) % 65_521;
+        (a, (b + a) % 65_521)
+    });
+    data.extend(((b << 16) | a).to_be_bytes());
+    data
+}
+
+/// A PNG file of 16-bit gray with a header of one's own.
+fn gray16(width: u32, height: u32, interlaced: bool, rows: &[u8]) -> Vec<u8> {
+    let mut header = [width.to_be_bytes(), height.to_be_bytes()].concat();
+    header.extend([16, 0, 0, 0, u8::from(interlaced)]);
+    let signature = b"\x89PNG\r\n\x1a\n".to_vec();
+    [
+        signature,
+        chunk(b"IHDR", &header),
+        chunk(b"IDAT", &stored(rows)),
+        chunk(b"IEND", &[]),
+    ]
+    .concat()
+}
+
+fn write(folder: &Path, name: &str, content: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+#[test]
+fn an_interlaced_depth_image_is_read_as_a_plain_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (width, height) = (13_u32, 11_u32);
+    let value = |u: u32, v: u32| u16::try_from(1 + 1000 * v + u).unwrap();
+    // Adam7: first column, first row, column step, row step.
+    let passes = [
+        (0, 0, 8, 8),
+        (4, 0, 8, 8),
+        (0, 4, 4, 8),
+        (2, 0, 4, 4),
+        (0, 2, 2, 4),
+        (1, 0, 2, 2),
+        (0, 1, 1, 2),
+    ];
+    let mut rows = Vec::new();
+    for (first_u, first_v, step_u, step_v) in passes {
+        for v in (first_v..height).step_by(step_v) {
+            // No filter.
+            rows.push(0);
+            rows.extend(
+                (first_u..width)
+                    .step_by(step_u)
+                    .flat_map(|u| value(u, v).to_be_bytes()),
+            );
+        }
+    }
+    let path = write(
+        folder.path(),
+        "interlaced.png",
+        &gray16(width, height, true, &rows),
+    );
+    let depth = read_depth_png(&path, 1.0).unwrap();
+    assert_eq!((depth.width(), depth.height()), (width, height));
+    for v in 0..height {
+        for u in 0..width {
+            let meters = depth.pixels()[(v * width + u) as usize];
+            assert!(
+                (f64::from(meters) * 1000.0 - f64::from(value(u, v))).abs() < 1e-3,
+                "{u} {v}"
+            );
+        }
+    }
+    assert_eq!(
+        read_mask_png(&path)
+            .unwrap()
+            .pixels()
+            .iter()
+            .filter(|set| **set)
+            .count(),
+        143
+    );
+    // Cut anywhere it is an error, never half an image.
+    let whole = std::fs::read(&path).unwrap();
+    // The last chunk and two checksums may be missing: the pixels are all there.
+    for length in 0..whole.len() - 12 - 8 {
+        let cut = write(folder.path(), "cut.png", &whole[..length]);
+        assert!(
+            matches!(read_depth_png(&cut, 1.0), Err(IoError::Png { .. })),
+            "{length}"
+        );
+    }
+}
+
+#[test]
+fn every_other_pixel_type_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    use BitDepth::{Eight, Four, One, Sixteen};
+    use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
+    for (color, depth, bytes, named) in [
+        (Grayscale, One, 1, "1-bit gray"),
+        (Grayscale, Eight, 1, "8-bit gray"),
+        (GrayscaleAlpha, Sixteen, 4, "16-bit gray + alpha"),
+        (Rgb, Eight, 3, "8-bit RGB"),
+        (Rgb, Sixteen, 6, "16-bit RGB"),
+        (Rgba, Eight, 4, "8-bit RGBA"),
+        (Indexed, Eight, 1, "8-bit palette"),
+        (Indexed, Four, 1, "4-bit palette"),
+    ] {
+        let mut encoder = Encoder::new(std::fs::File::create(&path).unwrap(), 1, 1);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        if color == Indexed {
+            encoder.set_palette(vec![9, 9, 9]);
+        }
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&vec![0; bytes]).unwrap();
+        writer.finish().unwrap();
+        let text = told(&read_depth_png(&path, 1.0).unwrap_err());
+        for part in ["a.png", named, "expected 16-bit gray"] {
+            assert!(text.contains(part), "no {part:?} in: {text}");
+        }
+        // A mask may be of any type.
+        assert_eq!(read_mask_png(&path).unwrap().pixels(), [color == Indexed]);
+        assert_eq!(read_rgb_png(&path).unwrap().2.len(), 3);
+    }
+}
+
+#[test]
+fn a_decompression_bomb_is_refused_by_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    // More than the limit; within it, but more than the file can hold; and what is really there, above a limit of one's own.
+    for (width, height, parts) in [
+        (
+            32_768,
+            32_768,
+            &[
+                "byte 16",
+                "32768x32768",
+                "at most 33554432 pixels",
+                "--max-pixels",
+            ][..],
+        ),
+        (100_000, 2, &["100000x2", "sides of 1 to"]),
+        (
+            4096,
+            8192,
+            &["byte 16", "promises 33554432 pixels", "are left"],
+        ),
+    ] {
+        let path = write(
+            folder.path(),
+            "a.png",
+            &gray16(width, height, false, &[0; 3]),
+        );
+        for error in [
+            read_depth_png(&path, 1.0).unwrap_err(),
+            read_mask_png(&path).unwrap_err(),
+            read_rgb_png(&path).unwrap_err(),
+        ] {
+            let text = told(&error);
+            for part in parts {
+                assert!(text.contains(part), "no {part:?} in: {text}");
+            }
+        }
+    }
+    let path = folder.path().join("bomb.png");
+    let mut encoder = Encoder::new(std::fs::File::create(&path).unwrap(), 4096, 4096);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(BitDepth::Sixteen);
+    encoder.set_compression(Compression::High);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![0; 4096 * 4096 * 2]).unwrap();
+    writer.finish().unwrap();
+    assert!(std::fs::metadata(&path).unwrap().len() < 200_000);
+    let limits = ReadLimits {
+        max_pixels: 4096 * 4096 - 1,
+        ..ReadLimits::DEFAULT
+    };
+    assert!(matches!(
+        limits.read_depth_png(&path, 1.0),
+        Err(IoError::ImageTooLarge { .. })
+    ));
+    assert!(matches!(
+        limits.read_mask_png(&path),
+        Err(IoError::ImageTooLarge { .. })
+    ));
+    assert_eq!(
+        read_depth_png(&path, 1.0).unwrap().pixels().len(),
+        4096 * 4096
+    );
+}
+
+#[test]
+fn data_that_do_not_fit_the_header_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let row = |width: usize| [vec![0], vec![1; 2 * width]].concat();
+    for (width, height, rows) in [
+        (4, 4, row(4).repeat(3)),
+        (4, 4, row(3).repeat(4)),
+        (0, 4, Vec::new()),
+        (4, 0, Vec::new()),
+        // A filter that there is not.
+        (1, 1, vec![9, 0, 1]),
+    ] {
+        let path = write(folder.path(), "a.png", &gray16(width, height, false, &rows));
+        let error = read_depth_png(&path, 1.0).unwrap_err();
+        assert!(
+            matches!(error, IoError::Png { .. }),
+            "{width}x{height}: {}",
+            told(&error)
+        );
+    }
+    // Every damaged byte gives an image or an error.
+    let depth = hicp_core::DepthImage::from_meters(5, 4, vec![0.5; 20]).unwrap();
+    let path = folder.path().join("a.png");
+    write_depth_png(&path, &depth, 1.0).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    for at in 0..whole.len() {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0xff;
+        match read_depth_png(write(folder.path(), "a.png", &damaged), 1.0) {
+            Ok(image) => assert_eq!(
+                image.pixels(),
+                depth.pixels(),
+                "byte {at}: checksums let it pass"
+            ),
+            Err(error) => assert!(told(&error).contains("a.png")),
+        }
+    }
+}

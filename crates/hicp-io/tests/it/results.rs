@@ -1,0 +1,177 @@
+//! Result files: what is read, what is refused, and that unchanged rows keep their numbers.
+
+use std::path::Path;
+
+use hicp_core::{Isometry3, RotationError, Vector6, se3};
+use hicp_io::IoError;
+use hicp_io::bop::{ResultRow, read_results, results_from_csv, write_results};
+use proptest::prelude::*;
+
+const HEADER: &str = "scene_id,im_id,obj_id,score,R,t,time";
+const EYE: &str = "1 0 0 0 1 0 0 0 1";
+
+fn read(text: impl AsRef<[u8]>) -> Result<Vec<ResultRow>, IoError> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    std::fs::write(&path, text).unwrap();
+    read_results(&path)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn rows_come_back_exactly(
+        twists in prop::collection::vec(prop::array::uniform6(-3.0_f64..3.0), 0..5),
+        score in -1e30_f64..1e30,
+        time in prop::option::of(0.0_f64..1e3),
+    ) {
+        let rows: Vec<ResultRow> = (0..).zip(&twists).map(|(id, twist)| {
+            let mut row = ResultRow::new(id, id + 1, id + 2, se3::exp(&Vector6::from(*twist)));
+            (row.score, row.time_s) = (score, time);
+            row
+        }).collect();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.csv");
+        write_results(&path, &rows).unwrap();
+        let back = read_results(&path).unwrap();
+        prop_assert_eq!(back.len(), rows.len());
+        for (a, b) in back.iter().zip(&rows) {
+            prop_assert_eq!(a.rotation(), b.rotation());
+            prop_assert_eq!(a.translation_mm(), b.translation_mm());
+            prop_assert_eq!((a.scene_id, a.im_id, a.obj_id), (b.scene_id, b.im_id, b.obj_id));
+            prop_assert_eq!((a.score, a.time_s), (b.score, b.time_s));
+            let (angle, distance) = se3::pose_distance(&a.camera_from_object(), &b.camera_from_object());
+            prop_assert!(angle < 1e-12 && distance < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_row_that_is_not_touched_keeps_its_numbers_and_a_new_pose_replaces_them() {
+    // Orthogonal to 5e-4 only.
+    let rotation = "1.0002 0 0 0 0.9998 0 0 0 1";
+    let mut rows = read(format!(
+        "{HEADER}\n50,1,2,0.5,{rotation},0.1 0.2 1035.65777,-1\n"
+    ))
+    .unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("out.csv");
+    write_results(&path, &rows).unwrap();
+    assert_eq!(
+        std::fs::read_to_string(&path).unwrap(),
+        format!("{HEADER}\n50,1,2,0.5,{rotation},0.1 0.2 1035.65777,-1\n")
+    );
+    assert!((rows[0].camera_from_object().translation.z - 1.035_657_77).abs() < 1e-12);
+
+    rows[0].set_camera_from_object(Isometry3::translation(0.0, 0.0, 0.5));
+    write_results(&path, &rows).unwrap();
+    assert_eq!(
+        std::fs::read_to_string(&path).unwrap(),
+        format!("{HEADER}\n50,1,2,0.5,{EYE},0 0 500,-1\n")
+    );
+}
+
+#[test]
+fn form_is_lenient() {
+    let text = format!(
+        "\u{feff}im_id, scene_id ,obj_id,t,R,score,time,note\r\n\r\n 1 , 50,2, 1  2 3 ,\"{EYE}\",1e0,0.25,x\r\n  \r\n2,50,2,1 2 3,{EYE},0,-1,"
+    );
+    let rows = read(&text).unwrap();
+    assert_eq!(rows.len(), 2);
+    assert_eq!((rows[0].scene_id, rows[0].im_id), (50, 1));
+    assert_eq!(rows[0].translation_mm(), &[1.0, 2.0, 3.0]);
+    assert_eq!((rows[0].time_s, rows[1].time_s), (Some(0.25), None));
+    assert!(read(HEADER).unwrap().is_empty());
+}
+
+#[test]
+fn content_is_strict_and_faults_name_line_and_column() {
+    let good = ["50", "1", "2", "0.5", EYE, "0 0 500", "-1"];
+    for (index, bad, name) in [
+        (0, "-1", "scene_id"),
+        (1, "1.5", "im_id"),
+        (2, "", "obj_id"),
+        (3, "nan", "score"),
+        (4, "1 0 0 0 1 0 0 0", "R"),
+        (4, "1 0 0 0 1 0 0 0 inf", "R"),
+        (5, "0 0 x", "t"),
+        (5, "0 0 1 2", "t"),
+        (6, "fast", "time"),
+    ] {
+        let mut cells = good;
+        cells[index] = bad;
+        let text = format!("{HEADER}\n{}\n\n{}\n", good.join(","), cells.join(","));
+        match read(&text) {
+            Err(IoError::CsvValue {
+                line,
+                column,
+                found,
+                ..
+            }) => {
+                assert_eq!((line, column, found.as_str()), (4, name, bad));
+            }
+            other => panic!("{bad}: {other:?}"),
+        }
+    }
+    let reflection = format!("{HEADER}\n50,1,2,1,1 0 0 0 1 0 0 0 -1,0 0 1,-1");
+    assert!(matches!(
+        read(&reflection),
+        Err(IoError::Rotation { place, source: RotationError::Determinant { .. }, .. })
+            if place == "line 2, column \"R\""
+    ));
+}
+
+#[test]
+fn tables_that_are_not_results_are_refused() {
+    for (header, column, times) in [
+        ("", "scene_id", 0),
+        ("a,b", "scene_id", 0),
+        ("scene_id,im_id,obj_id,score,R,t", "time", 0),
+        ("scene_id,im_id,obj_id,score,R,t,time,t", "t", 2),
+    ] {
+        match read(header) {
+            Err(IoError::CsvHeader {
+                column: found,
+                times: count,
+                ..
+            }) => {
+                assert_eq!((found, count), (column, times));
+            }
+            other => panic!("{header}: {other:?}"),
+        }
+    }
+    assert!(matches!(
+        read(format!("{HEADER}\n50,1,2,1,{EYE},0 0 1\n")),
+        Err(IoError::CsvFields {
+            line: 2,
+            found: 6,
+            expected: 7,
+            ..
+        })
+    ));
+    let latin = [HEADER.as_bytes(), b"\n50,1,2,1,M\xfcller,0 0 1,-1\n"].concat();
+    assert!(matches!(read(latin), Err(IoError::Line { line: 2, .. })));
+    let utf16 = b"\xff\xfes\0";
+    assert!(matches!(
+        read(utf16),
+        Err(IoError::Encoding {
+            found: "UTF-16 LE",
+            ..
+        })
+    ));
+}
+
+#[test]
+fn the_content_of_a_file_is_read_like_the_file() {
+    let row = ResultRow::new(1, 2, 3, Isometry3::identity());
+    let text = format!("{}\n{row}\n", ResultRow::header());
+    assert_eq!(ResultRow::header(), HEADER);
+    let path = Path::new("rows of a message");
+    let rows = results_from_csv(text.as_bytes(), path).unwrap();
+    assert_eq!(rows, read(&text).unwrap());
+    assert_eq!(rows, [row]);
+    let error = results_from_csv(text.replace(",2,", ",two,").as_bytes(), path).unwrap_err();
+    for part in ["rows of a message", "2", "im_id", "two"] {
+        assert!(error.to_string().contains(part), "{error}");
+    }
+}

@@ -1,0 +1,59 @@
+//! Numbers that no file can state are refused by those who write, not left for those who read.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use hicp_core::{Isometry3, Matrix3};
+use hicp_io::bop::{ResultRow, SceneCamera, write_results, write_scene_camera};
+use hicp_io::{IoError, write_pose_json};
+
+fn refused(path: &Path, written: Result<(), IoError>, place: &str) {
+    match written {
+        Err(IoError::Write { source, .. }) => {
+            let text = source.to_string();
+            assert!(
+                text.starts_with(place) && text.contains("not a finite number"),
+                "{text}"
+            );
+        }
+        other => panic!("{place}: {other:?}"),
+    }
+    assert!(!path.exists());
+}
+
+#[test]
+fn nothing_is_written_that_could_not_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file");
+    // Finite in metres, beyond all numbers in millimetres.
+    let far = Isometry3::translation(1e306, 0.0, 0.0);
+    refused(&path, write_pose_json(&path, &far), "$.cam_t_m2c[0]");
+
+    let row = ResultRow::new(1, 2, 3, Isometry3::identity());
+    type Spoil = fn(&mut ResultRow);
+    let spoils: [(&str, Spoil); 3] = [
+        ("score of row 2", |row| row.score = f64::NAN),
+        ("time of row 2", |row| row.time_s = Some(f64::INFINITY)),
+        ("t of row 2", |row| {
+            row.set_camera_from_object(Isometry3::translation(0.0, 0.0, 1e306));
+        }),
+    ];
+    for (place, spoil) in spoils {
+        let mut bad = row.clone();
+        spoil(&mut bad);
+        refused(&path, write_results(&path, &[row.clone(), bad]), place);
+    }
+
+    let camera = SceneCamera {
+        matrix: Matrix3::identity(),
+        image_size: None,
+        depth_scale: Some(f64::NAN),
+        camera_from_world: None,
+    };
+    let cameras = BTreeMap::from([(7, camera)]);
+    refused(
+        &path,
+        write_scene_camera(&path, &cameras),
+        "$.7.depth_scale",
+    );
+}

@@ -1,0 +1,157 @@
+//! A Gaussian prior of the pose.
+
+use hicp_core::{Correspondences, Isometry3, Matrix3, Matrix6, Pair, Vector6, se3, so3::hat};
+
+use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::system::normal_equations::{NormalEquations, blocks};
+
+/// A Gaussian of the pose: its mean and its information Λ, the inverse of the covariance.
+///
+/// As everywhere, ξ = ln(T T₀⁻¹)^∨ = [ρ; φ] is a left perturbation in the camera frame, translation first (metres, radians).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // One in a pipeline.
+pub enum Prior {
+    /// Anything is as likely.
+    Flat,
+    /// A mean and information from elsewhere: the covariance of a fused estimate is Λ⁻¹ as it stands.
+    Gaussian {
+        /// T₀, the mean.
+        camera_from_object: Isometry3<f64>,
+        /// Λ, symmetric and positive semi-definite: 1/m² for the translation, 1/rad² for the rotation.
+        information: Matrix6<f64>,
+    },
+    /// The pose that the stage begins at is the mean, as good as the detector that gave it: alike in all directions.
+    AboutInitial {
+        /// Standard deviation of the position of the object's origin along each axis, metres, above 0; infinite for none.
+        translation_meters: f64,
+        /// Standard deviation of the turn about each axis through the object's origin, degrees, above 0; infinite for none.
+        rotation_degrees: f64,
+    },
+}
+
+impl Prior {
+    /// T₀ and Λ for a stage that begins at `init`; `None` without information.
+    fn resolve(&self, init: &Isometry3<f64>) -> Option<(Isometry3<f64>, Matrix6<f64>)> {
+        let (mean, information) = match *self {
+            Self::Flat => return None,
+            Self::Gaussian {
+                camera_from_object,
+                information,
+            } => (camera_from_object, information),
+            Self::AboutInitial {
+                translation_meters,
+                rotation_degrees,
+            } => {
+                // The displacement of the object's origin is ρ + φ × t.
+                let shift = -hat(&init.translation.vector);
+                let identity = Matrix3::identity();
+                let about_object = blocks(&identity, &shift, &identity);
+                let [t, r] = [translation_meters, rotation_degrees.to_radians()]
+                    .map(|sigma| sigma.powi(2).recip());
+                let information = Matrix6::from_diagonal(&Vector6::new(t, t, t, r, r, r));
+                (*init, about_object.transpose() * information * about_object)
+            }
+        };
+        (information != Matrix6::zeros()).then_some((mean, information))
+    }
+}
+
+/// A metric with a Gaussian [`Prior`] of the pose T: Σ w E + σ² ξᵀΛξ, ξ = ln(T T₀⁻¹)^∨.
+///
+/// σ (`sigma_meters`) is the standard deviation of a residual of weight 1: it makes both terms squares in units of m²,
+/// and 1/σ² times the sum is the negative log posterior. N residuals count as N independent ones; neighbouring pixels are not,
+/// so multiply σ by √(pixels per independent residual) where the prior should be heard.
+///
+/// The prior is linearised with the inverse left Jacobian (Barfoot & Furgale 2014): ξ + 𝓙(ξ)⁻¹ δ. The step is Gauss–Newton's,
+/// also for metrics with a closed form; without information it is the metric's own, bit for bit. A strong prior leads to T₀ in one
+/// step. The mean loss is the sum over Σ w. Six components of information make up for missing rows, not for missing pairs.
+///
+/// [`Prior::AboutInitial`] needs to be told where a stage begins, which [`ErrorMetric::begin`] does; until then it is flat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PosePrior<M> {
+    /// The data term.
+    pub metric: M,
+    /// What is known of the pose; default nothing.
+    pub prior: Prior,
+    /// σ of a residual of weight 1, metres; default 1 mm.
+    pub sigma_meters: f64,
+    /// T₀ and Λ of this stage.
+    resolved: Option<(Isometry3<f64>, Matrix6<f64>)>,
+}
+
+impl<M: Default> Default for PosePrior<M> {
+    fn default() -> Self {
+        Self::new(M::default(), Prior::Flat, 1e-3)
+    }
+}
+
+impl<M> PosePrior<M> {
+    /// Adds a prior to a metric; `sigma_meters` is the standard deviation of a residual of weight 1.
+    #[must_use]
+    pub fn new(metric: M, prior: Prior, sigma_meters: f64) -> Self {
+        let resolved = match prior {
+            Prior::AboutInitial { .. } => None,
+            _ => prior.resolve(&Isometry3::identity()),
+        };
+        Self {
+            metric,
+            prior,
+            sigma_meters,
+            resolved,
+        }
+    }
+
+    /// ξ at the pose of the pairs, and σ² Λ.
+    fn term(&self, pairs: &Correspondences) -> Option<(Vector6<f64>, Matrix6<f64>)> {
+        let (mean, information) = self.resolved?;
+        let error = se3::log(&(pairs.camera_from_object() * mean.inverse()));
+        Some((error, information * self.sigma_meters.powi(2)))
+    }
+}
+
+impl<M: ErrorMetric> ErrorMetric for PosePrior<M> {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        self.metric.linearize(pair, system);
+    }
+
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        self.metric.squared_error(pair)
+    }
+
+    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+        let data = self.metric.mean_loss(pairs)?;
+        let Some((error, information)) = self.term(pairs) else {
+            return Some(data);
+        };
+        let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+        let mean = data + error.dot(&(information * error)) / weight;
+        mean.is_finite().then_some(mean)
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        let mut system = self.metric.system(pairs)?;
+        if let Some((error, information)) = self.term(pairs) {
+            system.add_twist(&error, &se3::left_jacobian_inverse(&error), &information);
+        }
+        Some(system)
+    }
+
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+        if self.resolved.is_none() {
+            return self.metric.minimize(pairs);
+        }
+        Some(Step {
+            increment: self.system(pairs)?.solve()?,
+            mean_loss: self.mean_loss(pairs)?,
+        })
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
+        self.resolved = self.prior.resolve(init);
+    }
+
+    fn name(&self) -> &'static str {
+        "pose-prior"
+    }
+}

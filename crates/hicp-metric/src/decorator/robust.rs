@@ -1,0 +1,167 @@
+//! Robust kernels over any metric.
+
+use hicp_core::{Correspondences, Isometry3, Pair};
+
+use crate::decorator::kernel::Kernel;
+use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::system::normal_equations::NormalEquations;
+
+/// σ of a Gaussian over the median of its absolute values.
+const SIGMA_PER_MAD: f64 = 1.4826;
+/// Scales are at least a picometre, so that residuals of zero keep the weight 1.
+const MIN_SCALE: f64 = 1e-12;
+
+/// The σ that a kernel measures residuals by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// A known σ of the residuals, metres.
+    Meters(f64),
+    /// 1.4826 × the median of |r| over the pairs with weight, found anew in each step, but no less than a floor.
+    ///
+    /// It is right for residuals of one dimension; distances of points in space (`PointToPoint`) have a median 2.3 times as
+    /// large for the same σ per axis. More than half of the pairs must be right.
+    Mad {
+        /// Smallest σ, metres: the resolution of the sensor. Without it a perfect fit rejects whatever is not exactly zero.
+        floor_meters: f64,
+    },
+}
+
+/// The median absolute residual, at least 1 mm.
+impl Default for Scale {
+    fn default() -> Self {
+        Self::Mad { floor_meters: 1e-3 }
+    }
+}
+
+/// A metric with a robust kernel: E = 2σ² ρ(r/σ), r² the error of the metric inside; by iteratively re-weighted least squares.
+///
+/// A step multiplies the weight of each pair by w(r/σ) in a copy and lets the metric inside minimise that, closed form or not.
+///
+/// The mean loss is that of E, over the *original* weights, not the mean of w r². Only E falls with every exact step at a given
+/// σ (w r² is part of a majoriser), rises when pairs drift into the tail although their weights vanish there, and falls and rises
+/// with σ; so the rules that judge a mean loss keep their meaning. It equals the inner loss for [`Kernel::L2`] and for small residuals.
+///
+/// The kernel belongs to the set of pairs: [`ErrorMetric::linearize`] and [`ErrorMetric::squared_error`] are those of the metric
+/// inside; [`ErrorMetric::system`] carries the weights.
+/// Cost: one pass for the residuals, one to copy the pairs, a selection for the median, and the metric inside.
+#[derive(Clone, Debug, Default)]
+pub struct Robust<M> {
+    /// What is minimised.
+    pub metric: M,
+    /// How much a residual counts; default [`Kernel::HUBER`].
+    pub kernel: Kernel,
+    /// What residuals are measured by; default the median, floored at 1 mm.
+    pub scale: Scale,
+    reweighted: Correspondences,
+    residuals: Vec<f64>,
+    sorted: Vec<f64>,
+}
+
+impl<M: ErrorMetric> Robust<M> {
+    /// Makes a metric robust.
+    #[must_use]
+    pub fn new(metric: M, kernel: Kernel, scale: Scale) -> Self {
+        Self {
+            metric,
+            kernel,
+            scale,
+            reweighted: Correspondences::new(),
+            residuals: Vec::new(),
+            sorted: Vec::new(),
+        }
+    }
+
+    /// Fills the residuals and returns σ; `None` where it is not finite.
+    fn measure(&mut self, pairs: &Correspondences) -> Option<f64> {
+        let pairs = pairs.as_slice();
+        self.residuals.clear();
+        let metric = &self.metric;
+        self.residuals
+            .extend(pairs.iter().map(|pair| metric.squared_error(pair).sqrt()));
+        let sigma = match self.scale {
+            Scale::Meters(sigma) => sigma,
+            Scale::Mad { floor_meters } => {
+                self.sorted.clear();
+                let counting = pairs.iter().zip(&self.residuals);
+                self.sorted.extend(
+                    counting
+                        .filter(|(pair, _)| pair.weight > 0.0)
+                        .map(|(_, residual)| *residual),
+                );
+                let middle = self.sorted.len() / 2;
+                if self.sorted.is_empty() {
+                    return None;
+                }
+                let (_, median, _) = self.sorted.select_nth_unstable_by(middle, f64::total_cmp);
+                let sigma = SIGMA_PER_MAD * *median;
+                if !sigma.is_finite() {
+                    return None;
+                }
+                sigma.max(floor_meters)
+            }
+        };
+        let sigma = sigma.max(MIN_SCALE);
+        sigma.is_finite().then_some(sigma)
+    }
+
+    /// Fills the copy with the kernel's weights; returns the robust mean loss.
+    fn reweigh(&mut self, pairs: &Correspondences) -> Option<f64> {
+        let sigma = self.measure(pairs)?;
+        let kernel = self.kernel;
+        self.reweighted
+            .begin(pairs.camera_from_object(), pairs.n_candidates());
+        let weighted = pairs.as_slice().iter().zip(&self.residuals);
+        self.reweighted.extend(weighted.map(|(pair, residual)| {
+            #[allow(clippy::cast_possible_truncation)] // The weight of a pair is an f32.
+            let weight = (f64::from(pair.weight) * kernel.weight(residual / sigma)) as f32;
+            Pair { weight, ..*pair }
+        }));
+        self.loss(pairs, sigma)
+    }
+
+    /// Σ w 2σ² ρ(r/σ) / Σ w over the residuals measured last.
+    fn loss(&self, pairs: &Correspondences, sigma: f64) -> Option<f64> {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (pair, residual) in pairs.as_slice().iter().zip(&self.residuals) {
+            let w = f64::from(pair.weight);
+            sum += w * self.kernel.loss(residual / sigma);
+            weight += w;
+        }
+        let mean = 2.0 * sigma * sigma * sum / weight;
+        (weight > 0.0 && mean.is_finite()).then_some(mean)
+    }
+}
+
+impl<M: ErrorMetric> ErrorMetric for Robust<M> {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        self.metric.linearize(pair, system);
+    }
+
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        self.metric.squared_error(pair)
+    }
+
+    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+        let sigma = self.measure(pairs)?;
+        self.loss(pairs, sigma)
+    }
+
+    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        self.reweigh(pairs)?;
+        self.metric.system(&self.reweighted)
+    }
+
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+        let mean_loss = self.reweigh(pairs)?;
+        let step = self.metric.minimize(&self.reweighted)?;
+        Some(Step { mean_loss, ..step })
+    }
+
+    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
+        self.metric.begin(iteration, init);
+    }
+
+    fn name(&self) -> &'static str {
+        "robust"
+    }
+}

@@ -1,0 +1,76 @@
+//! Which motions the pairs determine.
+
+use hicp_core::{Isometry3, Point3, Translation3, Vector3, Vector6, se3};
+
+use crate::system::degeneracy::eigen;
+use crate::system::normal_equations::NormalEquations;
+
+/// The six motions that a set of pairs determines from worst to best: the eigen-decomposition of the scaled JᵀWJ.
+///
+/// Rotations turn about the pivot and are scaled by the length (see [`NormalEquations`]), so all six directions are displacements
+/// of similar size and the ratio of eigenvalues does not depend on the unit, the distance, or the number of pairs
+/// (Zhang, Kaess & Singh 2016 for the analysis; raw eigenvalues mix m² and rad²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observability {
+    /// Eigenvalues relative to the largest, ascending, in [0, 1]; all zero without any information.
+    pub eigenvalues: [f64; 6],
+    /// Their directions [ρ; L φ], camera frame, rotation about the pivot: unit vectors, all six components lengths.
+    pub directions: [Vector6<f64>; 6],
+    /// Where rotations turn about, camera frame, metres.
+    pub pivot: Point3<f64>,
+    /// L, metres per radian.
+    pub length: f64,
+}
+
+impl Observability {
+    /// Number of directions whose eigenvalue is at most `threshold` times the largest; the first so many of
+    /// [`Observability::directions`].
+    ///
+    /// ```
+    /// use hicp_core::{Point3, Vector3};
+    /// use hicp_metric::{Degeneracy, NormalEquations};
+    /// // A plane seen from half a metre, its normal towards the camera.
+    /// let mut plane = NormalEquations::new(Point3::new(0.0, 0.0, 0.5), 0.1);
+    /// for (x, y) in [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1), (0.07, 0.07), (-0.07, -0.07)] {
+    ///     plane.add_row(&Point3::new(x, y, 0.5), &-Vector3::z(), 0.0, 1.0);
+    /// }
+    /// // Two shifts and the turn about the normal stay open.
+    /// assert_eq!(plane.observability().unwrap().n_degenerate(Degeneracy::THRESHOLD), 3);
+    /// ```
+    #[must_use]
+    pub fn n_degenerate(&self, threshold: f64) -> usize {
+        let determined = |value: &&f64| **value > threshold.max(0.0);
+        6 - self.eigenvalues.iter().filter(determined).count()
+    }
+
+    /// Returns the motion of the camera frame along one of [`Observability::directions`], by `meters`.
+    #[must_use]
+    pub fn motion(&self, direction: &Vector6<f64>, meters: f64) -> Isometry3<f64> {
+        let mut twist = direction * meters;
+        let mut rotation = twist.fixed_rows_mut::<3>(3);
+        rotation /= self.length;
+        let pivot: Vector3<f64> = self.pivot.coords;
+        Translation3::from(pivot) * se3::exp(&twist) * Translation3::from(-pivot)
+    }
+}
+
+impl NormalEquations {
+    /// Returns which motions the rows determine; held components are not taken into account.
+    ///
+    /// `None` where a number is not finite. Cost: an eigen-decomposition of a 6×6 matrix.
+    #[must_use]
+    pub fn observability(&self) -> Option<Observability> {
+        let eigen = eigen(self.scaled_hessian())?;
+        let mut order = [0, 1, 2, 3, 4, 5];
+        order.sort_unstable_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        // Zero over something where there is no information.
+        let largest = eigen.eigenvalues[order[5]].max(f64::MIN_POSITIVE);
+        let relative = |i: usize| (eigen.eigenvalues[i] / largest).max(0.0);
+        Some(Observability {
+            eigenvalues: order.map(relative),
+            directions: order.map(|i| eigen.eigenvectors.column(i).into_owned()),
+            pivot: self.pivot,
+            length: self.length,
+        })
+    }
+}

@@ -1,0 +1,276 @@
+//! Which motions are open on which shapes, and that nothing moves along them.
+
+use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel};
+use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Surfel, Vector3};
+use hicp_metric::{
+    Conditioned, Degeneracy, ErrorMetric, NormalEquations, PointToPlane, PointToPoint,
+};
+
+fn at_rest(source: &[Surfel]) -> Correspondences {
+    exact(source, &Isometry3::identity())
+}
+
+fn plane(numbers: &mut Numbers) -> Vec<Surfel> {
+    let mut point = || center() + Vector3::new(numbers.sign(), numbers.sign(), 0.0) * 0.1;
+    (0..200).map(|_| surfel(point(), -Vector3::z())).collect()
+}
+
+fn cylinder(numbers: &mut Numbers) -> Vec<Surfel> {
+    let mut one = || {
+        let angle = numbers.unit() * std::f64::consts::TAU;
+        let normal = Vector3::new(angle.cos(), 0.0, angle.sin());
+        surfel(
+            center() + normal * 0.05 + Vector3::y() * (0.1 * numbers.sign()),
+            normal,
+        )
+    };
+    (0..300).map(|_| one()).collect()
+}
+
+fn sphere(numbers: &mut Numbers) -> Vec<Surfel> {
+    let mut one = || {
+        let normal = numbers.direction();
+        surfel(center() + normal * 0.05, normal)
+    };
+    (0..300).map(|_| one()).collect()
+}
+
+fn line(numbers: &mut Numbers) -> Vec<Surfel> {
+    let mut one = || {
+        surfel(
+            center() + Vector3::x() * (0.1 * numbers.sign()),
+            numbers.direction(),
+        )
+    };
+    (0..100).map(|_| one()).collect()
+}
+
+fn degenerate(metric: &mut dyn ErrorMetric, pairs: &Correspondences) -> usize {
+    let system = metric.system(pairs).unwrap();
+    let found = system.observability().unwrap();
+    found.n_degenerate(Degeneracy::THRESHOLD)
+}
+
+/// In every frame, at every size and for any number of pairs.
+#[test]
+fn shapes_leave_open_what_they_should() {
+    let mut numbers = Numbers(81);
+    let (plane, cylinder) = (plane(&mut numbers), cylinder(&mut numbers));
+    let (sphere, line) = (sphere(&mut numbers), line(&mut numbers));
+    let ellipsoid = ellipsoid(&mut numbers, 300);
+    for _ in 0..10 {
+        let motion = numbers.motion(&center(), 100.0, 0.2);
+        for factor in [1.0, 1000.0] {
+            let count = |metric: &mut dyn ErrorMetric, source: &[Surfel]| {
+                degenerate(
+                    metric,
+                    &resized(&carried(&at_rest(source), &motion), factor),
+                )
+            };
+            assert_eq!(count(&mut PointToPlane, &plane), 3);
+            assert_eq!(count(&mut PointToPlane, &cylinder), 2);
+            assert_eq!(count(&mut PointToPlane, &sphere), 3);
+            assert_eq!(count(&mut PointToPlane, &ellipsoid), 0);
+            assert_eq!(count(&mut PointToPlane, &ellipsoid[..5]), 1);
+            assert_eq!(count(&mut PointToPlane, &ellipsoid[..1]), 5);
+            // Points on a line determine all but the turn about it; planes through them also not more.
+            assert_eq!(count(&mut PointToPoint, &line), 1);
+            assert_eq!(count(&mut PointToPlane, &line), 1);
+            assert_eq!(count(&mut PointToPoint, &plane), 0);
+            assert_eq!(count(&mut PointToPoint, &plane[..1]), 3);
+        }
+    }
+}
+
+#[test]
+fn directions_are_unit_orthogonal_and_leave_the_residuals_alone() {
+    let mut numbers = Numbers(82);
+    for source in [
+        plane(&mut numbers),
+        cylinder(&mut numbers),
+        sphere(&mut numbers),
+    ] {
+        let motion = numbers.motion(&center(), 100.0, 0.2);
+        let pairs = carried(&at_rest(&source), &motion);
+        let system = PointToPlane.system(&pairs).unwrap();
+        let found = system.observability().unwrap();
+        assert!(found.eigenvalues.is_sorted());
+        assert!((found.eigenvalues[5] - 1.0).abs() < 1e-15);
+        let columns = Matrix6::from_columns(&found.directions);
+        assert!((columns.transpose() * columns - Matrix6::identity()).amax() < 1e-12);
+        let n = found.n_degenerate(Degeneracy::THRESHOLD);
+        for (i, direction) in found.directions.iter().enumerate() {
+            let along = found.motion(direction, 1e-3);
+            let moved = advanced(&pairs, &along);
+            let rms = PointToPlane.mean_loss(&moved).unwrap().sqrt();
+            // A millimetre along an open direction moves by roundings and by the curvature over a millimetre.
+            assert_eq!(rms < 2e-5, i < n, "{i} of {n}: {rms}");
+        }
+    }
+}
+
+fn conditioned<M>(metric: M, policy: Degeneracy) -> Conditioned<M> {
+    Conditioned {
+        metric,
+        policy,
+        threshold: Degeneracy::THRESHOLD,
+    }
+}
+
+/// A plane a little off, its counterparts elsewhere on the same plane.
+fn lifted(numbers: &mut Numbers, motion: &Isometry3<f64>) -> (Correspondences, Vector3<f64>) {
+    let lift = Isometry3::translation(0.03, 0.01, 0.004);
+    let pairs = carried(&exact(&plane(numbers), &lift), motion);
+    (pairs, motion.rotation * Vector3::z())
+}
+
+#[test]
+fn nothing_slides_along_a_plane() {
+    let mut numbers = Numbers(83);
+    for _ in 0..20 {
+        let motion = numbers.motion(&center(), 100.0, 0.2);
+        let (pairs, normal) = lifted(&mut numbers, &motion);
+        let middle = motion * center();
+        for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
+            let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+            let shift = step.increment * middle - middle;
+            let slide = shift - normal * shift.dot(&normal);
+            assert!((shift.dot(&normal) - 0.004).abs() < 1e-6, "{policy:?}");
+            assert!(slide.norm() < 1e-6, "{policy:?}: {}", slide.norm());
+            let turn = step.increment.rotation.scaled_axis().dot(&normal);
+            assert!(turn.abs() < 1e-5, "{policy:?}: {turn}");
+        }
+        assert_eq!(
+            conditioned(PointToPlane, Degeneracy::Refuse).minimize(&pairs),
+            None
+        );
+    }
+}
+
+/// Where noise alone determines a direction, damping moves along it and freezing does not.
+#[test]
+fn noisy_normals_do_not_make_a_plane_slide_when_frozen() {
+    let mut numbers = Numbers(84);
+    let (mut worst, mut worst_damped) = (0.0_f64, 0.0_f64);
+    for _ in 0..20 {
+        let (mut pairs, normal) = lifted(&mut numbers, &Isometry3::identity());
+        for pair in pairs.as_mut_slice() {
+            // Normals off by a degree, points by a millimetre.
+            let tilted =
+                -normal + Vector3::new(numbers.gaussian(), numbers.gaussian(), 0.0) * 0.017;
+            pair.target = surfel(pair.target.point.cast(), tilted);
+            pair.target.point += (normal * (numbers.gaussian() * 0.001)).cast::<f32>();
+        }
+        let slide = |policy| {
+            let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+            let shift = step.increment * center() - center();
+            (shift - normal * shift.dot(&normal)).norm()
+        };
+        worst = worst.max(slide(Degeneracy::Freeze));
+        worst_damped = worst_damped.max(slide(Degeneracy::Damp));
+    }
+    // Eigenvectors are tilted by about a degree over √200 at most; the lift is 4 mm.
+    assert!(worst < 1e-3, "{worst}");
+    assert!(worst_damped > 3.0 * worst, "{worst_damped} {worst}");
+}
+
+#[test]
+fn well_determined_pairs_give_the_same_step_under_every_policy() {
+    let mut numbers = Numbers(85);
+    let pairs = messy(&mut numbers, 200);
+    let expected = conditioned(PointToPlane, Degeneracy::Ignore)
+        .minimize(&pairs)
+        .unwrap();
+    for policy in [Degeneracy::Damp, Degeneracy::Freeze, Degeneracy::Refuse] {
+        let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+        let (angle, distance) = crate::scenes::difference(&step.increment, &expected.increment);
+        assert!(
+            angle < 1e-5 && distance < 1e-6,
+            "{policy:?}: {angle} {distance}"
+        );
+        assert_eq!(step.mean_loss.to_bits(), expected.mean_loss.to_bits());
+    }
+    // Damping is what the metric does by itself.
+    let damped = conditioned(PointToPlane, Degeneracy::Damp)
+        .minimize(&pairs)
+        .unwrap();
+    assert_eq!(
+        damped.increment,
+        PointToPlane.minimize(&pairs).unwrap().increment
+    );
+    let system = PointToPlane.system(&pairs).unwrap();
+    assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
+}
+
+/// The threshold is a share of the largest eigenvalue: above 1 everything is degenerate, at 0 only what has no information.
+#[test]
+fn thresholds_bound_what_moves() {
+    let mut numbers = Numbers(86);
+    let pairs = messy(&mut numbers, 200);
+    let system = PointToPlane.system(&pairs).unwrap();
+    let still = system.solve_with(Degeneracy::Freeze, 2.0).unwrap();
+    assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
+    assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
+    assert!(system.solve_with(Degeneracy::Refuse, 0.0).is_some());
+    // The ratio at the threshold is degenerate too, and that of the best direction is 1.
+    let still = system.solve_with(Degeneracy::Freeze, 1.0).unwrap();
+    assert_eq!(
+        crate::scenes::difference(&still, &Isometry3::identity()).1,
+        0.0
+    );
+    assert_eq!(system.solve_with(Degeneracy::Refuse, 1.0), None);
+    assert_eq!(system.observability().unwrap().n_degenerate(1.0), 6);
+    // Six directions of the same information, to the bit: whatever is below 1 leaves all of them, and 1 none.
+    let mut alike = NormalEquations::new(Point3::origin(), 1.0);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for (lever, direction) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (axes[i], axes[j])) {
+        alike.add_row(&Point3::from(lever), &direction, 0.1, 1.0);
+        alike.add_row(&Point3::from(-lever), &-direction, 0.1, 1.0);
+    }
+    assert_eq!(alike.information(), Matrix6::identity() * 2.0);
+    assert!(alike.solve_with(Degeneracy::Refuse, 0.999).is_some());
+    assert_eq!(alike.solve_with(Degeneracy::Refuse, 1.0), None);
+    // A negative threshold is none.
+    let (zero, below) = (
+        system.solve_with(Degeneracy::Freeze, 0.0),
+        system.solve_with(Degeneracy::Freeze, -1.0),
+    );
+    assert_eq!(zero, below);
+}
+
+#[test]
+fn numbers_that_are_none_end_in_none() {
+    let mut empty = NormalEquations::new(center(), 0.1);
+    let found = empty.observability().unwrap();
+    assert_eq!(found.n_degenerate(0.0), 6);
+    assert_eq!(empty.solve(), None);
+    let mut silent = NormalEquations::new(center(), 0.1);
+    for _ in 0..6 {
+        silent.add_row(&center(), &Vector3::zeros(), 0.1, 1.0);
+    }
+    for bad in [f64::NAN, f64::INFINITY] {
+        empty.add_row(&Point3::new(bad, 0.0, 1.0), &Vector3::z(), 0.1, 1.0);
+        assert!(empty.observability().is_none());
+        assert_eq!(empty.covariance(), None);
+    }
+    for policy in [
+        Degeneracy::Damp,
+        Degeneracy::Freeze,
+        Degeneracy::Refuse,
+        Degeneracy::Ignore,
+    ] {
+        assert_eq!(empty.solve_with(policy, 1e-3), None);
+        assert_eq!(silent.solve_with(policy, 1e-3), None, "{policy:?}");
+        let mut metric = conditioned(PointToPlane, policy);
+        assert_eq!(metric.minimize(&Correspondences::new()), None);
+        let one: Correspondences = [Pair::new(
+            0,
+            surfel(center(), Vector3::z()),
+            0,
+            surfel(center(), Vector3::z()),
+        )]
+        .into_iter()
+        .collect();
+        assert_eq!(metric.minimize(&one), None);
+    }
+}

@@ -1,0 +1,68 @@
+//! Normal equations in the hands of someone who writes a metric of their own.
+
+use crate::scenes::{Numbers, messy};
+use hicp_core::{Matrix6, Point3, UnitQuaternion, Vector3, Vector6, se3, so3};
+use hicp_metric::{Degeneracy, ErrorMetric, NormalEquations, PointToPlane};
+
+fn system(seed: u64) -> NormalEquations {
+    PointToPlane.system(&messy(&mut Numbers(seed), 60)).unwrap()
+}
+
+#[test]
+fn a_policy_of_the_system_is_the_policy_of_its_solution() {
+    let system = system(3);
+    for policy in [
+        Degeneracy::Damp,
+        Degeneracy::Freeze,
+        Degeneracy::Refuse,
+        Degeneracy::Ignore,
+    ] {
+        for threshold in [1e-3, 0.5, 2.0] {
+            let own = system.with_policy(policy, threshold);
+            assert_eq!(own.solve(), system.solve_with(policy, threshold));
+        }
+    }
+    // Above the ratio of every direction, all but one count as degenerate.
+    let refused = system.with_policy(Degeneracy::Refuse, 0.999_999);
+    assert!(refused.solve().is_none() && system.solve().is_some());
+}
+
+#[test]
+fn held_components_do_not_move_the_centre_or_turn_about_it() {
+    let mut numbers = Numbers(5);
+    let axes = UnitQuaternion::new(numbers.vector());
+    let center = Point3::new(0.1, -0.05, 0.7);
+    let mut held = system(5);
+    let free = held.solve().unwrap();
+    held.freeze(&axes, &center, [true, false, false], [false, true, false]);
+    let increment = held.solve().unwrap();
+    let components = |motion: &hicp_core::Isometry3<f64>| {
+        let shift: Vector3<f64> = axes.inverse() * (motion * center - center);
+        let turn = axes.inverse() * so3::log(&motion.rotation);
+        (shift.x, turn.y, shift.norm(), turn.norm())
+    };
+    let (x, y, shift, turn) = components(&increment);
+    assert!(x.abs() < 1e-12 * shift && y.abs() < 1e-12, "{x} {y}");
+    assert!(shift > 1e-6 && turn > 1e-6, "{shift} {turn}");
+    let (x, y, ..) = components(&free);
+    assert!(x.abs() > 1e-6 && y.abs() > 1e-6, "{x} {y}");
+}
+
+#[test]
+fn a_twist_with_all_the_information_is_the_solution() {
+    let wanted = Vector6::new(1e-4, -2e-4, 3e-4, 4e-4, -5e-4, 6e-4);
+    let plain = system(7);
+    let mut pulled = plain;
+    pulled.add_twist(&-wanted, &Matrix6::identity(), &(Matrix6::identity() * 1e9));
+    let found = se3::log(&pulled.solve().unwrap());
+    assert!((found - wanted).norm() < 1e-6, "{found}");
+    assert_eq!(pulled.rows(), plain.rows() + 6);
+    let expected = plain.loss() + 1e9 * wanted.norm_squared();
+    assert!((pulled.loss() / expected - 1.0).abs() < 1e-12);
+    // And with none it is nothing.
+    let mut same = plain;
+    same.add_twist(&-wanted, &Matrix6::identity(), &Matrix6::zeros());
+    assert_eq!((same.rows(), same.loss()), (plain.rows(), plain.loss()));
+    let difference = same.solve().unwrap().inverse() * plain.solve().unwrap();
+    assert!(se3::log(&difference).norm() < 1e-12);
+}

@@ -1,0 +1,276 @@
+//! Held components are exactly zero, and the rest is the constrained minimum.
+
+use crate::scenes::{Numbers, at, difference, exact, messy};
+use hicp_core::{Correspondences, Isometry3, Point3, Vector3, Vector6, se3, so3};
+use hicp_metric::{
+    Conditioned, ErrorMetric, Frame, Frozen, GaussNewton, LevenbergMarquardt, PointToPlane,
+    PointToPoint, Symmetric,
+};
+
+/// Displacement of the object's origin and rotation vector, in the axes of the frame.
+fn components(frame: Frame, pose: &Isometry3<f64>, increment: &Isometry3<f64>) -> [f64; 6] {
+    let axes = match frame {
+        Frame::Camera => Isometry3::identity().rotation,
+        Frame::Object => pose.rotation,
+    };
+    let origin = Point3::from(pose.translation.vector);
+    let shift = axes.inverse() * (increment * origin - origin);
+    let turn = axes.inverse() * so3::log(&increment.rotation);
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+}
+
+fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
+    let pose =
+        Isometry3::translation(0.02, -0.03, 0.58) * numbers.motion(&Point3::origin(), 80.0, 0.0);
+    at(&pose, &messy(numbers, count))
+}
+
+fn masks() -> impl Iterator<Item = ([bool; 3], [bool; 3])> {
+    (0_u8..64).map(|bits| {
+        let held = |i: u8| bits & (1 << i) != 0;
+        ([held(0), held(1), held(2)], [held(3), held(4), held(5)])
+    })
+}
+
+fn frozen<M>(
+    metric: M,
+    frame: Frame,
+    (translation, rotation): ([bool; 3], [bool; 3]),
+) -> Frozen<M> {
+    Frozen {
+        metric,
+        frame,
+        translation,
+        rotation,
+    }
+}
+
+#[test]
+fn held_components_are_zero_and_the_others_move() {
+    fn check<M: ErrorMetric + Copy>(metric: M) {
+        let mut numbers = Numbers(51);
+        let pairs = posed(&mut numbers, 80);
+        for frame in [Frame::Camera, Frame::Object] {
+            for mask in masks() {
+                let step = frozen(metric, frame, mask).minimize(&pairs).unwrap();
+                let found = components(frame, pairs.camera_from_object(), &step.increment);
+                let held = [mask.0, mask.1].concat();
+                for (i, (x, held)) in found.iter().zip(held).enumerate() {
+                    // Zero but for the rounding of c − R c here in the test.
+                    if held {
+                        assert!(x.abs() < 1e-15, "{frame:?} {mask:?} {i}: {x}");
+                    } else {
+                        assert!(x.abs() > 1e-8, "{frame:?} {mask:?} {i}: {x}");
+                    }
+                }
+            }
+        }
+    }
+    check(PointToPlane);
+    check(PointToPoint);
+    check(Symmetric);
+}
+
+#[test]
+fn exactly_zero_means_the_bits() {
+    let mut numbers = Numbers(52);
+    let pairs = posed(&mut numbers, 80);
+    let all = [true; 3];
+    let none = [false; 3];
+    for frame in [Frame::Camera, Frame::Object] {
+        let step = frozen(PointToPlane, frame, (all, all))
+            .minimize(&pairs)
+            .unwrap();
+        assert_eq!(step.increment, Isometry3::identity());
+        let step = frozen(PointToPlane, frame, (none, all))
+            .minimize(&pairs)
+            .unwrap();
+        assert_eq!(step.increment.rotation, Isometry3::identity().rotation);
+    }
+    // Among the eigenvectors too, although their algorithm mixes what is held with what is free on its way.
+    for mask in masks() {
+        let mut metric = Conditioned {
+            metric: frozen(PointToPlane, Frame::Camera, mask),
+            ..Conditioned::default()
+        };
+        let increment = metric.minimize(&pairs).unwrap().increment;
+        let turn = increment.rotation.imag();
+        for axis in 0..3 {
+            assert!(!mask.1[axis] || turn[axis] == 0.0, "{mask:?} {turn}");
+            let shift = increment.translation.vector[axis];
+            assert!(mask.1 != all || !mask.0[axis] || shift == 0.0, "{mask:?}");
+        }
+    }
+    let hold = ([false, false, true], all);
+    let step = frozen(PointToPoint, Frame::Camera, hold)
+        .minimize(&pairs)
+        .unwrap();
+    assert_eq!(step.increment.translation.z.to_bits(), 0.0_f64.to_bits());
+}
+
+#[test]
+fn nothing_held_is_the_metric_itself() {
+    let mut numbers = Numbers(53);
+    let pairs = posed(&mut numbers, 80);
+    let none = ([false; 3], [false; 3]);
+    for frame in [Frame::Camera, Frame::Object] {
+        assert_eq!(
+            frozen(PointToPoint, frame, none).minimize(&pairs),
+            PointToPoint.minimize(&pairs)
+        );
+        assert_eq!(
+            frozen(PointToPlane, frame, none).system(&pairs),
+            PointToPlane.system(&pairs)
+        );
+    }
+    assert_eq!(
+        Frozen::<PointToPoint>::default().minimize(&pairs),
+        PointToPoint.minimize(&pairs)
+    );
+}
+
+/// The loss of the linearised problem has no slope left in the free components, and translation alone is the mean offset.
+#[test]
+fn the_free_components_are_at_the_constrained_minimum() {
+    let mut numbers = Numbers(54);
+    let pairs = posed(&mut numbers, 80);
+    let (mut mean, mut weight) = (Vector3::zeros(), 0.0);
+    for pair in pairs.as_slice() {
+        let w = f64::from(pair.weight);
+        mean += (pair.target.point - pair.source.point).cast::<f64>() * w;
+        weight += w;
+    }
+    mean /= weight;
+    let shift = frozen(
+        PointToPoint,
+        Frame::Camera,
+        ([false, true, false], [true; 3]),
+    )
+    .minimize(&pairs)
+    .unwrap()
+    .increment
+    .translation
+    .vector;
+    // The damping of 10⁻⁶.
+    assert!((shift - Vector3::new(mean.x, 0.0, mean.z)).norm() < 3e-6 * mean.norm());
+
+    let loss = |motion: &Isometry3<f64>| -> f64 {
+        let terms = pairs.as_slice().iter().map(|pair| {
+            let p = motion * pair.source.point.cast::<f64>();
+            f64::from(pair.weight) * (p - pair.target.point.cast::<f64>()).norm_squared()
+        });
+        terms.sum()
+    };
+    for frame in [Frame::Camera, Frame::Object] {
+        for mask in masks() {
+            let mut solved = GaussNewton::new(frozen(PointToPoint, frame, mask));
+            (solved.max_iterations, solved.tolerance) = (30, 0.0);
+            let end = solved.minimize(&pairs).unwrap().increment;
+            let held = [mask.0, mask.1].concat();
+            for component in (0..6).filter(|i| !held[*i]) {
+                // Along one component, from wherever the object is after a motion.
+                let slope = |motion: &Isometry3<f64>| {
+                    let pose = motion * pairs.camera_from_object();
+                    let axes = match frame {
+                        Frame::Camera => Isometry3::identity(),
+                        Frame::Object => {
+                            Isometry3::from_parts(Vector3::zeros().into(), pose.rotation)
+                        }
+                    };
+                    let place = Isometry3::from_parts(pose.translation, axes.rotation);
+                    let nudged = |h: f64| {
+                        let mut twist = Vector6::zeros();
+                        twist[component] = h;
+                        loss(&(place * se3::exp(&twist) * place.inverse() * motion))
+                    };
+                    (nudged(1e-5) - nudged(-1e-5)) / 2e-5
+                };
+                let (start, rest) = (slope(&Isometry3::identity()), slope(&end));
+                // Sources are rounded to f32 in between: 3e-8 m of offsets of a centimetre, and slopes may start small by chance.
+                assert!(
+                    rest.abs() < 1e-4 * start.abs().max(0.01),
+                    "{frame:?} {mask:?} {component}: {start} {rest}"
+                );
+            }
+        }
+    }
+}
+
+/// A motion within the free components is found although the others are held.
+#[test]
+fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
+    let mut numbers = Numbers(55);
+    for _ in 0..10 {
+        let pose = Isometry3::translation(0.02, -0.03, 0.58)
+            * numbers.motion(&Point3::origin(), 80.0, 0.0);
+        let turn = Isometry3::new(Vector3::zeros(), Vector3::z() * 0.2);
+        let motion = pose * turn * pose.inverse();
+        let source = crate::scenes::ellipsoid(&mut numbers, 100);
+        let pairs = at(&pose, &exact(&source, &motion));
+        let only_z = ([true; 3], [true, true, false]);
+        let mut metric = GaussNewton::new(frozen(PointToPoint, Frame::Object, only_z));
+        let step = metric.minimize(&pairs).unwrap();
+        let (angle, distance) = difference(&step.increment, &motion);
+        assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
+        // Held, it does not turn.
+        let mut held = frozen(
+            PointToPoint,
+            Frame::Object,
+            ([false; 3], [false, false, true]),
+        );
+        let found = components(
+            Frame::Object,
+            &pose,
+            &held.minimize(&pairs).unwrap().increment,
+        );
+        assert!(found[5].abs() < 1e-15);
+    }
+}
+
+#[test]
+fn as_few_rows_as_unknowns_do() {
+    let mut numbers = Numbers(56);
+    let pairs = posed(&mut numbers, 3);
+    assert_eq!(PointToPlane.minimize(&pairs), None);
+    let mut shift = frozen(PointToPlane, Frame::Camera, ([false; 3], [true; 3]));
+    assert!(shift.minimize(&pairs).is_some());
+    let one: Correspondences = pairs.as_slice()[..1].iter().copied().collect();
+    assert_eq!(shift.minimize(&one), None);
+    assert_eq!(shift.minimize(&Correspondences::new()), None);
+}
+
+#[test]
+fn solvers_and_policies_heed_what_is_held() {
+    let mut numbers = Numbers(57);
+    let pairs = posed(&mut numbers, 80);
+    let pose = *pairs.camera_from_object();
+    let mask = ([true, false, true], [true; 3]);
+    let frozen = frozen(PointToPlane, Frame::Object, mask);
+    let conditioned = Conditioned {
+        metric: frozen,
+        ..Conditioned::default()
+    };
+    let metrics: [Box<dyn ErrorMetric>; 5] = [
+        Box::new(frozen),
+        Box::new(conditioned),
+        Box::new(GaussNewton::new(frozen)),
+        Box::new(GaussNewton::new(conditioned)),
+        Box::new(LevenbergMarquardt::new(frozen)),
+    ];
+    for mut metric in metrics {
+        let step = metric.minimize(&pairs).unwrap();
+        let found = components(Frame::Object, &pose, &step.increment);
+        for (i, x) in found.iter().enumerate() {
+            assert!(i == 1 || x.abs() < 1e-14, "{}: {i} {x}", metric.name());
+        }
+        assert!(found[1].abs() > 1e-6, "{}", metric.name());
+    }
+    // Its covariance is that of the free components.
+    let covariance = frozen.clone().system(&pairs).unwrap().covariance().unwrap();
+    let direction = pose.rotation * Vector3::y();
+    let block = covariance.fixed_view::<3, 3>(0, 0);
+    let variance = direction.dot(&(block * direction));
+    assert!(variance > 0.0);
+    assert!((block - direction * direction.transpose() * variance).amax() < 1e-12 * variance);
+    assert!(covariance.fixed_view::<3, 3>(3, 3).amax() < 1e-30);
+}

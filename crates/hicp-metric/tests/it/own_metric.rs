@@ -1,0 +1,192 @@
+//! What a metric of one's own gets from the trait.
+
+use crate::scenes::{Numbers, center, ellipsoid, exact, messy, same_information};
+use hicp_core::{Correspondences, Isometry3, Pair, Vector3};
+use hicp_metric::{
+    ErrorMetric, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
+};
+
+/// The point that a pair's rows act at.
+type Place = fn(&Pair) -> Vector3<f64>;
+
+/// The difference of depths alone.
+struct DepthDifference;
+
+impl ErrorMetric for DepthDifference {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let (p, c) = (
+            pair.source.point.cast::<f64>(),
+            pair.target.point.cast::<f64>(),
+        );
+        system.add_row(&p, &Vector3::z(), p.z - c.z, f64::from(pair.weight));
+    }
+}
+
+/// The rows of another metric and nothing else of it.
+struct Rows<M>(M);
+
+impl<M: ErrorMetric> ErrorMetric for Rows<M> {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        self.0.linearize(pair, system);
+    }
+}
+
+#[test]
+fn the_error_of_a_pair_is_the_sum_of_the_squares_of_its_rows_without_its_weight() {
+    let mut numbers = Numbers(401);
+    let mut pairs = messy(&mut numbers, 30);
+    pairs.as_mut_slice()[0].weight = 0.0;
+    for pair in pairs.as_slice() {
+        let depth = f64::from(pair.source.point.z) - f64::from(pair.target.point.z);
+        let found = DepthDifference.squared_error(pair);
+        assert!((found - depth * depth).abs() <= 1e-15 * found && found > 0.0);
+        let inner: [(Box<dyn ErrorMetric>, f64); 2] = [
+            (
+                Box::new(Rows(PointToPoint)),
+                PointToPoint.squared_error(pair),
+            ),
+            (Box::new(Rows(Symmetric)), Symmetric.squared_error(pair)),
+        ];
+        for (rows, expected) in inner {
+            assert!((rows.squared_error(pair) - expected).abs() <= 1e-15 * expected);
+        }
+    }
+}
+
+#[test]
+fn its_name_is_that_of_its_type() {
+    assert_eq!(DepthDifference.name(), "DepthDifference");
+    assert_eq!(Rows(PointToPoint).name(), "Rows");
+}
+
+/// Points that are not finite are found even where no row's residual says so.
+#[test]
+fn points_that_are_not_finite_give_no_system() {
+    let mut numbers = Numbers(402);
+    let mut pairs = messy(&mut numbers, 30);
+    assert!(DepthDifference.system(&pairs).is_some());
+    pairs.as_mut_slice()[7].source.point.x = f32::INFINITY;
+    assert!(DepthDifference.system(&pairs).is_none());
+    assert_eq!(DepthDifference.minimize(&pairs), None);
+}
+
+/// Centred at the centroid of the points that the rows act at, and scaled by their RMS radius.
+#[test]
+fn systems_are_centred_and_scaled() {
+    let mut numbers = Numbers(403);
+    let pairs = messy(&mut numbers, 70);
+    let expected = |of: Place| {
+        let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+        let mean = |value: &dyn Fn(&Pair) -> Vector3<f64>| {
+            let sum: Vector3<f64> = pairs
+                .as_slice()
+                .iter()
+                .map(|p| value(p) * f64::from(p.weight))
+                .sum();
+            sum / weight
+        };
+        let centroid = mean(&of);
+        let squares = mean(&|p| (of(p) - centroid).map(|x| x * x));
+        (centroid, squares.sum().sqrt())
+    };
+    let source: Place = |pair| pair.source.point.coords.cast();
+    let target: Place = |pair| pair.target.point.coords.cast();
+    let metrics: [(Box<dyn ErrorMetric>, Place); 4] = [
+        (Box::new(DepthDifference), source),
+        (Box::new(PointToPoint), source),
+        (Box::new(PointToPlane), source),
+        (Box::new(PlaneToPoint), target),
+    ];
+    for (mut metric, of) in metrics {
+        let system = metric.system(&pairs).unwrap();
+        let (centroid, radius) = expected(of);
+        assert!(
+            (system.pivot().coords - centroid).norm() < 1e-14,
+            "{}",
+            metric.name()
+        );
+        assert!(
+            (system.length() - radius).abs() < 1e-14,
+            "{}",
+            metric.name()
+        );
+    }
+    // Points all in one place have no radius.
+    let one = exact(
+        &vec![ellipsoid(&mut numbers, 1)[0]; 9],
+        &Isometry3::identity(),
+    );
+    assert_eq!(PointToPoint.system(&one).unwrap().length(), 1.0);
+}
+
+/// A pair without weight costs no digits, however far off it is and wherever in the list.
+#[test]
+fn what_has_no_weight_does_not_matter_wherever_it_is() {
+    let mut numbers = Numbers(404);
+    let pairs = messy(&mut numbers, 60);
+    let mut far = pairs.as_slice()[0];
+    far.weight = 0.0;
+    far.source.point += Vector3::new(600.0, -700.0, 400.0);
+    far.target.point = far.source.point;
+    let with: Correspondences = std::iter::once(far)
+        .chain(pairs.as_slice().iter().copied())
+        .collect();
+    let metrics: [Box<dyn ErrorMetric>; 5] = [
+        Box::new(Rows(PointToPlane)),
+        Box::new(PointToPoint),
+        Box::new(PointToPlane),
+        Box::new(PlaneToPoint),
+        Box::new(Symmetric),
+    ];
+    for mut metric in metrics {
+        let (a, b) = (
+            metric.system(&pairs).unwrap(),
+            metric.system(&with).unwrap(),
+        );
+        assert!((a.length() - b.length()).abs() < 1e-14, "{}", metric.name());
+        assert!((a.pivot() - b.pivot()).norm() < 1e-14, "{}", metric.name());
+        assert!(same_information(&a, &b, 1e-13), "{}", metric.name());
+        let (a, b) = (
+            metric.minimize(&pairs).unwrap(),
+            metric.minimize(&with).unwrap(),
+        );
+        let (angle, distance) = crate::scenes::difference(&a.increment, &b.increment);
+        assert!(
+            angle < 1e-10 && distance < 1e-11,
+            "{}: {angle} {distance}",
+            metric.name()
+        );
+    }
+}
+
+/// A metric that must not be asked.
+struct Never;
+
+impl ErrorMetric for Never {
+    fn linearize(&self, _: &Pair, _: &mut NormalEquations) {
+        unreachable!("asked for rows");
+    }
+    fn mean_loss(&mut self, _: &Correspondences) -> Option<f64> {
+        None
+    }
+}
+
+#[test]
+fn a_term_of_factor_zero_is_left_out() {
+    let mut numbers = Numbers(405);
+    let pairs = messy(&mut numbers, 30);
+    let mut sum = WeightedSum {
+        terms: ((1.0, PointToPlane), (0.0, Never)),
+    };
+    assert_eq!(sum.minimize(&pairs), PointToPlane.minimize(&pairs));
+    assert_eq!(sum.mean_loss(&pairs), PointToPlane.mean_loss(&pairs));
+    for pair in pairs.as_slice() {
+        assert_eq!(sum.squared_error(pair), PointToPlane.squared_error(pair));
+        let rows = |metric: &dyn ErrorMetric| {
+            let mut system = NormalEquations::new(center(), 0.1);
+            metric.linearize(pair, &mut system);
+            system
+        };
+        assert_eq!(rows(&sum), rows(&PointToPlane));
+    }
+}

@@ -1,0 +1,292 @@
+//! Point-to-point where the pairs are few, weightless, far away or in one place.
+
+use crate::pairs::support::Numbers;
+use crate::pairs::{determinant, images, pair, rms, rounding};
+use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3};
+use hicp_metric::{ErrorMetric, PointToPoint, Step};
+
+fn cloud(numbers: &mut Numbers, count: usize) -> Vec<Point3<f64>> {
+    (0..count)
+        .map(|_| Point3::from(numbers.vector() * 0.05))
+        .collect()
+}
+
+fn close(a: &Step, b: &Step) -> bool {
+    let (angle, distance) = se3::pose_distance(&a.increment, &b.increment);
+    angle < 1e-12 && distance < 1e-12 && (a.mean_loss - b.mean_loss).abs() <= 1e-12 * a.mean_loss
+}
+
+#[test]
+fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
+    let mut numbers = Numbers(111);
+    for _ in 0..50 {
+        let points = cloud(&mut numbers, 20);
+        let mut pairs = images(&points, &numbers.pose(0.2));
+        for pair in pairs.as_mut_slice() {
+            pair.target.point += (numbers.vector() * 0.01).cast::<f32>();
+        }
+        let (mut weighted, mut repeated) = (Correspondences::new(), Correspondences::new());
+        for (i, pair) in pairs.as_slice().iter().enumerate() {
+            let copies = i % 3;
+            weighted.push(Pair {
+                weight: copies as f32,
+                ..*pair
+            });
+            repeated.extend(std::iter::repeat_n(*pair, copies));
+        }
+        let (a, b) = (
+            PointToPoint.minimize(&weighted),
+            PointToPoint.minimize(&repeated),
+        );
+        assert!(close(&a.unwrap(), &b.unwrap()));
+        // Only ratios of weights matter.
+        for pair in weighted.as_mut_slice() {
+            pair.weight *= 0.125;
+        }
+        assert!(close(
+            &PointToPoint.minimize(&weighted).unwrap(),
+            &b.unwrap()
+        ));
+    }
+}
+
+#[test]
+fn too_few_pairs_and_no_weight_determine_nothing() {
+    let mut numbers = Numbers(112);
+    let pairs = images(&cloud(&mut numbers, 10), &numbers.pose(0.2));
+    let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
+    for n in 0..3 {
+        assert_eq!(PointToPoint.minimize(&first(n)), None, "{n} pairs");
+    }
+    assert!(PointToPoint.minimize(&first(3)).is_some());
+    for weight in [0.0, f32::NAN, -1.0] {
+        let mut pairs = pairs.clone();
+        pairs
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(|p| p.weight = weight);
+        assert_eq!(PointToPoint.minimize(&pairs), None, "weight {weight}");
+    }
+    // Pairs of weight zero do not make up the number.
+    let mut two = first(8);
+    two.as_mut_slice()[2..]
+        .iter_mut()
+        .for_each(|p| p.weight = 0.0);
+    assert_eq!(PointToPoint.minimize(&two), None);
+}
+
+#[test]
+fn points_all_in_one_place_determine_no_rotation() {
+    let mut numbers = Numbers(113);
+    for _ in 0..100 {
+        let (here, there) = (
+            Point3::from(numbers.vector()),
+            Point3::from(numbers.vector()),
+        );
+        let spread = |n: &mut Numbers| Point3::from(n.vector());
+        let count = 3 + numbers.below(20);
+        let sources: Correspondences = (0..count)
+            .map(|_| pair(here, spread(&mut numbers), Vector3::z(), 1.0))
+            .collect();
+        let targets: Correspondences = (0..count)
+            .map(|_| pair(spread(&mut numbers), there, Vector3::z(), 1.0))
+            .collect();
+        let both: Correspondences = (0..count)
+            .map(|_| pair(here, there, Vector3::z(), 0.3))
+            .collect();
+        for mut pairs in [sources, targets, both] {
+            assert_eq!(PointToPoint.minimize(&pairs), None);
+            // A pair without weight elsewhere changes nothing, wherever it stands in the list.
+            let outsider = pair(
+                spread(&mut numbers),
+                spread(&mut numbers),
+                Vector3::z(),
+                0.0,
+            );
+            let with: Correspondences = std::iter::once(outsider)
+                .chain(pairs.as_slice().iter().copied())
+                .collect();
+            assert_eq!(PointToPoint.minimize(&with), None);
+            pairs.push(outsider);
+            assert_eq!(PointToPoint.minimize(&pairs), None);
+        }
+    }
+}
+
+/// A mirrored cube: a quarter turn one way fits as well as the other, so there is no best rotation to return.
+#[test]
+fn pitfall_18_ambiguous_reflections_are_refused() {
+    let mut numbers = Numbers(114);
+    for _ in 0..50 {
+        let turn = numbers.rotation();
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let pairs: Correspondences = axes
+            .iter()
+            .flat_map(|a| [*a, -*a])
+            .map(|p| pair(Point3::from(p), turn * Point3::from(-p), Vector3::z(), 1.0))
+            .collect();
+        // Roundings of f32 (6e-8) may break the tie, and the result is a rotation then; exact ties are refused.
+        if let Some(step) = PointToPoint.minimize(&pairs) {
+            assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
+        }
+        let exact: Correspondences = axes
+            .iter()
+            .flat_map(|a| [*a, -*a])
+            .map(|p| pair(Point3::from(p), Point3::from(-p), Vector3::z(), 1.0))
+            .collect();
+        assert_eq!(PointToPoint.minimize(&exact), None);
+    }
+}
+
+#[test]
+fn pitfall_20_a_common_offset_of_a_kilometre_costs_only_the_digits_of_the_points() {
+    let mut numbers = Numbers(115);
+    let offset = Vector3::new(600.0, -700.0, 400.0);
+    for _ in 0..50 {
+        let motion = numbers.pose(0.05);
+        // Coordinates on the grid that f32 has at 1 km (2⁻¹³ m), so that the points of both sets are exact.
+        let grid = |x: f64| (x * 8192.0).round() / 8192.0;
+        let points: Vec<_> = (0..100)
+            .map(|_| Point3::from(numbers.vector().map(|x| grid(0.2 * x))))
+            .collect();
+        let near: Correspondences = points
+            .iter()
+            .map(|p| {
+                pair(
+                    *p,
+                    Point3::from((motion * p).coords.map(grid)),
+                    Vector3::z(),
+                    1.0,
+                )
+            })
+            .collect();
+        let far: Correspondences = near
+            .as_slice()
+            .iter()
+            .map(|p| {
+                let shift = |q: Point3<f32>| q.cast::<f64>() + offset;
+                pair(
+                    shift(p.source.point),
+                    shift(p.target.point),
+                    Vector3::z(),
+                    1.0,
+                )
+            })
+            .collect();
+        let (a, b) = (
+            PointToPoint.minimize(&near).unwrap(),
+            PointToPoint.minimize(&far).unwrap(),
+        );
+        let angle = se3::pose_distance(&a.increment, &b.increment).0;
+        assert!(angle < 1e-14, "{angle}");
+        let moved_near = a.increment * points[0] + offset;
+        let moved_far = b.increment * (points[0] + offset);
+        // A kilometre times ε of the rotation.
+        assert!((moved_near - moved_far).norm() < 1e-11);
+    }
+}
+
+#[test]
+fn nothing_makes_a_nan() {
+    let mut numbers = Numbers(116);
+    let scales = [0.0, 1e-38, 1e-20, 1e-6, 1.0, 1e6, 1e18, 3e38];
+    let mut steps = 0;
+    for _ in 0..3000 {
+        let count = numbers.below(6);
+        let pairs: Correspondences = (0..count)
+            .map(|_| {
+                let point = |n: &mut Numbers| {
+                    let scale = scales[n.below(scales.len())];
+                    Point3::from(n.vector().map(|x| x.clamp(-1.0, 1.0) * scale))
+                };
+                pair(
+                    point(&mut numbers),
+                    point(&mut numbers),
+                    Vector3::z(),
+                    numbers.below(3) as f32,
+                )
+            })
+            .collect();
+        if let Some(step) = PointToPoint.minimize(&pairs) {
+            steps += 1;
+            assert!(se3::is_finite(&step.increment) && step.mean_loss.is_finite());
+            assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
+        }
+    }
+    assert!(steps > 500, "{steps}");
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut pairs = images(&cloud(&mut numbers, 5), &Isometry3::identity());
+        pairs.push(pair(
+            Point3::new(bad, 0.0, 0.0),
+            Point3::origin(),
+            Vector3::z(),
+            1.0,
+        ));
+        assert_eq!(PointToPoint.minimize(&pairs), None);
+    }
+}
+
+/// Weights of which some are tiny count for what they are.
+#[test]
+fn pitfall_18_tiny_weights_are_tiny() {
+    let mut numbers = Numbers(117);
+    let motion = numbers.pose(0.2);
+    let mut pairs = images(&cloud(&mut numbers, 30), &motion);
+    let bound = 2.0 * rounding(&pairs);
+    for _ in 0..30 {
+        let outlier = Point3::from(numbers.vector());
+        pairs.push(pair(
+            outlier,
+            Point3::from(numbers.vector()),
+            Vector3::z(),
+            1e-30,
+        ));
+    }
+    let found = PointToPoint.minimize(&pairs).unwrap().increment;
+    let inliers: Correspondences = pairs.as_slice()[..30].iter().copied().collect();
+    assert!(rms(&inliers, &found) <= bound);
+}
+
+/// From the smallest numbers of f32 to its largest: a power of two of all lengths changes no bit of the rotation.
+#[test]
+fn the_rotation_does_not_depend_on_the_unit_of_length() {
+    let mut numbers = Numbers(118);
+    let points: Vec<[Vector3<f64>; 2]> = (0..20)
+        .map(|_| [(); 2].map(|()| numbers.vector().map(|x| (1000.0 * x).round())))
+        .collect();
+    let step = |unit: f64| {
+        let pairs: Correspondences = points
+            .iter()
+            .map(|[p, q]| pair((p * unit).into(), (q * unit).into(), Vector3::z(), 1.0))
+            .collect();
+        PointToPoint.minimize(&pairs).unwrap()
+    };
+    let expected = step(1.0);
+    for power in [-149, -100, 100, 115] {
+        let unit = 2.0_f64.powi(power);
+        let found = step(unit);
+        assert_eq!(
+            found.increment.rotation, expected.increment.rotation,
+            "{power}"
+        );
+        assert_eq!(found.mean_loss, expected.mean_loss * unit * unit, "{power}");
+    }
+}
+
+/// A line and one that is opposite to it but for 10⁻¹¹ rad, in whole numbers that f32 holds: the axis of that half turn is known to few
+/// digits, and the line arrives where it should all the same.
+#[test]
+fn pitfall_12_a_line_is_mapped_onto_one_that_is_all_but_opposite() {
+    let size = f64::from((1 << 24) - 10_000);
+    for off in [[3000.0, -5000.0], [-9000.0, 1234.0], [1000.0, 2000.0]] {
+        let from = Vector3::new(size, size - off[0], size - off[1]);
+        let to = -(from - Vector3::new(1.0, 1.0, 1.0));
+        let pairs: Correspondences = [-1.0, 0.0, 1.0]
+            .map(|at| pair((from * at).into(), (to * at).into(), Vector3::z(), 1.0))
+            .into_iter()
+            .collect();
+        let found = PointToPoint.minimize(&pairs).unwrap().increment;
+        let arrived = found.rotation * from.normalize() - to.normalize();
+        assert!(arrived.norm() < 1e-12, "{off:?}: {}", arrived.norm());
+    }
+}

@@ -1,0 +1,220 @@
+//! The prior between its limits.
+
+use crate::scenes::{Numbers, at, center, difference, messy};
+use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Vector6, se3};
+use hicp_metric::{ErrorMetric, GaussNewton, PointToPlane, PointToPoint, PosePrior, Prior, Robust};
+
+fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
+    let pose =
+        Isometry3::translation(0.02, -0.03, 0.58) * numbers.motion(&Point3::origin(), 80.0, 0.0);
+    at(&pose, &messy(numbers, count))
+}
+
+fn prior<M>(metric: M, mean: &Isometry3<f64>, information: Matrix6<f64>) -> PosePrior<M> {
+    let prior = Prior::Gaussian {
+        camera_from_object: *mean,
+        information,
+    };
+    PosePrior::new(metric, prior, 1e-3)
+}
+
+/// A full, not diagonal, positive definite matrix.
+fn random_information(numbers: &mut Numbers, size: f64) -> Matrix6<f64> {
+    let m = Matrix6::from_fn(|_, _| numbers.sign());
+    (m * m.transpose() + Matrix6::identity() * 0.1) * size
+}
+
+#[test]
+fn without_information_it_is_the_metric_itself() {
+    let mut numbers = Numbers(61);
+    let pairs = posed(&mut numbers, 80);
+    let elsewhere = numbers.motion(&center(), 50.0, 0.3);
+    let mut flat = prior(PointToPoint, &elsewhere, Matrix6::zeros());
+    assert_eq!(flat.minimize(&pairs), PointToPoint.minimize(&pairs));
+    assert_eq!(flat.system(&pairs), PointToPoint.system(&pairs));
+    let mut default = PosePrior::<PointToPlane>::default();
+    assert_eq!(default.minimize(&pairs), PointToPlane.minimize(&pairs));
+    // And very little changes very little.
+    let mut weak = prior(PointToPlane, &elsewhere, Matrix6::identity() * 1e-9);
+    let (a, b) = (
+        weak.minimize(&pairs).unwrap(),
+        PointToPlane.minimize(&pairs).unwrap(),
+    );
+    assert!(difference(&a.increment, &b.increment).0 < 1e-9);
+}
+
+#[test]
+fn a_strong_prior_pins_the_pose() {
+    let mut numbers = Numbers(62);
+    for degrees in [0.0, 1.0, 30.0, 120.0] {
+        let pairs = posed(&mut numbers, 80);
+        let pose = *pairs.camera_from_object();
+        let mean = numbers.motion(&center(), degrees, 0.05) * pose;
+        let information = random_information(&mut numbers, 1e16);
+        let mut pinned = prior(PointToPlane, &mean, information);
+        let next = pinned.minimize(&pairs).unwrap().increment * pose;
+        let (angle, distance) = se3::pose_distance(&next, &mean);
+        assert!(
+            angle < 1e-7 && distance < 1e-7,
+            "{degrees}: {angle} {distance}"
+        );
+    }
+}
+
+/// Directions that the prior leaves alone are refined as without it, however stiff the others are.
+#[test]
+fn a_prior_of_one_direction_does_not_damp_the_others() {
+    let mut numbers = Numbers(63);
+    let pairs = posed(&mut numbers, 80);
+    let step = |stiffness| {
+        let mut information = Matrix6::zeros();
+        information[(2, 2)] = stiffness;
+        let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
+        se3::log(&metric.minimize(&pairs).unwrap().increment)
+    };
+    // The data say some 60 here, the prior 10⁶ and 10⁹.
+    let (stiff, stiffer) = (step(1e12), step(1e15));
+    assert!(stiffer[2].abs() < 1e-9);
+    assert!(
+        (stiff - stiffer).norm() < 1e-3 * stiff.norm(),
+        "{stiff} {stiffer}"
+    );
+}
+
+/// At the minimum the slope of the stated sum vanishes: data loss over σ² plus the square of the logarithm.
+#[test]
+fn the_minimum_is_that_of_the_stated_sum() {
+    let mut numbers = Numbers(64);
+    for _ in 0..5 {
+        let pairs = posed(&mut numbers, 80);
+        let pose = *pairs.camera_from_object();
+        let mean = numbers.motion(&center(), 20.0, 0.02) * pose;
+        let information = random_information(&mut numbers, 1e5);
+        let mut metric = GaussNewton::new(prior(PointToPoint, &mean, information));
+        metric.max_iterations = 30;
+        metric.tolerance = 0.0;
+        let increment = metric.minimize(&pairs).unwrap().increment;
+        let sigma = metric.metric.sigma_meters;
+        let sum = |t: &Isometry3<f64>| {
+            let data: f64 = pairs
+                .as_slice()
+                .iter()
+                .map(|pair| {
+                    let d = t * pair.source.point.cast::<f64>() - pair.target.point.cast::<f64>();
+                    f64::from(pair.weight) * d.norm_squared()
+                })
+                .sum();
+            let xi = se3::log(&(t * pose * mean.inverse()));
+            data + sigma * sigma * xi.dot(&(information * xi))
+        };
+        let slope = |t: &Isometry3<f64>, i: usize| {
+            let mut twist = Vector6::zeros();
+            twist[i] = 1e-5;
+            (sum(&(se3::exp(&twist) * t)) - sum(&(se3::exp(&-twist) * t))) / 2e-5
+        };
+        for i in 0..6 {
+            let (start, end) = (slope(&Isometry3::identity(), i), slope(&increment, i));
+            assert!(
+                end.abs() < 1e-4 * start.abs().max(0.01),
+                "{i}: {start} {end}"
+            );
+        }
+        let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+        let mean_loss = metric.minimize(&pairs).unwrap().mean_loss;
+        let expected = sum(&Isometry3::identity()) / weight;
+        assert!((mean_loss - expected).abs() < 1e-9 * expected);
+    }
+}
+
+#[test]
+fn information_adds_up() {
+    let mut numbers = Numbers(65);
+    let pairs = posed(&mut numbers, 80);
+    let information = random_information(&mut numbers, 1e5);
+    // At the mean the left Jacobian is the identity.
+    let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
+    let sum = metric.system(&pairs).unwrap().information();
+    let expected = PointToPlane.system(&pairs).unwrap().information() + information * 1e-6;
+    assert!((sum - expected).amax() < 1e-12 * expected.amax());
+}
+
+#[test]
+fn a_prior_makes_up_for_rows_but_not_for_pairs() {
+    let mut numbers = Numbers(66);
+    let pairs = posed(&mut numbers, 2);
+    let mut metric = prior(
+        PointToPlane,
+        pairs.camera_from_object(),
+        Matrix6::identity(),
+    );
+    assert_eq!(PointToPlane.minimize(&pairs), None);
+    assert!(metric.minimize(&pairs).is_some());
+    assert_eq!(metric.minimize(&Correspondences::new()), None);
+}
+
+#[test]
+fn boxed_and_decorated_it_stays_in_effect() {
+    let mut numbers = Numbers(67);
+    let pairs = posed(&mut numbers, 80);
+    let pose = *pairs.camera_from_object();
+    let mean = numbers.motion(&center(), 3.0, 0.01) * pose;
+    let pin = prior(
+        Robust::<PointToPlane>::default(),
+        &mean,
+        Matrix6::identity() * 1e16,
+    );
+    let mut boxed: Box<dyn ErrorMetric> = Box::new(pin.clone());
+    assert_eq!(boxed.minimize(&pairs), pin.clone().minimize(&pairs));
+    assert_eq!(boxed.mean_loss(&pairs), pin.clone().mean_loss(&pairs));
+    let metrics: [Box<dyn ErrorMetric>; 3] = [
+        Box::new(GaussNewton::new(pin.clone())),
+        Box::new(hicp_metric::LevenbergMarquardt::new(pin.clone())),
+        Box::new(hicp_metric::Conditioned {
+            metric: pin,
+            ..Default::default()
+        }),
+    ];
+    for mut metric in metrics {
+        let next = metric.minimize(&pairs).unwrap().increment * pose;
+        let (angle, distance) = se3::pose_distance(&next, &mean);
+        assert!(
+            angle < 1e-5 && distance < 1e-5,
+            "{}: {angle} {distance}",
+            metric.name()
+        );
+    }
+}
+
+/// A prior about the start is the Gaussian that it says: of the object's origin and of turns about it, once told where.
+#[test]
+fn about_the_initial_pose() {
+    let mut numbers = Numbers(68);
+    let pairs = posed(&mut numbers, 80);
+    let pose = *pairs.camera_from_object();
+    let init = numbers.motion(&center(), 4.0, 0.01) * pose;
+    let (translation_meters, rotation_degrees) = (0.004, 3.0);
+    let prior = Prior::AboutInitial {
+        translation_meters,
+        rotation_degrees,
+    };
+    let mut metric = PosePrior::new(PointToPlane, prior, 1e-3);
+    assert_eq!(metric.minimize(&pairs), PointToPlane.minimize(&pairs));
+    metric.begin(0, &init);
+    let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
+    let loss = metric.mean_loss(&pairs).unwrap() - PointToPlane.mean_loss(&pairs).unwrap();
+    // To first order the twist about the object's origin is its displacement and the rotation vector; 4° and 1 cm are small.
+    let turn = (pose.rotation * init.rotation.inverse()).scaled_axis();
+    let moved = pose.translation.vector - init.translation.vector;
+    let expected = moved.norm_squared() / translation_meters.powi(2)
+        + turn.norm_squared() / rotation_degrees.to_radians().powi(2);
+    let found = loss * weight * 1e6;
+    assert!(
+        (found - expected).abs() < 0.05 * expected,
+        "{found} {expected}"
+    );
+    // Wherever it was before, it begins anew.
+    metric.begin(7, &pose);
+    let mut fresh = PosePrior::new(PointToPlane, prior, 1e-3);
+    fresh.begin(0, &pose);
+    assert_eq!(metric.minimize(&pairs), fresh.minimize(&pairs));
+}

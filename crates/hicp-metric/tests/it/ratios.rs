@@ -1,0 +1,124 @@
+//! Only ratios of weights count, and only ratios of lengths.
+
+use crate::scenes::{Numbers, carried, center, exact, messy, resized, surfel};
+use hicp_core::{Correspondences, Isometry3, Vector3};
+use hicp_metric::{
+    Conditioned, Degeneracy, ErrorMetric, Frozen, GaussNewton, Generalized, LevenbergMarquardt,
+    PlaneToPoint, PointToPlane, PointToPoint, Robust, Scale, Symmetric, WeightedSum,
+    sandwich_covariance,
+};
+
+/// 2⁻⁴⁰ and 2⁴⁰: far from 1, and without rounding.
+const FACTORS: [f32; 2] = [1.0 / 1_099_511_627_776.0, 1_099_511_627_776.0];
+
+fn weighing(pairs: &Correspondences, factor: f32) -> Correspondences {
+    let mut pairs = pairs.clone();
+    for pair in pairs.as_mut_slice() {
+        pair.weight *= factor;
+    }
+    pairs
+}
+
+/// A plane that is not along an axis, lifted by 4 mm, its counterparts elsewhere on it.
+fn plane(numbers: &mut Numbers) -> Correspondences {
+    let source: Vec<_> = (0..200)
+        .map(|_| Vector3::new(numbers.sign(), numbers.sign(), 0.0) * 0.1)
+        .map(|offset| surfel(center() + offset, -Vector3::z()))
+        .collect();
+    let motion = numbers.motion(&center(), 70.0, 0.2);
+    carried(
+        &exact(&source, &Isometry3::translation(0.03, 0.01, 0.004)),
+        &motion,
+    )
+}
+
+fn conditioned(policy: Degeneracy) -> Box<dyn ErrorMetric> {
+    Box::new(Conditioned {
+        metric: PointToPlane,
+        policy,
+        threshold: Degeneracy::THRESHOLD,
+    })
+}
+
+/// Metrics without a length of their own.
+fn metrics() -> Vec<Box<dyn ErrorMetric>> {
+    let scale = Scale::Mad { floor_meters: 0.0 };
+    vec![
+        Box::new(PointToPoint),
+        Box::new(PointToPlane),
+        Box::new(PlaneToPoint),
+        Box::new(Symmetric),
+        Box::new(Generalized::default()),
+        Box::new(WeightedSum {
+            terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
+        }),
+        Box::new(Robust::new(PointToPlane, Default::default(), scale)),
+        Box::new(Frozen {
+            metric: PointToPlane,
+            rotation: [false, true, false],
+            ..Frozen::default()
+        }),
+        conditioned(Degeneracy::Damp),
+        conditioned(Degeneracy::Freeze),
+        conditioned(Degeneracy::Refuse),
+        Box::new(GaussNewton::new(PointToPlane)),
+        Box::new(LevenbergMarquardt::new(PointToPlane)),
+    ]
+}
+
+#[test]
+fn steps_depend_on_the_ratios_of_weights_alone() {
+    let mut numbers = Numbers(301);
+    for pairs in [messy(&mut numbers, 60), plane(&mut numbers)] {
+        for factor in FACTORS {
+            let heavy = weighing(&pairs, factor);
+            for mut metric in metrics() {
+                let (name, step) = (metric.name(), metric.minimize(&pairs));
+                let same = metric.minimize(&heavy);
+                assert_eq!(step.is_some(), same.is_some(), "{name} {factor}");
+                let (Some(a), Some(b)) = (step, same) else {
+                    continue;
+                };
+                let (angle, distance) = crate::scenes::difference(&a.increment, &b.increment);
+                assert!(angle < 1e-12 && distance < 1e-12, "{name} {factor}");
+                assert!((a.mean_loss - b.mean_loss).abs() <= 1e-12 * a.mean_loss);
+            }
+        }
+    }
+}
+
+#[test]
+fn covariances_depend_on_the_ratios_of_weights_alone() {
+    let mut numbers = Numbers(302);
+    let pairs = messy(&mut numbers, 60);
+    for factor in FACTORS {
+        let heavy = weighing(&pairs, factor);
+        let plain = |pairs| PointToPlane.system(pairs).unwrap().covariance().unwrap();
+        let (a, b) = (plain(&pairs), plain(&heavy));
+        assert!((a - b).amax() <= 1e-12 * a.amax(), "{factor}");
+        let sandwich = |pairs| sandwich_covariance(&mut PointToPlane, pairs).unwrap();
+        let (a, b) = (sandwich(&pairs), sandwich(&heavy));
+        assert!((a - b).amax() <= 1e-12 * a.amax(), "{factor}");
+    }
+}
+
+/// From a tenth of a millimetre to a hundred kilometres.
+#[test]
+fn steps_depend_on_the_ratios_of_lengths_alone() {
+    let mut numbers = Numbers(303);
+    let pairs = messy(&mut numbers, 60);
+    for factor in [1.0 / 1024.0, 1024.0, 1_048_576.0] {
+        let resized = resized(&pairs, factor);
+        for mut metric in metrics() {
+            let (name, a) = (metric.name(), metric.minimize(&pairs).unwrap());
+            let b = metric.minimize(&resized).unwrap();
+            let turn = a.increment.rotation.inverse() * b.increment.rotation;
+            assert!(turn.angle() < 1e-12, "{name} {factor}: {}", turn.angle());
+            let factor = f64::from(factor);
+            let shift = b.increment.translation.vector / factor;
+            assert!((shift - a.increment.translation.vector).norm() < 1e-12);
+            let loss = b.mean_loss / factor.powi(2);
+            assert!((loss - a.mean_loss).abs() < 1e-12 * a.mean_loss);
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Pairs on known surfaces.
+
+use std::f64::consts::PI;
+
+use hicp_core::{
+    Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3, Vector6, se3,
+};
+use hicp_metric::{ErrorMetric, NormalEquations};
+
+/// SplitMix64: the same numbers everywhere.
+#[derive(Clone, Debug)]
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// In [-1, 1).
+    pub fn sign(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    pub fn vector(&mut self) -> Vector3<f64> {
+        Vector3::new(self.sign(), self.sign(), self.sign())
+    }
+
+    pub fn direction(&mut self) -> Vector3<f64> {
+        loop {
+            let v = self.vector();
+            if v.norm() > 0.1 && v.norm() <= 1.0 {
+                return v.normalize();
+            }
+        }
+    }
+
+    pub fn gaussian(&mut self) -> f64 {
+        let (a, b) = (1.0 - self.unit(), self.unit());
+        (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
+    }
+
+    /// A turn of `degrees` about a random axis through `center`, and a shift of `meters`.
+    pub fn motion(&mut self, center: &Point3<f64>, degrees: f64, meters: f64) -> Isometry3<f64> {
+        let turn = self.direction() * degrees.to_radians();
+        let c = center.coords;
+        let shift = self.direction() * meters;
+        let about = Isometry3::new(Vector3::zeros(), turn);
+        Isometry3::translation(c.x + shift.x, c.y + shift.y, c.z + shift.z)
+            * about
+            * Isometry3::translation(-c.x, -c.y, -c.z)
+    }
+}
+
+pub fn surfel(point: Point3<f64>, normal: Vector3<f64>) -> Surfel {
+    Surfel {
+        point: point.cast(),
+        normal: UnitVector3::new_unchecked(normal.normalize().cast()),
+    }
+}
+
+pub fn transformed(motion: &Isometry3<f64>, surfel: &Surfel) -> Surfel {
+    Surfel {
+        point: (motion * surfel.point.cast::<f64>()).cast(),
+        normal: UnitVector3::new_unchecked(
+            (motion.rotation * surfel.normal.cast::<f64>().into_inner()).cast(),
+        ),
+    }
+}
+
+/// The centre of all scenes.
+pub fn center() -> Point3<f64> {
+    Point3::new(0.02, -0.03, 0.6)
+}
+
+/// An ellipsoid of 4, 6 and 9 cm about the centre: determines everything.
+pub fn ellipsoid(numbers: &mut Numbers, count: usize) -> Vec<Surfel> {
+    let radii = Vector3::new(0.04, 0.06, 0.09);
+    (0..count)
+        .map(|_| {
+            let d = numbers.direction();
+            surfel(center() + d.component_mul(&radii), d.component_div(&radii))
+        })
+        .collect()
+}
+
+/// Model points and their counterparts at `motion * point`.
+pub fn exact(source: &[Surfel], motion: &Isometry3<f64>) -> Correspondences {
+    let pairs = source.iter().zip(0..);
+    pairs
+        .map(|(s, i)| Pair::new(i, *s, i, transformed(motion, s)))
+        .collect()
+}
+
+/// Pairs with independent noise of the target points, random weights, and normals that differ.
+pub fn messy(numbers: &mut Numbers, count: usize) -> Correspondences {
+    let source = ellipsoid(numbers, count);
+    let motion = numbers.motion(&center(), 4.0, 0.01);
+    let mut pairs = exact(&source, &motion);
+    for pair in pairs.as_mut_slice() {
+        pair.target.point += (numbers.vector() * 0.003).cast::<f32>();
+        let normal = pair.target.normal.cast::<f64>().into_inner() + numbers.vector() * 0.2;
+        pair.target.normal = UnitVector3::new_unchecked(normal.normalize().cast());
+        pair.weight = 0.2 + numbers.unit() as f32;
+    }
+    pairs
+}
+
+/// All pairs moved by one motion: sources, targets and the pose.
+pub fn carried(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
+    let mut moved = Correspondences::new();
+    moved.begin(&(motion * pairs.camera_from_object()), pairs.n_candidates());
+    moved.extend(pairs.as_slice().iter().map(|pair| Pair {
+        source: transformed(motion, &pair.source),
+        target: transformed(motion, &pair.target),
+        ..*pair
+    }));
+    moved
+}
+
+/// The sources moved by one motion.
+pub fn advanced(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
+    let mut moved = Correspondences::new();
+    moved.begin(&(motion * pairs.camera_from_object()), pairs.n_candidates());
+    moved.extend(pairs.as_slice().iter().map(|pair| Pair {
+        source: transformed(motion, &pair.source),
+        ..*pair
+    }));
+    moved
+}
+
+/// All lengths times a factor.
+pub fn resized(pairs: &Correspondences, factor: f32) -> Correspondences {
+    let mut resized = pairs.clone();
+    for pair in resized.as_mut_slice() {
+        pair.source.point *= factor;
+        pair.target.point *= factor;
+    }
+    resized
+}
+
+/// The pairs as if made at a pose.
+pub fn at(pose: &Isometry3<f64>, pairs: &Correspondences) -> Correspondences {
+    let mut posed = Correspondences::new();
+    posed.begin(pose, pairs.n_candidates());
+    posed.extend(pairs.as_slice().iter().copied());
+    posed
+}
+
+/// Rotation (radians) and displacement of the scene's centre (metres) between two motions.
+pub fn difference(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let (angle, _) = se3::pose_distance(a, b);
+    (angle, (a * center() - b * center()).norm())
+}
+
+/// Checks a metric's rows: the gradient of the system against central differences of its residuals, one pair at a time.
+///
+/// `residual` is E's definition, exact in the twist.
+pub fn check_rows<M: ErrorMetric>(
+    metric: &M,
+    pair: &Pair,
+    squared: impl Fn(&Isometry3<f64>) -> f64,
+    tolerance: f64,
+) {
+    let mut system = NormalEquations::new(center(), 0.05);
+    metric.linearize(pair, &mut system);
+    let weight = f64::from(pair.weight);
+    let at_rest = squared(&Isometry3::identity());
+    assert!((system.loss() - weight * at_rest).abs() <= tolerance * weight * at_rest.max(1e-9));
+    assert!((metric.squared_error(pair) - at_rest).abs() <= tolerance * at_rest.max(1e-9));
+    // E = rᵀr: half of its derivative is Jᵀr, its second difference JᵀJ where r is linear enough.
+    let step = 1e-5;
+    let gradient = system.gradient();
+    for i in 0..6 {
+        let mut twist = Vector6::zeros();
+        twist[i] = step;
+        let (plus, minus) = (squared(&se3::exp(&twist)), squared(&se3::exp(&-twist)));
+        let numeric = weight * (plus - minus) / (4.0 * step);
+        let scale = gradient.amax().max(1e-6);
+        assert!(
+            (numeric - gradient[i]).abs() <= tolerance * scale,
+            "{i}: {numeric} {}",
+            gradient[i]
+        );
+    }
+}
+
+/// Whether two systems hold the same information, to a relative tolerance.
+pub fn same_information(a: &NormalEquations, b: &NormalEquations, tolerance: f64) -> bool {
+    let (a, b) = (a.information(), b.information());
+    (a - b).amax() <= tolerance * a.amax()
+}

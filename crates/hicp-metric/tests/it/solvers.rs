@@ -1,0 +1,210 @@
+//! Iterations over fixed pairs.
+
+use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
+use hicp_core::{Correspondences, Isometry3};
+use hicp_metric::{
+    ErrorMetric, GaussNewton, Generalized, Kernel, LevenbergMarquardt, PlaneToPoint, PointToPlane,
+    PointToPoint, Robust, Scale, Symmetric,
+};
+
+fn metrics() -> Vec<Box<dyn ErrorMetric>> {
+    vec![
+        Box::new(PointToPoint),
+        Box::new(PointToPlane),
+        Box::new(PlaneToPoint),
+        Box::new(Symmetric),
+        Box::new(Generalized::default()),
+        Box::new(Robust::new(PointToPlane, Kernel::TUKEY, Scale::default())),
+        Box::new(Robust::new(
+            PointToPoint,
+            Kernel::CAUCHY,
+            Scale::Meters(0.002),
+        )),
+    ]
+}
+
+/// Sources moved as the solvers move them: from the originals, once.
+fn loss_after(
+    metric: &mut dyn ErrorMetric,
+    pairs: &Correspondences,
+    increment: &Isometry3<f64>,
+) -> f64 {
+    metric.mean_loss(&advanced(pairs, increment)).unwrap()
+}
+
+#[test]
+fn gauss_newton_ends_where_the_closed_form_does() {
+    let mut numbers = Numbers(71);
+    for degrees in [0.0, 5.0, 30.0, 60.0] {
+        let motion = numbers.motion(&center(), degrees, 0.05);
+        let pairs = advanced(&messy(&mut numbers, 80), &motion);
+        let mut iterated = GaussNewton::new(PointToPoint);
+        iterated.tolerance = 0.0;
+        let (a, b) = (
+            iterated.minimize(&pairs).unwrap(),
+            PointToPoint.minimize(&pairs).unwrap(),
+        );
+        let (angle, distance) = difference(&a.increment, &b.increment);
+        assert!(
+            angle < 1e-6 && distance < 1e-7,
+            "{degrees}: {angle} {distance}"
+        );
+        assert!((a.mean_loss - b.mean_loss).abs() < 1e-12 * b.mean_loss);
+    }
+}
+
+#[test]
+fn exact_pairs_are_aligned() {
+    let mut numbers = Numbers(72);
+    for degrees in [1.0, 15.0, 30.0] {
+        let source = ellipsoid(&mut numbers, 200);
+        let motion = numbers.motion(&center(), degrees, 0.02);
+        let pairs = exact(&source, &motion);
+        for (a, b) in metrics().into_iter().zip(metrics()) {
+            let mut newton = GaussNewton::new(a);
+            newton.max_iterations = 30;
+            let mut marquardt = LevenbergMarquardt::new(b);
+            marquardt.max_iterations = 60;
+            let solvers: [&mut dyn ErrorMetric; 2] = [&mut newton, &mut marquardt];
+            for solver in solvers {
+                let step = solver.minimize(&pairs).unwrap();
+                let (angle, distance) = difference(&step.increment, &motion);
+                assert!(
+                    angle < 2e-5 && distance < 2e-6,
+                    "{} {degrees}: {angle} {distance}",
+                    solver.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn one_iteration_is_one_step() {
+    let mut numbers = Numbers(73);
+    let pairs = messy(&mut numbers, 80);
+    let mut once = GaussNewton::new(PointToPlane);
+    once.max_iterations = 1;
+    let (a, b) = (
+        once.minimize(&pairs).unwrap(),
+        PointToPlane.minimize(&pairs).unwrap(),
+    );
+    let (angle, distance) = difference(&a.increment, &b.increment);
+    assert!(angle < 1e-15 && distance < 1e-15);
+    once.max_iterations = 0;
+    assert_eq!(
+        once.minimize(&pairs).unwrap().increment,
+        Isometry3::identity()
+    );
+    let mut never = LevenbergMarquardt::new(PointToPlane);
+    never.max_iterations = 0;
+    assert_eq!(
+        never.minimize(&pairs).unwrap().increment,
+        Isometry3::identity()
+    );
+}
+
+#[test]
+fn levenberg_marquardt_never_raises_the_loss() {
+    let mut numbers = Numbers(74);
+    for _ in 0..20 {
+        // Far off, with wrong normals and outliers: Gauss–Newton overshoots on some of these.
+        let motion = numbers.motion(&center(), 100.0, 0.1);
+        let mut pairs = advanced(&messy(&mut numbers, 30), &motion);
+        for pair in &mut pairs.as_mut_slice()[..10] {
+            pair.target.point += (numbers.vector() * 0.2).cast::<f32>();
+        }
+        for mut metric in metrics() {
+            let before = metric.mean_loss(&pairs).unwrap();
+            for iterations in [1, 2, 5, 40] {
+                let mut solver = LevenbergMarquardt::new(metric);
+                solver.max_iterations = iterations;
+                solver.initial_damping = 0.0;
+                let step = solver.minimize(&pairs).unwrap();
+                assert!((step.mean_loss - before).abs() <= 1e-15 * before);
+                metric = solver.metric;
+                let after = loss_after(&mut metric, &pairs, &step.increment);
+                assert!(after <= before, "{}: {before} {after}", metric.name());
+            }
+        }
+    }
+}
+
+/// Steps are really rejected: there are problems where the plain step raises the loss and this one does not.
+#[test]
+fn plain_steps_that_raise_the_loss_are_rejected() {
+    let mut numbers = Numbers(75);
+    let mut raised = 0;
+    for _ in 0..40 {
+        let motion = numbers.motion(&center(), 120.0, 0.05);
+        let pairs = advanced(&messy(&mut numbers, 12), &motion);
+        let step = PointToPlane.minimize(&pairs).unwrap();
+        if loss_after(&mut PointToPlane, &pairs, &step.increment) > step.mean_loss {
+            raised += 1;
+            let mut solver = LevenbergMarquardt::new(PointToPlane);
+            solver.initial_damping = 0.0;
+            let careful = solver.minimize(&pairs).unwrap();
+            assert!(loss_after(&mut PointToPlane, &pairs, &careful.increment) < step.mean_loss);
+        }
+    }
+    assert!(raised > 0);
+}
+
+/// A power of two keeps the roundings: the same iterations in metres and in units of a 1024th.
+#[test]
+fn the_unit_of_length_does_not_matter() {
+    let mut numbers = Numbers(76);
+    let pairs = messy(&mut numbers, 60);
+    let small = resized(&pairs, 1024.0);
+    let solvers: [Box<dyn ErrorMetric>; 2] = [
+        Box::new(GaussNewton::new(PointToPlane)),
+        Box::new(LevenbergMarquardt::new(PointToPlane)),
+    ];
+    for mut solver in solvers {
+        let (a, b) = (
+            solver.minimize(&pairs).unwrap(),
+            solver.minimize(&small).unwrap(),
+        );
+        let turn = a.increment.rotation.inverse() * b.increment.rotation;
+        assert!(turn.angle() < 1e-7, "{}", solver.name());
+        let shift = b.increment.translation.vector / 1024.0 - a.increment.translation.vector;
+        assert!(shift.norm() < 1e-9, "{}", solver.name());
+    }
+}
+
+#[test]
+fn fitting_few_and_no_pairs() {
+    let mut numbers = Numbers(77);
+    let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
+    let few: Correspondences = messy(&mut numbers, 1);
+    let solvers: [Box<dyn ErrorMetric>; 2] = [
+        Box::new(GaussNewton::new(PointToPlane)),
+        Box::new(LevenbergMarquardt::new(PointToPlane)),
+    ];
+    for mut solver in solvers {
+        let step = solver.minimize(&fitting).unwrap();
+        assert!(difference(&step.increment, &Isometry3::identity()).1 < 1e-12);
+        assert_eq!(step.mean_loss.to_bits(), 0.0_f64.to_bits());
+        assert_eq!(solver.minimize(&few), None);
+        assert_eq!(solver.minimize(&Correspondences::new()), None);
+    }
+}
+
+#[test]
+fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
+    fn check<M: ErrorMetric + Clone + 'static>(fresh: &M) {
+        let mut numbers = Numbers(78);
+        let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
+        let mut used = fresh.clone();
+        let _ = used.minimize(&others);
+        let mut boxed: Box<dyn ErrorMetric> = Box::new(used.clone());
+        let expected = fresh.clone().minimize(&pairs);
+        assert!(expected.is_some());
+        assert_eq!(used.minimize(&pairs), expected);
+        assert_eq!(boxed.minimize(&pairs), expected);
+        assert_eq!(boxed.mean_loss(&pairs), fresh.clone().mean_loss(&pairs));
+        assert_eq!(boxed.system(&pairs), fresh.clone().system(&pairs));
+    }
+    check(&GaussNewton::new(Symmetric));
+    check(&LevenbergMarquardt::new(Robust::<Generalized>::default()));
+}

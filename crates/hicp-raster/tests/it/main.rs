@@ -1,0 +1,9 @@
+//! Integration tests of `hicp-raster`: one program, so that it is linked once.
+
+#![allow(clippy::unwrap_used, dead_code, reason = "helpers of tests")]
+
+mod common;
+mod edges;
+mod invariance;
+mod raycast;
+mod robustness;

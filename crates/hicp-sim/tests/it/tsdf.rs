@@ -1,0 +1,230 @@
+//! Volumes give back the surfaces that were integrated into them.
+
+use std::collections::{HashMap, HashSet};
+
+use hicp_core::{Facing, Model, PinholeCamera, Point3, TriMesh};
+use hicp_raster::render_depth_image;
+use hicp_sim::{
+    EmptyPixels, Household, Reconstruction, ReconstructionNoise, SimError, Solid, TsdfConfig,
+    TsdfVolume, Unseen, components, object_pose, rng,
+};
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480).unwrap()
+}
+
+/// V − E + F; 2 for a sphere.
+fn euler_characteristic(mesh: &TriMesh) -> i64 {
+    let edges: HashSet<_> = mesh
+        .triangles()
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    let used = mesh.used_vertices().iter().filter(|used| **used).count();
+    let count = |n: usize| i64::try_from(n).unwrap();
+    count(used) - count(edges.len()) + count(mesh.triangles().len())
+}
+
+/// Every edge in exactly two triangles, once each way; every vertex with one disc of triangles around it.
+fn assert_manifold(mesh: &TriMesh) {
+    let mut next: HashMap<u32, HashMap<u32, u32>> = HashMap::new();
+    for &[a, b, c] in mesh.triangles() {
+        for (vertex, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
+            assert_eq!(next.entry(vertex).or_default().insert(from, to), None);
+        }
+    }
+    for around in next.values() {
+        let start = *around.keys().next().unwrap();
+        let (mut at, mut steps) = (around[&start], 1);
+        while at != start {
+            at = around[&at];
+            steps += 1;
+        }
+        assert_eq!(steps, around.len());
+    }
+}
+
+/// A sphere of 80 mm about a point off the grid.
+fn sphere(center: &Point3<f64>) -> TriMesh {
+    let profile: Vec<_> = (0..=120)
+        .map(|i| {
+            let t = std::f64::consts::PI * f64::from(i) / 120.0;
+            let r = if i == 0 || i == 120 {
+                0.0
+            } else {
+                0.08 * t.sin()
+            };
+            (r, -0.08 * t.cos())
+        })
+        .collect();
+    let at = hicp_core::Isometry3::translation(center.x, center.y, center.z);
+    Solid::lathe(&profile, 160).moved(&at).to_mesh().unwrap()
+}
+
+#[test]
+fn an_integrated_sphere_is_a_closed_manifold_with_its_radius() {
+    let center = Point3::new(0.0013, -0.0007, 0.0021);
+    let mesh = sphere(&center);
+    let voxel_meters = 0.004;
+    let mut volume = TsdfVolume::new(TsdfConfig {
+        min: Point3::new(-0.1, -0.1, -0.1),
+        max: Point3::new(0.1, 0.1, 0.1),
+        voxel_meters,
+        truncation_meters: 0.012,
+    })
+    .unwrap();
+    let mut rng = rng(31);
+    for _ in 0..60 {
+        let pose = object_pose(&mut rng, &center, 0.3..0.6, 0.02);
+        let depth = render_depth_image(&mesh, &camera(), &pose);
+        volume
+            .integrate(&depth, &camera(), &pose, EmptyPixels::Free)
+            .unwrap();
+    }
+    let surface = volume.surface(Unseen::Solid).unwrap();
+    assert_eq!(surface.facing(), Facing::Outward);
+    assert_eq!(euler_characteristic(&surface), 2);
+    assert_eq!(components(&surface).unwrap().len(), 1);
+    assert_manifold(&surface);
+    let errors: Vec<f64> = surface
+        .vertices()
+        .iter()
+        .map(|p| (p.cast::<f64>() - center).norm() - 0.08)
+        .collect();
+    let worst = errors.iter().fold(0.0_f64, |worst, e| worst.max(e.abs()));
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    println!(
+        "{} vertices, radius error {:.3} mm on average, {:.3} mm at most",
+        errors.len(),
+        mean * 1e3,
+        worst * 1e3
+    );
+    assert!(worst < voxel_meters, "{worst}");
+    assert!(mean.abs() < 0.25 * voxel_meters, "{mean}");
+}
+
+#[test]
+fn what_was_not_seen_is_solid_or_open() {
+    let center = Point3::origin();
+    let mesh = sphere(&center);
+    let config = TsdfConfig {
+        min: Point3::new(-0.1, -0.1, -0.1),
+        max: Point3::new(0.1, 0.1, 0.1),
+        voxel_meters: 0.005,
+        truncation_meters: 0.015,
+    };
+    let mut volume = TsdfVolume::new(config).unwrap();
+    assert_eq!(
+        volume.surface(Unseen::Open).unwrap_err(),
+        SimError::NoSurface { images: 0 }
+    );
+    let pose = hicp_core::Isometry3::translation(0.0, 0.0, 0.5);
+    let depth = render_depth_image(&mesh, &camera(), &pose);
+    volume
+        .integrate(&depth, &camera(), &pose, EmptyPixels::Unknown)
+        .unwrap();
+    let (solid, open) = (
+        volume.surface(Unseen::Solid).unwrap(),
+        volume.surface(Unseen::Open).unwrap(),
+    );
+    // Closed, though a voxel between two rays that nothing reached may be a part of its own.
+    assert_manifold(&solid);
+    let parts = components(&solid).unwrap();
+    assert!(parts[0].volume > 0.0 && parts[0].area > 0.99 * solid.area());
+    assert_eq!(open.facing(), Facing::Unknown);
+    // Only what faces the camera, where it was measured.
+    for p in open.vertices() {
+        assert!(p.z < 0.0 && (p.coords.norm() - 0.08).abs() < 0.005, "{p}");
+    }
+}
+
+#[test]
+fn volumes_that_cannot_be_are_refused() {
+    let config = TsdfConfig {
+        min: Point3::origin(),
+        max: Point3::new(10.0, 10.0, 10.0),
+        voxel_meters: 0.001,
+        truncation_meters: 0.01,
+    };
+    let told = TsdfVolume::new(config).unwrap_err().to_string();
+    assert!(
+        told.starts_with("a volume of 10001x10001x10001 voxels"),
+        "{told}"
+    );
+    let told = TsdfVolume::new(TsdfConfig {
+        voxel_meters: 0.0,
+        ..config
+    })
+    .unwrap_err()
+    .to_string();
+    assert_eq!(told, "voxel size is 0, expected metres from 1e-6 to 1000");
+    let told = TsdfVolume::new(TsdfConfig {
+        max: Point3::new(1.0, -1.0, 1.0),
+        ..config
+    })
+    .unwrap_err()
+    .to_string();
+    assert!(told.starts_with("volume along y is -1"), "{told}");
+    let told = ReconstructionNoise::level(5).unwrap_err().to_string();
+    assert_eq!(told, "reconstruction level is 5, expected 1, 2, 3 or 4");
+}
+
+/// Mean distance from samples of one model to the nearest of the dense samples of another, metres.
+fn surface_error(from: &Model, to: &Model) -> f64 {
+    let dense = hicp_core::sample_surface(to.mesh(), 20_000);
+    let nearest = |p: &Point3<f32>| {
+        dense
+            .iter()
+            .map(|s| (s.point - p).norm_squared())
+            .fold(f32::INFINITY, f32::min)
+    };
+    let samples = from.samples();
+    samples
+        .iter()
+        .map(|s| f64::from(nearest(&s.point).sqrt()))
+        .sum::<f64>()
+        / samples.len() as f64
+}
+
+#[test]
+fn reconstructions_are_closed_and_worse_with_every_level() {
+    for object in [Household::Mug, Household::Car] {
+        let model = object.model().unwrap();
+        let mut errors = Vec::new();
+        for level in 1..=4 {
+            let settings = Reconstruction {
+                images: 60,
+                voxel_meters: 0.003,
+                ..Reconstruction::new(camera(), ReconstructionNoise::level(level).unwrap())
+            };
+            let made = settings.reconstruct(&model, object.name(), 1).unwrap();
+            assert_eq!(
+                made.mesh().facing(),
+                Facing::Outward,
+                "{} level {level}",
+                object.name()
+            );
+            assert_manifold(made.mesh());
+            assert_eq!(made.symmetries(), model.symmetries());
+            assert_eq!(made.diameter().to_bits(), model.diameter().to_bits());
+            errors.push(f64::midpoint(
+                surface_error(&made, &model),
+                surface_error(&model, &made),
+            ));
+        }
+        println!(
+            "{}: {:?} mm",
+            object.name(),
+            errors
+                .iter()
+                .map(|e| (e * 1e5).round() / 1e2)
+                .collect::<Vec<_>>()
+        );
+        assert!(errors[0] < 0.003, "{errors:?}");
+        assert!(
+            errors.windows(2).all(|pair| pair[0] < pair[1]),
+            "{errors:?}"
+        );
+    }
+}

@@ -1,0 +1,8 @@
+//! Integration tests of `hicp-switch`: one program, so that it is linked once.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod switch;
+
+#[path = "../../../hicp-core/tests/it/support/mod.rs"]
+mod support;

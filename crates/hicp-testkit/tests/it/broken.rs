@@ -1,0 +1,432 @@
+//! Components that break one law each are caught, and the message names it.
+
+// A helper of tests may fail as a test does.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use hicp_testkit::{
+    AssociationLaws, FilterLaws, MetricLaws, RendererLaws, ScoreLaws, StageLaws, StopRuleLaws,
+    SwitcherLaws, check_association, check_filter, check_metric, check_metric_forwards,
+    check_renderer, check_score, check_selection, check_stage, check_stop_rule, check_switcher,
+};
+use hybrid_icp::{
+    Context, Correspondences, DataAssociation, ErrorMetric, Isometry3, NormalEquations, Outcome,
+    OutlierFilter, Pair, PinholeCamera, PixelRegion, PointSelection, PointToPlane, PointToPoint,
+    Problem, Progress, Projective, Rasterizer, Regime, RegimeEvent, RenderedView, Renderer, Score,
+    Session, Stage, Step, StopRule, Surfel, Switcher, Termination, TriMesh, Vector3, Verdict,
+};
+
+/// Runs a check that must fail with a message that names the law.
+fn caught(law: &str, check: impl FnOnce()) {
+    let Err(payload) = catch_unwind(AssertUnwindSafe(check)) else {
+        panic!("nobody noticed that {law:?} is broken");
+    };
+    let message = payload
+        .downcast_ref::<String>()
+        .expect("a message with the law, the input and what was found");
+    assert!(message.contains(law), "expected {law:?} in: {message}");
+    for part in ["breaks the law", "input: ", "found: "] {
+        assert!(message.contains(part), "expected {part:?} in: {message}");
+    }
+}
+
+/// A metric with one fault.
+#[derive(Clone, Copy)]
+enum Fault {
+    NanLoss,
+    Stateful(u32),
+    WrongSign,
+    CameraAxis,
+    ForgetsWeights,
+    Panics,
+    NotItsRows,
+    Negative,
+}
+
+impl ErrorMetric for Fault {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let (p, c) = (pair.source.point.cast(), pair.target.point.cast::<f64>());
+        let weight = match self {
+            Self::ForgetsWeights => 1.0,
+            _ => f64::from(pair.weight),
+        };
+        for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            let mut residual: f64 = axis.dot(&(p - c));
+            if matches!(self, Self::WrongSign) {
+                residual = -residual;
+            }
+            let depth = matches!(self, Self::CameraAxis) && axis.z == 1.0;
+            system.add_row(
+                &p,
+                &axis,
+                residual,
+                if depth { weight * 9.0 } else { weight },
+            );
+        }
+    }
+
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
+        self.linearize(
+            &Pair {
+                weight: 1.0,
+                ..*pair
+            },
+            &mut rows,
+        );
+        rows.loss()
+            * if matches!(self, Self::NotItsRows) {
+                2.0
+            } else {
+                1.0
+            }
+    }
+
+    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+        let increment = self.system(pairs)?.solve()?;
+        let mut mean_loss = self.mean_loss(pairs)?;
+        match self {
+            Self::NanLoss => mean_loss = f64::NAN,
+            Self::Negative => mean_loss = -1.0,
+            Self::Panics => assert!(pairs.len() != 2, "two pairs"),
+            Self::Stateful(calls) => {
+                *calls += 1;
+                mean_loss *= f64::from(*calls);
+            }
+            _ => {}
+        }
+        Some(Step {
+            increment,
+            mean_loss,
+        })
+    }
+}
+
+#[test]
+fn metrics() {
+    let all = MetricLaws::default();
+    for (law, fault) in [
+        ("the loss is finite", Fault::NanLoss),
+        ("the loss is finite and not negative", Fault::Negative),
+        ("pure", Fault::Stateful(0)),
+        ("downhill", Fault::WrongSign),
+        ("frame", Fault::CameraAxis),
+        ("rows carry the weight", Fault::ForgetsWeights),
+        ("never panics", Fault::Panics),
+        ("squared_error", Fault::NotItsRows),
+    ] {
+        caught(law, || check_metric(|| fault, all));
+    }
+}
+
+/// Forwards what must be implemented, and none of what is provided.
+struct Unforwarded<M>(M);
+
+impl<M: ErrorMetric> ErrorMetric for Unforwarded<M> {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        self.0.linearize(pair, system);
+    }
+}
+
+#[test]
+fn a_wrapper_that_forwards_no_provided_method() {
+    caught("forwards every method", || {
+        check_metric_forwards(|| PointToPoint, || Unforwarded(PointToPoint));
+    });
+}
+
+/// Selects something else each time, or what is not finite.
+struct Sloppy {
+    calls: usize,
+    nan: bool,
+}
+
+impl PointSelection for Sloppy {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        pose: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        let skip = self.calls;
+        self.calls += 1;
+        source.extend(context.problem.model.samples().iter().skip(skip).take(9));
+        if self.nan {
+            source[0].point.x = pose.translation.x as f32 * f32::INFINITY;
+        }
+    }
+}
+
+#[test]
+fn selections() {
+    let sloppy = |nan| move || Sloppy { calls: 0, nan };
+    caught("pure", || check_selection(sloppy(false)));
+    caught("points are finite", || check_selection(sloppy(true)));
+}
+
+/// Changes the pairs of a right association.
+struct Spoilt(fn(&[Surfel], &mut Pair));
+
+impl DataAssociation for Spoilt {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        pose: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        Projective.associate(context, source, pose, pairs);
+        let change = self.0;
+        pairs
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(|pair| change(source, pair));
+    }
+}
+
+#[test]
+fn associations() {
+    let laws = AssociationLaws::default();
+    caught("moved by the pose", || {
+        let unmoved = |source: &[Surfel], pair: &mut Pair| {
+            pair.source = source[pair.source_index as usize];
+        };
+        check_association(|| Spoilt(unmoved), laws);
+    });
+    caught("not negative", || {
+        check_association(|| Spoilt(|_, pair| pair.weight = -1.0), laws);
+    });
+    caught("source indices", || {
+        check_association(|| Spoilt(|_, pair| pair.source_index += 10_000), laws);
+    });
+    caught("target indices", || {
+        check_association(|| Spoilt(|_, pair| pair.target_index = u32::MAX), laws);
+    });
+    caught("observed surfels of their indices", || {
+        check_association(|| Spoilt(|_, pair| pair.target.point.z += 0.01), laws);
+    });
+    caught("pairs are finite", || {
+        check_association(|| Spoilt(|_, pair| pair.source.point.z /= 0.0), laws);
+    });
+}
+
+/// Filters by a function.
+#[derive(Clone, Copy)]
+struct By(fn(&mut Correspondences));
+
+impl OutlierFilter for By {
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        self.0(pairs);
+    }
+}
+
+#[test]
+fn filters() {
+    let laws = FilterLaws::default();
+    let spoils = |filter: fn(&mut Correspondences)| move || By(filter);
+    caught("keeps their order", || {
+        check_filter(spoils(|pairs| pairs.as_mut_slice().reverse()), laws);
+    });
+    caught("only removes", || {
+        let moves = |pairs: &mut Correspondences| {
+            for pair in pairs.as_mut_slice() {
+                pair.target.point.x += 0.001;
+            }
+        };
+        check_filter(spoils(moves), laws);
+    });
+    caught("not negative", || {
+        let negates = |pairs: &mut Correspondences| {
+            for pair in pairs.as_mut_slice() {
+                pair.weight = -pair.weight - 1.0;
+            }
+        };
+        check_filter(spoils(negates), laws);
+    });
+    let halves = |pairs: &mut Correspondences| {
+        for pair in pairs.as_mut_slice() {
+            pair.weight *= 0.5;
+        }
+    };
+    caught("idempotent", || {
+        let idempotent = FilterLaws {
+            idempotent: true,
+            ..laws
+        };
+        check_filter(spoils(halves), idempotent);
+    });
+    caught("weights stay", || {
+        let keeps_weights = FilterLaws {
+            keeps_weights: true,
+            ..laws
+        };
+        check_filter(spoils(halves), keeps_weights);
+    });
+    caught("never panics", || {
+        check_filter(spoils(|pairs| assert!(!pairs.as_slice().is_empty())), laws);
+    });
+}
+
+/// Keeps fewer pairs from iteration to iteration, by a memory of those begun so far.
+struct Remembers {
+    turns: usize,
+    remember: fn(usize, usize) -> usize,
+}
+
+impl OutlierFilter for Remembers {
+    fn begin(&mut self, iteration: usize) {
+        self.turns = (self.remember)(self.turns, iteration);
+    }
+
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let limit = 0.05 / (1.0 + self.turns as f32);
+        pairs.retain(|pair| pair.distance() < limit);
+    }
+}
+
+#[test]
+fn filters_that_remember_what_iterations_came_before() {
+    let remembers = |remember| move || Remembers { turns: 0, remember };
+    let law = "pure given the iteration";
+    caught(law, || {
+        let counts = |turns, _| turns + 1;
+        check_filter(remembers(counts), FilterLaws::default());
+    });
+    caught(law, || {
+        let never_back = |turns: usize, iteration| turns.max(iteration);
+        check_filter(remembers(never_back), FilterLaws::default());
+    });
+    // The same without the memory is a schedule.
+    check_filter(remembers(|_, iteration| iteration), FilterLaws::default());
+}
+
+/// Counts turns and forgets to begin anew.
+struct Forgets(usize);
+
+impl StopRule for Forgets {
+    fn check(&mut self, _progress: &Progress<'_>) -> ControlFlow<Termination> {
+        self.0 += 1;
+        if self.0 > 4 {
+            ControlFlow::Break(Termination::Converged)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+#[test]
+fn a_stop_rule_that_forgets_to_forget() {
+    caught("start forgets", || {
+        check_stop_rule(|| Forgets(0), StopRuleLaws::default());
+    });
+}
+
+/// A score that is not a number where nothing was observed, or renders for itself.
+struct Share {
+    elsewhere: bool,
+}
+
+impl Score for Share {
+    fn score(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> f64 {
+        let n = context.problem.observation.n_surfels() as f64;
+        if self.elsewhere {
+            context.view(&(Isometry3::translation(0.0, 0.0, 1e-9) * pose));
+            return 0.5;
+        }
+        0.0 / n
+    }
+}
+
+impl Switcher for Share {
+    fn regime(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> RegimeEvent {
+        RegimeEvent {
+            regime: Regime(if self.elsewhere { 2 } else { 0 }),
+            score: Some(self.score(context, pose)),
+        }
+    }
+}
+
+#[test]
+fn scores_and_switchers() {
+    let share = |elsewhere| move || Share { elsewhere };
+    let laws = ScoreLaws::default();
+    caught("never NaN", || check_score(share(false), laws));
+    caught("shares the render", || check_score(share(true), laws));
+    let laws = SwitcherLaws::default();
+    caught("never NaN", || check_switcher(share(false), laws));
+    caught("regime", || check_switcher(share(true), laws));
+}
+
+/// Forgets the initial pose where it finds nothing, or returns a pose that nobody evaluated.
+struct Rash {
+    kept: bool,
+}
+
+impl Stage for Rash {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        _: &mut Session<'_>,
+    ) -> Outcome {
+        let nothing = problem.observation.n_surfels() == 0;
+        let pose = match (self.kept, nothing) {
+            (true, true) => Isometry3::identity(),
+            (false, false) => Isometry3::translation(0.0, 0.0, 1e-3) * init,
+            _ => *init,
+        };
+        let kept = Outcome::kept(init, Termination::NoPairs);
+        Outcome {
+            camera_from_object: pose,
+            verdict: if self.kept {
+                kept.verdict
+            } else {
+                Verdict::Refined
+            },
+            ..kept
+        }
+    }
+}
+
+#[test]
+fn stages() {
+    let laws = StageLaws::default();
+    caught("a kept pose", || check_stage(|| Rash { kept: true }, laws));
+    caught("accept after evaluation", || {
+        check_stage(|| Rash { kept: false }, laws);
+    });
+}
+
+/// Leaves the triangles of the last render where it draws nothing.
+#[derive(Default)]
+struct NoTriangles(Rasterizer);
+
+impl Renderer for NoTriangles {
+    fn render(
+        &mut self,
+        mesh: &TriMesh,
+        camera: &PinholeCamera,
+        pose: &Isometry3<f64>,
+        region: &PixelRegion,
+        view: &mut RenderedView,
+    ) {
+        self.0.render(mesh, camera, pose, region, view);
+        view.buffers_mut().1.fill(0);
+    }
+}
+
+#[test]
+fn renderers() {
+    caught("exactly if it has a triangle", || {
+        check_renderer(NoTriangles::default, RendererLaws::default());
+    });
+}
+
+/// The faults above are caught for what they are: without them the same code passes.
+#[test]
+fn what_is_not_broken_passes() {
+    check_association(|| Spoilt(|_, _| ()), AssociationLaws::default());
+    check_filter(|| By(|_| ()), FilterLaws::default());
+    check_metric(|| Unforwarded(PointToPlane), MetricLaws::default());
+}

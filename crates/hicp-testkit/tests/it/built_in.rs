@@ -1,0 +1,314 @@
+//! Every part that ships keeps the laws that it asks of others.
+
+use std::time::{Duration, Instant};
+
+use hicp_testkit::{
+    AssociationLaws, FilterLaws, MetricLaws, RendererLaws, ScoreLaws, StageLaws, StopRuleLaws,
+    SwitcherLaws, check_association, check_filter, check_metric, check_metric_forwards,
+    check_renderer, check_score, check_selection, check_stage, check_stop_rule, check_switcher,
+    scenes,
+};
+use hybrid_icp::{
+    AbsoluteLoss, AllSamples, AtResolution, Bound, BoundaryTargets, ClosestPointOnMesh,
+    Conditioned, ConstantWeight, Convergence, Deadline, Degeneracy, DistanceWeight, Divergence,
+    ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Guard, IterationLimit, KNearest,
+    KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
+    MeanVsd, MedianDistance, MetricSchedule, MinPairs, NearestNeighbor, NormalCompatible,
+    NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
+    OrganizedNearestNeighbor, Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Preset, Prior, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
+    Rasterizer, Reciprocal, Regime, Robust, SampledMve, Scale, Schedule, SensorNoiseWeight,
+    SmallMotion, StableSampling, SwitchUntilStall, Symmetric, Threshold, Thresholds, TimeLimit,
+    Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WarmNearestNeighbor,
+    WeightedSum, WithoutBoundary,
+};
+
+#[test]
+fn selections() {
+    check_selection(|| AllSamples);
+    check_selection(VisibleSurface::default);
+    check_selection(ObservedSurface::default);
+    check_selection(WithoutBoundary::default);
+    check_selection(UniformCount::default);
+    check_selection(RandomSample::default);
+    check_selection(VoxelGrid::default);
+    check_selection(NormalSpace::default);
+    check_selection(StableSampling::default);
+    check_selection(|| StableSampling::new(VisibleSurface::default(), 100));
+}
+
+#[test]
+fn associations() {
+    let strict = AssociationLaws::default();
+    check_association(NearestNeighbor::default, strict);
+    check_association(WarmNearestNeighbor::default, strict);
+    check_association(OrganizedNearestNeighbor::default, strict);
+    check_association(KNearest::default, strict);
+    check_association(NormalCompatible::default, strict);
+    check_association(NormalShooting::default, strict);
+    check_association(|| Reciprocal::new(NearestNeighbor::default()), strict);
+    check_association(|| Projective, strict);
+    check_association(ProjectiveSearch::default, strict);
+    let interpolating = AssociationLaws {
+        targets_are_the_observed: false,
+        ..strict
+    };
+    check_association(ProjectiveInterpolated::default, interpolating);
+    let from_the_observation = AssociationLaws {
+        sources_are_the_selected: false,
+        ..strict
+    };
+    check_association(ObservationToModel::default, from_the_observation);
+    check_association(ClosestPointOnMesh::default, from_the_observation);
+}
+
+#[test]
+fn filters() {
+    let removes = FilterLaws {
+        keeps_weights: true,
+        idempotent: false,
+    };
+    let limits = FilterLaws {
+        idempotent: true,
+        ..removes
+    };
+    check_filter(|| (), limits);
+    check_filter(|| None::<Trimmed>, limits);
+    check_filter(|| MaxDistance::diameters(0.1), limits);
+    check_filter(|| MaxNormalAngle::degrees(45.0), limits);
+    check_filter(OneToOne::new, limits);
+    check_filter(BoundaryTargets::default, limits);
+    check_filter(MinPairs::default, limits);
+    check_filter(MedianDistance::default, removes);
+    check_filter(MadDistance::default, removes);
+    check_filter(Trimmed::default, removes);
+    check_filter(VarTrimmed::default, removes);
+    let weighs = FilterLaws::default();
+    check_filter(ConstantWeight::default, weighs);
+    check_filter(DistanceWeight::default, weighs);
+    check_filter(|| NormalWeight, weighs);
+    check_filter(SensorNoiseWeight::default, weighs);
+    let chain = || (MaxDistance::diameters(0.2), Trimmed::new(0.8), NormalWeight);
+    check_filter(chain, weighs);
+    check_filter(|| vec![Trimmed::new(0.8), Trimmed::new(0.5)], removes);
+    let narrowing = || Schedule::new([0.5, 0.02, 0.3].map(MaxDistance::diameters).to_vec());
+    check_filter(narrowing, limits);
+    check_filter(|| (Schedule::new(vec![narrowing()]), NormalWeight), weighs);
+}
+
+#[test]
+fn metrics() {
+    let all = MetricLaws::default();
+    check_metric(|| PointToPoint, all);
+    check_metric(|| PointToPlane, all);
+    check_metric(|| PlaneToPoint, all);
+    check_metric(|| Symmetric, all);
+    check_metric(Generalized::default, all);
+    let sum = || WeightedSum {
+        terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
+    };
+    check_metric(sum, all);
+    check_metric(
+        || WeightedSum {
+            terms: vec![(0.5, PointToPlane), (0.5, PointToPlane)],
+        },
+        all,
+    );
+}
+
+#[test]
+fn robust_metrics() {
+    let all = MetricLaws::default();
+    let known = MetricLaws {
+        units: false,
+        ..all
+    };
+    let median = MetricLaws {
+        multiplicity: false,
+        ..all
+    };
+    for kernel in [
+        Kernel::L2,
+        Kernel::HUBER,
+        Kernel::FAIR,
+        Kernel::CAUCHY,
+        Kernel::GEMAN_MCCLURE,
+        Kernel::WELSCH,
+        Kernel::TUKEY,
+    ] {
+        check_metric(
+            || Robust::new(PointToPlane, kernel, Scale::Meters(0.003)),
+            known,
+        );
+        let scale = Scale::Mad { floor_meters: 0.0 };
+        check_metric(|| Robust::new(PointToPoint, kernel, scale), median);
+    }
+    check_metric(
+        Robust::<PointToPoint>::default,
+        MetricLaws {
+            units: false,
+            ..median
+        },
+    );
+}
+
+#[test]
+fn decorated_metrics() {
+    let all = MetricLaws::default();
+    for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
+        let conditioned = || Conditioned {
+            metric: PointToPlane,
+            policy,
+            threshold: Degeneracy::THRESHOLD,
+        };
+        check_metric(conditioned, all);
+    }
+    check_metric(GaussNewton::<PointToPlane>::default, all);
+    // Not over `Symmetric`: λ scales the diagonal of JᵀWJ, which depends on the axes, so steps cut short by the iteration limit far
+    // off differ from frame to frame.
+    check_metric(LevenbergMarquardt::<PointToPlane>::default, all);
+    let frozen = |frame| Frozen {
+        metric: PointToPlane,
+        frame,
+        translation: [false, true, false],
+        rotation: [false, false, true],
+    };
+    check_metric(|| frozen(Frame::Object), all);
+    let fixed = MetricLaws {
+        frame: false,
+        ..all
+    };
+    check_metric(|| frozen(Frame::Camera), fixed);
+    let prior = || {
+        let prior = Prior::Gaussian {
+            camera_from_object: scenes()[0].truth,
+            information: Matrix6::identity() * 1e4,
+        };
+        PosePrior::new(PointToPlane, prior, 1e-3)
+    };
+    check_metric(
+        prior,
+        MetricLaws {
+            units: false,
+            ..fixed
+        },
+    );
+}
+
+#[test]
+fn decorators_that_change_nothing_forward_everything() {
+    check_metric_forwards(|| PointToPoint, Frozen::<PointToPoint>::default);
+    check_metric_forwards(|| Symmetric, PosePrior::<Symmetric>::default);
+    check_metric_forwards(|| Symmetric, || MetricSchedule::new(vec![Symmetric]));
+    check_metric_forwards(|| Symmetric, || Box::new(Symmetric) as Box<dyn ErrorMetric>);
+}
+
+#[test]
+fn stop_rules() {
+    let laws = StopRuleLaws::default();
+    check_stop_rule(Divergence::strict, laws);
+    check_stop_rule(Divergence::count_aware, laws);
+    check_stop_rule(Convergence::default, laws);
+    check_stop_rule(IterationLimit::default, laws);
+    check_stop_rule(AbsoluteLoss::default, laws);
+    check_stop_rule(SmallMotion::default, laws);
+    check_stop_rule(Bound::default, laws);
+    check_stop_rule(Oscillation::default, laws);
+    check_stop_rule(
+        || {
+            (
+                Oscillation::default(),
+                Convergence::default(),
+                IterationLimit(7),
+            )
+        },
+        laws,
+    );
+    let clock = StopRuleLaws {
+        deterministic: false,
+    };
+    check_stop_rule(|| TimeLimit::new(Duration::from_millis(5)), clock);
+    let past = Instant::now();
+    check_stop_rule(|| Deadline(past), laws);
+}
+
+#[test]
+fn scores_and_switchers() {
+    let share = ScoreLaws {
+        worst: 1.0,
+        ..ScoreLaws::default()
+    };
+    check_score(MeanVsd::default, share);
+    check_score(MeanVsd::paper, share);
+    check_score(SampledMve::default, share);
+    check_score(|| SampledMve::new(300, 150), share);
+    let truth = scenes()[0].truth;
+    check_score(
+        || Vsd::new(truth),
+        ScoreLaws {
+            ranks_poses: false,
+            extra_renders: 1,
+            ..share
+        },
+    );
+    let two = SwitcherLaws::default();
+    let threshold = || Threshold {
+        score: MeanVsd::default(),
+        alpha: PAPER_ALPHA,
+    };
+    check_switcher(threshold, two);
+    check_switcher(|| Regime::ALIGNED, two);
+    let thresholds = || Thresholds {
+        score: MeanVsd::default(),
+        bounds: vec![0.2, 0.6],
+    };
+    check_switcher(thresholds, SwitcherLaws { regimes: 3, ..two });
+}
+
+#[test]
+fn stages() {
+    let laws = StageLaws::default();
+    for preset in Preset::ALL {
+        check_stage(|| preset.build(), laws);
+    }
+    let fine = || Preset::ProjectivePointToPlane.build();
+    check_stage(
+        || Guard {
+            stage: fine(),
+            score: MeanVsd::default(),
+        },
+        laws,
+    );
+    check_stage(
+        || KeepBest {
+            times: 3,
+            stage: fine(),
+            score: MeanVsd::default(),
+        },
+        laws,
+    );
+    check_stage(
+        || SwitchUntilStall {
+            score: MeanVsd::default(),
+            alpha: 0.4,
+            aligned: fine(),
+            misaligned: Preset::NnPointToPoint.build(),
+            max_steps: 3,
+            min_gain: 0.01,
+            good_enough: 0.02,
+        },
+        laws,
+    );
+    check_stage(
+        || AtResolution {
+            factor: 2,
+            stage: fine(),
+        },
+        laws,
+    );
+}
+
+#[test]
+fn renderers() {
+    check_renderer(Rasterizer::default, RendererLaws::default());
+}

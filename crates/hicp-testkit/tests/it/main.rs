@@ -1,0 +1,14 @@
+//! Integration tests of `hicp-testkit`: one program, so that it is linked once.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "helpers of tests"
+)]
+
+mod broken;
+mod built_in;
+mod fusers;

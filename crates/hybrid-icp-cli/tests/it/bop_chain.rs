@@ -1,0 +1,74 @@
+//! The whole path over a generated dataset, as a user goes it: generate, refine, eval, compare, show.
+//!
+//! What is printed is held to `golden/bop_chain.txt` digit for digit: the dataset follows from its seed, no pose depends on the
+//! number of threads, and the figures are rounded to three digits. `HICP_BLESS=1 cargo test -p hybrid-icp-cli --test it bop_chain`
+//! writes it anew; the commit says why it changed.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::common::*;
+
+/// Runs a command of `hybrid-icp bop` that must succeed without a warning; returns what it printed.
+#[track_caller]
+fn bop(folder: &Path, words: &str) -> String {
+    let told = run(folder, std::iter::once("bop").chain(words.split(' '))).exits(0);
+    assert_eq!(told.err, "", "bop {words}");
+    told.out
+}
+
+/// The Markdown's lines without the columns of times, which no two runs have in common.
+fn without_times(markdown: &str) -> String {
+    let mut text = String::new();
+    let (table, rest) = markdown.split_once("\n\n").unwrap();
+    for line in table.lines() {
+        let cells: Vec<&str> = line.split('|').collect();
+        let _ = writeln!(text, "{}|", cells[..cells.len() - 3].join("|"));
+    }
+    text + "\n" + rest
+}
+
+#[test]
+fn generate_refine_eval_compare_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let initial = "set/initial_synthetic-test.csv";
+    let generate = "generate --scenes 1 --images 2 --instances 6 --seed 5 --out set";
+    let mut found = format!("$ bop {generate}\n{}", bop(folder, generate));
+
+    let refine = format!("refine --dataset set --no-time --results {initial} --output refined.csv");
+    let told = bop(folder, &refine);
+    let (_, summary) = told.split_once('\n').unwrap();
+    let _ = write!(found, "\n$ bop {refine}\n{summary}");
+
+    for results in ["set/truth_synthetic-test.csv", initial, "refined.csv"] {
+        let eval = format!("eval --dataset set --results {results}");
+        let _ = write!(found, "\n$ bop {eval}\n{}", bop(folder, &eval));
+    }
+
+    let pipelines = "hybrid,projective-cascade-point-plane";
+    let compare =
+        format!("compare --dataset set --init {initial} --pipelines {pipelines} --out compared");
+    // The pipelines are no equals: what is left of one of them is warned of.
+    let words = compare.split(' ');
+    let told = run(folder, std::iter::once("bop").chain(words)).exits(0);
+    let markdown = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
+    let table = without_times(&markdown);
+    let _ = write!(found, "\n$ bop {compare}\n{}\n{table}", told.err);
+    assert!(folder.join("compared/compare.html").is_file());
+
+    let show = format!(
+        "show --dataset set --scene 1 --image 1 --results refined.csv --against {initial} --out show.png"
+    );
+    let _ = write!(found, "\n$ bop {show}\n{}", bop(folder, &show));
+    let (width, height) = hicp_io::read_png_size(folder.join("show.png")).unwrap();
+    let _ = writeln!(found, "{width}x{height}");
+
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/bop_chain.txt");
+    if std::env::var_os("HICP_BLESS").is_some() {
+        std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
+        std::fs::write(&golden, &found).unwrap();
+    }
+    let expected = std::fs::read_to_string(&golden).unwrap();
+    assert!(found == expected, "expected\n{expected}\nfound\n{found}");
+}

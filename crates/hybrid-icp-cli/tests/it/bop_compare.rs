@@ -1,0 +1,191 @@
+//! `hybrid-icp bop compare` on a generated dataset.
+
+use std::path::Path;
+
+use crate::common::*;
+use serde_json::Value;
+
+const COMPARE: &str =
+    "bop compare --dataset set --init set/initial_synthetic-test.csv --out compared";
+
+/// The cells of the first table's lines below its head.
+fn cells(folder: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
+    let lines = text
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
+    let cells = |line: &str| {
+        line.trim_matches('|')
+            .split('|')
+            .map(|c| c.trim().to_owned())
+            .collect()
+    };
+    lines.map(cells).collect()
+}
+
+#[test]
+fn pipelines_are_compared_by_what_eval_says_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let words = "bop generate --scenes 1 --images 2 --instances 5 --out set";
+    run(folder, words.split(' ')).exits(0);
+    let words = format!("{COMPARE} --pipelines hybrid,nn-point-to-point");
+    let told = run(folder, words.split(' ')).exits(0);
+    // What did not come out well is told by the pipeline that it is of.
+    let begin = "warning: compared/nn-point-to-point.csv: ";
+    assert!(
+        told.err.lines().count() == 1 && told.err.starts_with(begin),
+        "{}",
+        told.err
+    );
+    assert_eq!(
+        names(&folder.join("compared")),
+        [
+            "compare.html",
+            "compare.json",
+            "compare.md",
+            "hybrid.csv",
+            "hybrid.json",
+            "initial.json",
+            "nn-point-to-point.csv",
+            "nn-point-to-point.json"
+        ]
+    );
+    let cells = cells(folder);
+    let named: Vec<&str> = cells.iter().map(|line| line[0].as_str()).collect();
+    assert_eq!(named, ["initial", "hybrid", "nn-point-to-point"]);
+    for line in &cells {
+        let path = folder.join(format!("compared/{}.json", line[0]));
+        let report: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        let keys = ["ar", "ar_vsd", "ar_mssd", "ar_mspd"];
+        for (key, cell) in keys.iter().zip(&line[1..]) {
+            assert_eq!(&format!("{:.3}", report[key].as_f64().unwrap()), cell);
+        }
+        let adi = report["median_adi_mm"].as_f64().unwrap();
+        assert_eq!(format!("{adi:.2}"), line[5]);
+        assert!(told.out.contains(&line.join(" | ")), "{}", told.out);
+    }
+    assert_eq!(cells[0][6..], ["-"; 4]);
+    let number = |line: usize, cell: usize| cells[line][cell].parse::<f64>().unwrap();
+    // Most poses are better after Hybrid ICP than before, and no share is above the whole.
+    assert!(number(1, 1) > number(0, 1) && number(1, 6) > 80.0);
+    for line in [1, 2] {
+        assert!(number(line, 6) + number(line, 7) <= 100.05);
+        assert!(number(line, 8) > 0.0);
+        let ratio = number(line, 8) / number(1, 8);
+        assert!((number(line, 9) - ratio).abs() < 0.01 + 0.01 * ratio);
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.join("compared").join(name)).unwrap();
+    let document: Value = serde_json::from_str(&read("compare.json")).unwrap();
+    for (entry, line) in document["entries"].as_array().unwrap().iter().zip(&cells) {
+        let report: Value = serde_json::from_str(&read(&format!("{}.json", line[0]))).unwrap();
+        assert_eq!(entry["name"].as_str().unwrap(), line[0]);
+        for key in ["ar", "ar_vsd", "median_adi_mm", "targets", "objects"] {
+            assert_eq!(entry[key], report[key], "{key}");
+        }
+    }
+    // The page has the same figures, holds everything and has a row per object.
+    let page = read("compare.html");
+    for line in &cells {
+        let row: String = line.iter().map(|cell| format!("<td>{cell}</td>")).collect();
+        assert!(page.contains(&format!("<tr>{row}</tr>")), "{row}");
+    }
+    for loaded in ["src=", "href=", "url(", "<script"] {
+        assert!(!page.contains(loaded), "{loaded}");
+    }
+    let objects = document["entries"][0]["objects"].as_object().unwrap();
+    for id in objects.keys() {
+        assert_eq!(page.matches(&format!("<tr><td>{id}</td>")).count(), 2);
+        assert_eq!(
+            read("compare.md").matches(&format!("\n| {id} |")).count(),
+            2
+        );
+    }
+
+    // What refine alone writes.
+    let words = "bop refine --dataset set --results set/initial_synthetic-test.csv --pipeline hybrid --output alone.csv";
+    run(folder, words.split(' ')).exits(0);
+    let poses = |name: &str| -> Vec<_> {
+        let rows = hicp_io::bop::read_results(folder.join(name)).unwrap();
+        rows.iter().map(|row| row.camera_from_object()).collect()
+    };
+    assert_eq!(poses("alone.csv"), poses("compared/hybrid.csv"));
+}
+
+#[test]
+fn wrong_pipelines_are_told_before_anything_is_computed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("hybrid.toml"), "").unwrap();
+    for (pipelines, code, parts) in [
+        (
+            "hybird",
+            2,
+            &["--pipelines", "hybird", "did you mean \"hybrid\""][..],
+        ),
+        ("hybrid,hybrid", 1, &["--pipelines gives hybrid twice"]),
+        ("compare.toml", 1, &["--pipelines gives compare", "differ"]),
+        ("hybrid,hybrid.toml", 1, &["--pipelines gives hybrid twice"]),
+        ("hybrid.toml", 1, &["hybrid.toml"]),
+        ("hybrid,gone.toml", 1, &["gone.toml"]),
+    ] {
+        let words = format!("{COMPARE} --pipelines {pipelines}");
+        run(folder, words.split(' ')).exits(code).complains(parts);
+        assert_eq!(names(folder), ["hybrid.toml"]);
+    }
+    let words = format!("{COMPARE} --pipelines hybrid");
+    run(folder, words.split(' '))
+        .exits(1)
+        .complains(&["initial_synthetic-test.csv"]);
+}
+
+#[test]
+fn no_input_is_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let words = "bop generate --scenes 1 --images 1 --instances 2 --out set";
+    run(folder, words.split(' ')).exits(0);
+    let init = std::fs::read(folder.join("set/initial_synthetic-test.csv")).unwrap();
+    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
+    std::fs::create_dir(folder.join("out")).unwrap();
+    for name in ["hybrid.csv", "hybrid.csv.journal"] {
+        std::fs::write(folder.join("out").join(name), &init).unwrap();
+    }
+    std::fs::write(folder.join("test_targets_bop19.toml"), &pipeline).unwrap();
+    for (init, pipelines, out, parts) in [
+        (
+            "out/hybrid.csv",
+            "nn-point-to-point,hybrid",
+            "out",
+            &["--out and --init both name out/hybrid.csv"][..],
+        ),
+        (
+            "out/hybrid.csv.journal",
+            "hybrid",
+            "./out",
+            &["--out and --init both name ./out/hybrid.csv.journal"],
+        ),
+        (
+            "set/initial_synthetic-test.csv",
+            "test_targets_bop19.toml",
+            "set",
+            &[
+                "--out names set/test_targets_bop19.json",
+                "belongs to the dataset set",
+            ],
+        ),
+    ] {
+        let words =
+            format!("bop compare --dataset set --init {init} --pipelines {pipelines} --out {out}");
+        let told = run(folder, words.split(' ')).exits(1);
+        assert_eq!(told.complains(parts).out, "");
+        assert_eq!(
+            names(&folder.join("out")),
+            ["hybrid.csv", "hybrid.csv.journal"]
+        );
+    }
+    for name in ["hybrid.csv", "hybrid.csv.journal"] {
+        assert_eq!(std::fs::read(folder.join("out").join(name)).unwrap(), init);
+    }
+}

@@ -1,0 +1,461 @@
+//! `hybrid-icp bop refine` on a small dataset made here.
+
+use std::collections::BTreeMap;
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::bop::{ResultRow, Rle, read_results, write_results};
+use hybrid_icp::{Isometry3, Mask};
+use serde_json::{Value, json};
+
+#[test]
+fn every_row_is_refined_against_its_own_instance() {
+    let world = World::new();
+    let rows = world.rows();
+    let (run, refined) = world.refine(&rows, &[]);
+    let run = run.exits(0);
+    assert_eq!(run.err, "");
+    assert!(run.out.contains("10 rows of 4 frames"), "{}", run.out);
+    assert!(run.out.contains("10  refined") && run.out.contains("median MVE"));
+    for (before, after) in rows.iter().zip(&refined) {
+        world.assert_refined(before, after);
+    }
+    let text = std::fs::read_to_string(world.path("out.csv")).unwrap();
+    assert!(text.starts_with("scene_id,im_id,obj_id,score,R,t,time\n"));
+    assert!(!text.contains("NaN") && !text.contains("inf"));
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let world = World::new();
+    let rows = world.rows();
+    let mut outputs = Vec::new();
+    for threads in ["1", "2", "7"] {
+        let (run, refined) = world.refine(&rows, &["--no-time", "--threads", threads]);
+        run.exits(0);
+        assert!(refined.iter().all(|row| row.time_s.is_none()));
+        outputs.push(std::fs::read(world.path("out.csv")).unwrap());
+    }
+    assert!(outputs.iter().all(|output| output == &outputs[0]));
+    let text = String::from_utf8(outputs.remove(0)).unwrap();
+    assert!(text.lines().skip(1).all(|line| line.ends_with(",-1")));
+}
+
+#[test]
+fn the_time_is_the_same_on_all_rows_of_an_image() {
+    let world = World::new();
+    let mut rows = world.rows();
+    // Times in the input are added to; where the rows of an image disagree, or only some state one, the largest counts.
+    for (index, row) in rows.iter_mut().enumerate() {
+        row.time_s = match row.scene_id {
+            3 => Some(100.0),
+            _ if row.im_id == 40 => (index % 2 == 0).then_some(10.0 + index as f64),
+            _ => None,
+        };
+    }
+    let (run, refined) = world.refine(&rows, &[]);
+    run.exits(0);
+    let mut times: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+    for row in &refined {
+        let time = row.time_s.unwrap();
+        assert_eq!(
+            *times.entry((row.scene_id, row.im_id)).or_insert(time),
+            time
+        );
+    }
+    for ((scene, image), time) in times {
+        let stated = rows
+            .iter()
+            .filter(|r| (r.scene_id, r.im_id) == (scene, image));
+        let stated = stated.filter_map(|r| r.time_s).fold(0.0, f64::max);
+        assert!(
+            time > stated && time < stated + 10.0,
+            "{scene} {image}: {time}"
+        );
+    }
+}
+
+#[test]
+fn rows_that_cannot_be_refined_are_kept_and_counted() {
+    let world = World::new();
+    let mut rows = world.rows();
+    let refinable = rows.len();
+    let pose = rows[0].camera_from_object();
+    let aside = Isometry3::translation(0.0, 3.0, 0.0) * pose;
+    let behind = Isometry3::translation(0.0, 0.0, -3.0) * pose;
+    rows.insert(0, ResultRow::new(3, 0, ABSENT, pose));
+    rows.insert(4, ResultRow::new(3, 0, HAMMER, pose));
+    rows.push(ResultRow::new(3, 0, CAR, aside));
+    rows.push(ResultRow::new(12, 0, CAR, behind));
+    rows.push(ResultRow::new(3, 77, CAR, pose));
+    rows.push(ResultRow::new(44, 0, CAR, pose));
+    for row in &mut rows {
+        row.score = 0.123_456_789;
+    }
+    let (run, refined) = world.refine(&rows, &[]);
+    let run = run.exits(0);
+    for line in [
+        "10  refined",
+        "1  kept: missing model (object 9)",
+        "1  kept: no mask of the object",
+        "2  kept: no overlap with a mask of the object",
+        "2  kept: missing frame",
+    ] {
+        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
+    }
+    let warnings: Vec<&str> = run.err.lines().collect();
+    assert_eq!(warnings.len(), 2, "{}", run.err);
+    assert!(warnings.iter().all(|line| line.starts_with("warning: ")));
+    assert!(warnings[0].contains("obj_000009.ply"), "{}", run.err);
+    let kept = rows
+        .iter()
+        .zip(&refined)
+        .filter(|(a, b)| same_pose(a, b))
+        .count();
+    assert_eq!(kept, rows.len() - refinable);
+    // Nothing was computed for these, so nothing is known of the time.
+    for row in &refined[rows.len() - 2..] {
+        assert_eq!(row.time_s, None);
+    }
+
+    // The numbers are those of the file, though its rotation is one to nine digits only.
+    let numbers = "0.768311175 -0.0665434694 0.636608126 0.311033385 0.908074697 -0.280461366 -0.559424858 0.413487982 0.718381178,78.6667817 -7.67105284 1035.65777";
+    let text = format!("scene_id,im_id,obj_id,score,R,t,time\n3,0,9,0.5,{numbers},1.25\n");
+    std::fs::write(world.path("in.csv"), &text).unwrap();
+    world.run(&[]).exits(0);
+    assert_eq!(
+        std::fs::read_to_string(world.path("out.csv")).unwrap(),
+        text
+    );
+}
+
+#[test]
+fn missing_files_cost_their_rows_only() {
+    let world = World::new();
+    let rows = world.rows();
+    std::fs::remove_file(world.depth_path(3, 0)).unwrap();
+    std::fs::remove_file(world.mask_path(12, 40, 1)).unwrap();
+    // One of two cars loses its mask: its row has none that it overlaps.
+    std::fs::remove_file(world.mask_path(12, 0, 0)).unwrap();
+    let (run, refined) = world.refine(&rows, &[]);
+    let run = run.exits(0).complains(&[
+        "warning: depth image is missing: ./test/000003/depth/000000.png",
+        "warning: mask is missing: ./test/000012/mask_visib/0000",
+        "(and 1 more like it)",
+    ]);
+    for line in [
+        "6  refined",
+        "2  kept: missing frame",
+        "1  kept: no mask",
+        "1  kept: no overlap",
+    ] {
+        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
+    }
+    for (before, after) in rows.iter().zip(&refined) {
+        if !same_pose(before, after) {
+            world.assert_refined(before, after);
+        }
+        if (before.scene_id, before.im_id) == (3, 0) {
+            assert!(same_pose(before, after) && after.time_s.is_none());
+        }
+    }
+}
+
+#[test]
+fn ground_truth_that_masks_are_named_by_is_told_where_it_is_missing() {
+    let world = World::new();
+    let rows = world.rows();
+    let path = world.scene(3).join("scene_gt.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("\"40\":", "\"41\":")).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    let run = run.exits(0).complains(&[
+        "warning: ground truth is missing: ./test/000003/scene_gt.json does not have image 40",
+    ]);
+    assert!(run.out.contains("3  kept: no mask"), "{}", run.out);
+    std::fs::remove_file(&path).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    assert!(run.out.contains("5  kept: no mask"), "{}", run.out);
+    // Of both images, and told once.
+    assert_eq!(
+        run.exits(0).err,
+        "warning: ground truth is missing: ./test/000003/scene_gt.json does not exist\n"
+    );
+    // Nobody asks for it where masks come from elsewhere.
+    let (run, _) = world.refine(&rows, &["--mask", "none"]);
+    assert_eq!(run.exits(0).err, "");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_wrong_is_told_where_the_summary_cannot_be_written() {
+    if !std::path::Path::new("/dev/full").exists() {
+        println!("skipped: no /dev/full");
+        return;
+    }
+    let world = World::new();
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    let depth = world.depth_path(3, 40);
+    std::fs::write(&depth, "no image").unwrap();
+    std::fs::remove_file(world.depth_path(12, 40)).unwrap();
+    let words = "bop refine --dataset . --results in.csv --output out.csv --no-time";
+    let told = || {
+        let full = std::fs::File::options().write(true).open("/dev/full");
+        let full = full.unwrap();
+        let mut command = program(world.folder.path());
+        let output = command.args(words.split(' ')).stdout(full).output();
+        let output = output.unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let err = told();
+    for part in [
+        "warning: depth image is missing",
+        "error: ./test/000003/depth/000040.png",
+        "error: 1 files could not be used",
+    ] {
+        assert!(err.contains(part), "no {part:?} in: {err}");
+    }
+    // Without it the summary is all that is wrong.
+    std::fs::remove_file(&depth).unwrap();
+    let err = told();
+    for part in ["warning: depth", "error: cannot write to standard output"] {
+        assert!(err.contains(part), "no {part:?} in: {err}");
+    }
+}
+
+#[test]
+fn damaged_files_are_reported_and_the_rest_is_written() {
+    let world = World::new();
+    let rows = world.rows();
+    for (path, name) in [
+        (world.depth_path(3, 40), "000003/depth/000040.png"),
+        (
+            world.mask_path(12, 40, 1),
+            "000012/mask_visib/000040_000001.png",
+        ),
+        (world.path("models/obj_000001.ply"), "obj_000001.ply"),
+        (world.scene(12).join("scene_gt.json"), "scene_gt.json"),
+    ] {
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &whole[..whole.len() / 3]).unwrap();
+        let (run, refined) = world.refine(&rows, &[]);
+        let run =
+            run.exits(1)
+                .complains(&["error: ", name, "1 files could not be used", "out.csv"]);
+        assert!(run.out.contains("kept: damaged file"), "{}", run.out);
+        let changed = rows.iter().zip(&refined).filter(|(a, b)| !same_pose(a, b));
+        let changed: Vec<_> = changed.collect();
+        assert!(!changed.is_empty() && changed.len() < rows.len());
+        for (before, after) in changed {
+            world.assert_refined(before, after);
+        }
+        // What cannot be read is not missing.
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        let (run, _) = world.refine(&rows, &[]);
+        let run = run.exits(1).complains(&["error: ", name, "a folder"]);
+        assert!(run.out.contains("kept: damaged file"), "{}", run.out);
+        std::fs::remove_dir(&path).unwrap();
+        std::fs::write(&path, whole).unwrap();
+    }
+
+    let small = Mask::full(32, 24);
+    hicp_io::write_mask_png(world.mask_path(12, 40, 1), &small).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    run.exits(1)
+        .complains(&["000040_000001.png is 32x24", "000040.png is 320x240"]);
+
+    let camera = world.scene(3).join("scene_camera.json");
+    let text = std::fs::read_to_string(&camera).unwrap();
+    std::fs::write(&camera, text.replace("400", "0")).unwrap();
+    let (run, _) = world.refine(&rows, &[]);
+    run.exits(1)
+        .complains(&["scene_camera.json", "$.0.cam_K", "fx is 0", "above 0"]);
+}
+
+#[test]
+fn masks_of_a_detections_file_are_the_same_masks() {
+    let world = World::new();
+    let rows = world.rows();
+    let (run, reference) = world.refine(&rows, &["--no-time"]);
+    run.exits(0);
+    for compressed in [true, false] {
+        let mut detections = Vec::new();
+        for ((scene, image), truths) in &world.truths {
+            for (instance, (id, _)) in truths.iter().enumerate() {
+                let mask =
+                    hicp_io::read_mask_png(world.mask_path(*scene, *image, instance)).unwrap();
+                let rle = Rle::of_mask(&mask);
+                let counts = if compressed {
+                    json!(rle.to_compressed())
+                } else {
+                    json!(rle.counts())
+                };
+                detections.push(json!({
+                    "scene_id": scene, "image_id": image, "category_id": id, "score": 0.9,
+                    "bbox": [0, 0, 1, 1], "time": 0.1,
+                    "segmentation": {"size": [240, 320], "counts": counts},
+                }));
+            }
+        }
+        // One without a segmentation is of no use and no harm.
+        detections.push(json!({"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1}));
+        std::fs::write(
+            world.path("found.json"),
+            Value::from(detections.clone()).to_string(),
+        )
+        .unwrap();
+        let (run, refined) = world.refine(&rows, &["--no-time", "--detections", "found.json"]);
+        run.exits(0);
+        assert_eq!(refined, reference);
+
+        // Without ground truth too: that is what they are for.
+        for scene in [3, 12] {
+            let file = world.scene(scene).join("scene_gt.json");
+            let aside = file.with_extension("aside");
+            if file.is_file() {
+                std::fs::rename(file, aside).unwrap();
+            }
+        }
+        let (run, refined) = world.refine(&rows, &["--no-time", "--detections", "found.json"]);
+        run.exits(0);
+        assert_eq!(refined, reference);
+        let (run, _) = world.refine(&rows, &[]);
+        assert!(run.exits(0).out.contains("10  kept: no mask of the object"));
+        for scene in [3, 12] {
+            let file = world.scene(scene).join("scene_gt.json");
+            std::fs::rename(file.with_extension("aside"), file).unwrap();
+        }
+    }
+    std::fs::write(
+        world.path("found.json"),
+        r#"[{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": {"size": [240, 320], "counts": [7]}}]"#,
+    )
+    .unwrap();
+    world
+        .run(&["--detections", "found.json"])
+        .exits(1)
+        .complains(&[
+            "found.json",
+            "$[0].segmentation",
+            "cover 7 pixels",
+            "expected 76800",
+        ]);
+    std::fs::write(
+        world.path("found.json"),
+        r#"[{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": {"size": [1, 7], "counts": [0, 7]}}]"#,
+    )
+    .unwrap();
+    world
+        .run(&["--detections", "found.json"])
+        .exits(1)
+        .complains(&["7x1", "320x240", "--detections"]);
+}
+
+#[test]
+fn what_fails_before_the_refinement_touches_nothing() {
+    let world = World::new();
+    let rows = world.rows();
+    write_results(world.path("in.csv"), &rows).unwrap();
+    std::fs::write(world.path("out.csv"), "the user's").unwrap();
+    let fails = |options: &[&str], parts: &[&str]| {
+        let told = run(world.folder.path(), ["bop", "refine"].iter().chain(options)).exits(1);
+        let told = told.complains(parts);
+        assert_eq!(told.out, "");
+        assert_eq!(std::fs::read(world.path("out.csv")).unwrap(), b"the user's");
+    };
+    let dataset = ["--dataset", "."];
+    let results = ["--results", "in.csv"];
+    let output = ["--output", "out.csv"];
+    fails(
+        &[&["--dataset", "gone"], &results[..], &output].concat(),
+        &["dataset folder", "gone"],
+    );
+    fails(
+        &[&dataset, &results[..], &output, &["--split", "tset"]].concat(),
+        &["split is missing", "tset"],
+    );
+    fails(
+        &[&dataset, &["--results", "gone.csv"][..], &output].concat(),
+        &["cannot read gone.csv"],
+    );
+    fails(
+        &[&dataset, &results[..], &["--output", "no/out.csv"]].concat(),
+        &["cannot write no/out.csv", "folder no does not exist"],
+    );
+    fails(
+        &[
+            &dataset,
+            &results[..],
+            &output,
+            &["--detections", "out.csv"],
+        ]
+        .concat(),
+        &["--output", "--detections", "overwritten"],
+    );
+    for (from, to, parts) in [
+        ("scene_id,", "", &["in.csv", "line 1", "scene_id"][..]),
+        (
+            ",-1\n",
+            ",soon\n",
+            &["in.csv", "line 2", "\"time\"", "\"soon\"", "seconds"],
+        ),
+        (
+            "\n12,",
+            "\nx,",
+            &["in.csv", "\"scene_id\"", "\"x\"", "integer"],
+        ),
+    ] {
+        let text = std::fs::read_to_string(world.path("in.csv")).unwrap();
+        std::fs::write(world.path("bad.csv"), text.replacen(from, to, 1)).unwrap();
+        let parts: Vec<_> = parts
+            .iter()
+            .map(|part| part.replace("in.csv", "bad.csv"))
+            .collect();
+        let parts: Vec<_> = parts.iter().map(String::as_str).collect();
+        fails(
+            &[&dataset, &["--results", "bad.csv"][..], &output].concat(),
+            &parts,
+        );
+    }
+    let reflected = "scene_id,im_id,obj_id,score,R,t,time\n3,0,1,1,1 0 0 0 1 0 0 0 -1,0 0 500,-1\n";
+    std::fs::write(world.path("bad.csv"), reflected).unwrap();
+    fails(
+        &[&dataset, &["--results", "bad.csv"][..], &output].concat(),
+        &["bad.csv", "line 2", "\"R\"", "determinant -1"],
+    );
+}
+
+#[test]
+fn a_result_file_can_be_refined_in_place_and_may_be_empty() {
+    let world = World::new();
+    let rows = world.rows();
+    write_results(world.path("in.csv"), &rows).unwrap();
+    world.run(&["--output", "in.csv"]).exits(2);
+    let words = "bop refine --dataset . --results in.csv --output in.csv";
+    run(world.folder.path(), words.split(' ')).exits(0);
+    for (before, after) in rows
+        .iter()
+        .zip(&read_results(world.path("in.csv")).unwrap())
+    {
+        world.assert_refined(before, after);
+    }
+    let (run, refined) = world.refine(&[], &[]);
+    assert!(run.exits(0).out.contains("0 rows"));
+    assert!(refined.is_empty());
+}
+
+#[test]
+fn a_dataset_without_any_of_the_frames_is_an_error() {
+    let world = World::new();
+    let pose = world.rows()[0].camera_from_object();
+    let rows = [
+        ResultRow::new(3, 5, CAR, pose),
+        ResultRow::new(99, 0, CAR, pose),
+    ];
+    let (run, refined) = world.refine(&rows, &[]);
+    run.exits(1)
+        .complains(&["in.csv", "none of its frames", "--split"]);
+    assert!(rows.iter().zip(&refined).all(|(a, b)| same_pose(a, b)));
+}

@@ -1,0 +1,242 @@
+//! `hybrid-icp bop sequence` on generated scenes: fused poses near the truth, images without the object, and what is refused.
+
+use std::fs;
+use std::path::Path;
+
+use crate::common::*;
+use hicp_io::LengthUnit;
+use hicp_io::bop::{Dataset, Scene, read_results};
+use hybrid_icp::{Isometry3, se3};
+use serde_json::Value;
+
+const IMAGES: usize = 7;
+const SEQUENCE: &str = "bop sequence --dataset set --scene 1 --object 1 --output out.jsonl --init";
+const INITIAL: &str = "set/initial_synthetic-test.csv";
+
+/// Three cars on a table, seen along a path: which of them is meant, only the pose says.
+fn cars() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("meshes")).unwrap();
+    let mesh = folder.path().join("meshes/car.ply");
+    hicp_io::write_ply(mesh, &car(), LengthUnit::Meters).unwrap();
+    let words = "bop generate --objects meshes --scenes 1 --images 7 --instances 3 --seed 5 --trajectory --out set";
+    run(folder.path(), words.split(' ')).exits(0);
+    folder
+}
+
+#[track_caller]
+fn sequence(folder: &Path, init: &str, options: &str) -> Run {
+    let words = format!("{SEQUENCE} {init} {options}");
+    run(folder, words.split_whitespace())
+}
+
+fn lines(folder: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(folder.join("out.jsonl")).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+fn scene(folder: &Path) -> Scene {
+    let dataset = Dataset::open(folder.join("set")).unwrap();
+    dataset.scene("test", 1).unwrap()
+}
+
+/// The instance whose perturbed pose comes first, and its true poses by image.
+fn followed(folder: &Path) -> (usize, Vec<Isometry3<f64>>) {
+    let init = read_results(folder.join(INITIAL)).unwrap()[0].camera_from_object();
+    let scene = scene(folder);
+    let near = |pose: &Isometry3<f64>| (pose.translation.vector - init.translation.vector).norm();
+    let truths = scene.ground_truth(0).unwrap();
+    let (instance, _) = (0..)
+        .zip(truths)
+        .min_by(|(_, a), (_, b)| {
+            near(&a.camera_from_object).total_cmp(&near(&b.camera_from_object))
+        })
+        .unwrap();
+    let of_image = |im_id| scene.ground_truth(im_id).unwrap()[instance].camera_from_object;
+    (instance, (0..7).map(of_image).collect())
+}
+
+fn off(pose: &Isometry3<f64>, truth: &Isometry3<f64>) -> (f64, f64) {
+    se3::pose_distance(pose, truth)
+}
+
+#[test]
+fn one_of_three_alike_is_followed() {
+    let folder = cars();
+    let folder = folder.path();
+    let (instance, truths) = followed(folder);
+    // The camera does move, and all of its poses belong together.
+    assert!(off(&truths[0], &truths[6]).1 > 0.05);
+    for fuser in ["weighted-average", "filtering --uncertainty mve"] {
+        let options = format!("--results fused.csv --fuser {fuser}");
+        let told = sequence(folder, INITIAL, &options).exits(0);
+        assert_eq!(told.err, "");
+        assert!(
+            told.out.contains("7 images of scene 1") && told.out.contains("mm fused"),
+            "{}",
+            told.out
+        );
+        let lines = lines(folder);
+        assert_eq!(lines.len(), IMAGES);
+        let fused = read_results(folder.join("fused.csv")).unwrap();
+        for (im_id, (line, truth)) in lines.iter().zip(&truths).enumerate() {
+            assert_eq!(
+                (&line["im_id"], &line["obj_id"]),
+                (&im_id.into(), &1.into())
+            );
+            assert_eq!(line["instance"], instance, "{line}");
+            assert!(line["single"]["mve"].as_f64().unwrap() < 0.4, "{line}");
+            assert_eq!(line["covariance"].as_array().unwrap().len(), 36);
+            pose_of(&line["single"]);
+            assert!(
+                (fused[im_id].translation_mm()[2] - line["cam_t_m2c"][2].as_f64().unwrap()).abs()
+                    < 1e-6
+            );
+            let (angle, distance) = off(&pose_of(line), truth);
+            assert!(
+                angle < 0.08 && distance < 0.004,
+                "{im_id}: {angle} rad, {distance} m"
+            );
+        }
+        assert_eq!(lines[6]["outcome"], "accepted");
+        assert_improved(&pose_of(&lines[6]), &truths[6]);
+    }
+}
+
+/// A dataset in the wrong unit is followed as well as can be, but not without a word.
+#[test]
+fn scales_and_sizes_that_cannot_be_are_told() {
+    let folder = cars();
+    let folder = folder.path();
+    let cameras = folder.join("set/test/000001/scene_camera.json");
+    let text = fs::read_to_string(&cameras).unwrap();
+    let scaled = |factor: f64| {
+        let mut value: Value = serde_json::from_str(&text).unwrap();
+        for camera in value.as_object_mut().unwrap().values_mut() {
+            let scale = camera["depth_scale"].as_f64().unwrap();
+            camera["depth_scale"] = (factor * scale).into();
+        }
+        fs::write(&cameras, value.to_string()).unwrap();
+        sequence(folder, INITIAL, "").exits(0)
+    };
+    let none =
+        "warning: out.jsonl: none of its 7 images was accepted: its poses are not to be trusted\n";
+    assert_eq!(scaled(2.0).err, none);
+    let told = scaled(10.0).err;
+    let begin = "warning: object 1 in image 0 of scene 1: the median depth inside the mask is ";
+    assert!(told.starts_with(begin) && told.ends_with(none), "{told}");
+    assert!(
+        told.contains(
+            ": check depth_scale in scene_camera.json, and that --init states millimetres\n"
+        ),
+        "{told}"
+    );
+    assert_eq!(told.lines().count(), 2, "{told}");
+
+    fs::write(&cameras, &text).unwrap();
+    let info = folder.join("set/models/models_info.json");
+    let mut value: Value = serde_json::from_str(&fs::read_to_string(&info).unwrap()).unwrap();
+    let diameter = value["1"]["diameter"].as_f64().unwrap();
+    value["1"]["diameter"] = (1e3 * diameter).into();
+    fs::write(&info, value.to_string()).unwrap();
+    let told = sequence(folder, INITIAL, "").exits(0).err;
+    let first = told.lines().next().unwrap();
+    assert!(
+        first.contains("models_info.json: object 1: the stated diameter is "),
+        "{told}"
+    );
+    assert!(!told.contains("is in mm"), "{told}");
+}
+
+#[test]
+fn images_without_the_object_move_the_pose_with_the_camera() {
+    let folder = cars();
+    let folder = folder.path();
+    let (_, truths) = followed(folder);
+    let scene_dir = folder.join("set/test/000001");
+    // No masks in image 2, no depth in image 4.
+    for instance in 0..3 {
+        fs::remove_file(scene(folder).visible_mask_path(2, instance)).unwrap();
+    }
+    fs::remove_file(scene_dir.join("depth/000004.png")).unwrap();
+    let told = sequence(folder, INITIAL, "").exits(0);
+    for part in [
+        "1  moved with the camera: no mask of the object",
+        "no depth image",
+    ] {
+        assert!(told.out.contains(part), "{}", told.out);
+    }
+    let fused = lines(folder);
+    for (im_id, reason) in [(2, "mask"), (4, "depth")] {
+        let (before, line) = (&fused[im_id - 1], &fused[im_id]);
+        assert_eq!(
+            (&line["outcome"], &line["single"]),
+            (&"moved".into(), &Value::Null)
+        );
+        assert!(line["reason"].as_str().unwrap().contains(reason));
+        // As the true pose moves.
+        let motion = truths[im_id] * truths[im_id - 1].inverse();
+        let (angle, distance) = off(&pose_of(line), &(motion * pose_of(before)));
+        assert!(angle < 1e-9 && distance < 1e-9, "{angle} rad, {distance} m");
+    }
+    assert_improved(&pose_of(&fused[6]), &truths[6]);
+
+    // A damaged image costs its estimate, is told, and all the others are written.
+    fs::write(scene_dir.join("depth/000005.png"), "no image").unwrap();
+    sequence(folder, INITIAL, "")
+        .exits(1)
+        .complains(&["000005.png", "1 files could not be used"]);
+    let damaged = lines(folder);
+    assert_eq!(
+        (damaged.len(), &damaged[5]["outcome"]),
+        (IMAGES, &"moved".into())
+    );
+    assert_eq!(damaged[3], fused[3]);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let folder = cars();
+    let folder = folder.path();
+    let refused = |init: &str, options: &str, parts: &[&str]| {
+        sequence(folder, init, options).exits(1).complains(parts);
+        assert!(!folder.join("out.jsonl").exists());
+    };
+    refused(INITIAL, "--first 99", &["--first 99", "scene_camera.json"]);
+    refused("none.json", "", &["none.json"]);
+    let words = SEQUENCE.replace("--object 1", "--object 8");
+    let other = run(folder, words.split(' ').chain([INITIAL]));
+    other
+        .exits(1)
+        .complains(&["--object 8", "scene_gt.json: 1"]);
+    fs::write(
+        folder.join("other.csv"),
+        "scene_id,im_id,obj_id,score,R,t,time\n",
+    )
+    .unwrap();
+    refused(
+        "other.csv",
+        "",
+        &["other.csv", "scene 1, image 0, object 1", "--first"],
+    );
+    sequence(folder, INITIAL, "--fuser best")
+        .exits(2)
+        .complains(&["best", "most-confident"]);
+
+    let cameras = folder.join("set/test/000001/scene_camera.json");
+    let text = fs::read_to_string(&cameras).unwrap();
+    let mut value: Value = serde_json::from_str(&text).unwrap();
+    value["3"].as_object_mut().unwrap().remove("cam_t_w2c");
+    fs::write(&cameras, value.to_string()).unwrap();
+    refused(INITIAL, "", &["scene_camera.json", "$.3", "cam_t_w2c"]);
+    value["3"].as_object_mut().unwrap().remove("cam_R_w2c");
+    fs::write(&cameras, value.to_string()).unwrap();
+    refused(INITIAL, "", &["scene_camera.json", "$.3", "cam_R_w2c"]);
+    // Begun behind it, it does not matter.
+    let pose = pose_json(&followed(folder).1[4]);
+    fs::write(folder.join("init.json"), pose.to_string()).unwrap();
+    sequence(folder, "init.json", "--first 4").exits(0);
+    assert_eq!(lines(folder).len(), 3);
+}

@@ -1,0 +1,311 @@
+//! `hybrid-icp bop show` on a small dataset made here.
+
+use std::collections::BTreeMap;
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::bop::{ResultRow, Rle, write_results};
+use hybrid_icp::Isometry3;
+use serde_json::{Value, json};
+
+const AFTER: [u8; 3] = [86, 180, 233];
+const BEFORE: [u8; 3] = [230, 159, 0];
+/// The image with two cars and a hammer.
+const FRAME: (u32, u32) = (3, 40);
+
+/// A dataset with two result files: the truth, and poses off by 3 mm and 5 degrees.
+fn dataset() -> World {
+    let world = World::new();
+    write_results(world.path("off.csv"), &world.rows()).unwrap();
+    let mut truth = Vec::new();
+    for ((scene, image), truths) in &world.truths {
+        for (id, pose) in truths {
+            truth.push(ResultRow::new(*scene, *image, *id, *pose));
+        }
+    }
+    write_results(world.path("truth.csv"), &truth).unwrap();
+    world
+}
+
+#[track_caller]
+fn show(world: &World, options: &str) -> Run {
+    let fixed = "bop show --dataset . --scene 3 --image 40 --out show.png";
+    run(
+        world.folder.path(),
+        fixed.split(' ').chain(options.split(' ')),
+    )
+}
+
+/// The printed cells by the object's tag.
+fn cells(told: &Run) -> BTreeMap<String, Vec<String>> {
+    let lines = told.out.lines().skip(2);
+    let lines = lines.take_while(|line| line.starts_with(' '));
+    let words =
+        |line: &str| -> Vec<String> { line.split_whitespace().map(str::to_owned).collect() };
+    lines
+        .map(words)
+        .map(|w| (w[0].clone(), w[1..].to_vec()))
+        .collect()
+}
+
+/// Width, height and colours of the picture.
+fn picture(world: &World) -> (u32, u32, Vec<[u8; 3]>) {
+    let (width, height, rgb) = hicp_io::read_rgb_png(world.path("show.png")).unwrap();
+    let pixels = rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
+    (width, height, pixels.collect())
+}
+
+fn count(pixels: &[[u8; 3]], color: [u8; 3]) -> usize {
+    pixels.iter().filter(|pixel| **pixel == color).count()
+}
+
+#[test]
+fn outlines_of_both_files_and_what_eval_says_of_them() {
+    let world = dataset();
+    let told = show(&world, "--results truth.csv --against off.csv").exits(0);
+    assert_eq!(told.err, "");
+    assert!(told.out.contains("truth.csv") && told.out.ends_with("show.png\n"));
+    let found = cells(&told);
+    let tags: Vec<&str> = found.keys().map(String::as_str).collect();
+    assert_eq!(tags, ["1a", "1b", "2"]);
+    for cells in found.values() {
+        let [score, mve, adi, vsd] = [0, 1, 2, 3].map(|i| cells[i].as_str());
+        assert_eq!((score, adi, vsd), ("1.000", "0.00", "0.000"));
+        assert!(mve.parse::<f64>().unwrap() < 0.02, "{mve}");
+        // Paired with the estimate that is off a little, not with that of the other car.
+        let adi: f64 = cells[6].parse().unwrap();
+        assert!(adi > 0.5 && adi < 6.0, "{adi}");
+        assert!(cells[5].parse::<f64>().unwrap() > mve.parse().unwrap());
+    }
+
+    // The errors are those of bop eval.
+    let words = "bop eval --dataset . --results off.csv --errors errors.csv";
+    run(world.folder.path(), words.split(' ')).exits(0);
+    let errors = std::fs::read_to_string(world.path("errors.csv")).unwrap();
+    let mut expected: Vec<(String, String)> = Vec::new();
+    let mut least: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for line in errors.lines().skip(1) {
+        let numbers: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
+        if (numbers[0], numbers[1]) == (f64::from(FRAME.0), f64::from(FRAME.1)) {
+            let best = least
+                .entry(numbers[3] as u64)
+                .or_insert_with(|| numbers.clone());
+            if numbers[19] < best[19] {
+                *best = numbers;
+            }
+        }
+    }
+    for numbers in least.values() {
+        let vsd = numbers[6..16].iter().sum::<f64>() / 10.0;
+        expected.push((format!("{:.2}", numbers[19]), format!("{vsd:.3}")));
+    }
+    let mut shown: Vec<_> = found
+        .values()
+        .map(|cells| (cells[6].clone(), cells[7].clone()))
+        .collect();
+    expected.sort();
+    shown.sort();
+    assert_eq!(shown, expected);
+
+    let (width, height, pixels) = picture(&world);
+    assert_eq!(width, 640);
+    assert!(height > 240 + 3 * 19, "{height}");
+    let image = &pixels[..640 * 240];
+    assert!(count(image, AFTER) > 300 && count(image, BEFORE) > 100);
+    // A solid and a dashed line in the legend.
+    let legend = &pixels[640 * 240..];
+    assert!(count(legend, AFTER) > count(legend, BEFORE) && count(legend, BEFORE) > 20);
+
+    let bytes = std::fs::read(world.path("show.png")).unwrap();
+    show(&world, "--results truth.csv --against off.csv").exits(0);
+    assert_eq!(std::fs::read(world.path("show.png")).unwrap(), bytes);
+
+    // Alone, there is one colour.
+    show(&world, "--results truth.csv").exits(0);
+    let (_, _, pixels) = picture(&world);
+    assert!(count(&pixels, AFTER) > 300);
+    assert_eq!(count(&pixels, BEFORE), 0);
+}
+
+#[test]
+fn the_colour_image_is_the_ground_where_it_can_be_read() {
+    let world = dataset();
+    let folder = world.scene(3).join("rgb");
+    std::fs::create_dir(&folder).unwrap();
+    let path = folder.join("000040.png");
+    let green = [20, 120, 40];
+    hicp_io::write_rgb_png(&path, 320, 240, &green.repeat(320 * 240)).unwrap();
+    show(&world, "--results off.csv").exits(0);
+    let (width, height, pixels) = picture(&world);
+    // In the middle of the width, and nothing but the outlines hides it: the legend is below.
+    let is_image = |index: usize| (160..480).contains(&(index % 640)) && index / 640 < 240;
+    let (mut of_image, mut changed) = (0, 0);
+    for (index, pixel) in pixels.iter().enumerate() {
+        of_image += usize::from(is_image(index) && *pixel == green);
+        changed += usize::from(!is_image(index) && *pixel == green);
+    }
+    assert!(of_image > 320 * 240 * 9 / 10, "{of_image}");
+    assert_eq!((width, changed), (640, 0));
+    assert!(height < 240 + 8 * 20, "{height}");
+
+    show(&world, "--results off.csv --depth").exits(0);
+    assert_eq!(count(&picture(&world).2, green), 0);
+
+    hicp_io::write_rgb_png(&path, 4, 3, &green.repeat(12)).unwrap();
+    show(&world, "--results off.csv")
+        .exits(1)
+        .complains(&["rgb/000040.png is 4x3 pixels, expected 320x240 as the depth image"]);
+    std::fs::write(&path, "no picture").unwrap();
+    show(&world, "--results off.csv")
+        .exits(1)
+        .complains(&["rgb/000040.png"]);
+    std::fs::rename(&path, folder.join("000040.jpg")).unwrap();
+    let told = show(&world, "--results off.csv").exits(0);
+    told.complains(&["warning: ", "rgb/000040.jpg is no PNG file", "depth"]);
+    assert_eq!(count(&picture(&world).2, green), 0);
+}
+
+#[test]
+fn without_ground_truth_there_is_the_mve_of_detections() {
+    let world = dataset();
+    let mut detections = Vec::new();
+    for (instance, (id, _)) in world.truths[&FRAME].iter().enumerate() {
+        let mask = hicp_io::read_mask_png(world.mask_path(FRAME.0, FRAME.1, instance)).unwrap();
+        detections.push(json!({
+            "scene_id": FRAME.0, "image_id": FRAME.1, "category_id": id, "score": 0.9,
+            "segmentation": {"size": [240, 320], "counts": Rle::of_mask(&mask).counts()},
+        }));
+    }
+    std::fs::write(
+        world.path("found.json"),
+        Value::from(detections).to_string(),
+    )
+    .unwrap();
+    let known = cells(&show(&world, "--results off.csv --top 2").exits(0));
+    std::fs::remove_file(world.scene(3).join("scene_gt.json")).unwrap();
+    let told = show(&world, "--results off.csv").exits(0);
+    // One of each object, as nothing says that there are two cars.
+    let told = told.complains(&["warning: off.csv: 1 estimates", "--top"]);
+    for cells in cells(&told).values() {
+        assert_eq!(cells[1..], ["–"; 3]);
+    }
+    let told = show(&world, "--results off.csv --top 2 --detections found.json").exits(0);
+    assert_eq!(told.err, "");
+    for (tag, cells) in cells(&told) {
+        assert_eq!(
+            (&cells[1], &cells[2..]),
+            (&known[&tag][1], &["–"; 2].map(String::from)[..])
+        );
+    }
+}
+
+#[test]
+fn what_has_no_estimate_is_told() {
+    let world = dataset();
+    let rows = world.rows();
+    let of_hammer = |row: &ResultRow| row.obj_id == HAMMER && (row.scene_id, row.im_id) == FRAME;
+    let mut hammer: Vec<_> = rows.into_iter().filter(of_hammer).collect();
+    let pose = hammer[0].camera_from_object();
+    hammer.push(ResultRow::new(3, 40, ABSENT, pose));
+    // Beside its mask: no MVE, and the errors of a pose that is far away.
+    let aside = Isometry3::translation(0.3, 0.0, 0.0) * pose;
+    hammer[0].set_camera_from_object(aside);
+    write_results(world.path("in.csv"), &hammer).unwrap();
+    let told = show(&world, "--results in.csv").exits(0);
+    let told = told.complains(&["warning: the dataset has no model of object 9"]);
+    let found = cells(&told);
+    let dashes = ["–"; 4].map(String::from);
+    assert_eq!(
+        (&found["1a"][..], &found["1b"][..]),
+        (&dashes[..], &dashes[..])
+    );
+    let adi: f64 = found["2"][2].parse().unwrap();
+    assert!(
+        adi > 100.0 && found["2"][1] == "–" && found["2"][3] == "1.000",
+        "{found:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused() {
+    let world = dataset();
+    let fails = |options: &str, parts: &[&str]| {
+        let told = show(&world, options).exits(1).complains(parts);
+        assert_eq!(told.out, "");
+        assert!(!world.path("show.png").exists());
+    };
+    let pose = world.rows()[0].camera_from_object();
+    let write = |row: ResultRow| write_results(world.path("in.csv"), &[row]).unwrap();
+    write(ResultRow::new(3, 0, CAR, pose));
+    fails(
+        "--results in.csv",
+        &[
+            "in.csv has no row of image 40 of scene 3",
+            "of scene 3 it has image 0",
+        ],
+    );
+    fails(
+        "--results off.csv --against in.csv",
+        &["in.csv has no row of image 40 of scene 3"],
+    );
+    write(ResultRow::new(3, 40, ABSENT, pose));
+    fails("--results in.csv", &["nothing to show", "no model"]);
+    fails("--results gone.csv", &["cannot read gone.csv"]);
+    fails(
+        "--results off.csv --split tset",
+        &["split is missing", "tset"],
+    );
+    std::fs::write(world.path("found.json"), "[7]").unwrap();
+    fails(
+        "--results off.csv --detections found.json",
+        &["found.json, $[0]"],
+    );
+    let depth = world.depth_path(3, 40);
+    let whole = std::fs::read(&depth).unwrap();
+    std::fs::remove_file(&depth).unwrap();
+    fails(
+        "--results off.csv",
+        &["000003/depth/000040.png does not exist"],
+    );
+    std::fs::write(&depth, &whole[..whole.len() / 3]).unwrap();
+    fails("--results off.csv", &["000003/depth/000040.png"]);
+    std::fs::write(&depth, whole).unwrap();
+
+    let named = |words: &str, code: i32, parts: &[&str]| {
+        let words = format!("bop show --dataset . --results off.csv {words}");
+        run(world.folder.path(), words.split(' '))
+            .exits(code)
+            .complains(parts);
+    };
+    named(
+        "--scene 9 --image 40 --out a.png",
+        1,
+        &["no row of image 40 of scene 9"],
+    );
+    named(
+        "--scene 3 --image 40 --out off.csv",
+        1,
+        &["--out and --results", "overwritten"],
+    );
+    named(
+        "--scene 3 --image 40 --out no/a.png",
+        1,
+        &["folder no does not exist"],
+    );
+    named("--scene 3 --image -1 --out a.png", 2, &["--image"]);
+    named(
+        "--scene 3 --image 40 --out a.png --top 0",
+        2,
+        &["--top", "1.."],
+    );
+
+    // A damaged mask costs its MVE only.
+    let mask = world.mask_path(3, 40, 1);
+    let whole = std::fs::read(&mask).unwrap();
+    std::fs::write(&mask, &whole[..whole.len() / 3]).unwrap();
+    let told = show(&world, "--results truth.csv").exits(1);
+    let told = told.complains(&["mask_visib/000040_000001.png", "1 files could not be used"]);
+    let found = cells(&told);
+    assert_eq!(found["2"][1..], ["–", "0.00", "0.000"]);
+    assert!(found["1a"][1] != "–" && world.path("show.png").exists());
+}

@@ -1,0 +1,305 @@
+//! `hybrid-icp bop refine` on datasets in the wrong unit: it refines what it can, and says once per object what looks wrong;
+//! and where its poses are not to be trusted.
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::LengthUnit;
+use hicp_io::bop::{read_results, write_results};
+use hybrid_icp::{DepthImage, Isometry3, Point3, TriMesh};
+use serde_json::json;
+
+/// What the cameras state of the depth.
+const SCALE: &str = "\"depth_scale\":0.1";
+
+/// Lines of warnings.
+fn warnings(run: &Run) -> Vec<&str> {
+    run.err
+        .lines()
+        .filter(|l| l.starts_with("warning: "))
+        .collect()
+}
+
+/// Those of them that are not about the poses in the output.
+fn about_inputs(run: &Run) -> Vec<&str> {
+    let of_output = |line: &&str| line.starts_with("warning: out.csv: ");
+    warnings(run)
+        .into_iter()
+        .filter(|line| !of_output(line))
+        .collect()
+}
+
+/// The fields of the lines that `--rows rows.csv` wrote.
+fn lines_of(world: &World) -> Vec<Vec<String>> {
+    let mut lines = csv::Reader::from_path(world.path("rows.csv")).unwrap();
+    let header = "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings";
+    assert!(lines.headers().unwrap().iter().eq(header.split(',')));
+    let records = lines.records().map(Result::unwrap);
+    records
+        .map(|line| line.iter().map(str::to_owned).collect())
+        .collect()
+}
+
+/// Changes what the cameras of some scenes state.
+fn in_cameras(world: &World, scenes: &[u32], from: &str, to: &str) {
+    for &scene in scenes {
+        let path = world.scene(scene).join("scene_camera.json");
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{text}");
+        std::fs::write(path, text.replace(from, to)).unwrap();
+    }
+}
+
+#[test]
+fn nothing_is_said_of_a_dataset_that_is_right() {
+    let world = World::new();
+    let (run, _) = world.refine(&world.rows(), &[]);
+    assert_eq!(run.exits(0).err, "");
+}
+
+#[test]
+fn depth_at_ten_times_its_scale_is_told_once_per_object() {
+    let world = World::new();
+    in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":1.0");
+    let (run, _) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    let told = about_inputs(&run);
+    assert_eq!(told.len(), 2, "{}", run.err);
+    for (line, (object, images)) in told.iter().zip([(CAR, 4), (HAMMER, 2)]) {
+        let begin = format!("warning: object {object}: the median depth inside the mask is ");
+        assert!(line.starts_with(&begin), "{line}");
+        let end = format!(
+            " ({images} of {images} images of scenes 3, 12): check depth_scale in scene_camera.json, and that --results states millimetres"
+        );
+        assert!(line.ends_with(&end), "{line}");
+    }
+}
+
+/// Every scene has its own files: one of many must not be outvoted.
+#[test]
+fn depth_of_one_scene_at_ten_times_its_scale_is_told() {
+    let world = World::new();
+    in_cameras(&world, &[3], SCALE, "\"depth_scale\":1.0");
+    let (run, _) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    let told = about_inputs(&run);
+    assert_eq!(told.len(), 2, "{}", run.err);
+    for (line, (object, images)) in told.iter().zip([(CAR, 2), (HAMMER, 1)]) {
+        let begin = format!("warning: object {object}: the median depth inside the mask is ");
+        let of_scene = format!(" ({images} of {images} images of scene 3): check depth_scale");
+        assert!(
+            line.starts_with(&begin) && line.contains(&of_scene),
+            "{line}"
+        );
+    }
+}
+
+/// Twice the scale is within what a rough pose may be off, so that only the scores tell.
+#[test]
+fn poses_that_do_not_explain_their_image_are_counted_and_told_once() {
+    let world = World::new();
+    in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":0.2");
+    let rows = world.rows();
+    write_results(world.path("in.csv"), &rows).unwrap();
+    let ranked = world.run(&["--rescore", "mve"]).exits(0);
+    let scored = read_results(world.path("out.csv")).unwrap();
+    let bad = scored.iter().filter(|row| row.score <= 0.6).count();
+    assert!(bad > rows.len() / 2, "{bad}");
+    let counted = format!("{bad:>7}  with an MVE of 0.4 or more: not to be trusted");
+    assert!(ranked.out.contains(&counted), "{}", ranked.out);
+    let told = format!(
+        "warning: out.csv: {bad} of {} rows have an MVE of 0.4 or more after refinement: they are not to be trusted",
+        rows.len()
+    );
+    let about_scores = |run: &Run| -> Vec<String> {
+        let lines = warnings(run)
+            .into_iter()
+            .filter(|line| line.contains("MVE of"));
+        lines.map(str::to_owned).collect()
+    };
+    assert_eq!(
+        about_scores(&ranked),
+        [format!("{told} (--rows tells which)")]
+    );
+    let kept = world.run(&["--rows", "rows.csv"]).exits(0);
+    assert_eq!(
+        about_scores(&kept),
+        [format!("{told} (rows.csv tells which)")]
+    );
+    // A line per row of the output, in its order, with the numbers that the run ends with.
+    let lines = lines_of(&world);
+    assert_eq!(lines.len(), rows.len());
+    for ((number, row), line) in (0..).zip(&scored).zip(&lines) {
+        let ids = [row.scene_id, row.im_id, row.obj_id, number].map(|id| id.to_string());
+        assert_eq!(line[..4], ids);
+        let mve: f64 = line[6].parse().unwrap();
+        assert_eq!(1.0 - mve, row.score);
+        assert_eq!(
+            line[7].contains("the pose does not explain the image"),
+            mve >= 0.4,
+            "{line:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_found_where_the_initial_pose_explained_nothing_is_told() {
+    let world = World::new();
+    let mut rows = world.rows();
+    // A car seen in its mask, but 15 cm behind what was measured there: no pixel agrees, and the search finds the car.
+    let row = rows.iter_mut().find(|row| row.obj_id == CAR).unwrap();
+    let mut pose = row.camera_from_object();
+    pose.translation.vector *= 1.3;
+    row.set_camera_from_object(pose);
+    let (run, _) = world.refine(&rows, &["--rows", "rows.csv"]);
+    assert_eq!(
+        warnings(&run.exits(0)),
+        [
+            "warning: out.csv: in 1 of 10 rows the initial pose explained nothing of the mask (MVE 0.9 or more): what was found there may be another object (rows.csv tells which)"
+        ]
+    );
+    for line in lines_of(&world) {
+        let before: f64 = line[5].parse().unwrap();
+        let doubted = line[7].starts_with("the initial pose explained nothing of the mask (MVE ");
+        assert_eq!(doubted, before >= 0.9, "{line:?}");
+        assert_eq!(line[7].is_empty(), !doubted, "{line:?}");
+        assert_eq!(line[4], "refined");
+    }
+}
+
+#[test]
+fn what_is_found_on_a_wall_is_told() {
+    let world = World::new();
+    // Cars and a hammer were seen there, and what the camera measures is the wall that they stood before.
+    let (width, height) = (camera().width(), camera().height());
+    let wall = vec![0.5; (width * height) as usize];
+    let wall = DepthImage::from_meters(width, height, wall).unwrap();
+    hicp_io::write_depth_png(world.depth_path(3, 40), &wall, 0.1).unwrap();
+    let (run, _) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    assert!(
+        warnings(&run).contains(
+            &"warning: out.csv: in 1 of 10 rows the surface inside the mask is flat, and that of the model at the pose is not: what was found there may be another object (--rows tells which)"
+        ),
+        "{}",
+        run.err
+    );
+}
+
+/// The diameters of the models, millimetres, that of the car times a factor.
+fn state_diameters(world: &World, factor: f64) {
+    let info = json!({
+        "1": {"diameter": factor * world.diameter_mm(CAR)},
+        "2": {"diameter": world.diameter_mm(HAMMER)},
+    });
+    std::fs::write(world.path("models/models_info.json"), info.to_string()).unwrap();
+}
+
+#[test]
+fn a_stated_diameter_that_is_not_the_meshs_is_told_once() {
+    let world = World::new();
+    let told = |factor: f64| -> Vec<String> {
+        state_diameters(&world, factor);
+        let (run, _) = world.refine(&world.rows(), &[]);
+        let run = run.exits(0);
+        about_inputs(&run).iter().map(|l| (*l).to_owned()).collect()
+    };
+    for near in [1.0, 0.96, 1.04] {
+        assert_eq!(told(near), [""; 0]);
+    }
+    // Not the unit of the mesh is to blame for a diameter of more than a hundred metres.
+    for far in [1.0 / 3.0, 1.06, 10.0, 1000.0] {
+        let lines = told(far);
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        let begin = "models_info.json: object 1: the stated diameter is ";
+        assert!(lines[0].contains(begin), "{lines:?}");
+        assert!(
+            lines[0].contains(" m, but that of the mesh is 0.1"),
+            "{lines:?}"
+        );
+    }
+}
+
+#[test]
+fn depth_that_counts_as_missing_is_told_once_per_object() {
+    let world = World::new();
+    in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":1e9");
+    let (run, rows) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    let told = about_inputs(&run);
+    assert_eq!(told.len(), 2, "{}", run.err);
+    assert!(
+        told.iter()
+            .all(|line| line.contains("no depth inside the mask"))
+    );
+    assert!(rows.iter().zip(world.rows()).all(|(a, b)| same_pose(a, &b)));
+}
+
+#[test]
+fn a_model_in_metres_is_told_before_a_pose_depends_on_it() {
+    let world = World::new();
+    let path = world.path("models/obj_000001.ply");
+    hicp_io::write_ply(&path, &car(), LengthUnit::Meters).unwrap();
+    let (run, _) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    let told = about_inputs(&run);
+    let about_model = told
+        .iter()
+        .filter(|line| line.contains("the model's diameter is"));
+    assert_eq!(about_model.count(), 1, "{}", run.err);
+    assert!(
+        told[0].starts_with("warning: object 1: the model's diameter is "),
+        "{}",
+        run.err
+    );
+    assert!(told[0].contains("models is in mm"), "{}", run.err);
+    assert!(
+        told.iter().all(|line| !line.contains("object 2")),
+        "{}",
+        run.err
+    );
+}
+
+#[test]
+fn a_model_of_a_tenth_of_its_size_is_told_by_the_masks() {
+    let world = World::new();
+    let small = car();
+    let vertices = small
+        .vertices()
+        .iter()
+        .map(|p| Point3::from(p.coords * 0.1));
+    let small = TriMesh::new(vertices.collect(), small.triangles().to_vec()).unwrap();
+    let path = world.path("models/obj_000001.ply");
+    hicp_io::write_ply(&path, &small, LengthUnit::Millimeters).unwrap();
+    let (run, _) = world.refine(&world.rows(), &[]);
+    let run = run.exits(0);
+    let told = about_inputs(&run);
+    assert_eq!(told.len(), 1, "{}", run.err);
+    assert!(
+        told[0].starts_with("warning: object 1: the mask has "),
+        "{}",
+        run.err
+    );
+    assert!(
+        told[0].contains("check that models are in mm"),
+        "{}",
+        run.err
+    );
+}
+
+#[test]
+fn poses_that_are_far_off_in_a_few_images_are_no_matter_of_units() {
+    let world = World::new();
+    let mut rows = world.rows();
+    // One image of four: its cars four times as far, on the same line of sight.
+    for row in rows
+        .iter_mut()
+        .filter(|row| (row.scene_id, row.im_id) == (3, 0))
+    {
+        let mut pose: Isometry3<f64> = row.camera_from_object();
+        pose.translation.vector *= 4.0;
+        row.set_camera_from_object(pose);
+    }
+    write_results(world.path("in.csv"), &rows).unwrap();
+    let run = world.run(&[]).exits(0);
+    assert!(!run.err.contains("median depth"), "{}", run.err);
+}

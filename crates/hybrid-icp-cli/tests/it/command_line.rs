@@ -1,0 +1,201 @@
+//! Help, usage errors and closed pipes.
+
+use std::io::Read;
+use std::process::Stdio;
+
+use crate::common::{Scene, program, run};
+
+#[test]
+fn help_teaches_within_80_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    for (command, taught) in [
+        (
+            "--help",
+            &["Examples:", "Exit codes", "demo", "bop refine", "0.4"][..],
+        ),
+        (
+            "demo --help",
+            &["demo.png", "6.2 mm", "9.5", "--seed", "--noise"],
+        ),
+        (
+            "refine --help",
+            &[
+                "Example:",
+                "cam_R_m2c",
+                "MM_PER_UNIT",
+                "kept_initial",
+                "OBJ, OFF, PLY or STL",
+                "m, mm or cm",
+                "cam_K",
+            ],
+        ),
+        ("bop --help", &["refine"]),
+        (
+            "bop refine --help",
+            &[
+                "Example:",
+                "mask_visib",
+                "--detections",
+                "--threads",
+                "--no-time",
+                "Exit codes",
+            ],
+        ),
+        ("bop show --help", &["Example:", "--against"]),
+        ("bop sequence --help", &["Example:", "--fuser"]),
+        ("inspect --help", &["--unit", "--json"]),
+        ("pipelines --help", &["Usage"]),
+    ] {
+        let help = run(folder.path(), command.split(' ')).exits(0).out;
+        for word in taught {
+            assert!(help.contains(word), "no {word:?} in {command}");
+        }
+        for line in help.lines() {
+            assert!(line.chars().count() <= 80, "{command}: {line}");
+        }
+    }
+}
+
+#[test]
+fn wrong_command_lines_are_usage_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    for (command, parts) in [
+        ("", &["Usage"][..]),
+        ("bop", &["Usage"]),
+        ("refien", &["refien", "refine"]),
+        (
+            "demo --pipeline hybird",
+            &[
+                "--pipeline",
+                "\"hybird\"",
+                "did you mean \"hybrid\"",
+                "nn-cascade-plane-point",
+            ],
+        ),
+        (
+            "refine --pipeline nn-point-to-plan",
+            &["did you mean \"nn-point-to-plane\""],
+        ),
+        ("bop refine --pipeline x", &["--pipeline", "hybrid"]),
+        (
+            "refine",
+            &[
+                "--model",
+                "--model-unit",
+                "--depth",
+                "--mask",
+                "--camera",
+                "--init",
+            ],
+        ),
+        (
+            "refine --model-unit inch",
+            &["--model-unit", "inch", "m, mm or cm"],
+        ),
+        (
+            "refine --depth-scale 0",
+            &["--depth-scale", "'0'", "above 0"],
+        ),
+        (
+            "refine --depth-scale -0.1",
+            &["--depth-scale", "'-0.1'", "above 0"],
+        ),
+        (
+            "refine --depth-scale NaN",
+            &["--depth-scale", "'NaN'", "above 0"],
+        ),
+        (
+            "refine --depth-scale inf",
+            &["--depth-scale", "'inf'", "finite"],
+        ),
+        (
+            "refine --depth-scale 1mm",
+            &["--depth-scale", "'1mm'", "number"],
+        ),
+        ("bop refine --threads 0", &["--threads", "'0'", "1.."]),
+        ("bop refine --threads -1", &["--threads", "'-1'", "1.."]),
+        ("demo --object spoon", &["--object", "spoon", "mug"]),
+        ("demo --noise -1", &["--noise", "'-1'", "0 to 50"]),
+        ("demo --noise NaN", &["--noise", "NaN", "0 to 50"]),
+    ] {
+        let words = command.split(' ').filter(|word| !word.is_empty());
+        let told = run(folder.path(), words).exits(2).complains(parts);
+        assert_eq!(told.out, "", "{command}");
+    }
+    assert!(crate::common::names(folder.path()).is_empty());
+}
+
+#[test]
+fn pipelines_are_listed_one_per_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let listed = run(folder.path(), ["pipelines"]).exits(0).out;
+    let names: Vec<_> = listed
+        .lines()
+        .map(|l| l.split_whitespace().next().unwrap())
+        .collect();
+    let presets = hybrid_icp::Preset::ALL;
+    assert_eq!(names, presets.map(hybrid_icp::Preset::name));
+    for (line, preset) in listed.lines().zip(presets) {
+        assert!(line.ends_with(preset.summary()));
+    }
+}
+
+/// A pipe whose reader is gone before the program writes.
+#[test]
+fn a_closed_pipe_is_no_error_and_the_work_is_done() {
+    let scene = Scene::new()
+        .without("--output")
+        .with("--overlay", "overlay.png");
+    let refine: Vec<_> = scene
+        .arguments
+        .iter()
+        .flat_map(|(o, v)| [(*o).into(), v.clone()])
+        .collect();
+    let words = |text: &str| text.split(' ').map(Into::into).collect();
+    for (arguments, file) in [
+        (words("demo"), Some("demo.png")),
+        (words("pipelines"), None),
+        (words("--help"), None),
+        ([words("refine"), refine].concat(), Some("overlay.png")),
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut child = program(scene.folder.path())
+            .args(&arguments)
+            .stdout(writer)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut err = String::new();
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut err)
+            .unwrap();
+        let status = child.wait().unwrap();
+        assert_eq!(
+            (status.code(), err.as_str()),
+            (Some(0), ""),
+            "{arguments:?}"
+        );
+        assert!(file.is_none_or(|file| scene.path(file).is_file()));
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let full = std::fs::OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = program(folder.path())
+        .arg("pipelines")
+        .stdout(full)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("standard output"));
+}

@@ -1,0 +1,218 @@
+//! Running the program, and a scene in files for it to work on.
+
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hicp_io::LengthUnit;
+use hicp_sim::{Household, perturb, rng};
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, PinholeCamera, TriMesh, Vector3, render_depth_image, se3,
+};
+use serde_json::{Value, json};
+
+/// What a run of the program left behind.
+#[derive(Debug)]
+pub(crate) struct Run {
+    pub(crate) code: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+impl Run {
+    /// Asserts the exit code.
+    #[track_caller]
+    pub(crate) fn exits(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "{}\n{}", self.out, self.err);
+        self
+    }
+
+    /// Asserts that standard error says all of these.
+    #[track_caller]
+    pub(crate) fn complains(self, parts: &[&str]) -> Self {
+        for part in parts {
+            assert!(self.err.contains(part), "no {part:?} in: {}", self.err);
+        }
+        self
+    }
+}
+
+/// The program in a folder, not yet running.
+pub(crate) fn program(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid-icp"));
+    command
+        .current_dir(folder)
+        .env("COLUMNS", "80")
+        .env_remove("CLICOLOR_FORCE");
+    command
+}
+
+/// Sends a signal, `-INT` say, by the shell, which is there where no program `kill` is; returns whether the process was still there.
+pub(crate) fn send(signal: &str, child: &std::process::Child) -> bool {
+    let kill = ["-c", "kill \"$0\" \"$1\" 2>/dev/null", signal];
+    let status = Command::new("sh")
+        .args(kill)
+        .arg(child.id().to_string())
+        .status();
+    status.unwrap().success()
+}
+
+/// Runs the program in a folder; it must never panic.
+#[track_caller]
+pub(crate) fn run<I, S>(folder: &Path, arguments: I) -> Run
+where
+    I: IntoIterator<Item = S>,
+    S: AsRef<OsStr>,
+{
+    let output = program(folder).args(arguments).output().unwrap();
+    let run = Run {
+        code: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8_lossy(&output.stderr).into_owned(),
+    };
+    assert!(!run.err.contains("panicked"), "{}", run.err);
+    run
+}
+
+/// The names in a folder, in order.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+pub(crate) fn camera() -> PinholeCamera {
+    PinholeCamera::new(400.0, 402.0, 161.5, 118.0, 320, 240).unwrap()
+}
+
+/// A pose that looks at the car from aside.
+pub(crate) fn truth() -> Isometry3<f64> {
+    Isometry3::new(
+        Vector3::new(0.012, -0.008, 0.5),
+        Vector3::new(2.1, 0.7, -0.4),
+    )
+}
+
+/// A pose that is off by 6.2 mm and 9.5 degrees.
+pub(crate) fn off(pose: &Isometry3<f64>, seed: u64) -> Isometry3<f64> {
+    perturb(&mut rng(seed), pose, 0.0062, 9.5_f64.to_radians())
+}
+
+pub(crate) fn car() -> TriMesh {
+    Household::Car.solid().to_mesh().unwrap()
+}
+
+pub(crate) fn mask_of(depth: &DepthImage) -> Mask {
+    let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
+    Mask::new(depth.width(), depth.height(), pixels).unwrap()
+}
+
+pub(crate) fn pose_json(pose: &Isometry3<f64>) -> Value {
+    let (rotation, translation) = hicp_io::pose_to_bop(pose);
+    json!({"cam_R_m2c": rotation, "cam_t_m2c": translation})
+}
+
+/// The pose that a JSON object states.
+pub(crate) fn pose_of(value: &Value) -> Isometry3<f64> {
+    let numbers = |key: &str| -> Vec<f64> {
+        let items = value[key].as_array().unwrap();
+        items.iter().map(|n| n.as_f64().unwrap()).collect()
+    };
+    hicp_io::pose_from_bop(
+        &numbers("cam_R_m2c").try_into().unwrap(),
+        &numbers("cam_t_m2c").try_into().unwrap(),
+    )
+    .unwrap()
+}
+
+/// Asserts that a pose is nearer to the truth than the initial one was, and near.
+#[track_caller]
+pub(crate) fn assert_improved(pose: &Isometry3<f64>, truth: &Isometry3<f64>) {
+    let (angle, distance) = se3::pose_distance(pose, truth);
+    let degrees = angle.to_degrees();
+    assert!(
+        degrees < 3.0 && distance < 0.003,
+        "{degrees} deg, {distance} m"
+    );
+}
+
+/// A scene in the files that `refine` wants, and the call that refines it.
+pub(crate) struct Scene {
+    pub(crate) folder: tempfile::TempDir,
+    pub(crate) arguments: Vec<(&'static str, OsString)>,
+}
+
+impl Scene {
+    /// A car seen without noise, its pose off by 6.2 mm and 9.5 degrees.
+    pub(crate) fn new() -> Self {
+        let scene = Self {
+            folder: tempfile::tempdir().unwrap(),
+            arguments: [
+                ("--model", "mesh.ply"),
+                ("--model-unit", "m"),
+                ("--depth", "depth.png"),
+                ("--depth-scale", "0.1"),
+                ("--mask", "mask.png"),
+                ("--camera", "camera.json"),
+                ("--init", "init.json"),
+                ("--output", "out.json"),
+            ]
+            .map(|(option, value)| (option, value.into()))
+            .to_vec(),
+        };
+        let mesh = car();
+        let depth = render_depth_image(&mesh, &camera(), &truth());
+        hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
+        hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
+        hicp_io::write_mask_png(scene.path("mask.png"), &mask_of(&depth)).unwrap();
+        scene.write("camera.json", FLAT_CAMERA);
+        scene.write("init.json", pose_json(&off(&truth(), 5)).to_string());
+        scene
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), content).unwrap();
+    }
+
+    /// Sets or replaces an option.
+    pub(crate) fn with(mut self, option: &'static str, value: impl Into<OsString>) -> Self {
+        self = self.without(option);
+        self.arguments.push((option, value.into()));
+        self
+    }
+
+    pub(crate) fn without(mut self, option: &str) -> Self {
+        self.arguments.retain(|(name, _)| *name != option);
+        self
+    }
+
+    #[track_caller]
+    pub(crate) fn run(&self) -> Run {
+        let pairs = self.arguments.iter();
+        let words = pairs.flat_map(|(option, value)| [OsStr::new(*option), value.as_os_str()]);
+        run(
+            self.folder.path(),
+            std::iter::once(OsStr::new("refine")).chain(words),
+        )
+    }
+
+    /// Runs to success and returns the result.
+    #[track_caller]
+    pub(crate) fn result(&self) -> Value {
+        self.run().exits(0);
+        let text = std::fs::read_to_string(self.path("out.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    }
+}
+
+pub(crate) const FLAT_CAMERA: &str =
+    r#"{"fx": 400, "fy": 402, "cx": 161.5, "cy": 118, "width": 320, "height": 240}"#;
+pub(crate) const BOP_CAMERA: &str =
+    r#"{"cam_K": [400, 0, 161.5, 0, 402, 118, 0, 0, 1], "depth_scale": 0.1}"#;

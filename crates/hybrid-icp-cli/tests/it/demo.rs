@@ -1,0 +1,91 @@
+//! `hybrid-icp demo`.
+
+use crate::common::{names, run};
+
+/// The numbers of a line of the table of errors: degrees, millimetres, MVE, VSD.
+fn errors(out: &str, when: &str) -> Vec<f64> {
+    let line = out.lines().find(|line| line.starts_with(when)).unwrap();
+    line.split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect()
+}
+
+fn without_time(out: &str) -> String {
+    let lines = out.lines().filter(|line| !line.contains(" ms from depth"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn it_needs_nothing_and_shows_everything() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run(folder.path(), ["demo"]).exits(0);
+    let (before, after) = (errors(&shown.out, "before"), errors(&shown.out, "after"));
+    assert_eq!(&before[..2], &[9.5, 6.2]);
+    assert_eq!(before.len(), 4);
+    for (before, after) in before.iter().zip(&after) {
+        assert!(after < before, "{}", shown.out);
+    }
+    for word in [
+        "stage",
+        "association",
+        "metric",
+        "iterations",
+        "pairs",
+        "mean loss",
+        "ended",
+        " ms ",
+        "observation-to-model",
+        "projective",
+        "symmetric",
+        "demo.png",
+        "\n1 ",
+        "\n2 ",
+    ] {
+        assert!(shown.out.contains(word), "no {word:?} in {}", shown.out);
+    }
+    assert_eq!(shown.err, "");
+    assert_eq!(names(folder.path()), ["demo.png"]);
+
+    let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("demo.png")).unwrap();
+    assert_eq!((width, height), (640, 480));
+    // Both outlines and the measured depth are there.
+    let count = |wanted: &dyn Fn(&[u8]) -> bool| rgb.chunks_exact(3).filter(|p| wanted(p)).count();
+    assert!(count(&|p| p == [230, 159, 0]) > 100);
+    assert!(count(&|p| p == [86, 180, 233]) > 100);
+    assert!(count(&|p| p[0] == p[1] && p[1] == p[2] && p[0] > 0) > 1000);
+}
+
+#[test]
+fn everything_but_the_time_follows_from_the_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let once = run(folder.path(), ["demo", "--seed", "3", "--picture", "a.png"]).exits(0);
+    let again = run(folder.path(), ["demo", "--seed", "3", "--picture", "b.png"]).exits(0);
+    let other = run(folder.path(), ["demo", "--seed", "4", "--picture", "c.png"]).exits(0);
+    let out = without_time(&once.out);
+    assert_eq!(out, without_time(&again.out).replace("b.png", "a.png"));
+    assert_ne!(out, without_time(&other.out).replace("c.png", "a.png"));
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_eq!(bytes("a.png"), bytes("b.png"));
+    assert_ne!(bytes("a.png"), bytes("c.png"));
+}
+
+#[test]
+fn every_object_and_pipeline_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    for object in hicp_sim::Household::ALL {
+        let arguments = ["demo", "--object", object.name(), "--noise", "0"];
+        run(folder.path(), arguments).exits(0);
+    }
+    for pipeline in hybrid_icp::Preset::ALL {
+        let shown = run(folder.path(), ["demo", "--pipeline", pipeline.name()]).exits(0);
+        assert!(shown.out.contains(&format!("pipeline {pipeline},")));
+    }
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_told_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = run(folder.path(), ["demo", "--picture", "no/demo.png"]).exits(1);
+    let told = told.complains(&["cannot write no/demo.png", "folder no does not exist"]);
+    assert_eq!(told.out, "");
+}

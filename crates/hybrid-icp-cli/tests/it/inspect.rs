@@ -1,0 +1,192 @@
+//! `hybrid-icp inspect`.
+
+use crate::common::*;
+use hicp_io::LengthUnit;
+use serde_json::Value;
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// What the program says of a file.
+fn inspected(name: &str, content: impl AsRef<[u8]>, options: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join(name), content).unwrap();
+    let run = run(
+        folder.path(),
+        [&["inspect", name, "--json"], options].concat(),
+    )
+    .exits(0);
+    assert_eq!(run.err, "");
+    serde_json::from_str(&run.out).unwrap()
+}
+
+#[track_caller]
+fn warned(value: &Value, parts: &[&str]) {
+    let warnings = value["warnings"].as_array().unwrap();
+    let texts: Vec<&str> = warnings.iter().map(|text| text.as_str().unwrap()).collect();
+    for part in parts {
+        assert!(
+            texts.iter().any(|text| text.contains(part)),
+            "no {part:?} in {texts:?}"
+        );
+    }
+    assert_eq!(texts.len(), parts.len(), "{texts:?}");
+}
+
+#[test]
+fn a_clean_mesh() {
+    let cube = inspected("cube.obj", CUBE, &[]);
+    assert_eq!(cube["triangles"], 12);
+    assert_eq!(cube["vertices"], 8);
+    assert!((cube["diameter_m"].as_f64().unwrap() - 3.0_f64.sqrt()).abs() < 1e-9);
+    assert_eq!(cube["closed"], true);
+    assert_eq!(cube["facing"], "outward");
+    let corners = serde_json::json!([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]);
+    assert_eq!(cube["bounding_box_m"], corners);
+    assert_eq!(cube["area_m2"], 6.0);
+    assert_eq!(cube["components"], 1);
+    warned(&cube, &[]);
+    let folder = tempfile::tempdir().unwrap();
+    hicp_io::write_ply(
+        folder.path().join("car.ply"),
+        &car(),
+        LengthUnit::Millimeters,
+    )
+    .unwrap();
+    let told = run(folder.path(), ["inspect", "car.ply", "--unit", "mm"]).exits(0);
+    assert!(
+        told.out.contains("car.ply") && told.out.contains("diameter 0."),
+        "{}",
+        told.out
+    );
+}
+
+#[test]
+fn what_looks_wrong_is_told() {
+    let small = inspected("cube.obj", CUBE, &["--unit", "mm"]);
+    warned(
+        &small,
+        &["the diameter is 1.7321e-3 m in mm, expected 0.005 to 5 m; in m"],
+    );
+    assert_eq!(small["suspected_unit"], "m");
+    let large = inspected("cube.obj", CUBE, &["--unit", "cm", "--max-rows", "1"]);
+    assert_eq!(large["suspected_unit"], Value::Null);
+    assert_eq!(large["unit"], "cm");
+    let open = CUBE.replace("f 4 3 2 1\n", "");
+    let open = inspected("cube.obj", open, &[]);
+    assert_eq!(open["closed"], false);
+    warned(&open, &["4 edges have one triangle only"]);
+    let turned = inspected("cube.obj", CUBE.replace("f 4 3 2 1", "f 1 2 3 4"), &[]);
+    assert_eq!(turned["closed"], true);
+    assert_eq!(turned["facing"], "unknown");
+    warned(
+        &turned,
+        &["4 edges have triangles that are wound against each other"],
+    );
+    let twice = inspected("cube.obj", format!("{CUBE}f 5 6 7\n"), &[]);
+    warned(
+        &twice,
+        &[
+            "3 edges have more than two triangles",
+            "1 triangles repeat another",
+        ],
+    );
+    let flat = inspected("cube.obj", format!("{CUBE}f 1 1 2\n"), &[]);
+    warned(&flat, &["1 triangles have no area"]);
+    let off = "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n7 7 7\n3 0 1 2\n";
+    warned(
+        &inspected("a.off", off, &[]),
+        &["3 edges have one", "1 vertices belong to no triangle"],
+    );
+    let far = "v 500000 4582345.26 0\nv 500001 4582345 0\nv 500000 4582346 0\nf 1 2 3\n";
+    warned(
+        &inspected("a.obj", far, &[]),
+        &["steps of 5.0e-1 m", "3 edges have one"],
+    );
+}
+
+#[test]
+fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+    let inspect =
+        |options: &[&str]| run(folder.path(), [&["inspect", "cube.obj"], options].concat());
+    inspect(&["--max-triangles", "11"]).exits(1).complains(&[
+        "cube.obj, line 14",
+        "found 12 triangles, expected at most 11",
+        "--max-triangles",
+    ]);
+    inspect(&["--max-triangles", "12", "--max-vertices", "8"]).exits(0);
+    inspect(&["--max-file-bytes", "9"])
+        .exits(1)
+        .complains(&["expected at most 9", "--max-file-bytes"]);
+    run(folder.path(), ["inspect", "no.stl"])
+        .exits(1)
+        .complains(&["cannot read no.stl"]);
+    run(folder.path(), ["inspect", "."])
+        .exits(1)
+        .complains(&["extension"]);
+    run(folder.path(), ["inspect", "cube.obj", "--unit", "inch"]).exits(2);
+    let scene = Scene::new().with("--max-small-json-bytes", "9");
+    scene
+        .run()
+        .exits(1)
+        .complains(&["camera.json", "at most 9", "--max-small-json-bytes"]);
+    // Wherever a limit stands, it is one.
+    let scene = Scene::new().with("--max-pixels", "1000");
+    scene
+        .run()
+        .exits(1)
+        .complains(&["depth.png", "320x240", "at most 1000", "--max-pixels"]);
+}
+
+#[test]
+fn awkward_files_are_told_as_a_reference_reader_tells_them() {
+    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let root = std::env::var_os("HICP_DATA").unwrap_or_else(|| beside.into());
+    let folder = std::path::PathBuf::from(root).join("awkward");
+    let Ok(manifest) = std::fs::read(folder.join("manifest.json")) else {
+        println!("skipped: {} is not there (set HICP_DATA)", folder.display());
+        return;
+    };
+    let manifest: Vec<Value> = serde_json::from_slice(&manifest).unwrap();
+    let mut read = 0;
+    for entry in &manifest {
+        let file = entry["file"].as_str().unwrap();
+        let expected = entry["expected"].as_str().unwrap();
+        let told = run(&folder, ["inspect", file, "--json"]);
+        match told.code {
+            0 => {
+                assert!(
+                    !expected.starts_with("clean-error ") && expected != "clean-error",
+                    "{file}"
+                );
+                let value: Value = serde_json::from_str(&told.out).unwrap();
+                assert_eq!(value["triangles"], entry["trimesh_triangles"], "{file}");
+                read += 1;
+                if value["closed"] != entry["watertight"] {
+                    println!(
+                        "{file}: closed {}, reference {}",
+                        value["closed"], entry["watertight"]
+                    );
+                }
+            }
+            code => {
+                assert_eq!(code, 1);
+                assert!(
+                    !expected.eq("load") && !expected.starts_with("load ("),
+                    "{file}: {}",
+                    told.err
+                );
+                assert!(
+                    told.err.contains(file)
+                        && (told.err.contains(", line ") || told.err.contains(", byte ")),
+                    "{}",
+                    told.err
+                );
+            }
+        }
+    }
+    println!("{read} of {} read", manifest.len());
+    assert!(read > 40);
+}

@@ -1,0 +1,38 @@
+//! Integration tests of `hybrid-icp-cli`: one program, so that it is linked once.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    dead_code,
+    reason = "helpers of tests"
+)]
+
+mod bop_chain;
+mod bop_compare;
+mod bop_eval;
+mod bop_generate;
+mod bop_malformed;
+mod bop_masks;
+mod bop_refine;
+mod bop_scale;
+mod bop_sequence;
+mod bop_show;
+mod bop_warnings;
+mod command_line;
+mod common;
+mod demo;
+mod experiment;
+mod faults;
+mod inspect;
+mod killed_generator;
+mod no_regular_files;
+mod objects;
+mod outputs;
+mod pipeline_limits;
+mod pipelines;
+mod refine;
+mod refine_refusals;
+mod world;
+mod ycbv;

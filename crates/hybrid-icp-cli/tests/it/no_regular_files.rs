@@ -1,0 +1,282 @@
+//! Pipes that nobody writes to, devices without an end, and folders in the place of every input: each is told, and nothing waits.
+#![cfg(unix)]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::bop::write_results;
+
+/// A program that has not ended by then hangs; none of these computes anything.
+const HANGS_AFTER: Duration = Duration::from_secs(300);
+
+/// Runs the program, and ends it when it hangs.
+#[track_caller]
+fn ends(folder: &Path, words: &[&str]) -> Run {
+    let mut child = program(folder)
+        .args(words)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if begun.elapsed() > HANGS_AFTER {
+            child.kill().unwrap();
+            panic!("{words:?} hangs");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
+    Run {
+        code: output.status.code().unwrap(),
+        out: text(&output.stdout),
+        err: text(&output.stderr),
+    }
+}
+
+/// What may stand in the place of a file.
+const STRANGERS: [&str; 3] = ["a pipe", "a device", "a folder"];
+
+/// Puts a stranger at a path, where nothing else is.
+fn put(kind: &str, path: &Path) {
+    match kind {
+        "a pipe" => assert!(Command::new("mkfifo").arg(path).status().unwrap().success()),
+        "a device" => std::os::unix::fs::symlink("/dev/zero", path).unwrap(),
+        _ => std::fs::create_dir(path).unwrap(),
+    }
+}
+
+fn take_away(path: &Path) {
+    if std::fs::symlink_metadata(path).unwrap().is_dir() {
+        std::fs::remove_dir(path).unwrap();
+    } else {
+        std::fs::remove_file(path).unwrap();
+    }
+}
+
+/// Puts every stranger in the place of a file, runs, and puts the file back.
+#[track_caller]
+fn each_is_told(folder: &Path, words: &str, file: &str) {
+    let words: Vec<&str> = words.split(' ').collect();
+    let (path, aside) = (folder.join(file), folder.join("aside"));
+    std::fs::rename(&path, &aside).unwrap();
+    for kind in STRANGERS {
+        put(kind, &path);
+        let told = ends(folder, &words);
+        assert_eq!(told.code, 1, "{kind} for {file}: {}{}", told.out, told.err);
+        assert!(
+            told.err.starts_with("error: "),
+            "{kind} for {file}: {}",
+            told.err
+        );
+        assert!(told.err.contains(file), "{kind} for {file}: {}", told.err);
+        take_away(&path);
+    }
+    std::fs::rename(&aside, &path).unwrap();
+}
+
+#[test]
+fn every_input_of_refine() {
+    let scene = Scene::new();
+    let hybrid = ends(scene.folder.path(), &["pipelines", "--show", "hybrid"]).exits(0);
+    scene.write("mine.toml", hybrid.out);
+    let words = "refine --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 --mask mask.png \
+                 --camera camera.json --init init.json --pipeline mine.toml --output out.json";
+    let folder = scene.folder.path();
+    for file in [
+        "mesh.ply",
+        "depth.png",
+        "mask.png",
+        "camera.json",
+        "init.json",
+        "mine.toml",
+    ] {
+        each_is_told(folder, words, file);
+        assert!(!scene.path("out.json").exists(), "{file}");
+    }
+    // With all of them back it runs.
+    ends(folder, &words.split(' ').collect::<Vec<_>>()).exits(0);
+}
+
+#[test]
+fn inspect_and_replay() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for kind in STRANGERS {
+        for file in ["a.obj", "a.off", "a.ply", "a.stl", "trace.jsonl"] {
+            put(kind, &folder.join(file));
+            let command = if file.starts_with("trace") {
+                "replay"
+            } else {
+                "inspect"
+            };
+            ends(folder, &[command, file])
+                .exits(1)
+                .complains(&["error: ", file]);
+            take_away(&folder.join(file));
+        }
+    }
+}
+
+#[test]
+fn every_input_of_the_commands_over_datasets() {
+    let world = World::new();
+    let folder = world.folder.path();
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    std::fs::write(world.path("detections.json"), "[]").unwrap();
+    std::fs::write(world.path("targets.json"), "[]").unwrap();
+    let refine = "bop refine --dataset . --results in.csv --output out.csv";
+    each_is_told(folder, refine, "in.csv");
+    let detections = format!("{refine} --detections detections.json");
+    each_is_told(folder, &detections, "detections.json");
+    each_is_told(
+        folder,
+        &format!("{refine} --targets targets.json"),
+        "targets.json",
+    );
+    each_is_told(folder, "bop eval --dataset . --results in.csv", "in.csv");
+    let show = "bop show --dataset . --scene 3 --image 0 --results in.csv --out show.png";
+    each_is_told(folder, show, "in.csv");
+    std::fs::write(world.path("out.csv.journal"), "").unwrap();
+    each_is_told(folder, refine, "out.csv.journal");
+    std::fs::remove_file(world.path("out.csv.journal")).unwrap();
+    assert!(!world.path("out.csv").exists() && !world.path("show.png").exists());
+}
+
+/// What a dataset's folders hold is looked for: what is no file is not there, and costs the rows that need it.
+#[test]
+fn every_file_of_a_dataset() {
+    let world = World::new();
+    let folder = world.folder.path();
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    let words = "bop refine --dataset . --results in.csv --output out.csv --no-time";
+    let words: Vec<&str> = words.split(' ').collect();
+    for file in [
+        "models/obj_000001.ply",
+        "test/000003/scene_camera.json",
+        "test/000003/scene_gt.json",
+        "test/000003/depth/000000.png",
+        "test/000003/mask_visib/000000_000000.png",
+    ] {
+        let (path, aside) = (folder.join(file), folder.join("aside"));
+        std::fs::rename(&path, &aside).unwrap();
+        for kind in STRANGERS {
+            put(kind, &path);
+            let told = ends(folder, &words);
+            assert!(
+                told.code == 0 || told.err.contains("error: "),
+                "{kind} for {file}: {}",
+                told.err
+            );
+            // The rows of the other scene are refined all the same.
+            assert!(
+                told.out.contains(" refined"),
+                "{kind} for {file}: {}",
+                told.out
+            );
+            assert!(!told.err.contains("panicked"));
+            take_away(&path);
+        }
+        std::fs::rename(&aside, &path).unwrap();
+    }
+}
+
+#[test]
+fn meshes_and_pipelines_of_an_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::create_dir(folder.join("meshes")).unwrap();
+    for kind in STRANGERS {
+        put(kind, &folder.join("meshes/a.ply"));
+        let words = [
+            "experiment",
+            "init-noise",
+            "--objects",
+            "meshes",
+            "--out",
+            "out",
+            "--poses",
+            "1",
+        ];
+        let told = ends(folder, &words);
+        assert!(
+            told.code == 1 && told.err.starts_with("error: "),
+            "{kind}: {}",
+            told.err
+        );
+        take_away(&folder.join("meshes/a.ply"));
+        put(kind, &folder.join("a.toml"));
+        let words = [
+            "experiment",
+            "init-noise",
+            "--household",
+            "tuning",
+            "--out",
+            "out",
+            "--poses",
+            "1",
+            "--variants",
+            "a.toml",
+        ];
+        let told = ends(folder, &words);
+        assert!(
+            told.code == 1 && told.err.contains("a.toml"),
+            "{kind}: {}",
+            told.err
+        );
+        take_away(&folder.join("a.toml"));
+    }
+    assert_eq!(names(folder), ["meshes"]);
+}
+
+#[test]
+fn files_of_studies() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let words =
+        "experiment init-noise --household tuning --poses 1 --variants hybrid --resume --out a";
+    std::fs::create_dir(folder.join("a")).unwrap();
+    std::fs::write(folder.join("a/config.json"), "{}").unwrap();
+    std::fs::write(folder.join("a/cases.csv"), "object").unwrap();
+    each_is_told(folder, words, "a/config.json");
+    each_is_told(folder, "experiment report --out r a", "a/config.json");
+    let config = hicp_experiments::Config::new(
+        hicp_experiments::Experiment::InitNoise,
+        &hicp_experiments::Subject::household(&hicp_sim::Household::TUNING).unwrap(),
+        &[hicp_experiments::Variant::preset(
+            hybrid_icp::Preset::Hybrid,
+        )],
+        1,
+        1,
+    )
+    .unwrap();
+    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
+    std::fs::write(folder.join("a/config.json"), text).unwrap();
+    each_is_told(folder, words, "a/cases.csv");
+    each_is_told(folder, "experiment report --out r a", "a/cases.csv");
+
+    let words = "experiment sequential --resume --out s";
+    std::fs::create_dir(folder.join("s")).unwrap();
+    std::fs::write(folder.join("s/config.json"), "{}").unwrap();
+    std::fs::write(folder.join("s/trajectories.csv"), "object").unwrap();
+    each_is_told(folder, words, "s/config.json");
+    let config = hicp_experiments::TrajectoryConfig::new(
+        &hicp_experiments::Subject::household(&hicp_sim::Household::TEST).unwrap(),
+        &[
+            hybrid_icp::Preset::Hybrid,
+            hybrid_icp::Preset::ProjectiveCascadePointPlane,
+        ],
+        1,
+        1,
+    )
+    .unwrap();
+    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
+    std::fs::write(folder.join("s/config.json"), text).unwrap();
+    each_is_told(folder, words, "s/trajectories.csv");
+    assert!(!folder.join("r").exists());
+}

@@ -1,0 +1,75 @@
+//! `hybrid-icp objects`.
+
+use crate::common::{names, run};
+use hicp_io::{LengthUnit, read_mesh};
+use hicp_sim::{Household, Proportions};
+
+#[test]
+fn it_writes_every_object_a_sheet_and_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run(folder.path(), ["objects", "--out", "a/b"]).exits(0);
+    assert!(shown.out.contains("20 meshes"), "{}", shown.out);
+    let written = folder.path().join("a/b");
+    assert_eq!(names(&written).len(), 22);
+    let table = std::fs::read_to_string(written.join("objects.csv")).unwrap();
+    assert_eq!(table.lines().count(), 21);
+    for object in Household::ALL {
+        let name = object.name();
+        let mesh = read_mesh(written.join(format!("{name}.ply")), LengthUnit::Meters).unwrap();
+        let made = object.model().unwrap();
+        assert_eq!(
+            (mesh.vertices(), mesh.triangles()),
+            (made.mesh().vertices(), made.mesh().triangles())
+        );
+        let set = if Household::TEST.contains(&object) {
+            "test"
+        } else {
+            "tuning"
+        };
+        assert!(
+            table.contains(&format!(",{name},{set},{name}.ply,")),
+            "{table}"
+        );
+    }
+    // Something is drawn in every cell.
+    let (width, height, rgb) = hicp_io::read_rgb_png(written.join("contact_sheet.png")).unwrap();
+    assert_eq!((width, height), (1200, 960));
+    for (row, column) in (0..4).flat_map(|row| (0..5).map(move |column| (row, column))) {
+        let drawn = (0..240 * 240).filter(|i| {
+            let (u, v) = (column * 240 + i % 240, row * 240 + i / 240);
+            rgb[3 * (v * 1200 + u)..][..3] != [255, 255, 255]
+        });
+        let count = drawn.count();
+        assert!(
+            (1500..40_000).contains(&count),
+            "{count} pixels in row {row}, column {column}"
+        );
+    }
+}
+
+#[test]
+fn another_format_and_seed_are_other_files() {
+    let folder = tempfile::tempdir().unwrap();
+    run(
+        folder.path(),
+        ["objects", "--out", ".", "--format", "obj", "--seed", "4"],
+    )
+    .exits(0);
+    let mesh = read_mesh(folder.path().join("mug.obj"), LengthUnit::Meters).unwrap();
+    let made = Household::Mug
+        .model_with(Proportions::from_seed(4))
+        .unwrap();
+    assert_eq!(mesh.vertices(), made.mesh().vertices());
+    assert_ne!(
+        mesh.vertices(),
+        Household::Mug.model().unwrap().mesh().vertices()
+    );
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let told = run(folder.path(), ["objects", "--out", "file/below"]).exits(1);
+    told.complains(&["cannot make the folder file/below"]);
+}

@@ -1,0 +1,369 @@
+//! Outputs take the place of nothing that the user had: what a shell has redirected, files of the dataset, rows of the input, each other.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs::read_to_string;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::bop::write_results;
+#[cfg(target_os = "linux")]
+use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
+
+/// Runs the program with its standard output, or its standard error, in a file; returns what it said on the other one.
+#[cfg(target_os = "linux")]
+#[track_caller]
+fn redirected(folder: &Path, words: &str, file: File, is_error: bool) -> Run {
+    let mut command = program(folder);
+    command.args(words.split(' '));
+    let output = if is_error {
+        command.stderr(file).output().unwrap()
+    } else {
+        command.stdout(file).output().unwrap()
+    };
+    Run {
+        code: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+#[cfg(target_os = "linux")]
+const REFINE: &str = "refine --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 --mask mask.png \
+                      --camera camera.json --init init.json --output";
+
+/// `>> log` adds to the log, whichever of its names the output has.
+#[cfg(target_os = "linux")]
+#[test]
+fn redirected_streams_are_added_to() {
+    let scene = Scene::new();
+    let folder = scene.folder.path();
+    symlink("/dev/stdout", scene.path("link")).unwrap();
+    for (name, is_error) in [
+        ("/dev/stdout", false),
+        ("/dev/fd/1", false),
+        ("/proc/self/fd/1", false),
+        ("link", false),
+        ("/dev/stderr", true),
+    ] {
+        scene.write("log", "precious\n");
+        let inode = std::fs::metadata(scene.path("log")).unwrap().ino();
+        let log = File::options().append(true).open(scene.path("log"));
+        redirected(folder, &format!("{REFINE} {name}"), log.unwrap(), is_error).exits(0);
+        let text = read_to_string(scene.path("log")).unwrap();
+        let added = text.strip_prefix("precious\n").unwrap();
+        // What the program says on the stream comes after it and not over it.
+        let end = added.rfind('}').unwrap() + 1;
+        serde_json::from_str::<Value>(&added[..end]).unwrap();
+        assert_eq!(added[end..].contains("MVE"), !is_error, "{name}: {added}");
+        let after = std::fs::metadata(scene.path("log")).unwrap().ino();
+        assert_eq!(after, inode, "{name}: replaced");
+    }
+    // Not opened for appending, as by `> log`: the position is the stream's own.
+    let log = File::create(scene.path("log")).unwrap();
+    redirected(folder, &format!("{REFINE} /dev/stdout"), log, false).exits(0);
+    let text = read_to_string(scene.path("log")).unwrap();
+    let end = text.rfind('}').unwrap() + 1;
+    serde_json::from_str::<Value>(&text[..end]).unwrap();
+    assert!(text[end..].contains("MVE"), "{text}");
+    // Another descriptor, which a shell has opened.
+    scene.write("log", "precious\n");
+    let shell = format!("exec \"$0\" {REFINE} /dev/fd/3 3>>log");
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &shell, env!("CARGO_BIN_EXE_hybrid-icp")]);
+    let output = command.current_dir(folder).output().unwrap();
+    assert!(output.status.success());
+    let text = read_to_string(scene.path("log")).unwrap();
+    serde_json::from_str::<Value>(text.strip_prefix("precious\n").unwrap()).unwrap();
+    assert!(!names(folder).iter().any(|name| name.ends_with(".tmp")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn redirected_streams_of_the_commands_over_datasets() {
+    let world = World::new();
+    let folder = world.folder.path();
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    let add_to = |name: &str, words: &str| {
+        let file = File::options().append(true).open(world.path(name));
+        redirected(folder, words, file.unwrap(), false)
+    };
+    std::fs::write(world.path("log"), "precious\n").unwrap();
+    add_to(
+        "log",
+        "bop eval --dataset . --results in.csv --json /dev/stdout",
+    )
+    .exits(0);
+    let text = read_to_string(world.path("log")).unwrap();
+    assert!(text.starts_with("precious\n{"), "{text}");
+
+    // There is no journal beside a stream, so that whatever has its name is nobody's concern.
+    symlink("/dev/stdout", world.path("link")).unwrap();
+    std::fs::write(world.path("link.journal"), "my notes").unwrap();
+    std::fs::write(world.path("log"), "").unwrap();
+    let refine = "bop refine --dataset . --results in.csv --no-time --output";
+    add_to("log", &format!("{refine} link")).exits(0);
+    run(folder, format!("{refine} out.csv").split(' ')).exits(0);
+    let rows = read_to_string(world.path("out.csv")).unwrap();
+    let text = read_to_string(world.path("log")).unwrap();
+    assert!(text.starts_with(&rows), "{text}");
+    let notes = std::fs::read(world.path("link.journal")).unwrap();
+    assert_eq!(notes, b"my notes");
+
+    // In place is to replace the input; a stream would add to it.
+    let input = std::fs::read(world.path("in.csv")).unwrap();
+    add_to("in.csv", &format!("{refine} /dev/stdout"))
+        .exits(1)
+        .complains(&["--output and --results both name /dev/stdout"]);
+    assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), input);
+}
+
+/// Every file below a folder with what it holds.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            let content = std::fs::read(&path).unwrap();
+            found.insert(path, content);
+        }
+    }
+    found
+}
+
+/// A dataset in the folder `set`, with files as they come with one, and results of it beside.
+fn dataset() -> World {
+    let world = World::new();
+    for name in ["train_pbr/000007", "models_eval", "models_fine", "results"] {
+        std::fs::create_dir_all(world.path(name)).unwrap();
+    }
+    let targets = r#"[{"scene_id": 3, "im_id": 40, "obj_id": 1, "inst_count": 2}]"#;
+    std::fs::write(world.path("test_targets_bop19.json"), targets).unwrap();
+    for name in [
+        "camera_uw.json",
+        "dataset_info.md",
+        "train_pbr/notes",
+        "train_pbr/000007/scene_gt.json",
+        "models_eval/models_info.json",
+        "models_fine/obj_000001.ply",
+        "results/old.json",
+        "old.json",
+    ] {
+        std::fs::write(world.path(name), "{}").unwrap();
+    }
+    write_results(world.path("in.csv"), &world.rows()).unwrap();
+    world
+}
+
+/// Every command with a dataset, but for the path of one of its outputs.
+const COMMANDS: [(&str, &str); 7] = [
+    ("bop refine --dataset . --results in.csv", "--output"),
+    (
+        "bop refine --dataset . --results in.csv --output new.csv",
+        "--rows",
+    ),
+    ("bop eval --dataset . --results in.csv", "--json"),
+    ("bop eval --dataset . --results in.csv", "--errors"),
+    (
+        "bop show --dataset . --scene 3 --image 40 --results in.csv",
+        "--out",
+    ),
+    (
+        "bop sequence --dataset . --scene 3 --object 1 --init in.csv",
+        "--output",
+    ),
+    (
+        "bop sequence --dataset . --scene 3 --object 1 --init in.csv --output new.jsonl",
+        "--results",
+    ),
+];
+
+#[test]
+fn files_of_the_dataset_are_spared_by_every_command() {
+    let world = dataset();
+    let folder = world.folder.path();
+    symlink("test/000003/scene_gt.json", world.path("link.json")).unwrap();
+    let before = files(folder);
+    for (command, option) in COMMANDS {
+        for path in [
+            "models/obj_000002.ply",
+            "models_eval/models_info.json",
+            "test/000003/depth/000000.png",
+            "results/../test/000003/scene_camera.json",
+            "test_targets_bop19.json",
+            "link.json",
+        ] {
+            let words = format!("{command} {option} {path}");
+            let told = run(folder, words.split(' ')).exits(1);
+            let names = format!("error: {option} names {path}, which is there and belongs to");
+            assert_eq!(told.complains(&[&names, "overwritten"]).out, "");
+        }
+        assert_eq!(files(folder), before, "{command} {option}");
+    }
+    let words = "bop compare --dataset . --init in.csv --pipelines scene_gt.toml --out test/000003";
+    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
+    std::fs::write(world.path("scene_gt.toml"), pipeline).unwrap();
+    run(folder, words.split(' '))
+        .exits(1)
+        .complains(&["--out names test/000003/scene_gt.json", "its scenes"]);
+}
+
+#[test]
+fn what_belongs_to_a_dataset_and_what_does_not() {
+    let world = dataset();
+    let folder = world.folder.path();
+    let before = files(folder);
+    let eval = |json: &str| {
+        let words = "bop eval --dataset . --results in.csv --json";
+        run(folder, words.split(' ').chain([json]))
+    };
+    // Whatever lies in a folder of the dataset, also of another split, and what comes with one beside them.
+    for path in [
+        "camera_uw.json",
+        "dataset_info.md",
+        "train_pbr/notes",
+        "train_pbr/000007/scene_gt.json",
+        "models_fine/obj_000001.ply",
+    ] {
+        eval(path)
+            .exits(1)
+            .complains(&[path, "belongs to the dataset"]);
+    }
+    assert_eq!(files(folder), before);
+    std::fs::remove_dir_all(world.path("models_eval")).unwrap();
+    // What a run has left in the dataset's folder or beside its others is written anew, and where nothing is, nothing is lost.
+    for path in [
+        "old.json",
+        "results/old.json",
+        "test/../results/old.json",
+        "new.json",
+        "models/new.json",
+        "test/000003/new.json",
+    ] {
+        eval(path).exits(0);
+        let text = read_to_string(world.path(path)).unwrap();
+        assert!(text.contains("\"ar\""), "{path}");
+    }
+    // The dataset's folder as a split has scenes, and not all there is.
+    for path in ["7/scene_gt.json", "obj_000001.ply"] {
+        std::fs::create_dir_all(world.path(path).parent().unwrap()).unwrap();
+        std::fs::write(world.path(path), "{}").unwrap();
+        let words = format!("bop eval --dataset . --split . --results in.csv --json {path}");
+        run(folder, words.split(' '))
+            .exits(1)
+            .complains(&["belongs to the dataset"]);
+    }
+    let words = "bop eval --dataset . --split . --results in.csv --json old.json";
+    let told = run(folder, words.split(' ')).exits(1);
+    assert!(!told.err.contains("belongs"), "{}", told.err);
+}
+
+/// Splits, scenes and meshes are often links into another disk: neither name of such a file may be written to.
+#[test]
+fn links_do_not_hide_a_dataset() {
+    let world = dataset();
+    let folder = world.folder.path();
+    std::fs::create_dir(world.path("disk")).unwrap();
+    for (name, aside) in [
+        ("test/000012", "disk/twelve"),
+        ("models/obj_000001.ply", "disk/mesh"),
+        ("train_pbr", "disk/train"),
+        ("test_targets_bop19.json", "disk/targets"),
+    ] {
+        std::fs::rename(world.path(name), world.path(aside)).unwrap();
+        symlink(world.path(aside), world.path(name)).unwrap();
+    }
+    symlink(".", world.path("again")).unwrap();
+    let before = files(&world.path("disk"));
+    for path in [
+        "test/000012/scene_gt.json",
+        "disk/twelve/scene_gt.json",
+        "again/test/000012/depth/000000.png",
+        "models/obj_000001.ply",
+        "disk/mesh",
+        "train_pbr/notes",
+        "disk/train/000007/scene_gt.json",
+        "test_targets_bop19.json",
+        "disk/targets",
+    ] {
+        let words = "bop show --dataset again --scene 3 --image 40 --results in.csv --out";
+        run(folder, words.split(' ').chain([path]))
+            .exits(1)
+            .complains(&[path, "belongs to the dataset again"]);
+    }
+    assert_eq!(files(&world.path("disk")), before);
+}
+
+#[test]
+fn a_result_file_in_a_split_is_refined_in_place() {
+    let world = dataset();
+    let path = world.path("test/in.csv");
+    write_results(&path, &world.rows()[..2]).unwrap();
+    let before = std::fs::read(&path).unwrap();
+    let words = "bop refine --dataset . --results test/in.csv --output ./test/in.csv";
+    run(world.folder.path(), words.split(' ')).exits(0);
+    assert_ne!(std::fs::read(&path).unwrap(), before);
+}
+
+/// A run in place writes every row or none.
+#[test]
+fn rows_that_are_left_out_are_not_lost_in_place() {
+    let world = dataset();
+    let folder = world.folder.path();
+    symlink("in.csv", world.path("link.csv")).unwrap();
+    let before = std::fs::read(world.path("in.csv")).unwrap();
+    // Ten rows: three of every image with a hammer, and two targets.
+    for (option, left_out) in [
+        ("--limit 4", "--limit leaves out 6 of its 10 rows"),
+        ("--top-k 1", "--top-k leaves out 4 of its 10 rows"),
+        (
+            "--targets test_targets_bop19.json",
+            "--targets leaves out 8 of its 10 rows",
+        ),
+        ("--shard 1/2", "--shard leaves out 4 of its 10 rows"),
+        (
+            "--limit 9 --shard 1/1",
+            "--limit with --shard leaves out 1 of its 10 rows",
+        ),
+    ] {
+        for output in ["in.csv", "./in.csv", "link.csv"] {
+            let words =
+                format!("bop refine --dataset . --results in.csv --output {output} {option}");
+            let told = run(folder, words.split(' ')).exits(1);
+            let both = format!("--output and --results both name {output}, and {left_out}");
+            told.complains(&[&both, "they would be lost"]);
+            assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), before);
+            assert!(!world.path("in.csv.journal").exists());
+        }
+    }
+    // Options that leave nothing out do no harm.
+    let words =
+        "bop refine --dataset . --results in.csv --output in.csv --limit 10 --shard 1/1 --top-k 2";
+    run(folder, words.split(' ')).exits(0);
+    let rows = hicp_io::bop::read_results(world.path("in.csv")).unwrap();
+    assert_eq!(rows.len(), 10);
+    assert_ne!(std::fs::read(world.path("in.csv")).unwrap(), before);
+}
+
+/// Links to a file that is still to be made lead to that file.
+#[test]
+fn outputs_that_meet_behind_links_are_refused() {
+    let mut scene = Scene::new().with("--trace", "target.json");
+    std::fs::create_dir(scene.path("below")).unwrap();
+    symlink("target.json", scene.path("link")).unwrap();
+    symlink("../link", scene.path("below/link")).unwrap();
+    for output in ["link", "below/link", "below/../link"] {
+        scene = scene.with("--output", output);
+        let told = scene.run().exits(1);
+        let both = "--trace and --output both name target.json, expected different files";
+        assert_eq!(told.complains(&[both]).out, "");
+        assert!(!scene.path("target.json").exists());
+    }
+    // A link to another file is another file.
+    symlink("other.json", scene.path("third")).unwrap();
+    scene.with("--output", "third").run().exits(0);
+}

@@ -1,0 +1,259 @@
+//! What `hybrid-icp refine` refuses, and how it says so: file, field, value, what was expected.
+
+use crate::common::*;
+use hicp_io::LengthUnit;
+use hybrid_icp::{DepthImage, Mask};
+
+/// Asserts that a scene is refused with all of these words, and that outputs that were there stay as they were.
+#[track_caller]
+fn refused(scene: Scene, parts: &[&str]) {
+    let scene = if scene.arguments.iter().any(|(o, _)| *o == "--overlay") {
+        scene
+    } else {
+        scene.with("--overlay", "overlay.png")
+    };
+    for name in ["out.json", "overlay.png"] {
+        scene.write(name, "the user's");
+    }
+    let before = names(scene.folder.path());
+    let told = scene.run().exits(1).complains(parts);
+    assert!(told.err.starts_with("error: "), "{}", told.err);
+    assert_eq!(told.err.lines().count(), 1, "{}", told.err);
+    assert_eq!(told.out, "");
+    for name in ["out.json", "overlay.png"] {
+        assert_eq!(std::fs::read(scene.path(name)).unwrap(), b"the user's");
+    }
+    assert_eq!(names(scene.folder.path()), before, "nothing is left behind");
+}
+
+#[track_caller]
+fn refused_file(name: &str, content: impl AsRef<[u8]>, parts: &[&str]) {
+    let scene = Scene::new();
+    scene.write(name, content);
+    refused(scene, parts);
+}
+
+#[test]
+fn missing_files() {
+    for option in ["--model", "--depth", "--mask", "--camera", "--init"] {
+        let scene = Scene::new().with(option, "gone.ply");
+        refused(scene, &["cannot read gone.ply", "No such file"]);
+    }
+}
+
+#[test]
+fn cameras() {
+    let zero = FLAT_CAMERA.replace("400", "0");
+    refused_file("camera.json", zero, &["camera.json", "fx is 0", "above 0"]);
+    let negative = FLAT_CAMERA.replace("402", "-402");
+    refused_file(
+        "camera.json",
+        negative,
+        &["camera.json", "fy is -402", "above 0"],
+    );
+    let zero = BOP_CAMERA.replace("[400", "[0");
+    refused_file(
+        "camera.json",
+        zero,
+        &["camera.json", "cam_K", "fx is 0", "above 0"],
+    );
+    let skewed = BOP_CAMERA.replace("[400, 0", "[400, 3");
+    refused_file(
+        "camera.json",
+        skewed,
+        &["camera.json", "cam_K", "[0][1] is 3", "expected 0"],
+    );
+    refused_file(
+        "camera.json",
+        r#"{"cam_K": [1, 2]}"#,
+        &["camera.json", "cam_K", "array of 2", "9 numbers"],
+    );
+    refused_file(
+        "camera.json",
+        BOP_CAMERA.replace("400", "NaN"),
+        &["camera.json", "line 1", "not valid JSON"],
+    );
+    refused_file("camera.json", "{}", &["camera.json", "cam_K", "fx"]);
+    let no_height = FLAT_CAMERA.replace("height", "h");
+    refused_file("camera.json", no_height, &["camera.json", "height"]);
+    let zero = BOP_CAMERA.replace("0.1", "0");
+    refused_file(
+        "camera.json",
+        zero,
+        &["camera.json", "depth_scale", "found 0", "above 0"],
+    );
+    refused(
+        Scene::new().without("--depth-scale"),
+        &[
+            "camera.json",
+            "depth_scale",
+            "--depth-scale",
+            "millimetres per unit",
+        ],
+    );
+}
+
+#[test]
+fn sizes_that_disagree_name_both_files_and_sizes() {
+    let small = FLAT_CAMERA.replace("320", "640").replace("240", "480");
+    refused_file(
+        "camera.json",
+        small,
+        &["camera.json", "640x480", "depth.png", "320x240"],
+    );
+
+    let scene = Scene::new();
+    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::full(160, 120)).unwrap();
+    refused(scene, &["mask.png", "160x120", "depth.png", "320x240"]);
+
+    let scene = Scene::new();
+    let depth = DepthImage::from_meters(64, 48, vec![1.0; 64 * 48]).unwrap();
+    hicp_io::write_depth_png(scene.path("depth.png"), &depth, 1.0).unwrap();
+    refused(scene, &["mask.png", "320x240", "depth.png", "64x48"]);
+}
+
+#[test]
+fn images() {
+    for name in ["depth.png", "mask.png"] {
+        let scene = Scene::new();
+        let whole = std::fs::read(scene.path(name)).unwrap();
+        for length in [0, 20, whole.len() / 2] {
+            let scene = Scene::new();
+            scene.write(name, &whole[..length]);
+            refused(scene, &[name, "PNG"]);
+        }
+        refused_file(name, "P5 320 240", &[name, "PNG"]);
+    }
+    let scene = Scene::new();
+    hicp_io::write_rgb_png(scene.path("depth.png"), 320, 240, &[9; 320 * 240 * 3]).unwrap();
+    refused(scene, &["depth.png", "8-bit RGB", "16-bit gray"]);
+    let scene = Scene::new();
+    hicp_io::write_mask_png(scene.path("depth.png"), &Mask::full(320, 240)).unwrap();
+    refused(scene, &["depth.png", "8-bit gray", "16-bit gray"]);
+}
+
+#[test]
+fn initial_poses() {
+    let pose = |rotation: &str, translation: &str| {
+        format!(r#"{{"cam_R_m2c": {rotation}, "cam_t_m2c": {translation}}}"#)
+    };
+    let good = "[1,0,0,0,1,0,0,0,1]";
+    for (text, parts) in [
+        (
+            pose("[1,0,0,0,1,0,0,0,-1]", "[0,0,500]"),
+            &["cam_R_m2c", "determinant -1", "expected 1", "0.001"][..],
+        ),
+        (
+            pose("[1,0,0,0,1,0,0,0,1.002]", "[0,0,500]"),
+            &["cam_R_m2c", "not orthogonal", "0.00400", "0.001"],
+        ),
+        (
+            pose("[0,0,0,0,0,0,0,0,0]", "[0,0,500]"),
+            &["cam_R_m2c", "not orthogonal", " 1,"],
+        ),
+        (
+            pose("[1,0,0,0,1,0,0,0]", "[0,0,500]"),
+            &["cam_R_m2c", "array of 8", "9 numbers"],
+        ),
+        (
+            pose("[1,0,0,0,1,0,0,0,\"1\"]", "[0,0,500]"),
+            &["cam_R_m2c[8]", "number"],
+        ),
+        (
+            pose(good, "[0,0]"),
+            &["cam_t_m2c", "array of 2", "3 numbers"],
+        ),
+        (
+            pose(good, "[0,0,null]"),
+            &["cam_t_m2c[2]", "null", "number"],
+        ),
+        (pose(good, "[0,0,Infinity]"), &["line 1", "not valid JSON"]),
+        (format!(r#"{{"cam_R_m2c": {good}}}"#), &["cam_t_m2c"]),
+        (String::new(), &["line 1", "not valid JSON"]),
+    ] {
+        refused_file("init.json", text, &[&["init.json"], parts].concat());
+    }
+    // What four digits explain is a rotation.
+    let scene = Scene::new();
+    scene.write(
+        "init.json",
+        pose("[1,0,0,0,0.8661,-0.5,0,0.5,0.8660]", "[0,0,500]"),
+    );
+    scene.run().exits(0);
+}
+
+#[test]
+fn meshes() {
+    refused(
+        Scene::new().with("--model", "init.json"),
+        &["init.json", "\"json\""],
+    );
+    refused_file("mesh.ply", "", &["mesh.ply"]);
+    let scene = Scene::new().with("--model", "a.obj");
+    scene.write("a.obj", "v 0 0 0\nv 1 0 0\n");
+    refused(scene, &["a.obj", "line 2", "expected a face"]);
+    let scene = Scene::new().with("--model", "a.obj");
+    scene.write("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
+    refused(scene, &["a.obj", "finite"]);
+    let scene = Scene::new().with("--model", "a.obj");
+    scene.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+    refused(scene, &["a.obj", "4"]);
+    let scene = Scene::new().with("--model", "a.stl");
+    scene.write("a.stl", "solid x\nendsolid x\n");
+    refused(scene, &["a.stl"]);
+}
+
+#[test]
+fn outputs_are_checked_before_anything_is_read() {
+    for option in ["--output", "--overlay"] {
+        // The model is missing too: the output is what is told.
+        let scene = Scene::new()
+            .with("--model", "gone.ply")
+            .with(option, "no/where");
+        refused(
+            scene,
+            &["cannot write no/where", "folder no does not exist"],
+        );
+        refused(
+            Scene::new().with(option, "."),
+            &["cannot write .", "directory"],
+        );
+        for input in ["mesh.ply", "depth.png", "mask.png", "camera.json"] {
+            let scene = Scene::new().with(option, format!("./{input}"));
+            let content = std::fs::read(scene.path(input)).unwrap();
+            let path = scene.path(input);
+            let told = scene
+                .run()
+                .exits(1)
+                .complains(&[option, input, "overwritten"]);
+            assert_eq!(told.out, "");
+            assert_eq!(std::fs::read(path).unwrap(), content);
+        }
+    }
+    let scene = Scene::new().with("--overlay", "init.json");
+    scene
+        .run()
+        .exits(1)
+        .complains(&["--overlay", "--init", "init.json"]);
+    let scene = Scene::new().with("--output", "x").with("--overlay", "./x");
+    scene
+        .run()
+        .exits(1)
+        .complains(&["--output", "--overlay", "different files"]);
+    assert!(!scene.path("x").exists());
+    // Not the folder: a file in its place.
+    refused(
+        Scene::new().with("--output", "mask.png/out.json"),
+        &["cannot write mask.png/out.json"],
+    );
+}
+
+#[test]
+fn a_result_replaces_an_older_one_and_leaves_nothing_else() {
+    let scene = Scene::new();
+    scene.write("out.json", "older");
+    let before = names(scene.folder.path());
+    scene.result();
+    assert_eq!(names(scene.folder.path()), before);
+    hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Meters).unwrap();
+}

@@ -1,0 +1,140 @@
+//! A warm run makes no heap allocation, whatever the preset.
+
+use std::collections::BTreeMap;
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::allocations::allocations;
+use hicp_tests::scene;
+use hybrid_icp::fusion::{CameraMotion, FusionMethod};
+use hybrid_icp::pipeline::{PARTS, Part, PartKind};
+use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator, Vector3};
+
+#[test]
+fn a_warm_run_allocates_nothing() {
+    let mut rng = rng(3);
+    let scene = scene(Household::Mug, 1.0, &mut rng);
+    // One start that is nearly right and one that is far off, so that `hybrid` takes both of its branches; and one upside down,
+    // so that there is something to search for.
+    let starts = [
+        perturb(&mut rng, &scene.truth, 0.004, 0.08),
+        perturb(&mut rng, &scene.truth, 0.08, 0.6),
+        scene.truth * Isometry3::rotation(Vector3::x() * std::f64::consts::PI),
+    ];
+    let mut evaluations = BTreeMap::new();
+    for preset in Preset::ALL {
+        let mut refiner = Refiner::preset(preset);
+        for init in &starts {
+            refiner.refine(&scene.model, &scene.observation, init);
+        }
+        for init in &starts {
+            let before = allocations();
+            let refined = refiner.refine(&scene.model, &scene.observation, init);
+            let count = allocations() - before;
+            assert_eq!(count, 0, "{preset}: {refined:?}");
+            *evaluations.entry(preset.name()).or_insert(0) += refined.outcome.iterations;
+        }
+    }
+    for global in ["search", "auto"] {
+        assert!(
+            evaluations[global] > evaluations["local"],
+            "{global} never searched"
+        );
+    }
+    counter_works();
+}
+
+/// An ICP stage with one part of the catalogue in the place of its kind, or `None` for parts that are no component of a stage.
+fn stage_with(part: &Part) -> Option<String> {
+    let own = match part.name {
+        "schedule" => "{ type = \"schedule\", filters = [\"max-distance\", \"trimmed\"] }".to_owned(),
+        "weighted-sum" => {
+            "{ type = \"weighted-sum\", metrics = [\"point-to-plane\", \"point-to-point\"], weights = [1.0, 0.1] }".to_owned()
+        }
+        "metric-schedule" => {
+            "{ type = \"metric-schedule\", metrics = [\"point-to-point\", \"pose-prior\"] }".to_owned()
+        }
+        "time-limit" => "{ type = \"time-limit\", milliseconds = 1000 }".to_owned(),
+        name => format!("\"{name}\""),
+    };
+    let or = |kind, usual: &str| {
+        if part.kind == kind {
+            own.clone()
+        } else {
+            format!("\"{usual}\"")
+        }
+    };
+    let component = matches!(
+        part.kind,
+        PartKind::Selection
+            | PartKind::Association
+            | PartKind::Filter
+            | PartKind::Metric
+            | PartKind::Stop
+    );
+    component.then(|| {
+        format!(
+            "type = \"icp\"\nselection = {}\nassociation = {}\nfilter = [{}]\nmetric = {}\nstop = [{}, \"iteration-limit\"]",
+            or(PartKind::Selection, "visible-surface"),
+            or(PartKind::Association, "nearest-neighbor"),
+            or(PartKind::Filter, "max-normal-angle"),
+            or(PartKind::Metric, "point-to-plane"),
+            or(PartKind::Stop, "divergence"),
+        )
+    })
+}
+
+#[test]
+fn every_component_of_the_catalogue_is_silent_when_warm() {
+    let mut rng = rng(5);
+    let scene = scene(Household::Mug, 1.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let mut tried = 0;
+    for part in PARTS {
+        let Some(text) = stage_with(part) else {
+            continue;
+        };
+        let file = PipelineFile::parse(&text, part.name).expect("valid TOML");
+        let mut refiner = Refiner::boxed(file.build().expect("a valid pipeline"));
+        for _ in 0..2 {
+            refiner.refine(&scene.model, &scene.observation, &init);
+        }
+        let before = allocations();
+        refiner.refine(&scene.model, &scene.observation, &init);
+        assert_eq!(allocations() - before, 0, "{}", part.name);
+        tried += 1;
+    }
+    assert!(tried > 50, "{tried}");
+}
+
+#[test]
+fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
+    let mut rng = rng(7);
+    // A bottle: its symmetries are looked at too.
+    let scene = scene(Household::Bottle, 1.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let uncertain = CameraMotion::none()
+        .with_covariance(&(hybrid_icp::Matrix6::identity() * 1e-8))
+        .expect("a covariance");
+    for method in FusionMethod::ALL {
+        let stage = Preset::Hybrid.build();
+        let mut estimator =
+            SequentialEstimator::for_object(stage, method, &scene.model, &init).expect("valid");
+        let mut steps = |init: &Isometry3<f64>| {
+            estimator.restart(init).expect("valid");
+            for motion in [CameraMotion::none(), uncertain, CameraMotion::none()] {
+                estimator.step(&scene.model, &scene.observation, &motion);
+            }
+        };
+        steps(&init);
+        let before = allocations();
+        steps(&init);
+        assert_eq!(allocations() - before, 0, "{method}");
+    }
+    counter_works();
+}
+
+fn counter_works() {
+    let before = allocations();
+    std::hint::black_box(vec![1_u8]);
+    assert_eq!(allocations() - before, 1);
+}

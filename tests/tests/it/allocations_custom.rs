@@ -1,0 +1,70 @@
+//! Checks that a warm run with custom components makes no heap allocation. The conformance kit cannot test this.
+
+use crate::custom_association::SoftProjective;
+use crate::custom_metric::AlongRay;
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::allocations::allocations;
+use hicp_tests::scene;
+use hybrid_icp::{
+    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit,
+    PointToPlane, Refiner, Surfel, VisibleSurface, WeightedSum,
+};
+
+/// Allocations of the second of two equal refinements, and how many iterations it took.
+fn warm_allocations(association: impl DataAssociation + Send + 'static) -> (u64, u64) {
+    let mut rng = rng(3);
+    let scene = scene(Household::Mug, 1.0, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let along_ray = AlongRay { min_cosine: 0.2 };
+    let mut refiner = Refiner::new(Icp {
+        selection: VisibleSurface::default(),
+        association,
+        filter: (),
+        metric: WeightedSum {
+            terms: ((1.0, PointToPlane), (0.5, along_ray)),
+        },
+        stop: (Divergence::count_aware(), IterationLimit(20)),
+    });
+    refiner.refine(&scene.model, &scene.observation, &init);
+    let before = allocations();
+    let refined = refiner.refine(&scene.model, &scene.observation, &init);
+    (allocations() - before, refined.outcome.iterations as u64)
+}
+
+const SOFT: SoftProjective = SoftProjective {
+    radius_pixels: 2,
+    sigma_meters: 0.003,
+};
+
+#[test]
+fn a_warm_run_with_parts_of_ones_own_allocates_nothing() {
+    let (allocations, iterations) = warm_allocations(SOFT);
+    assert_eq!(allocations, 0);
+    assert!(iterations > 1, "{iterations}");
+}
+
+/// Makes a copy of the points in every iteration.
+struct Wasteful;
+
+impl DataAssociation for Wasteful {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        pose: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let mut soft = SOFT;
+        let copy = source.to_vec();
+        soft.associate(context, &copy, pose, pairs);
+    }
+}
+
+#[test]
+fn an_association_that_allocates_is_found_out() {
+    let (allocations, iterations) = warm_allocations(Wasteful);
+    assert!(
+        allocations >= iterations,
+        "{allocations} in {iterations} iterations"
+    );
+}

@@ -1,0 +1,92 @@
+//! A data association of one's own: soft correspondences with all pixels of a window.
+
+use hicp_testkit::{AssociationLaws, check_association};
+use hicp_tests::starts::{measure_stage, starts};
+use hybrid_icp::{
+    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit, Pair,
+    PointToPoint, Projective, RigidTransform, SmallMotion, Stage, Surfel, VisibleSurface,
+};
+
+// --- The component ---
+
+/// Pairs a model point with every observed point in a window about its projection, each with a share of a weight of one that
+/// falls with its distance as a Gaussian: the E-step of EM-ICP (Granger & Pennec 2002), with the image in the place of a tree.
+#[derive(Clone, Copy, Debug)]
+pub struct SoftProjective {
+    /// Half the width of the window, pixels.
+    pub radius_pixels: u8,
+    /// Standard deviation of the distances, metres.
+    pub sigma_meters: f32,
+}
+
+impl DataAssociation for SoftProjective {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let observation = context.problem.observation;
+        let mover = RigidTransform::new(camera_from_object);
+        let radius = i16::from(self.radius_pixels);
+        for (source_index, surfel) in (0..).zip(source) {
+            let source = mover.surfel(surfel);
+            let pixel = observation.camera().project(&source.point.cast());
+            let Some(pixel) = pixel.filter(|_| source.point.z.is_finite()) else {
+                continue;
+            };
+            let (u, v) = (pixel.x as f32, pixel.y as f32);
+            let first = pairs.len();
+            let offsets = (-radius..=radius).map(f32::from);
+            let window = (offsets.clone()).flat_map(|dv| offsets.clone().map(move |du| (du, dv)));
+            pairs.extend(window.filter_map(|(du, dv)| {
+                let index = observation.index_near(u + du, v + dv)?;
+                let mut pair = Pair::new(source_index, source, index, *observation.surfel(index)?);
+                pair.weight = (-0.5 * (pair.distance() / self.sigma_meters).powi(2)).exp();
+                Some(pair)
+            }));
+            let own = &mut pairs.as_mut_slice()[first..];
+            let sum: f32 = own.iter().map(|pair| pair.weight).sum();
+            own.iter_mut().for_each(|pair| pair.weight /= sum.max(1e-6));
+        }
+    }
+}
+
+// --- Its tests ---
+
+fn point_to_point<A: DataAssociation>(association: A) -> impl Stage {
+    Icp {
+        selection: VisibleSurface::default(),
+        association,
+        filter: (),
+        metric: PointToPoint,
+        stop: (
+            Divergence::count_aware(),
+            SmallMotion::default(),
+            IterationLimit(50),
+        ),
+    }
+}
+
+const SOFT: SoftProjective = SoftProjective {
+    radius_pixels: 3,
+    sigma_meters: 0.002,
+};
+
+#[test]
+fn it_keeps_the_laws() {
+    check_association(|| SOFT, AssociationLaws::default());
+}
+
+#[test]
+fn it_slides_where_one_pixel_per_point_stands_still() {
+    let starts = starts(2, 0.5);
+    let plain = measure_stage(&mut point_to_point(Projective), &starts);
+    let mine = measure_stage(&mut point_to_point(SOFT), &starts);
+    assert!(mine.degrees < 0.7 * plain.degrees, "{mine:?}\n{plain:?}");
+    assert!(
+        mine.millimeters < 0.7 * plain.millimeters,
+        "{mine:?}\n{plain:?}"
+    );
+}

@@ -1,0 +1,83 @@
+//! A filter of one's own: weights that grow stricter from iteration to iteration.
+
+use hicp_sim::MEAN_ROTATION_ERROR_DEGREES;
+use hicp_testkit::{FilterLaws, check_filter};
+use hicp_tests::starts::{Start, measure_stage, starts};
+use hybrid_icp::{
+    Correspondences, Icp, IterationLimit, OutlierFilter, PointToPlane, Problem, Projective,
+    SmallMotion, Stage, VisibleSurface,
+};
+
+// --- The component ---
+
+/// Graduated non-convexity (Yang, Antonante, Tzoumas & Carlone 2020): multiplies weights by those of a Geman–McClure kernel that is
+/// nearly quadratic at first and reaches its true width in the course of the iterations, w = (μσ²/(r² + μσ²))², r the distance
+/// to the observed tangent plane.
+#[derive(Clone, Copy, Debug)]
+struct Graduated {
+    /// σ: what a right pair is off by, metres.
+    sigma_meters: f32,
+    /// μ of the first iteration.
+    start: f32,
+    /// What μ is divided by from one iteration to the next, until it is 1.
+    rate: f32,
+    mu: f32,
+}
+
+impl OutlierFilter for Graduated {
+    fn begin(&mut self, iteration: usize) {
+        let turns = i32::try_from(iteration).unwrap_or(i32::MAX);
+        self.mu = (self.start / self.rate.powi(turns)).max(1.0);
+    }
+
+    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+        let width = self.mu * self.sigma_meters.powi(2);
+        for pair in pairs.as_mut_slice() {
+            let offset = pair.source.point - pair.target.point;
+            let residual = pair.target.normal.dot(&offset);
+            pair.weight *= (width / (residual * residual + width)).powi(2);
+        }
+    }
+}
+
+// --- Its tests ---
+
+fn graduated() -> Graduated {
+    Graduated {
+        sigma_meters: 0.002,
+        start: 30.0,
+        rate: 1.4,
+        mu: 30.0,
+    }
+}
+
+fn projective<F: OutlierFilter>(filter: F) -> impl Stage {
+    Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter,
+        metric: PointToPlane,
+        stop: (SmallMotion::default(), IterationLimit(50)),
+    }
+}
+
+#[test]
+fn it_keeps_the_laws() {
+    check_filter(graduated, FilterLaws::default());
+}
+
+#[test]
+fn it_finds_the_object_where_the_mask_holds_something_else_too() {
+    let mut starts = starts(3, 0.5);
+    for Start { scene, .. } in &mut starts {
+        scene.observation = scene.behind_a_bar(0.3, 0.02, true);
+    }
+    let plain = measure_stage(&mut projective(()), &starts);
+    let mine = measure_stage(&mut projective(graduated()), &starts);
+    assert!(mine.degrees < 0.5 * plain.degrees, "{mine:?}\n{plain:?}");
+    assert!(mine.degrees < 0.5 * MEAN_ROTATION_ERROR_DEGREES, "{mine:?}");
+    assert!(
+        mine.millimeters < 0.5 * plain.millimeters,
+        "{mine:?}\n{plain:?}"
+    );
+}

@@ -1,0 +1,85 @@
+//! An error metric of one's own: what the sensor measures, the depth along the viewing ray.
+
+use hicp_testkit::{MetricLaws, check_metric};
+use hicp_tests::starts::{measure_stage, starts};
+use hybrid_icp::{
+    Divergence, ErrorMetric, Icp, IterationLimit, NormalEquations, Pair, PointToPlane, Projective,
+    SmallMotion, Stage, VisibleSurface, WeightedSum,
+};
+
+// --- The component ---
+
+/// How far the model lies from the observed tangent plane *along the viewing ray*, r = nᵀ(p − c) / nᵀd, d the unit ray to c, as
+/// dense trackers align depth images: a sensor's noise adds to the length of the ray, not to the distance from a plane.
+/// Rays more grazing than `min_cosine` count as that, since there the quotient explodes.
+#[derive(Clone, Copy, Debug)]
+pub struct AlongRay {
+    /// Smallest cosine between ray and normal, above 0.
+    pub min_cosine: f64,
+}
+
+impl ErrorMetric for AlongRay {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        let point = pair.source.point.cast::<f64>();
+        let target = pair.target.point.cast::<f64>();
+        let normal = pair.target.normal.cast::<f64>().into_inner();
+        // Observed normals face the camera, so the cosine is negative.
+        let cosine = normal.dot(&target.coords) / target.coords.norm();
+        let direction = normal / cosine.min(-self.min_cosine);
+        let residual = direction.dot(&(point - target));
+        system.add_row(&point, &direction, residual, f64::from(pair.weight));
+    }
+}
+
+// --- Its tests ---
+
+const ALONG_RAY: AlongRay = AlongRay { min_cosine: 0.2 };
+
+fn with_planes() -> impl ErrorMetric {
+    WeightedSum {
+        terms: ((1.0, PointToPlane), (0.5, ALONG_RAY)),
+    }
+}
+
+fn projective<M: ErrorMetric>(metric: M) -> impl Stage {
+    Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter: (),
+        metric,
+        stop: (
+            Divergence::count_aware(),
+            SmallMotion::default(),
+            IterationLimit(50),
+        ),
+    }
+}
+
+#[test]
+fn it_keeps_the_laws() {
+    // The rays start at the camera: moving model and image together is another measurement.
+    let laws = MetricLaws {
+        frame: false,
+        ..MetricLaws::default()
+    };
+    check_metric(|| ALONG_RAY, laws);
+    check_metric(with_planes, laws);
+}
+
+#[test]
+fn alone_and_beside_planes_it_ends_nearer_the_truth_than_planes_alone() {
+    let starts = starts(3, 0.5);
+    let planes = measure_stage(&mut projective(PointToPlane), &starts);
+    let mine = measure_stage(&mut projective(ALONG_RAY), &starts);
+    let both = measure_stage(&mut projective(with_planes()), &starts);
+    assert!(mine.degrees < 0.7 * planes.degrees, "{mine:?}\n{planes:?}");
+    assert!(
+        mine.millimeters < 0.7 * planes.millimeters,
+        "{mine:?}\n{planes:?}"
+    );
+    assert!(both.degrees < planes.degrees, "{both:?}\n{planes:?}");
+    assert!(
+        both.millimeters < planes.millimeters,
+        "{both:?}\n{planes:?}"
+    );
+}

@@ -1,0 +1,82 @@
+//! A point selection of one's own: the visible surface without what something nearer hides.
+
+use hicp_testkit::check_selection;
+use hicp_tests::starts::{Start, measure_stage, starts};
+use hybrid_icp::{
+    Context, Divergence, Icp, Isometry3, IterationLimit, NearestNeighbor, PointSelection,
+    PointToPlane, SmallMotion, Stage, Surfel, VisibleSurface,
+};
+
+// --- The component ---
+
+/// Leaves out the points of another selection where the camera measured something nearer by more than a margin: they are
+/// behind a hand, a gripper or a shelf, and whatever they are paired with is wrong.
+#[derive(Clone, Copy, Debug)]
+struct Unhidden<P> {
+    inner: P,
+    margin_meters: f64,
+}
+
+impl<P: PointSelection> PointSelection for Unhidden<P> {
+    fn select(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        source: &mut Vec<Surfel>,
+    ) {
+        self.inner.select(context, camera_from_object, source);
+        let observation = context.problem.observation;
+        source.retain(|surfel| {
+            let point = camera_from_object * surfel.point.cast::<f64>();
+            let Some(pixel) = observation.camera().project(&point) else {
+                return false; // Behind the camera.
+            };
+            let (u, v) = (pixel.x.round().max(0.0), pixel.y.round().max(0.0));
+            let measured = observation.depth().get(u as u32, v as u32).unwrap_or(0.0);
+            measured <= 0.0 || f64::from(measured) > point.z - self.margin_meters
+        });
+    }
+}
+
+// --- Its tests ---
+
+fn nearest<P: PointSelection>(selection: P) -> impl Stage {
+    Icp {
+        selection,
+        association: NearestNeighbor::default(),
+        filter: (),
+        metric: PointToPlane,
+        stop: (
+            Divergence::count_aware(),
+            SmallMotion::default(),
+            IterationLimit(50),
+        ),
+    }
+}
+
+fn unhidden() -> Unhidden<VisibleSurface> {
+    Unhidden {
+        inner: VisibleSurface::default(),
+        margin_meters: 0.03,
+    }
+}
+
+#[test]
+fn it_keeps_the_laws() {
+    check_selection(unhidden);
+}
+
+#[test]
+fn behind_an_obstacle_it_refines_where_the_whole_visible_surface_is_misled() {
+    let mut starts = starts(3, 0.5);
+    for Start { scene, .. } in &mut starts {
+        scene.observation = scene.behind_a_bar(0.4, 0.05, false);
+    }
+    let plain = measure_stage(&mut nearest(VisibleSurface::default()), &starts);
+    let mine = measure_stage(&mut nearest(unhidden()), &starts);
+    assert!(mine.degrees < 0.7 * plain.degrees, "{mine:?}\n{plain:?}");
+    assert!(
+        mine.millimeters < 0.7 * plain.millimeters,
+        "{mine:?}\n{plain:?}"
+    );
+}

@@ -1,0 +1,44 @@
+//! Integration tests of the whole workspace: one program, so that it is linked once.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::unwrap_used,
+    reason = "helpers of tests"
+)]
+
+mod allocations;
+mod allocations_custom;
+mod beyond;
+mod catalogue;
+mod concurrency;
+mod cross;
+mod custom_association;
+mod custom_filter;
+mod custom_metric;
+mod custom_observer;
+mod custom_renderer;
+mod custom_score;
+mod custom_selection;
+mod custom_stage;
+mod custom_stop_rule;
+mod custom_switcher;
+mod degeneracy_scenes;
+mod determinism;
+mod fuzz_regressions;
+mod hostile;
+mod metrics;
+mod nees;
+mod numbers;
+mod pipeline_files;
+mod pipeline_limits;
+mod pitfalls;
+mod pitfalls_page;
+mod resolution;
+mod room;
+mod sequential;
+mod stages;
+mod starts;
+mod ycbv;
+
+#[global_allocator]
+static COUNTING: hicp_tests::allocations::Counting = hicp_tests::allocations::Counting;

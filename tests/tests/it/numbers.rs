@@ -1,0 +1,436 @@
+//! Numbers that are none, or cannot be: refused where a type is made, or an honest outcome; never a NaN in a result.
+
+use hicp_io::pose_from_bop;
+use hicp_sim::{Household, RelativeGaussian, rng};
+use hicp_tests::OBJECTS;
+use hicp_tests::starts::starts;
+use hybrid_icp::{
+    CameraError, DepthImage, Flatness, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
+    PAPER_ALPHA, PinholeCamera, Point3, Preset, Refinement, Refiner, TriMesh, Verdict, Warning,
+    render_depth_image, warning_of_diameter, warnings, warnings_of_result,
+};
+
+const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::new(300.0, 300.0, 79.5, 59.5, 160, 120).unwrap()
+}
+
+fn cuboid(sides: [f32; 3]) -> TriMesh {
+    let corner = |i: usize| {
+        let side = |axis: usize| sides[axis] * if (i >> axis) & 1 == 1 { 0.5 } else { -0.5 };
+        Point3::new(side(0), side(1), side(2))
+    };
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = faces
+        .iter()
+        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+        .collect();
+    TriMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+}
+
+struct Scene {
+    model: Model,
+    truth: Isometry3<f64>,
+    depth: DepthImage,
+    mask: Mask,
+}
+
+fn scene() -> Scene {
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let truth = Isometry3::new([0.01, -0.005, 0.4].into(), [0.6, -0.4, 0.3].into());
+    let depth = render_depth_image(&mesh, &camera(), &truth);
+    let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
+    let mask = Mask::new(160, 120, pixels).unwrap();
+    Scene {
+        model: Model::new(mesh),
+        truth,
+        depth,
+        mask,
+    }
+}
+
+impl Scene {
+    fn observe(&self, depth: DepthImage) -> Observation {
+        Observation::new(depth, self.mask.clone(), camera()).unwrap()
+    }
+
+    /// The depth with every pixel changed.
+    fn changed(&self, change: impl Fn(f32) -> f32) -> DepthImage {
+        let pixels = self.depth.pixels().iter().map(|z| change(*z)).collect();
+        DepthImage::from_meters(160, 120, pixels).unwrap()
+    }
+}
+
+#[track_caller]
+fn honest(refined: &Refinement, init: &Isometry3<f64>) {
+    let pose = refined.outcome.camera_from_object;
+    if init
+        .translation
+        .vector
+        .iter()
+        .chain(init.rotation.coords.iter())
+        .all(|x| x.is_finite())
+    {
+        let matrix = pose.to_homogeneous();
+        assert!(matrix.iter().all(|x| x.is_finite()), "{pose}");
+        assert!((pose.rotation.norm() - 1.0).abs() < 1e-9);
+    } else {
+        assert!(matches!(refined.outcome.verdict, Verdict::KeptInitial(_)));
+    }
+    for mve in [refined.mve, refined.mve_initial] {
+        assert!((0.0..=1.0).contains(&mve), "{mve}");
+    }
+}
+
+#[test]
+fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
+    let scene = scene();
+    let init = scene.truth * Isometry3::translation(0.003, 0.0, 0.0);
+    let plain = Refiner::preset(Preset::Hybrid).refine(
+        &scene.model,
+        &scene.observe(scene.depth.clone()),
+        &init,
+    );
+    assert_eq!(plain.outcome.verdict, Verdict::Refined);
+    // What the sensor writes for nothing: not a number, infinite, negative, a denormal, absurdly far.
+    for nothing in [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        -0.4,
+        -0.0,
+        1e-40,
+        1e30,
+    ] {
+        let mut number = 0;
+        let pixels: Vec<f32> = scene
+            .depth
+            .pixels()
+            .iter()
+            .map(|z| {
+                number += 1;
+                if *z == 0.0 || number % 7 == 0 {
+                    nothing
+                } else {
+                    *z
+                }
+            })
+            .collect();
+        let observation = scene.observe(DepthImage::from_meters(160, 120, pixels).unwrap());
+        assert!(
+            observation
+                .depth()
+                .pixels()
+                .iter()
+                .all(|z| *z == 0.0 || *z > 0.3),
+            "{nothing}"
+        );
+        for preset in Preset::ALL {
+            honest(
+                &Refiner::preset(preset).refine(&scene.model, &observation, &init),
+                &init,
+            );
+        }
+        let refined = Refiner::preset(Preset::Hybrid).refine(&scene.model, &observation, &init);
+        assert_eq!(refined.outcome.verdict, Verdict::Refined, "{nothing}");
+        let off = (refined.outcome.camera_from_object.translation.vector
+            - scene.truth.translation.vector)
+            .norm();
+        assert!(off < 0.002, "{nothing}: {off} m");
+    }
+}
+
+#[test]
+fn depth_in_another_unit_is_doubted() {
+    let scene = scene();
+    assert_eq!(
+        warnings(
+            &scene.model,
+            &scene.observe(scene.depth.clone()),
+            &scene.truth
+        ),
+        []
+    );
+    for (factor, expected) in [(0.1, 0.04), (10.0, 4.0), (0.001, 0.0004)] {
+        let observation = scene.observe(scene.changed(|z| z * factor));
+        let found = warnings(&scene.model, &observation, &scene.truth);
+        let [Warning::Depth { measured, .. }] = found[..] else {
+            panic!("{factor}: {found:?}");
+        };
+        assert!((measured / expected - 1.0).abs() < 0.2, "{measured}");
+        for preset in Preset::ALL {
+            let refined = Refiner::preset(preset).refine(&scene.model, &observation, &scene.truth);
+            honest(&refined, &scene.truth);
+        }
+    }
+    let nothing = scene.observe(scene.changed(|z| z * 1000.0 * 1000.0));
+    assert_eq!(
+        warnings(&scene.model, &nothing, &scene.truth),
+        [Warning::NoDepth]
+    );
+}
+
+#[test]
+fn models_in_another_unit_or_far_from_their_origin_are_doubted() {
+    let scene = scene();
+    let observation = scene.observe(scene.depth.clone());
+    for (scale, doubted) in [
+        (1000.0, "diameter is 123."),
+        (0.001, "diameter is 1.233e-4 m"),
+    ] {
+        let model = Model::new(cuboid([0.1 * scale, 0.06 * scale, 0.04 * scale]));
+        let found = warnings(&model, &observation, &scene.truth);
+        assert!(found[0].to_string().contains(doubted), "{found:?}");
+        honest(
+            &Refiner::preset(Preset::Hybrid).refine(&model, &observation, &scene.truth),
+            &scene.truth,
+        );
+    }
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let vertices = mesh
+        .vertices()
+        .iter()
+        .map(|p| Point3::new(p.x + 4096.0, p.y, p.z))
+        .collect();
+    let model = Model::new(TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap());
+    let init = scene.truth * Isometry3::translation(-4096.0, 0.0, 0.0);
+    let found = warnings(&model, &observation, &init);
+    assert!(
+        matches!(found[..], [Warning::CoarseCoordinates { step, .. }] if step > 4e-4),
+        "{found:?}"
+    );
+}
+
+/// Centimetres taken for decimetres make an object of a plausible size, but not behind its mask. What is thin and seen end-on, mostly
+/// occluded, or partly outside of the image has few pixels too, and is not doubted.
+#[test]
+fn models_far_too_large_for_their_mask_are_doubted() {
+    let scene = scene();
+    let told = |sides: [f32; 3], mask: &dyn Fn(usize, usize) -> bool, pose: &Isometry3<f64>| {
+        let pixels = (0..160 * 120).map(|i| mask(i % 160, i / 160)).collect();
+        let mask = Mask::new(160, 120, pixels).unwrap();
+        let depth = DepthImage::from_meters(160, 120, vec![0.4; 160 * 120]).unwrap();
+        let observation = Observation::new(depth, mask, camera()).unwrap();
+        // A vertex far away that no triangle uses is no part of the object.
+        let mesh = cuboid(sides);
+        let mut vertices = mesh.vertices().to_vec();
+        vertices.push(Point3::new(90.0, 80.0, 70.0));
+        let mesh = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+        warnings(&Model::new(mesh), &observation, pose)
+    };
+    let seen = |u: usize, v: usize| scene.mask.pixels()[v * 160 + u];
+    let found = told([1.0, 0.6, 0.4], &seen, &scene.truth);
+    assert!(matches!(found[..], [Warning::Sliver { .. }]), "{found:?}");
+    assert_eq!(told([0.1, 0.06, 0.04], &seen, &scene.truth), []);
+    let ahead = Isometry3::translation(0.0, 0.0, 0.4);
+    let square = |from: usize, to: usize| {
+        move |u: usize, v: usize| (from..to).contains(&u) && (from..to).contains(&v)
+    };
+    // A pen of 150 × 8 × 8 mm covers 6 × 6 pixels along its length.
+    assert_eq!(told([0.008, 0.008, 0.15], &square(57, 63), &ahead), []);
+    // Its side of 60 × 40 mm has 1,350 pixels. Of 81 left one has to ask what hides the others.
+    assert_eq!(told([0.1, 0.06, 0.04], &square(51, 60), &ahead), []);
+    let found = told([0.1, 0.06, 0.04], &square(51, 59), &ahead);
+    assert!(
+        matches!(found[..], [Warning::Sliver { pixels: 64, at_least, .. }] if (at_least - 1350.0).abs() < 1e-3),
+        "{found:?}"
+    );
+    assert_eq!(told([0.1, 0.06, 0.04], &square(0, 8), &ahead), []);
+    assert_eq!(told([0.6, 0.6, 0.0], &square(51, 59), &ahead), []);
+}
+
+/// A diameter that a dataset states may be that of another version of the mesh, but not of another object. Vertices that no triangle uses do
+/// not count.
+#[test]
+fn a_stated_diameter_that_is_not_the_meshs_is_doubted() {
+    let mesh = cuboid([0.1, 0.06, 0.04]);
+    let own = Model::new(mesh.clone()).diameter();
+    let mut vertices = mesh.vertices().to_vec();
+    vertices.push(Point3::new(5.0, 0.0, 0.0));
+    let stray = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+    for mesh in [mesh, stray] {
+        let told = |factor: f64| {
+            let diameter = Some(factor * own);
+            let config = ModelConfig {
+                diameter,
+                ..ModelConfig::default()
+            };
+            warning_of_diameter(&Model::with_config(mesh.clone(), config))
+        };
+        for near in [0.951, 1.0, 1.049] {
+            assert_eq!(told(near), None);
+        }
+        for far in [0.001, 0.949, 1.051, 1000.0] {
+            let expected = Warning::StatedDiameter {
+                stated: far * own,
+                measured: own,
+            };
+            assert_eq!(told(far), Some(expected));
+        }
+    }
+}
+
+/// The scores of a refinement from which on its pose is doubted.
+#[test]
+fn results_are_doubted_by_their_scores() {
+    let (half, nearly) = (0.5, 0.4_f64.next_down());
+    assert_eq!(warnings_of_result(half, nearly, None), []);
+    assert_eq!(
+        warnings_of_result(half, 0.4, None),
+        [Warning::Unexplained { mve: 0.4 }]
+    );
+    assert_eq!(warnings_of_result(0.9_f64.next_down(), nearly, None), []);
+    let found = warnings_of_result(0.9, nearly, None);
+    assert!(
+        matches!(found[..], [Warning::FoundElsewhere { mve_initial: 0.9, mve }] if mve == nearly),
+        "{found:?}"
+    );
+    // One warning about a pose that does not explain the image is enough.
+    assert_eq!(
+        warnings_of_result(1.0, 0.4, None),
+        [Warning::Unexplained { mve: 0.4 }]
+    );
+    assert_eq!(warnings_of_result(0.2, 0.2, None), []);
+    let flatness = Flatness {
+        residual: 0.01,
+        measured: 0.002,
+        rendered: 0.0123,
+        diameter: 0.2,
+    };
+    assert_eq!(warnings_of_result(half, 0.4, Some(flatness)).len(), 1);
+    // No depth image is as flat as numbers are.
+    let exact = Flatness {
+        measured: 1e-16,
+        ..flatness
+    };
+    let found = warnings_of_result(half, nearly, Some(exact));
+    assert!(found[0].to_string().contains("flat to within 0.0010 m"));
+    let found = warnings_of_result(half, nearly, Some(flatness));
+    assert_eq!(found, [Warning::Flat { flatness }]);
+    assert_eq!(
+        found[0].to_string(),
+        "the surface inside the mask is flat to within 0.0020 m, that of the model at the pose only to within 0.0123 m, and 0.0100 m away from it: \
+         what is there may be another object"
+    );
+    let found = warnings_of_result(0.2, 0.3, None);
+    assert_eq!(
+        found[0].to_string(),
+        "the returned pose explains the image worse than the initial one (MVE 0.300, was 0.200)"
+    );
+    assert!(
+        matches!(
+            warnings_of_result(0.95, 0.97, None)[..],
+            [Warning::Worse { .. }, Warning::Unexplained { .. }]
+        ),
+        "both are so"
+    );
+}
+
+/// Objects without a flat side, found on a wall. One with a flat side may lie on the wall as it would in its own place.
+#[test]
+fn what_is_found_on_a_wall_is_doubted() {
+    const ROUND: [Household; 3] = [Household::Mug, Household::Bottle, Household::Bowl];
+    let mut refiner = Refiner::preset(Preset::Auto);
+    for (index, start) in starts(2, 0.3).iter().enumerate() {
+        let (scene, observation) = (&start.scene, &start.scene.observation);
+        let refined = refiner.refine(&scene.model, observation, &start.init);
+        assert_eq!(refined.warnings(), [], "{refined:?}");
+        if !ROUND.contains(&OBJECTS[index / 2]) {
+            continue;
+        }
+        // A wall in the place of the object, nearer than its centre by a fifth of its diameter.
+        let center = scene.truth * scene.model.center();
+        let z = center.z - 0.2 * scene.model.diameter();
+        let (width, height) = (observation.depth().width(), observation.depth().height());
+        let wall = vec![z as f32; observation.depth().pixels().len()];
+        let wall = DepthImage::from_meters(width, height, wall).unwrap();
+        let wall = RelativeGaussian { percent: 0.3 }.apply(&mut rng(3), &wall);
+        let camera = *observation.camera();
+        let observation = Observation::new(wall, observation.mask().clone(), camera).unwrap();
+        let refined = refiner.refine(&scene.model, &observation, &start.init);
+        assert!(refined.mve < PAPER_ALPHA, "{refined:?}");
+        let found = refined.warnings();
+        assert!(matches!(found[..], [Warning::Flat { .. }]), "{found:?}");
+    }
+}
+
+#[test]
+fn cameras_that_cannot_be() {
+    for bad in [0.0, -0.0, -400.0, f64::NAN, f64::INFINITY] {
+        for (fx, fy, name) in [(bad, 400.0, "fx"), (400.0, bad, "fy")] {
+            let refused = PinholeCamera::new(fx, fy, 80.0, 60.0, 160, 120).unwrap_err();
+            assert!(matches!(refused, CameraError::FocalLength { name: n, .. } if n == name));
+        }
+    }
+    for bad in BAD {
+        assert!(PinholeCamera::new(400.0, 400.0, bad, 60.0, 160, 120).is_err());
+    }
+}
+
+#[test]
+fn matrices_that_are_no_rotation_are_refused() {
+    let told = |matrix: &Matrix3<f64>| {
+        let rows: [f64; 9] = matrix.transpose().as_slice().try_into().unwrap();
+        pose_from_bop(&rows, &[0.0; 3]).unwrap_err().to_string()
+    };
+    for axis in 0..3 {
+        let mut reflection = Matrix3::identity();
+        reflection[(axis, axis)] = -1.0;
+        assert!(told(&reflection).contains("determinant -1"));
+    }
+    let mut skewed = Matrix3::identity();
+    skewed[(0, 1)] = 0.01;
+    for bad in [
+        skewed,
+        Matrix3::identity() * 1.01,
+        Matrix3::zeros(),
+        Matrix3::identity() * 1e200,
+    ] {
+        assert!(told(&bad).contains("not orthogonal"), "{bad}");
+    }
+    for bad in BAD {
+        let mut matrix = Matrix3::identity();
+        matrix[(2, 1)] = bad;
+        told(&matrix);
+    }
+}
+
+#[test]
+fn poses_a_million_metres_away_or_not_finite_end_honestly() {
+    let scene = scene();
+    let observation = scene.observe(scene.depth.clone());
+    for direction in 0..3 {
+        for length in [
+            1e6,
+            -1e6,
+            1e12,
+            -1e300,
+            f64::MIN_POSITIVE,
+            f64::NAN,
+            f64::INFINITY,
+        ] {
+            let mut init = scene.truth;
+            init.translation.vector[direction] += length;
+            for preset in Preset::ALL {
+                honest(
+                    &Refiner::preset(preset).refine(&scene.model, &observation, &init),
+                    &init,
+                );
+            }
+            let z = (init * scene.model.center()).z;
+            let behind = warnings(&scene.model, &observation, &init);
+            let behind = behind
+                .iter()
+                .any(|warning| matches!(warning, Warning::BehindCamera { .. }));
+            assert_eq!(behind, z.is_nan() || z <= 0.0, "{length}");
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! Stages made of stages: acceleration, schedules, guards, and the numbers at the returned pose.
+
+use hicp_sim::{Household, SimRng, perturb, rng};
+use hicp_tests::{Scene, scene};
+use hybrid_icp::{
+    AllSamples, Anderson, Cascade, Correspondences, Guard, Icp, Isometry3, IterationEvent,
+    IterationLimit, KeepBest, MaxDistance, MeanVsd, NearestNeighbor, Observer, Outcome,
+    OutlierFilter, PointToPlane, PointToPoint, Preset, Problem, Projective, Quality, Rasterizer,
+    Refiner, Regime, Schedule, Session, SmallMotion, Stage, StageEvent, Switch, SwitchAmong,
+    Termination, Thresholds, Verdict, VisibleSurface, Workspace, presets,
+};
+
+fn case(object: Household, seed: u64, translation: f64, angle: f64) -> (Scene, Isometry3<f64>) {
+    let mut rng: SimRng = rng(seed);
+    let scene = scene(object, 0.5, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, translation, angle);
+    (scene, init)
+}
+
+fn run(stage: &mut dyn Stage, scene: &Scene, init: &Isometry3<f64>) -> Outcome {
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let problem = Problem::new(&scene.model, &scene.observation);
+    stage.run(&problem, init, &mut Session::new(&mut workspace, &mut ()))
+}
+
+fn creeping<S>(stop: S) -> Icp<AllSamples, NearestNeighbor, (), PointToPoint, S> {
+    Icp {
+        selection: AllSamples,
+        association: NearestNeighbor::default(),
+        filter: (),
+        metric: PointToPoint,
+        stop,
+    }
+}
+
+/// Notes the loss at which every ICP stage ended.
+#[derive(Default)]
+struct StepLosses(Vec<f64>);
+
+impl Observer for StepLosses {
+    fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+        let loss = event
+            .outcome
+            .evaluation
+            .map_or(f64::INFINITY, |e| e.mean_loss);
+        self.0.push(loss);
+    }
+}
+
+#[test]
+fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
+    let (mut plain_steps, mut fast_steps) = (0, 0);
+    for seed in 0..6 {
+        let (scene, init) = case(Household::Iron, seed, 0.004, 0.08);
+        // The plain iteration: one increment per step, until it stands still.
+        let mut pose = init;
+        let mut losses = Vec::new();
+        for _ in 0..60 {
+            let outcome = run(&mut creeping(IterationLimit(2)), &scene, &pose);
+            let Some(evaluation) = outcome.evaluation else {
+                break;
+            };
+            losses.push(evaluation.mean_loss);
+            pose = outcome.camera_from_object;
+        }
+        let reached = losses.iter().copied().fold(f64::INFINITY, f64::min) * 1.001;
+        plain_steps += losses.iter().position(|l| *l <= reached).unwrap() + 1;
+        let problem = Problem::new(&scene.model, &scene.observation);
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut steps = StepLosses::default();
+        let mut fast = Anderson::new(creeping(IterationLimit(2)));
+        fast.run(
+            &problem,
+            &init,
+            &mut Session::new(&mut workspace, &mut steps),
+        );
+        let position = steps.0.iter().position(|l| *l <= reached);
+        fast_steps += position.map_or(60, |index| index + 1);
+    }
+    assert!(
+        fast_steps < plain_steps,
+        "{fast_steps} accelerated steps, {plain_steps} plain ones"
+    );
+}
+
+#[test]
+fn anderson_never_returns_a_higher_loss_than_its_first_step() {
+    for seed in 0..6 {
+        let (scene, init) = case(Household::Car, seed, 0.01, 0.3);
+        let first = run(&mut creeping(IterationLimit(2)), &scene, &init);
+        let mut fast = Anderson::new(creeping(IterationLimit(2)));
+        let outcome = run(&mut fast, &scene, &init);
+        let loss = |o: &Outcome| o.evaluation.map_or(f64::INFINITY, |e| e.mean_loss);
+        assert!(loss(&outcome) <= loss(&first), "{outcome:?}");
+        assert_eq!(run(&mut fast, &scene, &init), outcome, "pure");
+    }
+}
+
+/// Notes how many pairs every iteration had.
+#[derive(Default)]
+struct PairCounts(Vec<usize>);
+
+impl Observer for PairCounts {
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> std::ops::ControlFlow<()> {
+        self.0.push(event.evaluation.n_pairs);
+        std::ops::ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_schedule_applies_one_filter_per_iteration_and_starts_anew() {
+    let (scene, init) = case(Household::Mug, 3, 0.004, 0.05);
+    let gates = [0.5_f32, 0.02, 0.01, 0.3];
+    let mut stage = Icp {
+        selection: VisibleSurface::default(),
+        association: Projective,
+        filter: (Schedule::new(gates.map(MaxDistance::diameters).to_vec()),),
+        metric: PointToPoint,
+        stop: (IterationLimit(6),),
+    };
+    let problem = Problem::new(&scene.model, &scene.observation);
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let mut record = |stage: &mut dyn Stage| {
+        let mut counts = PairCounts::default();
+        let outcome = stage.run(
+            &problem,
+            &init,
+            &mut Session::new(&mut workspace, &mut counts),
+        );
+        (counts.0, outcome)
+    };
+    let (counts, outcome) = record(&mut stage);
+    assert_eq!(counts.len(), 6);
+    assert!(
+        counts[1] < counts[0] && counts[2] < counts[1] && counts[3] > counts[2],
+        "{counts:?}"
+    );
+    // The numbers at the returned pose are those of its iteration.
+    assert_eq!(outcome.n_pairs(), counts[5]);
+    assert_eq!(record(&mut stage), (counts, outcome), "a second stage run");
+}
+
+#[test]
+fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
+    let mut rolled_back = 0;
+    for seed in 0..12 {
+        let (scene, init) = case(Household::Hammer, seed, 0.004, 0.1);
+        let mut stage = presets::projective_point_to_plane();
+        let outcome = run(&mut stage, &scene, &init);
+        rolled_back += usize::from(outcome.termination.is_rollback());
+        let Some(quality) = outcome.quality else {
+            continue;
+        };
+        // From the returned pose, with the points chosen at the initial one, the same pairs must come out.
+        let problem = Problem::new(&scene.model, &scene.observation);
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut context = workspace.context(&problem);
+        let mut source = Vec::new();
+        let pose = outcome.camera_from_object;
+        use hybrid_icp::{DataAssociation, PointSelection};
+        VisibleSurface::default().select(&mut context, &init, &mut source);
+        let mut pairs = Correspondences::new();
+        pairs.begin(&pose, source.len());
+        Projective.associate(&mut context, &source, &pose, &mut pairs);
+        assert_eq!(
+            Quality::of(&pairs, &mut PointToPlane),
+            Some(quality),
+            "seed {seed}"
+        );
+        assert_eq!(pairs.len(), outcome.n_pairs());
+        assert!((0.0..=1.0).contains(&quality.fitness) && quality.plane_rmse <= quality.point_rmse);
+        let loss = outcome.evaluation.unwrap().mean_loss;
+        assert!((loss.sqrt() - quality.plane_rmse).abs() < 1e-9);
+    }
+    assert!(rolled_back >= 3, "only {rolled_back} of 12 rolled back");
+}
+
+#[test]
+fn a_guard_never_lets_the_score_rise_and_keep_best_keeps_it() {
+    let mut worse_without = 0;
+    for (seed, object) in (0..).zip([
+        Household::Bowl,
+        Household::Plate,
+        Household::Mug,
+        Household::Pan,
+    ]) {
+        for (translation, angle) in [(0.0, 0.0), (0.004, 0.1), (0.02, 0.5), (0.08, 1.5)] {
+            let (scene, init) = case(object, seed, translation, angle);
+            let refine = |stage: Box<dyn Stage + Send>| {
+                Refiner::boxed(stage).refine(&scene.model, &scene.observation, &init)
+            };
+            let plain = refine(Preset::NnPointToPoint.build());
+            worse_without += usize::from(plain.mve > plain.mve_initial);
+            let guarded = refine(Box::new(Guard {
+                stage: Preset::NnPointToPoint.build(),
+                score: MeanVsd::default(),
+            }));
+            if plain.mve < plain.mve_initial {
+                assert_eq!(
+                    guarded.outcome.camera_from_object,
+                    plain.outcome.camera_from_object
+                );
+            } else {
+                assert_eq!(guarded.outcome.camera_from_object, init);
+                assert!(matches!(guarded.outcome.verdict, Verdict::KeptInitial(_)));
+            }
+            let best = refine(Box::new(KeepBest {
+                times: 3,
+                stage: Preset::NnPointToPoint.build(),
+                score: MeanVsd::default(),
+            }));
+            assert!(best.mve <= plain.mve.min(plain.mve_initial), "{best:?}");
+        }
+    }
+    assert!(worse_without > 0, "no case in which the guard matters");
+}
+
+#[test]
+fn a_switch_among_two_is_the_switch() {
+    let (scene, init) = case(Household::Mug, 5, 0.05, 1.0);
+    let bounds = vec![0.4];
+    let score = MeanVsd::default();
+    let mut two = Switch {
+        switcher: Thresholds {
+            score,
+            bounds: bounds.clone(),
+        },
+        aligned: Preset::ProjectiveCascadePointPlane.build(),
+        misaligned: Preset::NnPointToPoint.build(),
+    };
+    let mut many = SwitchAmong {
+        switcher: Thresholds { score, bounds },
+        stages: vec![
+            Preset::ProjectiveCascadePointPlane.build(),
+            Preset::NnPointToPoint.build(),
+        ],
+    };
+    for pose in [scene.truth, init] {
+        assert_eq!(run(&mut many, &scene, &pose), run(&mut two, &scene, &pose));
+    }
+    let mut beyond = SwitchAmong {
+        switcher: Regime(7),
+        stages: many.stages,
+    };
+    let mut last = Preset::NnPointToPoint.build();
+    assert_eq!(
+        run(&mut beyond, &scene, &init),
+        run(&mut *last, &scene, &init)
+    );
+}
+
+/// Asks to stop after a number of iterations of every stage.
+struct Impatient {
+    after: usize,
+    ended: Vec<Termination>,
+}
+
+impl Observer for Impatient {
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> std::ops::ControlFlow<()> {
+        if event.iteration + 1 >= self.after {
+            std::ops::ControlFlow::Break(())
+        } else {
+            std::ops::ControlFlow::Continue(())
+        }
+    }
+
+    fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+        self.ended.push(event.outcome.termination);
+    }
+}
+
+#[test]
+fn an_observer_can_stop_a_stage() {
+    let (scene, init) = case(Household::Iron, 1, 0.004, 0.05);
+    let mut stage = Cascade((
+        creeping(SmallMotion::default()),
+        creeping(SmallMotion::default()),
+    ));
+    let problem = Problem::new(&scene.model, &scene.observation);
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let mut observer = Impatient {
+        after: 2,
+        ended: Vec::new(),
+    };
+    let outcome = stage.run(
+        &problem,
+        &init,
+        &mut Session::new(&mut workspace, &mut observer),
+    );
+    assert_eq!(observer.ended, [Termination::Stopped; 2]);
+    assert_eq!(
+        (outcome.termination, outcome.iterations),
+        (Termination::Stopped, 4)
+    );
+    assert_eq!(outcome.verdict, Verdict::Refined);
+}
+
+#[test]
+fn filters_in_vectors_options_and_boxes_are_told_the_iteration_too() {
+    #[derive(Default)]
+    struct Told(Vec<usize>);
+    impl OutlierFilter for Told {
+        fn filter(&mut self, _: &Problem<'_>, _: &mut Correspondences) {}
+        fn begin(&mut self, iteration: usize) {
+            self.0.push(iteration);
+        }
+    }
+    let mut nested = (vec![Some(Box::new(Told::default()))],);
+    nested.begin(0);
+    nested.begin(1);
+    assert_eq!(nested.0[0].as_ref().unwrap().0, [0, 1]);
+}
