@@ -126,7 +126,7 @@ pub fn run_observed(
     let model = Model::new(support::cuboid(0.1, 0.1, 0.1));
     let camera = PinholeCamera::new(10.0, 10.0, 3.5, 3.5, 8, 8).unwrap();
     let observation: Observation =
-        support::observe_depth(crate::support::depth_image(&camera, |_| 1.0), &camera);
+        support::observe_depth(support::depth_image(&camera, |_| 1.0), &camera);
     let mut workspace = Workspace::new(support::RayCaster);
     stage.run(
         &Problem::new(&model, &observation),
