@@ -40,6 +40,9 @@ pub use atomic::{check_writable, destination, is_stream, write_atomically};
 pub use atomic_folder::NewFolder;
 pub use error::{IoError, Place};
 
+mod row_log;
+pub use row_log::RowLog;
+
 mod unit;
 pub use unit::{LengthUnit, UnknownUnit};
 

@@ -110,7 +110,8 @@ impl<'a> Source<'a> {
     }
 }
 
-fn kind_of(metadata: &Metadata) -> &'static str {
+/// Names what is there instead of a regular file.
+pub(crate) fn kind_of(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() {
         return "a folder";
     }
