@@ -1,44 +1,35 @@
-//! `docs/deviations.md`: where the code departs from the paper, collected from `// Deviation:` comments.
+//! `docs/deviations.md`: where the code departs from the paper, collected from `// Deviation:`
+//! comments.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::{Findings, relative, rust_files};
+use anyhow::{Context as _, Result};
+
+use crate::{read, rust_files};
 
 const FILE: &str = "docs/deviations.md";
 const MARK: &str = "// Deviation:";
 
 /// Writes the document.
-pub(crate) fn bless(root: &Path) -> Findings {
-    let file = root.join(FILE);
-    file.parent()
-        .map_or(Ok(()), std::fs::create_dir_all)
-        .and_then(|()| std::fs::write(&file, document(root)))
-        .map_err(|error| vec![format!("{FILE}: {error}")])
+pub(crate) fn bless() -> Result<()> {
+    std::fs::write(FILE, document()?).context(FILE)
 }
 
-/// Checks that the document is what [`bless`] would write.
-pub(crate) fn check(root: &Path) -> Vec<String> {
-    let written = std::fs::read_to_string(root.join(FILE)).unwrap_or_default();
-    if written == document(root) {
-        Vec::new()
-    } else {
-        vec![format!(
-            "{FILE} is not what the code says: run `cargo xtask bless`"
-        )]
-    }
+/// Returns a message if the document is not what [`bless`] would write.
+pub(crate) fn check() -> Result<Option<String>> {
+    let is_current = read(FILE)? == document()?;
+    Ok((!is_current).then(|| format!("{FILE} differs from the code: run `cargo xtask bless`")))
 }
 
-fn document(root: &Path) -> String {
+fn document() -> Result<String> {
     let mut text = String::from(
         "# Deviations from the paper\n\n\
          Collected from the `// Deviation:` comments in the code by `cargo xtask bless`; edit them there.\n\n\
          | where | what and why |\n|---|---|\n",
     );
-    for file in rust_files(&root.join("crates")) {
-        let Ok(code) = std::fs::read_to_string(&file) else {
-            continue;
-        };
+    for file in rust_files(Path::new("crates")) {
+        let code = read(&file)?;
         let mut lines = code.lines().map(str::trim).peekable();
         while let Some(line) = lines.next() {
             let Some(first) = line.strip_prefix(MARK) else {
@@ -50,8 +41,8 @@ fn document(root: &Path) -> String {
                 words.push_str(more.trim());
                 lines.next();
             }
-            let _ = writeln!(text, "| `{}` | {words} |", relative(root, &file));
+            let _ = writeln!(text, "| `{}` | {words} |", file.display());
         }
     }
-    text
+    Ok(text)
 }

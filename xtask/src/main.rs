@@ -1,13 +1,13 @@
 //! Automation of the workspace: `cargo xtask help` lists the commands.
 
-mod api;
 mod bench;
 mod ci;
 mod counts;
-mod deny;
+mod cycles;
 mod deviations;
 mod fuzz;
 mod instructions;
+mod licenses;
 mod miri;
 mod mutants;
 mod peers;
@@ -23,118 +23,106 @@ mod venv;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What a command returns: nothing, or what is wrong, one line per finding.
-type Findings = Result<(), Vec<String>>;
+use anyhow::{Context as _, Result};
 
 const HELP: &str = "\
 cargo xtask COMMAND
 
-  ci      everything that must pass before a change lands: formatting, clippy, tests, documentation,
-          benches in test mode, counts, instructions, tidy, api, deny, valgrind, the Python module,
-          and the README's commands
-  tidy    the rules that no other tool checks: the layer table, where glam, kiddo and tobj may be used,
-          crate documentation, nothing left open, docs/deviations.md and reasons of missed mutants up to date
-  bless   writes docs/deviations.md from the `// Deviation:` comments in the code
+  ci        everything that must pass before a change lands
+  tidy      layer table, import cycles, confined libraries, crate documentation, open ends, docs/deviations.md
+  licenses  licenses and sources of all dependencies, against deny.toml
+  bless     writes docs/deviations.md from the `// Deviation:` comments in the code
 
   python [--ray] [--open3d] [PYTEST OPTIONS]
-          builds the Python module into an environment of its own and tests it: pytest, doctests, mypy, examples; wants
-          Python 3 and, the first time, a network; with --ray the runs on two Ray workers too, with --open3d (which wants the
-          system's libusb-1.0) the comparison with it; ci does both
-  wheel   builds the Python wheel, states its size, and tries it in a fresh environment
+            builds and tests the Python module: pytest, doctests, mypy, examples; --ray and --open3d add the
+            tests that need these packages; needs Python 3, and network access on the first run
+  wheel     builds the Python wheel, prints its size, and tries it in a new environment
 
-  bench [--save NAME] [--against NAME] [FILTER]
-          runs the benches whose id contains FILTER and prints a table; keeps it as a baseline, compares with one
+  bench [--save NAME | --against NAME] [FILTER]
+            runs the benches whose id contains FILTER, saves them as a baseline, or compares them with one
   counts [--bless]
-          pairs, iterations, renders, allocations and the like of every preset on fixed scenes, against benches/counts.txt;
-          no clock changes them, and no x86-64 processor
-  instructions [--bless]
-          instructions of every step, against benches/instructions.txt within 3 %; wants valgrind and gungraun-runner
+            work of every preset on fixed scenes (pairs, renders, allocations, ...), against benches/counts.txt
+  instructions
+            instructions of every step, against the limits in benches/benches/instructions.rs
   peers [--instances N]
-          small_gicp, Open3D and this library on the same arrays, as a Markdown table; wants Python 3 and, the
-          first time, a network
+            small_gicp, Open3D and this library on the same arrays, as a Markdown table
   scale [--rows N] [--threads N] [--ray]
-          20,000 rows over generated images through `bop refine`: throughput, on N threads against one, peak memory, kill and
-          resume, shards; with --ray instead the same rows on N Ray workers, and once more with one of them killed; fails
-          where the bytes differ
-  api     public functions that no test and no example names
-  deny    licences, sources and duplicates of what is linked, against deny.toml; runs cargo-deny as well where it is
+            `bop refine` on 20,000 generated rows: throughput, peak memory, kill and resume, shards; with --ray
+            the same rows on N Ray workers; fails if the outputs differ
   fuzz [--minutes N] [--target T]...
-          every fuzz target, or those that are named, for N minutes of a processor each (5), and a table of executions;
-          wants cargo-fuzz and a C++ compiler
-  mutants [CRATE [--only WORD]... [--again] [--jobs N]]
-          changes to the numerical crates that no test notices, and the share that is: every mutant that cargo-mutants lists, in one
-          build per crate; those whose name holds a word; those that the last run missed; wants cargo-mutants, and git
-  valgrind
-          the vectorised loops under memcheck; wants valgrind
-  miri    unit tests under miri; wants a nightly toolchain that has it
+            every fuzz target, or those given, for N minutes each (default 5)
+  mutants [BASE [OPTIONS]]
+            cargo-mutants on the lines that differ from BASE (default main)
+  valgrind  the vectorized loops and the fuzz seeds under memcheck
+  miri      unit tests under miri; needs a nightly toolchain
 
-  repro   fig6, fig7, table1 or alpha: reruns that part of the paper's studies into target/study;
-          --quick takes minutes instead of the paper's number of poses
+  repro fig6|fig7|table1|alpha [--quick]
+            reruns a part of the paper's studies into target/study; --quick takes minutes
 ";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["ci"] => ci::run(&root()),
-        ["tidy"] => tidy::run(&root()),
-        ["bless"] => deviations::bless(&root()),
-        ["bench", ref options @ ..] => bench::run(&root(), options),
-        ["counts"] => counts::check(&root()),
-        ["counts", "--bless"] => counts::bless(&root()),
-        ["instructions"] => instructions::check(&root()),
-        ["instructions", "--bless"] => instructions::bless(&root()),
-        ["peers", ref options @ ..] => peers::run(&root(), options),
-        ["scale", ref options @ ..] => scale::run(&root(), options),
-        ["api"] => api::run(&root()),
-        ["deny"] => deny::run(&root()),
-        ["fuzz", ref options @ ..] => fuzz::run(&root(), options),
-        ["mutants", ref options @ ..] => mutants::run(&root(), options),
-        ["valgrind"] => valgrind::run(&root()),
-        ["miri"] => miri::run(&root()),
-        ["python", ref options @ ..] => python::check(&root(), options),
-        ["wheel"] => python::pack(&root()),
-        ["repro", what] => repro::run(&root(), what, false),
-        ["repro", what, "--quick"] => repro::run(&root(), what, true),
-        ["help" | "--help" | "-h"] => {
-            print!("{HELP}");
-            Ok(())
-        }
-        _ => {
-            eprint!("{HELP}");
-            return ExitCode::from(2);
-        }
-    };
-    match result {
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match dispatch(&words) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(findings) => {
-            for finding in &findings {
-                eprintln!("xtask: {finding}");
-            }
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
             ExitCode::FAILURE
         }
     }
 }
 
-/// The workspace's root folder.
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+fn dispatch(words: &[&str]) -> Result<()> {
+    std::env::set_current_dir(root()).with_context(|| root().display().to_string())?;
+    match words {
+        ["ci"] => ci::run(),
+        ["tidy"] => tidy::run(),
+        ["licenses"] => licenses::run(),
+        ["bless"] => deviations::bless(),
+        ["python", options @ ..] => python::check(options),
+        ["wheel"] => python::pack(),
+        ["bench", options @ ..] => bench::run(options),
+        ["counts"] => counts::check(),
+        ["counts", "--bless"] => counts::bless(),
+        ["instructions"] => instructions::run(),
+        ["peers", options @ ..] => peers::run(options),
+        ["scale", options @ ..] => scale::run(options),
+        ["fuzz", options @ ..] => fuzz::run(options),
+        ["mutants"] => mutants::run("main", &[]),
+        ["mutants", base, options @ ..] => mutants::run(base, options),
+        ["valgrind"] => valgrind::run(),
+        ["miri"] => miri::run(),
+        ["repro", figure] => repro::run(figure, false),
+        ["repro", figure, "--quick"] => repro::run(figure, true),
+        ["help" | "--help" | "-h"] => {
+            print!("{HELP}");
+            Ok(())
+        }
+        _ => anyhow::bail!("cannot read `{}`\n\n{HELP}", words.join(" ")),
+    }
 }
 
-/// Every Rust source file below a folder, in a fixed order.
+/// The workspace's root folder, in which every command runs.
+fn root() -> PathBuf {
+    let xtask = Path::new(env!("CARGO_MANIFEST_DIR"));
+    xtask.parent().unwrap_or(xtask).to_path_buf()
+}
+
+/// Reads a file of the workspace.
+fn read(path: impl AsRef<Path>) -> Result<String> {
+    let path = path.as_ref();
+    std::fs::read_to_string(path).with_context(|| path.display().to_string())
+}
+
+/// Returns every Rust source file below a folder, in a fixed order.
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(folder) = folders.pop() {
-        let Ok(entries) = std::fs::read_dir(&folder) else {
-            continue;
-        };
-        for path in entries.flatten().map(|entry| entry.path()) {
+        for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
             if path.is_dir() {
-                if !path.ends_with("target") && !path.ends_with(".git") {
-                    folders.push(path);
-                }
+                folders.push(path);
             } else if path.extension().is_some_and(|e| e == "rs") {
                 files.push(path);
             }
@@ -142,12 +130,4 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     }
     files.sort();
     files
-}
-
-/// A path as it is written in messages and documents: relative to the root, with forward slashes.
-fn relative(root: &Path, path: &Path) -> String {
-    path.strip_prefix(root)
-        .unwrap_or(path)
-        .to_string_lossy()
-        .replace('\\', "/")
 }

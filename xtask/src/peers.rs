@@ -1,36 +1,28 @@
 //! `cargo xtask peers`: other libraries and this one on the same arrays.
 
-use std::path::Path;
 use std::process::Command;
 
-use crate::{Findings, process, venv};
+use anyhow::Result;
 
-/// The programs of ours that the script runs.
-const PROGRAMS: [&str; 2] = ["peers", "bop_frame"];
+use crate::process::{cargo, execute, target};
+use crate::venv;
 
-/// Builds our programs, sets up the script's virtual environment below `target/`, and runs it; options are passed on.
+/// Builds our programs and runs the script in its own virtual environment; options go to the
+/// script.
 ///
 /// The table goes to the terminal and to `target/peers/peers.md`.
-pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
-    let mut build = process::cargo(root, &["build", "--release", "--package", "hicp-benches"]);
-    for program in PROGRAMS {
-        build.args(["--example", program]);
-    }
-    process::run(&mut build)?;
-    process::run(&mut process::cargo(
-        root,
-        &["build", "--release", "--package", "hybrid-icp-cli"],
+pub(crate) fn run(options: &[&str]) -> Result<()> {
+    execute(&mut cargo(
+        "build --release --package hicp-benches --example peers --example bop_frame",
     ))?;
-
-    let target = process::target(root);
-    let venv = target.join("peers/venv");
-    let python = venv::environment(root, &venv, &["benches/peers/requirements.txt"])?;
+    execute(&mut cargo("build --release --bin hybrid-icp"))?;
+    let venv = target().join("peers/venv");
+    let python = venv::environment(&venv, &["benches/peers/requirements.txt".to_owned()])?;
     let mut script = Command::new(python);
-    script
-        .arg(root.join("benches/peers/peers.py"))
-        .arg("--target")
-        .arg(&target)
-        .args(options)
-        .current_dir(root);
-    process::run(&mut script)
+    execute(
+        script
+            .args(["benches/peers/peers.py", "--target"])
+            .arg(target())
+            .args(options),
+    )
 }

@@ -1,65 +1,69 @@
-//! Programs that the commands run.
+//! Programs that the commands run. All of them run in the workspace's root.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use crate::Findings;
+use anyhow::{Context as _, Result, bail, ensure};
 
-/// The cargo that runs this.
-fn cargo_program() -> String {
-    std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned())
+/// Creates a command from its program and arguments, none of which contains a space.
+pub(crate) fn command(words: &str) -> Command {
+    let mut words = words.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or_default());
+    command.args(words);
+    command
 }
 
-/// A cargo command in the workspace.
-pub(crate) fn cargo(root: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(cargo_program());
-    command.args(arguments).current_dir(root);
+/// Creates a command of the cargo that runs this program.
+pub(crate) fn cargo(words: &str) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+    command.args(words.split_whitespace());
     command
 }
 
 /// Runs a command whose output goes to the terminal.
-pub(crate) fn run(command: &mut Command) -> Findings {
-    match command.status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(vec![format!("{command:?}: {status}")]),
-        Err(error) => Err(vec![format!("{command:?}: {error}")]),
-    }
+pub(crate) fn execute(command: &mut Command) -> Result<()> {
+    let status = command.status().with_context(|| shown(command))?;
+    ensure!(status.success(), "{}: {status}", shown(command));
+    Ok(())
 }
 
-/// Runs cargo and returns what it wrote to its standard output.
-pub(crate) fn cargo_output(root: &Path, arguments: &[&str]) -> Result<String, Vec<String>> {
-    let mut command = cargo(root, arguments);
+/// Runs a command and returns its standard output.
+pub(crate) fn output(command: &mut Command) -> Result<String> {
     let output = command.stderr(Stdio::inherit()).output();
-    match output {
-        Ok(output) if output.status.success() => {
-            String::from_utf8(output.stdout).map_err(|e| vec![format!("{command:?}: {e}")])
-        }
-        Ok(output) => Err(vec![format!("{command:?}: {}", output.status)]),
-        Err(error) => Err(vec![format!("{command:?}: {error}")]),
+    let output = output.with_context(|| shown(command))?;
+    ensure!(
+        output.status.success(),
+        "{}: {}",
+        shown(command),
+        output.status
+    );
+    String::from_utf8(output.stdout).with_context(|| shown(command))
+}
+
+/// Returns whether a command succeeds, without showing its output.
+pub(crate) fn succeeds(mut command: Command) -> bool {
+    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+    quiet.status().is_ok_and(|status| status.success())
+}
+
+/// Returns an error with the command that installs a tool, unless the tool runs.
+pub(crate) fn require(tool: Command, install: &str) -> Result<()> {
+    let name = shown(&tool);
+    if !succeeds(tool) {
+        bail!("`{name}` fails: install the tool with `{install}`");
     }
+    Ok(())
 }
 
-/// Returns whether a program is there: it can be started with `--version`.
-pub(crate) fn is_there(program: &str) -> bool {
-    Command::new(program)
-        .arg("--version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
+/// The folder of build artifacts. A relative `CARGO_TARGET_DIR` is relative to the root.
+pub(crate) fn target() -> PathBuf {
+    let folder = std::env::var_os("CARGO_TARGET_DIR").unwrap_or("target".into());
+    crate::root().join(folder)
 }
 
-/// Returns whether cargo has a subcommand: it can be started with `--version`.
-pub(crate) fn has_subcommand(root: &Path, name: &str) -> bool {
-    cargo(root, &[name, "--version"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
-}
-
-/// The folder of build artifacts.
-pub(crate) fn target(root: &Path) -> PathBuf {
-    // A relative one is relative to where cargo was called, which may not be here; the root is the usual place.
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |dir| root.join(dir))
+/// Returns a command as a user would type it.
+fn shown(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
+    words.join(" ")
 }

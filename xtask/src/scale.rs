@@ -1,279 +1,189 @@
-//! `cargo xtask scale`: a result file of many rows over generated images, refined whole, on one thread, killed and resumed, and in
-//! shards; or on Ray.
+//! `cargo xtask scale`: many rows over generated images through `bop refine`, as a whole, on one
+//! thread, killed and resumed, and in shards; or on Ray.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{Findings, process, scale_ray};
+use anyhow::{Context as _, Result, bail, ensure};
 
-/// Images are 20 scenes of 10; with six objects each, and this many starts per object, somewhat more than 20,000 rows.
-const GENERATED: &str = "--scenes 20 --images 10 --instances 6 --starts 20 --seed 7";
-const ROWS: u32 = 20_000;
+use crate::process::{cargo, execute, target};
+use crate::scale_ray;
 
-/// Runs it; the figures go to the terminal.
-pub(crate) fn run(root: &Path, options: &[&str]) -> Findings {
-    let on_ray = options.contains(&"--ray");
-    let others: Vec<&str> = options.iter().copied().filter(|o| *o != "--ray").collect();
-    let (rows, threads) = read(&others)?;
-    let mut build = process::cargo(root, &["build", "--release", "-p", "hybrid-icp-cli"]);
-    process::run(&mut build)?;
-    let target = process::target(root);
+/// 20 scenes of 10 images, 6 objects per image and 20 starts per object give more than 20,000 rows.
+const GENERATE: &str =
+    "bop generate --out data --scenes 20 --images 10 --instances 6 --starts 20 --seed 7";
+const ROWS: usize = 20_000;
+const REFINE: &str = "bop refine --dataset data --results data/initial_synthetic-test.csv --no-time \
+                      --rescore mve --pipeline hybrid";
+
+/// Runs `cargo xtask scale [--rows N] [--threads N] [--ray]`.
+pub(crate) fn run(options: &[&str]) -> Result<()> {
+    let (mut rows, mut threads, mut ray) = (ROWS, 1, false);
+    let mut options = options.iter();
+    while let Some(option) = options.next() {
+        let count = match *option {
+            "--ray" => {
+                ray = true;
+                continue;
+            }
+            "--rows" => &mut rows,
+            "--threads" => &mut threads,
+            _ => bail!("scale: expected --rows N, --threads N or --ray, found {option}"),
+        };
+        let number = options
+            .next()
+            .and_then(|text| text.parse().ok())
+            .filter(|n| *n > 0);
+        *count = number.with_context(|| format!("scale: {option} expects a number from 1"))?;
+    }
+    execute(&mut cargo("build --release --bin hybrid-icp"))?;
+    let folder = target().join("scale");
     let scale = Scale {
-        program: target.join("release/hybrid-icp"),
-        folder: target.join("scale"),
+        program: target().join("release/hybrid-icp"),
+        folder,
         rows,
         threads,
     };
     scale.generate()?;
-    if on_ray {
-        let whole = scale.whole()?;
-        scale_ray::run(root, &scale, whole.seconds)
-    } else {
-        scale.figures()
+    let seconds = scale.refine("whole.csv", &format!("--limit {rows} --threads {threads}"))?;
+    if ray {
+        return scale_ray::run(&scale, seconds);
     }
+    scale.compare(seconds)
 }
 
-/// Reads `--rows N` and `--threads N`.
-fn read(options: &[&str]) -> Result<(u32, u32), Vec<String>> {
-    let (mut rows, mut threads) = (ROWS, 1);
-    for pair in options.chunks(2) {
-        let value = pair.get(1).and_then(|text| text.parse().ok());
-        match (pair[0], value) {
-            ("--rows", Some(n)) if n > 0 => rows = n,
-            ("--threads", Some(n)) if n > 0 => threads = n,
-            (option, _) => {
-                return Err(vec![format!(
-                    "scale: {option}: expected --rows N or --threads N, with N from 1, or --ray"
-                )]);
-            }
-        }
-    }
-    Ok((rows, threads))
-}
-
-/// What is run.
+/// The runs of one command line.
 pub(crate) struct Scale {
     program: PathBuf,
-    /// Where it runs; the dataset is in `data`, what [`Scale::whole`] leaves in `whole.csv`.
+    /// The working folder, with the dataset in `data` and the output of the whole run in
+    /// `whole.csv`.
     pub(crate) folder: PathBuf,
-    pub(crate) rows: u32,
-    pub(crate) threads: u32,
-}
-
-/// What a run cost.
-struct Cost {
-    seconds: f64,
-    /// Peak of the resident memory, MiB, where the system tells.
-    peak: Option<f64>,
+    pub(crate) rows: usize,
+    pub(crate) threads: usize,
 }
 
 impl Scale {
-    /// Makes the dataset, once.
-    fn generate(&self) -> Findings {
-        let made = self.folder.join("generated");
-        if fs::read_to_string(&made).is_ok_and(|with| with == GENERATED) {
+    /// Generates the dataset, unless it is there already.
+    fn generate(&self) -> Result<()> {
+        let marker = self.folder.join("generated");
+        if fs::read_to_string(&marker).is_ok_and(|command| command == GENERATE) {
             return Ok(());
         }
-        let data = self.folder.join("data");
-        if data.exists() {
-            fs::remove_dir_all(&data).map_err(|e| vec![format!("{}: {e}", data.display())])?;
-        }
-        fs::create_dir_all(&self.folder)
-            .map_err(|e| vec![format!("{}: {e}", self.folder.display())])?;
-        let mut generate = Command::new(&self.program);
-        generate
-            .args(["bop", "generate", "--out", "data"])
-            .args(GENERATED.split(' '))
-            .current_dir(&self.folder);
-        process::run(&mut generate)?;
-        fs::write(&made, GENERATED).map_err(|e| vec![format!("{}: {e}", made.display())])
+        let _ = fs::remove_dir_all(&self.folder);
+        fs::create_dir_all(&self.folder)?;
+        execute(self.command(GENERATE).current_dir(&self.folder))?;
+        Ok(fs::write(marker, GENERATE)?)
     }
 
-    /// Refines all rows in one go.
-    fn whole(&self) -> Result<Cost, Vec<String>> {
-        let whole = self.refine("whole.csv", &[])?;
-        println!(
-            "{} rows whole, {} threads: {:.1} s, {:.1} rows/s, peak memory {}",
-            self.rows,
-            self.threads,
-            whole.seconds,
-            f64::from(self.rows) / whole.seconds,
-            whole.peak(),
-        );
-        Ok(whole)
-    }
-
-    fn figures(&self) -> Findings {
-        let whole = self.whole()?;
+    /// Compares the output of the whole run, which took some seconds, with those of the other runs.
+    fn compare(&self, seconds: f64) -> Result<()> {
+        let (rows, threads) = (self.rows, self.threads);
+        let limit = format!("--limit {rows} --threads {threads}");
         let expected = self.bytes("whole.csv")?;
-        let mut alone = expected.clone();
-        if self.threads > 1 {
-            let single = Self {
-                program: self.program.clone(),
-                folder: self.folder.clone(),
-                threads: 1,
-                ..*self
-            };
-            let cost = single.refine("single.csv", &[])?;
-            alone = self.bytes("single.csv")?;
-            println!(
-                "one thread: {:.1} s, {:.1} rows/s, {}; {} threads are {:.2} times as fast",
-                cost.seconds,
-                f64::from(self.rows) / cost.seconds,
-                same(&alone, &expected),
-                self.threads,
-                cost.seconds / whole.seconds,
+        let single = self.refine("single.csv", &format!("--limit {rows} --threads 1"))?;
+        println!(
+            "{threads} threads are {:.2} times as fast as one",
+            single / seconds
+        );
+        self.refine(
+            "quarter.csv",
+            &format!("--limit {} --threads {threads}", rows.div_ceil(4)),
+        )?;
+        self.kill("killed.csv", &limit)?;
+        self.refine("killed.csv", &format!("{limit} --resume"))?;
+        self.refine("shard1.csv", &format!("{limit} --shard 1/2"))?;
+        self.refine("shard2.csv", &format!("{limit} --shard 2/2"))?;
+        let [mut joined, second] = [self.bytes("shard1.csv")?, self.bytes("shard2.csv")?];
+        // Without the header.
+        joined.extend(
+            second
+                .splitn(2, |byte| *byte == b'\n')
+                .nth(1)
+                .unwrap_or_default(),
+        );
+        for (bytes, run) in [
+            (self.bytes("single.csv")?, "one thread"),
+            (self.bytes("killed.csv")?, "killed and resumed"),
+            (joined, "two shards"),
+        ] {
+            ensure!(
+                bytes == expected,
+                "scale: {run}: the output differs from that of the whole run"
             );
+            println!("{run}: the same bytes");
         }
-        let quarter = (self.rows / 4).max(1).to_string();
-        let cost = self.refine("quarter.csv", &["--limit", &quarter])?;
-        println!("{quarter} rows: peak memory {}", cost.peak());
-
-        let held = self.killed()?;
-        self.refine("killed.csv", &["--resume"])?;
-        let resumed = self.bytes("killed.csv")?;
-        println!(
-            "killed with {held} images in the journal, then resumed: {}",
-            same(&resumed, &expected)
-        );
-
-        let mut joined = Vec::new();
-        for shard in ["1/2", "2/2"] {
-            self.refine("shard.csv", &["--shard", shard])?;
-            let bytes = self.bytes("shard.csv")?;
-            let header = bytes
-                .iter()
-                .position(|byte| *byte == b'\n')
-                .map_or(0, |end| end + 1);
-            let from = if joined.is_empty() { 0 } else { header };
-            joined.extend_from_slice(&bytes[from..]);
-        }
-        println!(
-            "two shards one after the other: {}",
-            same(&joined, &expected)
-        );
-        if [alone, resumed, joined]
-            .iter()
-            .all(|bytes| *bytes == expected)
-        {
-            Ok(())
-        } else {
-            Err(vec!["scale: the outputs differ".to_owned()])
-        }
+        Ok(())
     }
 
-    fn command(&self, output: &str, options: &[&str]) -> Command {
-        let (rows, threads) = (self.rows.to_string(), self.threads.to_string());
-        let limit = ["--limit", rows.as_str()];
-        let limited = options.contains(&"--limit");
+    fn command(&self, words: &str) -> Command {
         let mut command = Command::new(&self.program);
         command
-            .args([
-                "bop",
-                "refine",
-                "--dataset",
-                "data",
-                "--no-time",
-                "--rescore",
-                "mve",
-                "--pipeline",
-                "hybrid",
-            ])
-            .args([
-                "--results",
-                "data/initial_synthetic-test.csv",
-                "--output",
-                output,
-            ])
-            .args(["--threads", &threads])
-            .args(if limited { &[][..] } else { &limit[..] })
-            .args(options)
+            .args(words.split_whitespace())
             .current_dir(&self.folder)
             .stdout(Stdio::null());
         command
     }
 
-    /// Runs to the end, looking at the memory meanwhile.
-    fn refine(&self, output: &str, options: &[&str]) -> Result<Cost, Vec<String>> {
-        let mut command = self.command(output, options);
-        let start = Instant::now();
-        let mut child = command
-            .spawn()
-            .map_err(|e| vec![format!("{command:?}: {e}")])?;
-        let mut peak = None;
-        loop {
-            peak = peak_memory(&child).or(peak);
-            match child.try_wait() {
-                Ok(None) => std::thread::sleep(Duration::from_millis(20)),
-                Ok(Some(status)) if status.success() => break,
-                Ok(Some(status)) => return Err(vec![format!("{command:?}: {status}")]),
-                Err(error) => return Err(vec![format!("{command:?}: {error}")]),
-            }
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        Ok(Cost { seconds, peak })
+    fn start(&self, output: &str, options: &str) -> Result<Child> {
+        let mut command = self.command(&format!("{REFINE} --output {output} {options}"));
+        command.spawn().context(output.to_owned())
     }
 
-    /// Kills a run when a third of the images are done; returns how many its journal holds.
-    fn killed(&self) -> Result<usize, Vec<String>> {
-        let journal = self.folder.join("killed.csv.journal");
-        let _ = fs::remove_file(&journal);
-        let mut command = self.command("killed.csv", &[]);
-        let mut child = command
-            .spawn()
-            .map_err(|e| vec![format!("{command:?}: {e}")])?;
-        let done = || {
-            let text = fs::read(&journal).unwrap_or_default();
-            let lines = text.iter().filter(|byte| **byte == b'\n').count();
-            lines.saturating_sub(1)
-        };
-        // 200 images of some 110 rows each.
-        let wanted = (self.rows as usize / 330).clamp(1, 60);
-        while done() < wanted {
-            if child.try_wait().is_ok_and(|status| status.is_some()) {
-                return Err(vec![format!(
-                    "{command:?}: ended before it could be killed"
-                )]);
+    /// Refines to the end, prints time and peak memory, and returns the seconds.
+    fn refine(&self, output: &str, options: &str) -> Result<f64> {
+        let start = Instant::now();
+        let mut child = self.start(output, options)?;
+        let mut peak = String::new();
+        let status = loop {
+            peak = peak_memory(&child).unwrap_or(peak);
+            match child.try_wait()? {
+                None => std::thread::sleep(Duration::from_millis(20)),
+                Some(status) => break status,
             }
+        };
+        ensure!(status.success(), "bop refine {options}: {status}");
+        let seconds = start.elapsed().as_secs_f64();
+        println!("bop refine {options}: {seconds:.1} s, peak memory {peak}");
+        Ok(seconds)
+    }
+
+    /// Kills a run when about a third of the 200 images are in its journal.
+    fn kill(&self, output: &str, options: &str) -> Result<()> {
+        let journal = self.folder.join(format!("{output}.journal"));
+        let _ = fs::remove_file(&journal);
+        let mut child = self.start(output, options)?;
+        let images = || {
+            let text = fs::read(&journal).unwrap_or_default();
+            text.iter()
+                .filter(|byte| **byte == b'\n')
+                .count()
+                .saturating_sub(1)
+        };
+        while images() < (self.rows / 330).clamp(1, 60) {
+            ensure!(
+                child.try_wait()?.is_none(),
+                "scale: the run ended before it could be killed"
+            );
             std::thread::sleep(Duration::from_millis(5));
         }
-        // SIGKILL where there are signals.
-        child
-            .kill()
-            .and_then(|()| child.wait())
-            .map_err(|e| vec![format!("{command:?}: {e}")])?;
-        Ok(done())
+        child.kill()?;
+        child.wait()?;
+        println!("killed with {} images in the journal", images());
+        Ok(())
     }
 
-    fn bytes(&self, name: &str) -> Result<Vec<u8>, Vec<String>> {
-        let path = self.folder.join(name);
-        fs::read(&path).map_err(|e| vec![format!("{}: {e}", path.display())])
+    fn bytes(&self, name: &str) -> Result<Vec<u8>> {
+        fs::read(self.folder.join(name)).context(name.to_owned())
     }
 }
 
-impl Cost {
-    fn peak(&self) -> String {
-        self.peak
-            .map_or_else(|| "not told here".to_owned(), |mib| format!("{mib:.0} MiB"))
-    }
-}
-
-fn same(found: &[u8], expected: &[u8]) -> &'static str {
-    if found == expected {
-        "the same bytes"
-    } else {
-        "OTHER BYTES"
-    }
-}
-
-/// Peak of a process's resident memory so far, MiB; `None` where there is no `/proc`, or it has ended.
-fn peak_memory(child: &Child) -> Option<f64> {
+/// Returns the peak of the resident memory so far, or `None` without `/proc` or after the end.
+fn peak_memory(child: &Child) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-    let line = status
+    let peak = status
         .lines()
         .find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(kib / 1024.0)
+    Some(peak.trim().to_owned())
 }

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use crate::{Findings, deviations, mutants, relative, rust_files};
+use anyhow::{Context as _, Result, ensure};
 
-/// Every crate and its level: dependencies within the workspace go strictly downwards.
+use crate::{cycles, deviations, read, rust_files};
+
+/// Every crate and its level. Dependencies within the workspace point to a lower level.
 const LAYERS: &[(&str, u32)] = &[
     ("hicp-core", 0),
     ("hicp-io", 1),
@@ -24,14 +26,14 @@ const LAYERS: &[(&str, u32)] = &[
     ("hybrid-icp-python", 6),
 ];
 
-/// Libraries that stay inside one crate.
+/// Libraries that only one crate may depend on.
 const CONFINED: &[(&str, &str)] = &[
     ("glam", "hicp-raster"),
     ("kiddo", "hicp-association"),
     ("tobj", "hicp-io"),
 ];
 
-/// What must not be left in the code. Split, so that this file does not hold them itself.
+/// Marks of unfinished work, split so that this file does not contain them.
 const LEFT_OPEN: &[(&str, &str)] = &[
     ("TO", "DO"),
     ("FIX", "ME"),
@@ -40,126 +42,89 @@ const LEFT_OPEN: &[(&str, &str)] = &[
     ("dbg", "!("),
 ];
 
-/// The names of the crates, from the lowest level up.
-pub(crate) fn crates() -> impl Iterator<Item = &'static str> {
-    LAYERS.iter().map(|(name, _)| *name)
-}
-
 /// Runs every rule.
-pub(crate) fn run(root: &Path) -> Findings {
-    let mut findings = layers(root);
-    findings.extend(crate_documentation(root));
-    findings.extend(left_open(root));
-    findings.extend(deviations::check(root));
-    findings.extend(mutants::outdated_reasons(root));
-    if findings.is_empty() {
-        Ok(())
-    } else {
-        Err(findings)
+pub(crate) fn run() -> Result<()> {
+    let mut findings = Vec::new();
+    for entry in std::fs::read_dir("crates").context("crates")? {
+        let name = entry.context("crates")?.file_name();
+        let name = name.to_string_lossy();
+        layers(
+            &name,
+            &read(format!("crates/{name}/Cargo.toml"))?,
+            &mut findings,
+        );
+        documentation(&name, &mut findings);
+        findings.extend(cycles::find(&Path::new("crates").join(&*name).join("src"))?);
     }
+    left_open(&mut findings)?;
+    findings.extend(deviations::check()?);
+    ensure!(findings.is_empty(), "{}", findings.join("\nxtask: "));
+    Ok(())
 }
 
-/// The layer table, and the libraries that stay inside one crate.
-fn layers(root: &Path) -> Vec<String> {
-    let mut findings = Vec::new();
-    let level_of = |name: &str| {
+/// Checks a manifest against the layer table and the confined libraries.
+fn layers(name: &str, manifest: &str, findings: &mut Vec<String>) {
+    let level = |name: &str| {
         LAYERS
             .iter()
             .find(|(n, _)| *n == name)
             .map(|(_, level)| *level)
     };
-    let mut found: Vec<String> = std::fs::read_dir(root.join("crates"))
-        .map(|entries| {
-            entries
-                .flatten()
-                .filter(|entry| entry.path().join("Cargo.toml").is_file())
-                .map(|entry| entry.file_name().to_string_lossy().into_owned())
-                .collect()
-        })
-        .unwrap_or_default();
-    found.sort();
-    for name in &found {
-        let manifest = format!("crates/{name}/Cargo.toml");
-        let Some(level) = level_of(name) else {
+    let Some(own) = level(name) else {
+        findings.push(format!(
+            "crates/{name}: not in the layer table of xtask/src/tidy.rs"
+        ));
+        return;
+    };
+    for dependency in dependencies(manifest) {
+        if let Some(other) = level(dependency).filter(|other| *other >= own) {
             findings.push(format!(
-                "{manifest}: {name} is not in the layer table of xtask/src/tidy.rs"
-            ));
-            continue;
-        };
-        let text = std::fs::read_to_string(root.join(&manifest)).unwrap_or_default();
-        if !text.contains(&format!("name = \"{name}\"")) {
-            findings.push(format!(
-                "{manifest}: the package is not named like its folder"
+                "crates/{name}: level {own} depends on {dependency} of level {other}, expected a lower level"
             ));
         }
-        for dependency in dependencies(&text) {
-            match level_of(&dependency) {
-                Some(below) if below >= level => findings.push(format!(
-                    "{manifest}: {name} (level {level}) depends on {dependency} (level {below}), expected a lower level"
-                )),
-                _ => {}
-            }
-            if let Some((_, home)) = CONFINED.iter().find(|(library, _)| *library == dependency)
-                && home != name
-            {
-                findings.push(format!("{manifest}: {dependency} stays inside {home}"));
-            }
+        let home = CONFINED.iter().find(|(library, _)| *library == dependency);
+        if let Some((_, home)) = home.filter(|(_, home)| *home != name) {
+            findings.push(format!(
+                "crates/{name}: only {home} may depend on {dependency}"
+            ));
         }
     }
-    for (name, _) in LAYERS {
-        if !found.iter().any(|f| f == name) {
-            findings.push(format!("crates/{name} is in the layer table but not there"));
-        }
-    }
-    findings
 }
 
-/// The names in a manifest's `[dependencies]`.
-fn dependencies(manifest: &str) -> Vec<String> {
-    manifest
+/// Returns the names in the `[dependencies]` of a manifest.
+fn dependencies(manifest: &str) -> impl Iterator<Item = &str> {
+    let lines = manifest
         .lines()
-        .skip_while(|line| line.trim() != "[dependencies]")
+        .skip_while(|line| line.trim() != "[dependencies]");
+    lines
         .skip(1)
         .take_while(|line| !line.starts_with('['))
         .filter_map(|line| line.split(['.', '=', ' ']).next())
         .filter(|name| !name.is_empty() && !name.starts_with('#'))
-        .map(str::to_owned)
-        .collect()
 }
 
-/// Every library says what it is, whether to use it, shows an example, and lists its modules.
-fn crate_documentation(root: &Path) -> Vec<String> {
-    let mut findings = Vec::new();
-    for (name, _) in LAYERS {
-        let file = format!("crates/{name}/src/lib.rs");
-        let Ok(text) = std::fs::read_to_string(root.join(&file)) else {
-            continue;
-        };
-        for wanted in ["Should you use this crate?", "//! ```", "reading order"] {
-            if !text.contains(wanted) {
-                findings.push(format!(
-                    "{file}: the crate's documentation lacks {wanted:?}"
-                ));
-            }
+/// Checks that the documentation of a library says whether to use it and shows an example.
+fn documentation(name: &str, findings: &mut Vec<String>) {
+    let file = format!("crates/{name}/src/lib.rs");
+    let Ok(text) = read(&file) else { return };
+    for part in ["Should you use this crate?", "//! ```"] {
+        if !text.contains(part) {
+            findings.push(format!("{file}: the crate's documentation lacks {part:?}"));
         }
     }
-    findings
 }
 
-fn left_open(root: &Path) -> Vec<String> {
-    let mut findings = Vec::new();
+/// Searches all code for marks of unfinished work.
+fn left_open(findings: &mut Vec<String>) -> Result<()> {
     for folder in ["crates", "benches", "tests", "xtask"] {
-        for file in rust_files(&root.join(folder)) {
-            let text = std::fs::read_to_string(&file).unwrap_or_default();
-            for (number, line) in (1..).zip(text.lines()) {
-                for (head, tail) in LEFT_OPEN {
-                    let mark = format!("{head}{tail}");
-                    if line.contains(&mark) {
-                        findings.push(format!("{}:{number}: {mark}", relative(root, &file)));
-                    }
+        for file in rust_files(Path::new(folder)) {
+            for (number, line) in (1..).zip(read(&file)?.lines()) {
+                let marks = LEFT_OPEN.iter().map(|(head, tail)| format!("{head}{tail}"));
+                for mark in marks.filter(|mark| line.contains(mark)) {
+                    findings.push(format!("{}:{number}: {mark}", file.display()));
                 }
             }
         }
     }
-    findings
+    Ok(())
 }

@@ -3,60 +3,35 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process;
+use anyhow::{Context as _, Result};
 
-/// The name under which Python 3 is started.
-pub(crate) const PYTHON: &str = "python3";
+use crate::process::{command, execute};
+use crate::read;
 
-/// Makes a virtual environment, once per content of the requirements files, and returns its Python.
-pub(crate) fn environment(
-    root: &Path,
-    venv: &Path,
-    requirements: &[&str],
-) -> Result<PathBuf, Vec<String>> {
-    let mut wanted = String::new();
-    for file in requirements {
-        let text = std::fs::read_to_string(root.join(file));
-        wanted.push_str(&text.map_err(|e| vec![format!("{file}: {e}")])?);
-    }
+/// Returns the Python of a virtual environment, which is set up again if the requirements files
+/// change.
+pub(crate) fn environment(venv: &Path, requirements: &[String]) -> Result<PathBuf> {
+    let files = requirements.iter().map(read).collect::<Result<Vec<_>>>()?;
+    let wanted = files.concat();
     let installed = venv.join("requirements.installed");
-    if std::fs::read_to_string(&installed).is_ok_and(|found| found == wanted) {
-        return Ok(python_of(venv));
+    if read(&installed).is_ok_and(|found| found == wanted) {
+        return Ok(venv.join("bin/python"));
     }
     let python = fresh(venv)?;
-    let mut install = pip(&python);
-    for file in requirements {
-        install.arg("--requirement").arg(root.join(file));
-    }
-    process::run(&mut install)?;
-    std::fs::write(&installed, wanted)
-        .map_err(|e| vec![format!("{}: {e}", installed.display())])?;
+    execute(pip(&python).args(requirements.iter().flat_map(|file| ["--requirement", file])))?;
+    std::fs::write(&installed, wanted).with_context(|| installed.display().to_string())?;
     Ok(python)
 }
 
-/// Makes an empty virtual environment, whatever was there before, and returns its Python.
-pub(crate) fn fresh(venv: &Path) -> Result<PathBuf, Vec<String>> {
-    process::run(
-        Command::new(PYTHON)
-            .args(["-m", "venv", "--clear"])
-            .arg(venv),
-    )?;
-    Ok(python_of(venv))
+/// Creates an empty virtual environment and returns its Python.
+pub(crate) fn fresh(venv: &Path) -> Result<PathBuf> {
+    execute(command("python3 -m venv --clear").arg(venv))?;
+    Ok(venv.join("bin/python"))
 }
 
-/// `pip install`, to be told what.
+/// A `pip install` that lacks what to install.
 pub(crate) fn pip(python: &Path) -> Command {
-    let mut command = Command::new(python);
-    command.args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-    ]);
-    command
-}
-
-fn python_of(venv: &Path) -> PathBuf {
-    venv.join("bin/python")
+    let mut pip = Command::new(python);
+    pip.args("-m pip install --quiet --disable-pip-version-check".split(' '));
+    pip
 }
