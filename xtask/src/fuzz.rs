@@ -9,11 +9,12 @@ use crate::process::{cargo, execute, require, target};
 
 /// Limits of libFuzzer: seconds until a run counts as hanging (also one that waits for a busy
 /// processor), MiB of memory, and bytes of the longest input.
-const LIMITS: [&str; 4] = [
+const LIMITS: [&str; 5] = [
     "-timeout=300",
     "-rss_limit_mb=2048",
     "-max_len=4096",
     "-print_final_stats=1",
+    "-verbosity=0",
 ];
 
 /// Runs `cargo xtask fuzz [--minutes N] [--target T]...`.
