@@ -17,13 +17,14 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-fusion", 1),
     ("hicp-icp", 2),
     ("hicp-switch", 3),
-    ("hybrid-icp", 4),
+    ("hicp-pipeline", 4),
     ("hicp-sim", 4),
-    ("hicp-testkit", 5),
-    ("hicp-experiments", 5),
-    ("hicp-bop", 5),
-    ("hybrid-icp-cli", 6),
-    ("hybrid-icp-python", 6),
+    ("hybrid-icp", 5),
+    ("hicp-testkit", 6),
+    ("hicp-experiments", 6),
+    ("hicp-bop", 6),
+    ("hybrid-icp-cli", 7),
+    ("hybrid-icp-python", 7),
 ];
 
 /// Libraries that only one crate may depend on.

@@ -45,6 +45,8 @@ mod rotation_grid;
 mod sampling;
 pub mod se3;
 pub mod so3;
+#[doc(hidden)]
+pub mod suggest;
 mod surfel;
 mod symmetry;
 mod vectorized;

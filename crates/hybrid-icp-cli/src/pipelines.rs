@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use hybrid_icp::Preset;
-use hybrid_icp::pipeline::catalogue;
+use hybrid_icp::pipeline::Catalog;
 
 use crate::terminal::say;
 
@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return say(preset.toml());
     }
     if arguments.parts {
-        return say(catalogue());
+        return say(Catalog::built_in().page());
     }
     let mut text = String::new();
     let width = Preset::ALL

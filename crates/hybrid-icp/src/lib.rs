@@ -36,16 +36,13 @@
 //! Conventions: metres, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
 //! right and y down; pixel centres are at integers.
 //!
-//! Modules in reading order: [`presets`] (the pipelines), `preset` (by name), [`pipeline`] (from a file),
-//! `refiner` (one call), `sequential` (a moving camera, with [`fusion`]), `calibration` (its uncertainty), `trace` (what ran).
+//! Start with [`presets`] (the pipelines), [`Refiner`] (one call), [`pipeline`] (files), [`fusion`] (a moving camera).
 
 mod calibration;
-pub mod pipeline;
 mod preset;
 pub mod presets;
 mod refiner;
 mod sequential;
-mod suggest;
 mod trace;
 mod warning;
 
@@ -82,6 +79,8 @@ pub use hicp_metric::{
     PointToPoint, PosePrior, Prior, Robust, Scale, Step, Symmetric, WeightedSum,
     sandwich_covariance,
 };
+#[cfg(feature = "pipeline")]
+pub use hicp_pipeline::{self as pipeline, PipelineError, PipelineFile, PipelineLimits};
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
     Flatness, Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
@@ -92,7 +91,6 @@ pub use hicp_score::{
 pub use hicp_switch::{
     PAPER_ALPHA, Switch, SwitchAmong, SwitchUntilStall, Switcher, Threshold, Thresholds,
 };
-pub use pipeline::{PipelineError, PipelineFile, PipelineLimits};
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::{SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep};

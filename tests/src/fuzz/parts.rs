@@ -1,6 +1,6 @@
 //! Arbitrary bytes into the text of a pipeline file, through the catalogue of parts.
 
-use hybrid_icp::pipeline::{Accepts, PARTS, Parameter, Part, PartKind};
+use hybrid_icp::pipeline::{Accepts, Catalog, Parameter, Part, PartKind};
 
 use super::bytes::Bytes;
 
@@ -21,8 +21,8 @@ fn choose(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> &'static Part 
         })
     };
     // A clock decides about the time limit, and a target must do the same every time.
-    let choices: Vec<&Part> = PARTS
-        .iter()
+    let choices: Vec<&Part> = Catalog::built_in()
+        .parts()
         .filter(|part| part.kind == kind && part.name != "time-limit")
         .filter(|part| depth < DEEPEST || !holds_its_kind(part))
         .collect();
@@ -31,7 +31,7 @@ fn choose(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> &'static Part 
 
 fn fields(bytes: &mut Bytes<'_>, part: &Part, depth: usize) -> Vec<String> {
     let mut fields = vec![format!("type = \"{}\"", part.name)];
-    for parameter in part.parameters {
+    for parameter in &part.parameters {
         // Defaults of counts are for good results, not for speed.
         let is_count = matches!(parameter.accepts, Accepts::Count { .. });
         if must_be_given(parameter) || is_count || bytes.one_in(2) {
@@ -54,18 +54,18 @@ fn must_be_given(parameter: &Parameter) -> bool {
 }
 
 fn value(bytes: &mut Bytes<'_>, accepts: &Accepts, depth: usize) -> String {
-    match *accepts {
-        Accepts::Number { min, max, .. } => number(bytes, min, max),
-        Accepts::Count { min, .. } => count(bytes, min).to_string(),
+    match accepts {
+        Accepts::Number { min, max, .. } => number(bytes, *min, *max),
+        Accepts::Count { min, .. } => count(bytes, *min).to_string(),
         Accepts::Flag { .. } => bytes.one_in(2).to_string(),
-        Accepts::Word { words, .. } => format!("\"{}\"", bytes.pick(words)),
+        Accepts::Word { words } => format!("\"{}\"", bytes.pick(words)),
         Accepts::NumberList => list(bytes, |b| number(b, 0.0, f64::INFINITY)),
         Accepts::Flags { count } => {
-            let flags: Vec<String> = (0..count).map(|_| bytes.one_in(2).to_string()).collect();
+            let flags: Vec<String> = (0..*count).map(|_| bytes.one_in(2).to_string()).collect();
             format!("[{}]", flags.join(", "))
         }
-        Accepts::Part { kind, .. } => inline(bytes, kind, depth + 1),
-        Accepts::Parts { kind, .. } => list(bytes, |b| inline(b, kind, depth + 1)),
+        Accepts::Part { kind, .. } => inline(bytes, *kind, depth + 1),
+        Accepts::Parts { kind, .. } => list(bytes, |b| inline(b, *kind, depth + 1)),
     }
 }
 

@@ -6,7 +6,7 @@ use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::allocations;
 use hicp_tests::scene;
 use hybrid_icp::fusion::{CameraMotion, FusionMethod};
-use hybrid_icp::pipeline::{PARTS, Part, PartKind};
+use hybrid_icp::pipeline::{Catalog, Part, PartKind};
 use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator, Vector3};
 
 #[test]
@@ -89,7 +89,7 @@ fn every_component_of_the_catalogue_is_silent_when_warm() {
     let scene = scene(Household::Mug, 1.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
     let mut tried = 0;
-    for part in PARTS {
+    for part in Catalog::built_in().parts() {
         let Some(text) = stage_with(part) else {
             continue;
         };

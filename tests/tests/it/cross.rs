@@ -22,7 +22,7 @@ use std::path::Path;
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hicp_tests::{Scene, camera, render};
-use hybrid_icp::pipeline::{PARTS, PartKind};
+use hybrid_icp::pipeline::{Catalog, PartKind};
 use hybrid_icp::{
     BoxedStage, Isometry3, Model, ModelConfig, Observation, Outcome, PipelineFile, Problem,
     Rasterizer, Session, Verdict, Workspace, se3,
@@ -104,12 +104,12 @@ fn point_error(scene: &Scene, pose: &Isometry3<f64>) -> f64 {
 
 /// The parts of a kind as they stand in a file, sized for small scenes.
 fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
-    PARTS
-        .iter()
+    Catalog::built_in()
+        .parts()
         .filter(|part| part.kind == kind)
         .map(|part| {
             let mut text = format!("{{ type = \"{}\"", part.name);
-            for parameter in part.parameters {
+            for parameter in &part.parameters {
                 let value = match (part.name, parameter.name) {
                     ("weighted-sum", "metrics") => {
                         "[\"point-to-point\", \"point-to-plane\"]".to_owned()

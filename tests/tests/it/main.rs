@@ -16,6 +16,7 @@ mod custom_association;
 mod custom_filter;
 mod custom_metric;
 mod custom_observer;
+mod custom_part;
 mod custom_renderer;
 mod custom_score;
 mod custom_selection;

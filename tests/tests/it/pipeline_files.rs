@@ -1,8 +1,11 @@
 //! Pipelines from files: the same bits as code, and messages that help.
 
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
+
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
-use hybrid_icp::pipeline::{Accepts, PARTS, PartKind};
+use hybrid_icp::pipeline::{Accepts, Catalog, PartKind};
 use hybrid_icp::{PipelineFile, Preset, Refiner};
 
 #[test]
@@ -31,12 +34,12 @@ fn every_shipped_file_gives_the_same_bits_as_its_code() {
 
 /// A file that uses a part, with every parameter that has no default given.
 fn smallest_use(kind: PartKind, name: &str) -> String {
-    let part = PARTS
-        .iter()
+    let part = Catalog::built_in()
+        .parts()
         .find(|p| p.kind == kind && p.name == name)
         .unwrap();
     let mut fields = format!("type = \"{name}\"");
-    for parameter in part.parameters {
+    for parameter in &part.parameters {
         let value = match parameter.accepts {
             Accepts::Number {
                 min, default: None, ..
@@ -60,7 +63,11 @@ fn smallest_use(kind: PartKind, name: &str) -> String {
 }
 
 fn first(kind: PartKind) -> &'static str {
-    PARTS.iter().find(|p| p.kind == kind).unwrap().name
+    Catalog::built_in()
+        .parts()
+        .find(|p| p.kind == kind)
+        .unwrap()
+        .name
 }
 
 /// A pipeline in which a part stands where parts of its kind stand.
@@ -96,7 +103,7 @@ fn every_part_of_the_catalogue_builds_and_runs() {
     let mut rng = rng(4);
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
-    for part in PARTS {
+    for part in Catalog::built_in().parts() {
         let text = pipeline_with(part.kind, &smallest_use(part.kind, part.name));
         let file = PipelineFile::parse(&text, part.name).unwrap();
         let stage = file.build().unwrap_or_else(|e| panic!("{e}\n{text}"));
@@ -112,11 +119,9 @@ fn every_part_of_the_catalogue_builds_and_runs() {
 
 #[test]
 fn names_in_the_catalogue_are_unique_within_a_kind() {
-    for (index, part) in PARTS.iter().enumerate() {
-        let twin = PARTS[..index]
-            .iter()
-            .find(|p| p.kind == part.kind && p.name == part.name);
-        assert!(twin.is_none(), "{} twice", part.name);
+    let mut names = HashSet::new();
+    for part in Catalog::built_in().parts() {
+        assert!(names.insert((part.kind, part.name)), "{} twice", part.name);
     }
 }
 
@@ -236,4 +241,28 @@ fn the_text_of_a_file_is_what_is_read_and_an_absent_one_is_named() {
     assert!(error.contains("byte 8: found what is not UTF-8"), "{error}");
     let absent = PipelineFile::read_text(folder.path().join("absent.toml"));
     assert!(absent.unwrap_err().to_string().contains("absent.toml"));
+}
+
+/// Most of the time of a large file was once spent on counting its lines, again for every value.
+#[test]
+fn reading_a_large_file_takes_time_in_proportion_to_its_size() {
+    let stage = "\n[[stages]]\ntype = \"icp\"\nselection = { type = \"visible-surface\", points = 500 }\n\
+                 association = \"projective\"\nmetric = \"point-to-plane\"\n";
+    let text = format!("type = \"cascade\"\n{}", stage.repeat(6000));
+    assert!(text.len() > 700_000);
+    let start = Instant::now();
+    let mut file = PipelineFile::parse(&text, "large.toml").unwrap();
+    assert!(file.build().is_ok());
+    file.set("stages.5999.metric=nothing").unwrap();
+    assert!(file.build().is_err());
+    let wrong = text.clone() + "points = 3\n";
+    let error = PipelineFile::parse(&wrong, "large.toml").unwrap().build();
+    let error = error.map(|_| ()).unwrap_err().to_string();
+    assert!(
+        error.starts_with("large.toml:36002: stages.5999.points: icp has no such field"),
+        "{error}"
+    );
+    // A tenth of a second where the code is optimized; counting lines took more than a minute.
+    let elapsed = start.elapsed();
+    assert!(elapsed < Duration::from_secs(20), "{elapsed:?}");
 }

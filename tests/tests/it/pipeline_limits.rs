@@ -2,7 +2,7 @@
 
 use hicp_sim::Household;
 use hicp_tests::render;
-use hybrid_icp::pipeline::{Accepts, PARTS, Part, PartKind, PipelineError};
+use hybrid_icp::pipeline::{Accepts, Catalog, Part, PartKind, PipelineError};
 use hybrid_icp::{
     Isometry3, Model, Observation, PinholeCamera, PipelineFile, PipelineLimits, Preset, Refiner,
     Vector3,
@@ -245,8 +245,8 @@ fn the_largest_counts_are_refused_or_survived() {
             Vector3::new(0.05, 0.0, 0.03),
         );
     let (mut refused, mut survived) = (Vec::new(), 0);
-    for part in PARTS {
-        for parameter in part.parameters {
+    for part in Catalog::built_in().parts() {
+        for parameter in &part.parameters {
             if !matches!(parameter.accepts, Accepts::Count { .. }) {
                 continue;
             }

@@ -1,16 +1,31 @@
-//! What can be wrong with a pipeline file.
+//! Errors of pipeline files.
+
+use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Where in a pipeline file something stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A place in a pipeline file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// The file's path, or what the text was called.
+    /// Path of the file, or the name that its text was given.
     pub origin: String,
-    /// Line, from 1; `None` for a value that was set from outside the file.
+    /// Line, from 1; `None` for a value that an override set.
     pub line: Option<usize>,
-    /// The field, as a dotted path with list indices from 0; empty for the whole.
+    /// The field, as a dotted path with list indices from 0; empty for the whole file.
     pub field: String,
+}
+
+impl Place {
+    /// The place of a field that starts at a byte of a text. Counts the lines before it, so that
+    /// only errors cost the time.
+    pub(crate) fn of(origin: &str, text: &str, start: Option<usize>, field: &str) -> Box<Self> {
+        let before = start.map(|start| text.get(..start).unwrap_or(text));
+        Box::new(Self {
+            origin: origin.to_owned(),
+            line: before.map(|text| text.matches('\n').count() + 1),
+            field: field.to_owned(),
+        })
+    }
 }
 
 impl std::fmt::Display for Place {
@@ -34,8 +49,8 @@ pub enum PipelineError {
     #[error("{}: cannot be read", path.display())]
     Read {
         /// The file.
-        path: std::path::PathBuf,
-        /// Why.
+        path: PathBuf,
+        /// The cause.
         #[source]
         source: std::io::Error,
     },
@@ -43,39 +58,25 @@ pub enum PipelineError {
     #[error("{place}: not TOML: {message}")]
     Syntax {
         /// Where.
-        place: Place,
-        /// What the parser says.
+        place: Box<Place>,
+        /// The message of the parser.
         message: String,
     },
-    /// A field that must be there is not.
+    /// A required field is missing.
     #[error("{place}: missing, expected {expected}")]
     Missing {
         /// The field.
-        place: Place,
-        /// What should be there.
+        place: Box<Place>,
+        /// The values that are accepted.
         expected: String,
     },
-    /// A field that means nothing here.
-    #[error("{place}: {part} has no such field{}; its fields are: {}", did_you_mean(suggestion.as_deref()), list(known))]
-    UnknownField {
+    /// A name that no part of the kind has, or a field that the part does not have.
+    #[error("{place}: {problem}{}; there are: {}", did_you_mean(suggestion.as_deref()), list(known))]
+    Unknown {
         /// The field.
-        place: Place,
-        /// Name of the part that it was given to.
-        part: String,
-        /// The known field nearest to it.
-        suggestion: Option<String>,
-        /// The known fields.
-        known: Vec<String>,
-    },
-    /// A name that no part of the kind has.
-    #[error("{place}: no {kind} is named {found:?}{}; there are: {}", did_you_mean(suggestion.as_deref()), list(known))]
-    UnknownPart {
-        /// The field.
-        place: Place,
-        /// What kind of part is expected.
-        kind: &'static str,
-        /// The name found.
-        found: String,
+        place: Box<Place>,
+        /// What is unknown.
+        problem: String,
         /// The known name nearest to it.
         suggestion: Option<String>,
         /// The known names.
@@ -85,25 +86,25 @@ pub enum PipelineError {
     #[error("{place}: found {found}, expected {expected}")]
     Value {
         /// The field.
-        place: Place,
-        /// What is there.
+        place: Box<Place>,
+        /// The value found.
         found: String,
-        /// What should be there.
+        /// The values that are accepted.
         expected: String,
     },
-    /// More work than [`PipelineLimits`](super::PipelineLimits) let a file ask for.
+    /// More work than [`PipelineLimits`](crate::PipelineLimits) allow.
     #[error(
         "{place}: found {found}, expected at most {limit}: raise the limit (--{} N, PipelineLimits::{field}) if that is meant",
         field.replace('_', "-")
     )]
     Limit {
-        /// The field that takes it above the limit.
-        place: Place,
-        /// What is there, and how much that is.
+        /// The field that exceeds the limit.
+        place: Box<Place>,
+        /// The value found, and the work that it stands for.
         found: String,
-        /// How much is accepted.
+        /// The largest value that is accepted.
         limit: u64,
-        /// The field of [`PipelineLimits`](super::PipelineLimits) that raises the limit.
+        /// The field of [`PipelineLimits`](crate::PipelineLimits) that raises the limit.
         field: &'static str,
     },
     /// An override that is not of the form `path=value`, or whose path leads nowhere.
@@ -121,9 +122,8 @@ fn did_you_mean(suggestion: Option<&str>) -> String {
 }
 
 fn list(names: &[String]) -> String {
-    if names.is_empty() {
-        "none".to_owned()
-    } else {
-        names.join(", ")
+    match names {
+        [] => "none".to_owned(),
+        _ => names.join(", "),
     }
 }

@@ -1,10 +1,7 @@
 //! The known name that somebody may have meant.
 
 /// Returns the candidate with the fewest edits from a name, if it takes no more than half of it to be retyped.
-pub(crate) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(candidate, name), candidate))

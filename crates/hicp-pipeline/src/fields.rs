@@ -1,0 +1,65 @@
+//! The fields that a file gives to a part, and where they stand.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::error::Place;
+use crate::value::NOWHERE;
+
+/// A field, and the byte of the file at which it starts; `None` for what an override set.
+#[derive(Clone, Debug)]
+pub(crate) struct Spot {
+    pub(crate) field: String,
+    pub(crate) start: Option<usize>,
+}
+
+impl Spot {
+    /// Returns the spot of a field or list item of this one.
+    pub(crate) fn inside(&self, field: &str, start: usize) -> Self {
+        Self {
+            field: match self.field.as_str() {
+                "" => field.to_owned(),
+                outer => format!("{outer}.{field}"),
+            },
+            start: self.start.filter(|_| start != NOWHERE).map(|_| start),
+        }
+    }
+
+    /// Returns the place in a file, for an error.
+    pub(crate) fn place(&self, origin: &str, text: &str) -> Box<Place> {
+        Place::of(origin, text, self.start, &self.field)
+    }
+}
+
+/// The fields that a file gives to a part.
+#[derive(Debug)]
+pub(crate) struct Fields<'a> {
+    /// `None` for a part that is given by its bare name, or by default.
+    given: Option<&'a DeTable<'a>>,
+    pub(crate) spot: Spot,
+}
+
+impl<'a> Fields<'a> {
+    pub(crate) fn new(given: Option<&'a DeTable<'a>>, spot: Spot) -> Self {
+        Self { given, spot }
+    }
+
+    /// Returns the names of the fields that are given.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'a str> {
+        let keys = self.given.into_iter().flat_map(|table| table.keys());
+        keys.map(|key| key.get_ref().as_ref())
+    }
+
+    /// Returns a field, if it is given, and where it stands. The place of a field that is not given
+    /// is that of its part; that of one that is given is its key, where a person looks.
+    pub(crate) fn field(&self, name: &str) -> (Option<&'a DeValue<'a>>, Spot) {
+        let given = self.given.and_then(|table| table.get_key_value(name));
+        let start = match given {
+            Some((_, value)) if value.span().start == NOWHERE => NOWHERE,
+            Some((key, _)) => key.span().start,
+            None => self.spot.start.unwrap_or(NOWHERE),
+        };
+        let value = given.map(|(_, value)| Spanned::get_ref(value));
+        (value, self.spot.inside(name, start))
+    }
+}

@@ -1,0 +1,136 @@
+//! Parameters that are values: declared and read by the same call.
+
+use toml::de::DeValue;
+
+use crate::build::Parameters;
+use crate::error::PipelineError;
+use crate::part::{Accepts, Parameter};
+use crate::range::Range;
+use crate::value::{integer, list, number};
+
+/// A type of numbers that a part can hold: `f32` or `f64`.
+pub trait Number {
+    /// Converts the number of a file.
+    fn of(number: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn of(number: f64) -> Self {
+        number
+    }
+}
+
+impl Number for f32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "f32 is the precision of buffers"
+    )]
+    fn of(number: f64) -> Self {
+        number as Self
+    }
+}
+
+impl Parameters<'_> {
+    /// Reads a number; without a default it is required.
+    pub fn number<T: Number>(
+        &mut self,
+        name: &'static str,
+        range: Range,
+        default: impl Into<Option<f64>>,
+        meaning: &'static str,
+    ) -> Result<T, PipelineError> {
+        let Range { min, max, unit } = range;
+        let default = default.into();
+        let accepts = Accepts::Number { min, max, default };
+        let parameter = Parameter {
+            name,
+            unit,
+            meaning,
+            accepts,
+        };
+        let accepted =
+            |value: &DeValue<'_>| number(value).filter(|number| (min..=max).contains(number));
+        self.read(parameter, default, min, accepted).map(T::of)
+    }
+
+    /// Reads a whole number of at least `min`, as `u32`, `u64` or `usize`.
+    pub fn count<T: TryFrom<u32>>(
+        &mut self,
+        name: &'static str,
+        min: u32,
+        default: impl Into<Option<u32>>,
+        meaning: &'static str,
+    ) -> Result<T, PipelineError> {
+        let default = default.into();
+        let accepts = Accepts::Count { min, default };
+        let accepted = |value: &DeValue<'_>| {
+            let count = u32::try_from(integer(value)?).ok();
+            count.filter(|count| *count >= min)
+        };
+        let count = self.read(
+            Parameter::new(name, meaning, accepts),
+            default,
+            min,
+            accepted,
+        )?;
+        Ok(T::try_from(count).unwrap_or_else(|_| unreachable!("the type holds every u32")))
+    }
+
+    /// Reads true or false.
+    pub fn flag(
+        &mut self,
+        name: &'static str,
+        default: bool,
+        meaning: &'static str,
+    ) -> Result<bool, PipelineError> {
+        let parameter = Parameter::new(name, meaning, Accepts::Flag { default });
+        self.read(parameter, Some(default), default, |value| value.as_bool())
+    }
+
+    /// Reads a word and returns the value next to it; the first word is the default.
+    pub fn word<T: Copy>(
+        &mut self,
+        name: &'static str,
+        words: &[(&'static str, T)],
+        meaning: &'static str,
+    ) -> Result<T, PipelineError> {
+        let accepts = Accepts::Word {
+            words: words.iter().map(|(word, _)| *word).collect(),
+        };
+        let (_, first) = words[0];
+        self.read(
+            Parameter::new(name, meaning, accepts),
+            Some(first),
+            first,
+            |value| {
+                let text = value.as_str()?;
+                words
+                    .iter()
+                    .find(|(word, _)| *word == text)
+                    .map(|(_, value)| *value)
+            },
+        )
+    }
+
+    /// Reads a list of numbers, which is required.
+    pub fn numbers(
+        &mut self,
+        name: &'static str,
+        meaning: &'static str,
+    ) -> Result<Vec<f64>, PipelineError> {
+        let parameter = Parameter::new(name, meaning, Accepts::NumberList);
+        self.read(parameter, None, Vec::new(), |value| list(value, number))
+    }
+
+    /// Reads a list of `N` flags, all false by default.
+    pub fn flags<const N: usize>(
+        &mut self,
+        name: &'static str,
+        meaning: &'static str,
+    ) -> Result<[bool; N], PipelineError> {
+        let parameter = Parameter::new(name, meaning, Accepts::Flags { count: N });
+        self.read(parameter, Some([false; N]), [false; N], |value| {
+            list(value, |flag| flag.as_bool())?.try_into().ok()
+        })
+    }
+}

@@ -1,0 +1,130 @@
+//! Data associations.
+
+use hicp_association::{
+    ClosestPointOnMesh, KNearest, Length, NearestNeighbor, NormalCompatible, NormalShooting,
+    ObservationToModel, OrganizedNearestNeighbor, Projective, ProjectiveInterpolated,
+    ProjectiveSearch, Reciprocal, Stride, WarmNearestNeighbor,
+};
+
+use super::{length, stride};
+use crate::build::Parameters;
+use crate::catalog::{BoxedAssociation, Catalog};
+use crate::error::PipelineError;
+use crate::range::Range;
+use crate::work::Limited;
+
+pub(super) fn add(catalog: &mut Catalog) {
+    catalog.add_association("nearest-neighbor", |p| {
+        p.about = "Pairs a point with the closest observed point. Source: §III-A.1; Besl & McKay \
+            1992. Cost: O(n log m), and O(m log m) once per observation.";
+        Ok(NearestNeighbor {
+            targets: searched(p)?,
+        })
+    });
+    catalog.add_association("warm-nearest-neighbor", |p| {
+        p.about = "Pairs a point with the closest observed point, searched from the one of the \
+            last iteration: the same pairs, faster. Source: §III-A.1; Besl & McKay 1992, \
+            Greenspan & Godin 2001. Cost: O(n log m), and O(m log m) once per observation.";
+        Ok(WarmNearestNeighbor::new(searched(p)?))
+    });
+    catalog.add_association("organized-nearest-neighbor", |p| {
+        p.about = "Pairs a point with the closest observed point, searched in the image around \
+            its projection: the same pairs, faster for visible points. Source: §III-A.1; Besl & \
+            McKay 1992. Cost: O(n (f d / z)²), and O(pixels of the box) once per observation.";
+        Ok(OrganizedNearestNeighbor::new(stride(p, 4000, 1, SEARCHED)?))
+    });
+    catalog.add_association("projective", |p| {
+        p.about = "Pairs a point with the observed point at the pixel that it projects to. \
+            Source: §III-A.1; Blais & Levine 1995. Cost: O(n).";
+        Ok(Projective)
+    });
+    catalog.add_association("k-nearest", |p| {
+        p.about = "Pairs a point with the k closest observed points, each with weight 1/k. \
+            Cost: O(k n log m).";
+        let k = p.limited(Limited::Neighbors, "k", 1, 3, "number of neighbors")?;
+        Ok(KNearest::new(k, searched(p)?))
+    });
+    catalog.add_association("normal-compatible", |p| {
+        p.about = "Pairs a point with the closest of its k nearest whose normal agrees. \
+            Source: Pulli 1999. Cost: O(k n log m).";
+        let half_turn = Range::new(0.0, 180.0, "degrees");
+        let angle = p.number("max_angle_degrees", half_turn, 45.0, "between the normals")?;
+        Ok(NormalCompatible::new(angle, considered(p)?, searched(p)?))
+    });
+    catalog.add_association("normal-shooting", |p| {
+        p.about = "Pairs a point with the one of its k nearest that is closest to the line along \
+            its normal. Source: Chen & Medioni 1991. Cost: O(k n log m).";
+        let k = considered(p)?;
+        let offset = length(p, "max_offset", f64::INFINITY, "distance from the line")?;
+        let (Length::Meters(value) | Length::Diameters(value)) = offset;
+        let offset = value.is_finite().then_some(offset);
+        Ok(NormalShooting::new(k, offset, searched(p)?))
+    });
+    catalog.add_association("reciprocal", |p| {
+        p.about = "Keeps the pairs of another association in which each is the other's closest. \
+            Source: Pajdla & Van Gool 1995. Cost: that association, and O(n log n).";
+        let inner =
+            p.part::<BoxedAssociation>("association", "nearest-neighbor", "to choose from")?;
+        Ok(Reciprocal::new(inner))
+    });
+    catalog.add_association("projective-search", |p| {
+        p.about = "Pairs a point with the closest observed point in a window around its \
+            projection. Source: Benjemaa & Schmitt 1997. Cost: O(n radius²).";
+        Ok(ProjectiveSearch {
+            radius: p.count("radius", 0, 2, "half side of the window, pixels")?,
+        })
+    });
+    catalog.add_association("projective-interpolated", |p| {
+        p.about = "Pairs a point with the observed surface interpolated at its projection. \
+            Cost: O(n).";
+        let step = Range::positive("share of the depth");
+        Ok(ProjectiveInterpolated {
+            max_step: p.number("max_step", step, 0.02, "a larger step is not interpolated")?,
+        })
+    });
+    catalog.add_association("observation-to-model", |p| {
+        p.about = "Pairs every observed point with the closest model sample. Cost: O(m log s), \
+            and O(s log s) once per model.";
+        Ok(ObservationToModel {
+            stride: asking(p)?,
+            samples: p.limited(
+                Limited::Samples,
+                "samples",
+                1,
+                20_000,
+                "model samples in the index",
+            )?,
+            visible_only: visible_only(p)?,
+        })
+    });
+    catalog.add_association("closest-point-on-mesh", |p| {
+        p.about = "Pairs every observed point with the closest point of the model's triangles, \
+            exactly. Cost: O(m log t), and O(t log t) once per model.";
+        Ok(ClosestPointOnMesh {
+            stride: asking(p)?,
+            visible_only: visible_only(p)?,
+        })
+    });
+}
+
+const SEARCHED: &str = "observed points to search, about";
+
+fn searched(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
+    stride(p, 4000, 0, SEARCHED)
+}
+
+fn asking(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
+    stride(p, 2000, 0, "observed points to pair, about")
+}
+
+fn considered(p: &mut Parameters<'_>) -> Result<usize, PipelineError> {
+    p.limited(Limited::Neighbors, "k", 1, 10, "neighbors to consider")
+}
+
+fn visible_only(p: &mut Parameters<'_>) -> Result<bool, PipelineError> {
+    p.flag(
+        "visible_only",
+        true,
+        "leaves out what faces away from the camera",
+    )
+}

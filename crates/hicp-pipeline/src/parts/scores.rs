@@ -1,0 +1,33 @@
+//! Scores.
+
+use hicp_score::{MeanVsd, SampledMve};
+
+use crate::catalog::Catalog;
+use crate::range::Range;
+use crate::work::Limited;
+
+/// What an occlusion tolerance means.
+const HIDES: &str = "what something outside the mask must stand in front of the object to hide it; below 0 it may \
+    also lie that far behind, where the mask misses a part; inf is the paper's definition";
+/// Any; a meter behind the object is nowhere near it.
+const TOLERANCE: Range = Range::new(-1.0, f64::INFINITY, "m");
+
+pub(super) fn add(catalog: &mut Catalog) {
+    catalog.add_score("mve", |p| {
+        p.about = "Computes the mean VSD estimate against the live image. Source: §IV-A.2. \
+            Cost: a render, shared with the selection, and O(pixels).";
+        let tolerance: f64 = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
+        Ok(MeanVsd {
+            occlusion_tolerance: tolerance.is_finite().then_some(tolerance),
+        })
+    });
+    catalog.add_score("sampled-mve", |p| {
+        p.about = "Computes the MVE at low resolution from points of the model instead of a \
+            render, for ranking many poses. Cost: O(samples), whatever the mesh.";
+        let samples = p.limited(Limited::Samples, "samples", 0, 1500, "points on the model")?;
+        let pixels = p.count("pixels", 1, 200, "pixels of the mask, about")?;
+        let mut score = SampledMve::new(samples, pixels);
+        score.occlusion_tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
+        Ok(score)
+    });
+}

@@ -1,0 +1,215 @@
+//! Stages and the switchers that choose among them.
+
+use std::time::Duration;
+
+use hicp_icp::{
+    Anderson, AtResolution, Bound, Cascade, Guard, HypothesisSearch, Icp, KeepBest, MAX_ITERATIONS,
+    Repeat, Rotations, SearchOptions,
+};
+use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
+
+use crate::build::Parameters;
+use crate::catalog::{
+    BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStage, BoxedStop,
+    BoxedSwitcher, Catalog,
+};
+use crate::error::PipelineError;
+use crate::range::{DEGREES, FACTOR, METERS, Range};
+use crate::work::Limited::Hypotheses;
+
+const INFINITY: f64 = f64::INFINITY;
+/// When a stage of the paper's variants ends.
+const PAPER_STOP: &[&str] = &["divergence", "convergence", "iteration-limit"];
+
+pub(super) fn add(catalog: &mut Catalog) {
+    catalog.add_stage("icp", |p| {
+        p.about = "Runs generic ICP from its five components. Source: Algorithm 1. \
+            Cost: iterations × (association + metric).";
+        let icp = Icp {
+            selection: p.part::<BoxedSelection>("selection", None, "points to register")?,
+            association: p.part::<BoxedAssociation>(
+                "association",
+                None,
+                "pairs them with observed points",
+            )?,
+            filter: p.parts::<BoxedFilter>(
+                "filter",
+                &[][..],
+                "outlier filters and weights, in order",
+            )?,
+            metric: p.part::<BoxedMetric>("metric", None, "error metric to minimize")?,
+            stop: p.parts::<BoxedStop>(
+                "stop",
+                PAPER_STOP,
+                "the first rule that applies ends it",
+            )?,
+        };
+        let engine = MAX_ITERATIONS as u64;
+        let iterations = p.iterations_of("stop").fold(engine, u64::min).max(1);
+        let steps = p.iterations_of("metric").fold(1, u64::max);
+        p.takes("metric", iterations.saturating_mul(steps))?;
+        Ok(icp)
+    });
+    catalog.add_stage("cascade", |p| {
+        p.about = "Runs stages one after the other, each from the pose of the one before. \
+            Source: §IV-B. Cost: the sum of its stages.";
+        let stages = p.parts::<BoxedStage>("stages", None, "the stages, in order")?;
+        let total = p.iterations_of("stages").fold(0, u64::saturating_add);
+        p.takes("stages", total)?;
+        Ok(Cascade(stages))
+    });
+    catalog.add_stage("repeat", |p| {
+        p.about = "Runs a stage several times; ends early when it keeps its pose. Source: §IV-C. \
+            Cost: times × the stage.";
+        let times = p.count("times", 0, 2, "largest number of runs")?;
+        let stage = p.part::<BoxedStage>("stage", None, "what is repeated")?;
+        p.repeats("times", times)?;
+        Ok(Repeat { times, stage })
+    });
+    catalog.add_stage("switch", |p| {
+        p.about = "Runs one of two stages, chosen from the image at the estimate. \
+            Source: §IV-A.2. Cost: the switcher's and the chosen stage's.";
+        Ok(Switch {
+            switcher: p.part::<BoxedSwitcher>("switcher", "threshold", "selects the stage")?,
+            aligned: p.part::<BoxedStage>(
+                "aligned",
+                None,
+                "runs if the estimate fits the image",
+            )?,
+            misaligned: p.part::<BoxedStage>("misaligned", None, "runs if it does not")?,
+        })
+    });
+    catalog.add_stage("switch-among", |p| {
+        p.about = "Runs one of any number of stages, chosen from the image at the estimate. \
+            Source: §IV-A.2, generalized. Cost: the switcher's and the chosen stage's.";
+        Ok(SwitchAmong {
+            switcher: p.part::<BoxedSwitcher>("switcher", "threshold", "selects the stage")?,
+            stages: p.parts::<BoxedStage>("stages", None, "the stages, by regime")?,
+        })
+    });
+    catalog.add_stage("alternate", |p| {
+        p.about = "Switches until the score stalls, and tries the other stage once; returns the \
+            pose with the best score. Source: §IV-A.2, repeated. Cost: max_steps × (a stage and a \
+            score).";
+        let stage = SwitchUntilStall {
+            score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
+            alpha: p.number("alpha", FACTOR, 0.4, "score of a misaligned pose")?,
+            aligned: p.part::<BoxedStage>("aligned", None, "runs below alpha")?,
+            misaligned: p.part::<BoxedStage>("misaligned", None, "runs from alpha on")?,
+            max_steps: p.count("max_steps", 0, 4, "largest number of steps")?,
+            min_gain: p.number("min_gain", FACTOR, 0.01, "smaller gains count as a stall")?,
+            good_enough: p.number("good_enough", FACTOR, 0.0, "score that ends it")?,
+        };
+        p.repeats("max_steps", stage.max_steps)?;
+        Ok(stage)
+    });
+    catalog.add_stage("hypothesis-search", |p| {
+        p.about = "Runs a local stage; where its score stays bad, runs it again from the best of \
+            many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking and \
+            refined × explore.";
+        let search = HypothesisSearch::new(
+            p.part::<BoxedStage>("stage", None, "refines locally")?,
+            p.part::<BoxedStage>("explore", None, "refines hypotheses, cheaply")?,
+            p.part::<BoxedScore>("ranking", "sampled-mve", "ranks hypotheses")?,
+            p.part::<BoxedScore>("score", "mve", "judges poses")?,
+            search_options(p)?,
+        );
+        // The local stage runs from the initial pose and from the best hypothesis.
+        let local = p.iterations_of("stage").fold(0, u64::max).saturating_mul(2);
+        let explore = p.iterations_of("explore").fold(0, u64::max);
+        let explored = explore.saturating_mul(search.options.refined as u64);
+        let total = local.saturating_add(search.options.hypotheses as u64);
+        p.takes("refined", total.saturating_add(explored))?;
+        Ok(search)
+    });
+    catalog.add_stage("at-resolution", |p| {
+        p.about = "Runs a stage on every n-th pixel, phase-aligned; coarse-to-fine is a cascade \
+            of these. Source: image pyramids. Cost: the stage on a coarser image.";
+        Ok(AtResolution {
+            factor: p.count("factor", 1, 2, "keeps every n-th pixel")?,
+            stage: p.part::<BoxedStage>("stage", None, "what is run")?,
+        })
+    });
+    catalog.add_stage("guard", |p| {
+        p.about = "Accepts the pose of a stage only if a score improves. Cost: the stage and two \
+            scores.";
+        Ok(Guard {
+            stage: p.part::<BoxedStage>("stage", None, "what is run")?,
+            score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
+        })
+    });
+    catalog.add_stage("keep-best", |p| {
+        p.about = "Runs a stage several times; returns the best pose by a score, which may be the \
+            initial one. Cost: times × (the stage and a score).";
+        let stage = KeepBest {
+            times: p.count("times", 0, 2, "largest number of runs")?,
+            stage: p.part::<BoxedStage>("stage", None, "what is repeated")?,
+            score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
+        };
+        p.repeats("times", stage.times)?;
+        Ok(stage)
+    });
+    catalog.add_stage("anderson", |p| {
+        p.about = "Runs a stage of one step again and again, from extrapolated poses. \
+            Source: Anderson 1965; Pavlov et al. 2018; Zhang, Yao & Deng 2021. Cost: steps × the \
+            stage.";
+        let stage = Anderson {
+            stage: p.part::<BoxedStage>("stage", None, "ICP with an iteration limit of 2")?,
+            max_steps: p.count("max_steps", 0, 50, "largest number of steps")?,
+            translation_meters: p.number("translation_meters", METERS, 1e-5, "ends below")?,
+            rotation_degrees: p.number("rotation_degrees", DEGREES, 1e-3, "and below")?,
+        };
+        p.repeats("max_steps", stage.max_steps)?;
+        Ok(stage)
+    });
+    catalog.add_switcher("threshold", |p| {
+        p.about = "Misaligned where a score is α or more. Source: §IV-A.2. Cost: a score.";
+        let of_score = Range::new(-INFINITY, INFINITY, "of the score");
+        Ok(Threshold {
+            score: p.part::<BoxedScore>("score", "mve", "the score")?,
+            alpha: p.number("alpha", of_score, 0.4, "the threshold")?,
+        })
+    });
+    catalog.add_switcher("thresholds", |p| {
+        p.about = "Selects regime k where exactly k bounds are at or below a score. \
+            Source: §IV-A.2, generalized. Cost: a score.";
+        Ok(Thresholds {
+            score: p.part::<BoxedScore>("score", "mve", "the score")?,
+            bounds: p.numbers("bounds", "bounds of the score, ascending")?,
+        })
+    });
+}
+
+fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError> {
+    let rotations = [
+        ("even", Rotations::Even),
+        ("view-axis", Rotations::ViewAxis),
+        ("symmetry", Rotations::Symmetry),
+    ];
+    let tried = "rotations to try: of SO(3), around the viewing ray, or the declared symmetries";
+    let least = "least angle between those; of two that are nearer the better ranked is refined";
+    let options = SearchOptions {
+        threshold: p.number("threshold", FACTOR, 0.15, "searches above this score")?,
+        good_enough: p.number("good_enough", FACTOR, 0.05, "score that ends it")?,
+        min_gain: p.number("min_gain", FACTOR, 0.03, "gain that leaves the local pose")?,
+        rotations: p.word("rotations", &rotations, tried)?,
+        hypotheses: p.limited(Hypotheses, "hypotheses", 0, 256, "rotations to rank")?,
+        refined: p.count("refined", 0, 12, "hypotheses that are refined")?,
+        spacing_degrees: p.number("spacing_degrees", DEGREES, 20.0, least)?,
+        ..SearchOptions::default()
+    };
+    let far = "largest distance of the result from the initial pose";
+    let bound = Bound {
+        translation_meters: p.number("max_translation_meters", METERS, INFINITY, far)?,
+        rotation_degrees: p.number("max_rotation_degrees", DEGREES, INFINITY, far)?,
+    };
+    let bounded = bound.translation_meters.is_finite() || bound.rotation_degrees.is_finite();
+    let time = "time limit of a run; if finite, results depend on the clock";
+    let milliseconds: f64 = p.number("milliseconds", Range::positive("ms"), INFINITY, time)?;
+    Ok(SearchOptions {
+        bound: bounded.then_some(bound),
+        // A time that no duration can hold is no limit.
+        time_limit: Duration::try_from_secs_f64(milliseconds / 1000.0).ok(),
+        ..options
+    })
+}
