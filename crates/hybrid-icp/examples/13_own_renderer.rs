@@ -1,4 +1,4 @@
-//! A renderer of one's own: what selections and scores see of the model.
+//! A custom renderer, which selections and scores use.
 //!
 //! `cargo run --release -p hybrid-icp --example 13_own_renderer`
 
@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use hybrid_icp::{
-    Isometry3, PinholeCamera, PixelRegion, Preset, Problem, Rasterizer, RenderedView, Renderer,
-    Session, Stage, TriMesh, Workspace,
+    Isometry3, PinholeCamera, PixelRegion, Rasterizer, Refiner, RenderedView, Renderer, TriMesh,
+    presets,
 };
 
 mod scene;
 
-/// Lets another renderer draw, and adds up the time that it takes. One on a GPU is put in likewise.
+/// Adds up the time that another renderer takes. One on a GPU is passed in the same way.
 struct Timed<R> {
     inner: R,
     nanoseconds: Arc<AtomicU64>,
@@ -42,26 +42,22 @@ impl<R: Renderer> Renderer for Timed<R> {
 fn main() -> Result<(), Box<dyn Error>> {
     let given = scene::Scene::new()?;
     let (model, observation) = given.problem()?;
-    let problem = Problem::new(&model, &observation);
     let nanoseconds = Arc::new(AtomicU64::new(0));
-    // A workspace holds the renderer of a thread; `Refiner` makes one with the rasterizer.
-    let mut workspace = Workspace::new(Timed {
+    let renderer = Timed {
         inner: Rasterizer::default(),
         nanoseconds: Arc::clone(&nanoseconds),
-    });
-    let mut stage = Preset::Hybrid.build();
+    };
+    let mut refiner = Refiner::with_renderer(presets::hybrid(), renderer);
     let start = Instant::now();
-    let mut observer = ();
-    let mut session = Session::new(&mut workspace, &mut observer);
-    let outcome = stage.run(&problem, &given.detected, &mut session);
+    let refined = refiner.refine(&model, &observation, &given.detected);
+    let renders = refiner.workspace_mut().renders();
     println!(
-        "{} iterations took {:.2?}, of which {} renders {:.2?}",
-        outcome.iterations,
+        "{} iterations took {:.2?}, of which {renders} renders {:.2?}",
+        refined.outcome.iterations,
         start.elapsed(),
-        workspace.renders(),
         Duration::from_nanos(nanoseconds.load(Ordering::Relaxed))
     );
-    if workspace.renders() == 0 {
+    if renders == 0 {
         return Err("nothing was rendered".into());
     }
     Ok(())

@@ -1,23 +1,53 @@
-//! Hybrid ICP and the eight baselines of the paper's Table I, each a plain composition of public parts; and what goes beyond
-//! the paper ([`hybrid_visible`], [`local`], [`search`], [`auto`]), in a file of its own.
+//! Hybrid ICP and the eight baselines of the paper's Table I, each a plain composition of public
+//! parts; and the presets that go beyond the paper ([`hybrid_visible`], [`local`], [`search`],
+//! [`auto`]), in a file of their own.
 //!
-//! Read beside the paper: §III-A for the parts, §IV-B for the cascade and its divergence rules, §IV-C for Hybrid ICP,
-//! §VI-B for the baselines. What those of the paper share where the paper leaves it open:
+//! The sections of the paper: §III-A for the parts, §IV-B for the cascade and its divergence rules,
+//! §IV-C for Hybrid ICP, §VI-B for the baselines. The paper leaves some choices open; its variants
+//! share these:
 //!
-//! - O is the whole surface for nearest neighbours ([`AllSamples`]) and the visible one for projective association
-//!   ([`VisibleSurface`], V_O rendered at the stage's initial estimate).
+//! - O is the whole surface for nearest neighbors ([`AllSamples`]) and the visible one for
+//!   projective association ([`VisibleSurface`], V_O rendered at the stage's initial estimate).
 //! - τ_max and θ_max are off.
-//! - Every stage ends by the same rules: the paper's divergence rules as written, convergence of the loss, 50 iterations.
+//! - Every stage ends by the same rules: the paper's divergence rules as written, convergence of
+//!   the loss, 50 iterations.
+//!
+//! Each preset has a named type whose fields are public, so that a program can change it:
+//!
+//! ```
+//! use hybrid_icp::{LossRule, Refiner, presets};
+//! let mut stage = presets::hybrid();
+//! stage.times = 3;
+//! stage.stage.switcher.alpha = 0.3;
+//! let (divergence, _, limit) = &mut stage.stage.misaligned.stop;
+//! divergence.loss_rule = LossRule::CountAware;
+//! limit.0 = 20;
+//! let refiner = Refiner::new(stage);
+//! # let _ = refiner;
+//! ```
+//!
+//! To put in a part of another type, move the others over:
+//!
+//! ```
+//! use hybrid_icp::{Icp, Kernel, PointToPlane, Refiner, Repeat, Robust, Scale, Switch, presets};
+//! let Repeat { times, stage: Switch { switcher, aligned, misaligned } } = presets::hybrid();
+//! let metric = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Mad { floor_meters: 1e-3 });
+//! let Icp { selection, association, filter, stop, .. } = misaligned;
+//! let misaligned = Icp { selection, association, filter, metric, stop };
+//! let refiner = Refiner::new(Repeat { times, stage: Switch { switcher, aligned, misaligned } });
+//! # let _ = refiner;
+//! ```
 
 mod beyond;
 
-pub use beyond::{auto, hybrid_visible, local, search, search_with};
-
-use hicp_association::{
-    AllSamples, DataAssociation, PointSelection, Projective, VisibleSurface, WarmNearestNeighbor,
+pub use beyond::{
+    CloudToModelIcp, Explore, Far, GatedIcp, HybridVisible, Local, Near, Search, auto,
+    hybrid_visible, local, search, search_with,
 };
-use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, Stage};
-use hicp_metric::{ErrorMetric, PointToPlane, PointToPoint};
+
+use hicp_association::{AllSamples, Projective, VisibleSurface, WarmNearestNeighbor};
+use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat};
+use hicp_metric::{PointToPlane, PointToPoint};
 use hicp_score::MeanVsd;
 use hicp_switch::{PAPER_ALPHA, Switch, Threshold};
 
@@ -37,84 +67,97 @@ pub fn paper_stop() -> PaperStop {
 }
 
 /// An ICP stage as the paper's variants use it: no gates, the paper's stop rules.
-type PaperIcp<P, A, M> = Icp<P, A, (), M, PaperStop>;
+pub type PaperIcp<P, A, M> = Icp<P, A, (), M, PaperStop>;
+/// A stage of the paper with projective association.
+pub type ProjectiveIcp<M> = PaperIcp<VisibleSurface, Projective, M>;
+/// A stage of the paper with nearest neighbors.
+pub type NearestIcp<M> = PaperIcp<AllSamples, WarmNearestNeighbor, M>;
+/// Cascading ICP with projective association, in either order.
+pub type ProjectiveCascade<M, N> = Cascade<(ProjectiveIcp<M>, ProjectiveIcp<N>)>;
+/// Cascading ICP with nearest neighbors, in either order.
+pub type NearestCascade<M, N> = Cascade<(NearestIcp<M>, NearestIcp<N>)>;
+/// The type of [`hybrid`].
+pub type Hybrid = Repeat<
+    Switch<
+        Threshold<MeanVsd>,
+        ProjectiveCascade<PointToPoint, PointToPlane>,
+        NearestIcp<PointToPoint>,
+    >,
+>;
 
-fn icp<P, A, M>(selection: P, association: A, metric: M) -> PaperIcp<P, A, M>
-where
-    P: PointSelection,
-    A: DataAssociation,
-    M: ErrorMetric,
-{
+fn projective<M>(metric: M) -> ProjectiveIcp<M> {
     Icp {
-        selection,
-        association,
+        selection: VisibleSurface::default(),
+        association: Projective,
         filter: (),
         metric,
         stop: paper_stop(),
     }
 }
 
-fn projective<M: ErrorMetric>(metric: M) -> PaperIcp<VisibleSurface, Projective, M> {
-    icp(VisibleSurface::default(), Projective, metric)
-}
-
-fn nearest<M: ErrorMetric>(metric: M) -> PaperIcp<AllSamples, WarmNearestNeighbor, M> {
-    icp(AllSamples, WarmNearestNeighbor::default(), metric)
+fn nearest<M>(metric: M) -> NearestIcp<M> {
+    Icp {
+        selection: AllSamples,
+        association: WarmNearestNeighbor::default(),
+        filter: (),
+        metric,
+        stop: paper_stop(),
+    }
 }
 
 /// `projective-point-to-point`: the visible surface, projective association, point-to-point.
 #[must_use]
-pub fn projective_point_to_point() -> impl Stage + Send + Clone {
+pub fn projective_point_to_point() -> ProjectiveIcp<PointToPoint> {
     projective(PointToPoint)
 }
 
 /// `projective-point-to-plane`: the visible surface, projective association, point-to-plane.
 #[must_use]
-pub fn projective_point_to_plane() -> impl Stage + Send + Clone {
+pub fn projective_point_to_plane() -> ProjectiveIcp<PointToPlane> {
     projective(PointToPlane)
 }
 
 /// `projective-cascade-point-plane`: the paper's Cascading ICP (§IV-B) with projective association.
 #[must_use]
-pub fn projective_cascade_point_plane() -> impl Stage + Send + Clone {
+pub fn projective_cascade_point_plane() -> ProjectiveCascade<PointToPoint, PointToPlane> {
     Cascade((projective(PointToPoint), projective(PointToPlane)))
 }
 
 /// `projective-cascade-plane-point`: the cascade in the other order.
 #[must_use]
-pub fn projective_cascade_plane_point() -> impl Stage + Send + Clone {
+pub fn projective_cascade_plane_point() -> ProjectiveCascade<PointToPlane, PointToPoint> {
     Cascade((projective(PointToPlane), projective(PointToPoint)))
 }
 
-/// `nn-point-to-point`: the whole surface, nearest neighbours, point-to-point.
+/// `nn-point-to-point`: the whole surface, nearest neighbors, point-to-point.
 #[must_use]
-pub fn nn_point_to_point() -> impl Stage + Send + Clone {
+pub fn nn_point_to_point() -> NearestIcp<PointToPoint> {
     nearest(PointToPoint)
 }
 
-/// `nn-point-to-plane`: the whole surface, nearest neighbours, point-to-plane.
+/// `nn-point-to-plane`: the whole surface, nearest neighbors, point-to-plane.
 #[must_use]
-pub fn nn_point_to_plane() -> impl Stage + Send + Clone {
+pub fn nn_point_to_plane() -> NearestIcp<PointToPlane> {
     nearest(PointToPlane)
 }
 
-/// `nn-cascade-point-plane`: Cascading ICP with nearest neighbours.
+/// `nn-cascade-point-plane`: Cascading ICP with nearest neighbors.
 #[must_use]
-pub fn nn_cascade_point_plane() -> impl Stage + Send + Clone {
+pub fn nn_cascade_point_plane() -> NearestCascade<PointToPoint, PointToPlane> {
     Cascade((nearest(PointToPoint), nearest(PointToPlane)))
 }
 
 /// `nn-cascade-plane-point`: that cascade in the other order.
 #[must_use]
-pub fn nn_cascade_plane_point() -> impl Stage + Send + Clone {
+pub fn nn_cascade_plane_point() -> NearestCascade<PointToPlane, PointToPoint> {
     Cascade((nearest(PointToPlane), nearest(PointToPoint)))
 }
 
-/// `hybrid`: Hybrid ICP (§IV-C). Twice: score the estimate by the MVE; below α = 0.4 run the projective cascade, else
-/// nearest-neighbour point-to-point.
+/// `hybrid`: Hybrid ICP (§IV-C). Twice: score the estimate by the MVE; below α = 0.4 run the
+/// projective cascade, else nearest-neighbor point-to-point.
 // Deviation: occluded pixels do not count toward the MVE; where nothing stands in front of the object it is the paper's MVE exactly.
 #[must_use]
-pub fn hybrid() -> impl Stage + Send + Clone {
+pub fn hybrid() -> Hybrid {
     Repeat {
         times: 2,
         stage: Switch {

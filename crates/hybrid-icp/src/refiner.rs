@@ -1,6 +1,6 @@
 //! One call from an observation and a rough pose to a pose with its score.
 
-use hicp_core::{Isometry3, Model, Observation, Problem};
+use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
 use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{Flatness, MeanVsd, Score};
@@ -8,32 +8,38 @@ use hicp_score::{Flatness, MeanVsd, Score};
 use crate::preset::{BoxedStage, Preset};
 use crate::warning::{Warning, warnings_of_result};
 
-/// What a refinement returns: a pose, how it came about, and how well it explains the image.
+/// The result of a refinement: a pose, how it was found, and how well it explains the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Refinement {
-    /// The pose (`outcome.camera_from_object`), why the pipeline ended, and the numbers at that pose.
+    /// The pose (`outcome.camera_from_object`), the reason why the pipeline ended, and the numbers at
+    /// that pose.
     pub outcome: Outcome,
     /// The mean VSD estimate of the initial pose: 0 agrees with the image everywhere, 1 nowhere.
     pub mve_initial: f64,
     /// The mean VSD estimate of the returned pose.
     ///
-    /// Above about 0.4 the pose is not to be trusted; above `mve_initial` the refinement made it worse; where `mve_initial` is 0.9 or more it
-    /// may be the pose of another object ([`Self::warnings`]).
+    /// Do not trust a pose above about 0.4. Above `mve_initial`, the refinement made the pose worse. If
+    /// `mve_initial` is 0.9 or more, it may be the pose of another object ([`Self::warnings`]).
     pub mve: f64,
-    /// How flat the measured and the rendered surface are at the returned pose: whether a plane would explain the depth better. `None` where
-    /// fewer than 64 pixels show both.
+    /// Flatness of the measured and the rendered surface at the returned pose, which tells whether a
+    /// plane would explain the depth better. `None` if fewer than 64 pixels show both.
     pub flatness: Option<Flatness>,
 }
 
 impl Refinement {
-    /// Returns why the pose is not to be trusted ([`warnings_of_result`]); nothing where no score says so.
+    /// Returns the reasons not to trust the pose, if there are any ([`warnings_of_result`]).
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         warnings_of_result(self.mve_initial, self.mve, self.flatness)
     }
 }
 
-/// A pipeline with its scratch memory and renderer: make one per thread, use it for any number of refinements.
+/// A pipeline with its scratch memory and renderer, for any number of refinements: create one per
+/// thread.
+///
+/// The pipeline is any stage, by default a boxed one. [`Refiner::stage_mut`] changes it in place, and
+/// [`Refiner::into_stage`] returns it.
 ///
 /// ```
 /// use hybrid_icp::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Preset, Refiner, TriMesh};
@@ -43,7 +49,7 @@ impl Refinement {
 ///     Point3::new(-0.1, -0.1, 0.0), Point3::new(0.1, -0.1, 0.0), Point3::new(0.1, 0.1, 0.0), Point3::new(-0.1, 0.1, 0.0),
 /// ];
 /// let model = Model::new(TriMesh::new(plate, vec![[0, 2, 1], [0, 3, 2]])?);
-/// // The plate stands half a metre in front of the camera; the detector is four centimetres off.
+/// // The plate stands half a meter in front of the camera; the detector is four centimetres off.
 /// let depth = (0..64 * 64).map(|i| if (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64)) { 0.5 } else { 0.0 });
 /// let depth = DepthImage::from_meters(64, 64, depth.collect())?;
 /// let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
@@ -55,38 +61,63 @@ impl Refinement {
 /// assert!(refined.mve < refined.mve_initial);
 /// # Ok(()) }
 /// ```
-pub struct Refiner {
-    stage: BoxedStage,
+pub struct Refiner<S = BoxedStage> {
+    stage: S,
     workspace: Workspace,
     score: MeanVsd,
 }
 
 impl Refiner {
-    /// Makes a refiner from any stage.
-    pub fn new(stage: impl Stage + Send + 'static) -> Self {
-        Self::boxed(Box::new(stage))
-    }
-
-    /// Makes a refiner from a preset.
+    /// Creates a refiner that runs a preset.
     #[must_use]
     pub fn preset(preset: Preset) -> Self {
-        Self::boxed(preset.build())
+        Self::new(preset.build())
     }
 
-    /// Makes a refiner from a boxed stage.
+    /// Creates a refiner that runs a stage behind a box, so that its type does not name the stage.
     #[must_use]
-    pub fn boxed(stage: BoxedStage) -> Self {
+    pub fn boxed(stage: impl Stage + Send + 'static) -> Self {
+        Self::new(Box::new(stage))
+    }
+}
+
+impl<S: Stage> Refiner<S> {
+    /// Creates a refiner that runs `stage`.
+    #[must_use]
+    pub fn new(stage: S) -> Self {
+        Self::with_renderer(stage, Rasterizer::default())
+    }
+
+    /// Creates a refiner that runs `stage` and renders with `renderer`.
+    #[must_use]
+    pub fn with_renderer(stage: S, renderer: impl Renderer + Send + 'static) -> Self {
         Self {
             stage,
-            workspace: Workspace::new(Rasterizer::default()),
+            workspace: Workspace::new(renderer),
             score: MeanVsd::default(),
         }
     }
 
-    /// Refines a pose (`camera_from_object`, metres).
+    /// Returns the stage.
+    pub fn stage(&self) -> &S {
+        &self.stage
+    }
+
+    /// Returns the stage, to change it between refinements.
+    pub fn stage_mut(&mut self) -> &mut S {
+        &mut self.stage
+    }
+
+    /// Returns the stage and drops the scratch memory.
+    pub fn into_stage(self) -> S {
+        self.stage
+    }
+
+    /// Refines a pose (`camera_from_object`, meters).
     ///
-    /// Never fails on data: no overlap, degenerate geometry and the like end with an outcome that says so, and the initial
-    /// pose. Deterministic. Cost: the pipeline's, and one render for the final score.
+    /// Never fails on data: without overlap, or with degenerate geometry, the outcome has the initial
+    /// pose and states the reason. Deterministic. Cost: that of the pipeline, and one render for the
+    /// final score.
     pub fn refine(
         &mut self,
         model: &Model,
@@ -96,7 +127,7 @@ impl Refiner {
         self.refine_observed(model, observation, init, &mut ())
     }
 
-    /// Refines a pose and tells an observer what happens on the way.
+    /// Refines a pose and reports every step to an observer.
     pub fn refine_observed(
         &mut self,
         model: &Model,
@@ -132,13 +163,13 @@ impl Refiner {
             .score(&mut self.workspace.context(&problem), camera_from_object)
     }
 
-    /// The scratch memory and render cache, for scores and renders of one's own.
+    /// Returns the scratch memory and render cache, for custom scores and renders.
     pub fn workspace_mut(&mut self) -> &mut Workspace {
         &mut self.workspace
     }
 }
 
-impl std::fmt::Debug for Refiner {
+impl<S> std::fmt::Debug for Refiner<S> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Refiner")
             .field("workspace", &self.workspace)

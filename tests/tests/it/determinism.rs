@@ -106,7 +106,7 @@ fn boxed_hybrid() -> BoxedStage {
 #[test]
 fn boxed_parts_give_the_same_bits_as_static_ones() {
     let cases = cases();
-    let expected = run(&mut Refiner::new(presets::hybrid()), &cases);
+    let expected = run(&mut Refiner::boxed(presets::hybrid()), &cases);
     assert_eq!(run(&mut Refiner::boxed(boxed_hybrid()), &cases), expected);
     assert_eq!(run(&mut Refiner::preset(Preset::Hybrid), &cases), expected);
     // The cases are worth something only if they differ.
@@ -117,46 +117,46 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
 fn the_functions_of_the_presets_are_what_their_names_build() {
     let cases = cases();
     let functions: [(Preset, Refiner); 13] = [
-        (Preset::Hybrid, Refiner::new(presets::hybrid())),
+        (Preset::Hybrid, Refiner::boxed(presets::hybrid())),
         (
             Preset::ProjectivePointToPoint,
-            Refiner::new(presets::projective_point_to_point()),
+            Refiner::boxed(presets::projective_point_to_point()),
         ),
         (
             Preset::ProjectivePointToPlane,
-            Refiner::new(presets::projective_point_to_plane()),
+            Refiner::boxed(presets::projective_point_to_plane()),
         ),
         (
             Preset::ProjectiveCascadePointPlane,
-            Refiner::new(presets::projective_cascade_point_plane()),
+            Refiner::boxed(presets::projective_cascade_point_plane()),
         ),
         (
             Preset::ProjectiveCascadePlanePoint,
-            Refiner::new(presets::projective_cascade_plane_point()),
+            Refiner::boxed(presets::projective_cascade_plane_point()),
         ),
         (
             Preset::NnPointToPoint,
-            Refiner::new(presets::nn_point_to_point()),
+            Refiner::boxed(presets::nn_point_to_point()),
         ),
         (
             Preset::NnPointToPlane,
-            Refiner::new(presets::nn_point_to_plane()),
+            Refiner::boxed(presets::nn_point_to_plane()),
         ),
         (
             Preset::NnCascadePointPlane,
-            Refiner::new(presets::nn_cascade_point_plane()),
+            Refiner::boxed(presets::nn_cascade_point_plane()),
         ),
         (
             Preset::NnCascadePlanePoint,
-            Refiner::new(presets::nn_cascade_plane_point()),
+            Refiner::boxed(presets::nn_cascade_plane_point()),
         ),
         (
             Preset::HybridVisible,
-            Refiner::new(presets::hybrid_visible()),
+            Refiner::boxed(presets::hybrid_visible()),
         ),
-        (Preset::Local, Refiner::new(presets::local())),
-        (Preset::Search, Refiner::new(presets::search())),
-        (Preset::Auto, Refiner::new(presets::auto())),
+        (Preset::Local, Refiner::boxed(presets::local())),
+        (Preset::Search, Refiner::boxed(presets::search())),
+        (Preset::Auto, Refiner::boxed(presets::auto())),
     ];
     assert_eq!(functions.each_ref().map(|(preset, _)| *preset), Preset::ALL);
     let mut results = Vec::new();
@@ -179,5 +179,5 @@ fn the_functions_of_the_presets_are_what_their_names_build() {
         metric: PointToPlane,
         stop: presets::paper_stop(),
     };
-    assert_eq!(run(&mut Refiner::new(by_hand), &cases), results[2]);
+    assert_eq!(run(&mut Refiner::boxed(by_hand), &cases), results[2]);
 }

@@ -34,6 +34,7 @@ mod pipeline_files;
 mod pipeline_limits;
 mod pitfalls;
 mod pitfalls_page;
+mod presets;
 mod resolution;
 mod room;
 mod sequential;

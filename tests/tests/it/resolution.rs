@@ -43,11 +43,11 @@ fn coarse_to_fine_ends_where_fine_does() {
     let pyramid = Cascade((
         AtResolution {
             factor: 4,
-            stage: fine.clone(),
+            stage: fine,
         },
         AtResolution {
             factor: 2,
-            stage: fine.clone(),
+            stage: fine,
         },
         fine,
     ));

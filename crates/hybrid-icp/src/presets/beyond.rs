@@ -1,8 +1,9 @@
 //! The presets that go beyond the paper, composed of the same public parts.
 //!
-//! Two classes that are never to be confused: [`hybrid_visible`] and [`local`] refine the pose that they are given; [`search`]
-//! and [`auto`] look for another one when that fails, and can end far from it, also at a pose that is equivalent by symmetry.
-//! Their numbers were chosen on the ten tuning objects of `hicp-sim`; `docs/presets.md` says what each change carries.
+//! [`hybrid_visible`] and [`local`] refine the pose that they are given. [`search`] and [`auto`]
+//! search for another one when that fails: they can end far from it, also at a pose that is
+//! equivalent by symmetry. Their numbers were chosen on the ten tuning objects of `hicp-sim`;
+//! `docs/presets.md` states the effect of each change.
 
 use hicp_association::{
     AllSamples, MaxDistance, MaxNormalAngle, ObservationToModel, Projective, Stride,
@@ -10,13 +11,39 @@ use hicp_association::{
 };
 use hicp_icp::{
     Cascade, Convergence, Divergence, Guard, HypothesisSearch, Icp, IterationLimit, Repeat,
-    SearchOptions, Stage,
+    SearchOptions,
 };
-use hicp_metric::{ErrorMetric, PointToPoint, Symmetric};
+use hicp_metric::{PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
 use super::PaperStop;
+
+/// A projective stage whose pairs are at most a quarter of the diameter apart.
+pub type GatedIcp<M> = Icp<VisibleSurface, Projective, MaxDistance, M, PaperStop>;
+/// A stage that pairs observed points with points of the model.
+pub type CloudToModelIcp<M> = Icp<AllSamples, ObservationToModel, (), M, PaperStop>;
+/// The stage of estimates that agree with the image.
+pub type Near = Cascade<(GatedIcp<PointToPoint>, GatedIcp<Symmetric>)>;
+/// The stage of estimates that do not.
+pub type Far = Cascade<(CloudToModelIcp<PointToPoint>, CloudToModelIcp<Symmetric>)>;
+/// The type of [`hybrid_visible`].
+pub type HybridVisible = Repeat<
+    Switch<
+        Threshold<MeanVsd>,
+        Near,
+        Icp<VisibleSurface, WarmNearestNeighbor, MaxNormalAngle, PointToPoint, PaperStop>,
+    >,
+>;
+/// The type of [`local`].
+pub type Local = Cascade<(
+    SwitchUntilStall<MeanVsd, Near, Far>,
+    Guard<GatedIcp<Symmetric>, MeanVsd>,
+)>;
+/// The stage that refines hypotheses.
+pub type Explore = SwitchUntilStall<MeanVsd, Near, CloudToModelIcp<PointToPoint>>;
+/// The type of [`search`], [`auto`] and [`search_with`].
+pub type Search = HypothesisSearch<Local, Explore, SampledMve, MeanVsd>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
@@ -33,11 +60,7 @@ fn stop(iterations: usize) -> PaperStop {
 }
 
 /// A projective stage of about so many points.
-fn projective<M: ErrorMetric>(
-    metric: M,
-    points: usize,
-    iterations: usize,
-) -> Icp<VisibleSurface, Projective, MaxDistance, M, PaperStop> {
+fn projective<M>(metric: M, points: usize, iterations: usize) -> GatedIcp<M> {
     Icp {
         selection: VisibleSurface {
             stride: Stride::AboutPoints(points),
@@ -50,7 +73,7 @@ fn projective<M: ErrorMetric>(
 }
 
 /// The near stage: the projective cascade with the symmetric metric in the place of point-to-plane.
-fn near(points: usize) -> impl Stage + Send + Clone {
+fn near(points: usize) -> Near {
     Cascade((
         projective(PointToPoint, points, 50),
         projective(Symmetric, points, 50),
@@ -59,11 +82,11 @@ fn near(points: usize) -> impl Stage + Send + Clone {
 
 /// A stage that pairs so many observed points with points of the model, hidden ones too: passing those over costs time and,
 /// from afar, where they hide is not known.
-fn observed<M: ErrorMetric>(
+fn observed<M>(
     (points, samples): (usize, usize),
     metric: M,
     convergence: Convergence,
-) -> Icp<AllSamples, ObservationToModel, (), M, PaperStop> {
+) -> CloudToModelIcp<M> {
     Icp {
         selection: AllSamples,
         association: ObservationToModel {
@@ -90,7 +113,7 @@ fn coarse() -> Convergence {
 /// O is the visible surface for nearest neighbours too, whose pairs are at most 90° apart; the second projective stage
 /// minimises the symmetric metric, projective pairs are at most a quarter of the diameter apart, and rule 3 is count-aware.
 #[must_use]
-pub fn hybrid_visible() -> impl Stage + Send + Clone {
+pub fn hybrid_visible() -> HybridVisible {
     Repeat {
         times: 2,
         stage: Switch {
@@ -116,7 +139,7 @@ pub fn hybrid_visible() -> impl Stage + Send + Clone {
 /// the estimate agrees with the image, else observed points matched to the model, point-to-point and then the symmetric metric. A
 /// polish of twice as many points follows, which is accepted only if the MVE improves.
 #[must_use]
-pub fn local() -> impl Stage + Send + Clone {
+pub fn local() -> Local {
     let far = (300, 5000);
     Cascade((
         SwitchUntilStall {
@@ -139,7 +162,7 @@ pub fn local() -> impl Stage + Send + Clone {
 }
 
 /// What hypotheses are refined by: two steps of fewer points.
-fn explore() -> impl Stage + Send + Clone {
+fn explore() -> Explore {
     SwitchUntilStall {
         score: MeanVsd::default(),
         alpha: PAPER_ALPHA,
@@ -162,7 +185,7 @@ fn explore() -> impl Stage + Send + Clone {
 /// # let _ = refiner;
 /// ```
 #[must_use]
-pub fn search_with(options: SearchOptions) -> impl Stage + Send + Clone {
+pub fn search_with(options: SearchOptions) -> Search {
     HypothesisSearch::new(
         local(),
         explore(),
@@ -176,7 +199,7 @@ pub fn search_with(options: SearchOptions) -> impl Stage + Send + Clone {
 ///
 /// Not local refinement: it can end anywhere, also at a pose that is equivalent by symmetry.
 #[must_use]
-pub fn search() -> impl Stage + Send + Clone {
+pub fn search() -> Search {
     search_with(SearchOptions::default())
 }
 
@@ -184,7 +207,7 @@ pub fn search() -> impl Stage + Send + Clone {
 ///
 /// A hypothesis must beat the local pose by 0.05. Where that happens it is no local refinement any more.
 #[must_use]
-pub fn auto() -> impl Stage + Send + Clone {
+pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.2,
         good_enough: 0.15,

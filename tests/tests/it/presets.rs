@@ -1,0 +1,78 @@
+//! Presets changed in Rust.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use hicp_sim::{Household, perturb, rng};
+use hicp_tests::scene;
+use hybrid_icp::{
+    Isometry3, PinholeCamera, PipelineFile, PixelRegion, Preset, Rasterizer, Refiner, RenderedView,
+    Renderer, TriMesh, presets,
+};
+
+#[test]
+fn a_preset_changed_in_place_gives_the_bits_of_its_file_with_the_same_override() {
+    let mut rng = rng(31);
+    let scene = scene(Household::Mug, 0.5, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.05, 0.8);
+    let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
+    file.set("stages.0.max_steps=1").unwrap();
+    file.set("stages.0.misaligned.stages.1.association.points=200")
+        .unwrap();
+    let expected =
+        Refiner::new(file.build().unwrap()).refine(&scene.model, &scene.observation, &init);
+
+    let mut refiner = Refiner::new(presets::local());
+    let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
+    let (steps, _) = &mut refiner.stage_mut().0;
+    steps.max_steps = 1;
+    steps.misaligned.0.1.association.stride = hybrid_icp::Stride::AboutPoints(200);
+    let changed = refiner.refine(&scene.model, &scene.observation, &init);
+    assert_eq!(changed, expected);
+    assert_ne!(changed, unchanged);
+
+    let stage = refiner.into_stage();
+    assert_eq!(stage.0.0.max_steps, 1);
+    let again = Refiner::new(stage).refine(&scene.model, &scene.observation, &init);
+    assert_eq!(again, expected);
+}
+
+/// Counts the renders of a rasterizer.
+struct Counted(Rasterizer, Arc<AtomicUsize>);
+
+impl Renderer for Counted {
+    fn render(
+        &mut self,
+        mesh: &TriMesh,
+        camera: &PinholeCamera,
+        camera_from_object: &Isometry3<f64>,
+        region: &PixelRegion,
+        view: &mut RenderedView,
+    ) {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0
+            .render(mesh, camera, camera_from_object, region, view);
+    }
+}
+
+#[test]
+fn a_refiner_renders_with_the_renderer_that_it_is_given() {
+    let mut rng = rng(32);
+    let scene = scene(Household::Mug, 0.5, &mut rng);
+    let init = perturb(&mut rng, &scene.truth, 0.005, 0.1);
+    let renders = Arc::new(AtomicUsize::new(0));
+    let renderer = Counted(Rasterizer::default(), Arc::clone(&renders));
+    let mut refiner = Refiner::with_renderer(presets::hybrid(), renderer);
+    let found = refiner.refine(&scene.model, &scene.observation, &init);
+    assert!(renders.load(Ordering::Relaxed) > 0);
+    let expected = Refiner::preset(Preset::Hybrid).refine(&scene.model, &scene.observation, &init);
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn refiners_can_be_sent_to_threads() {
+    fn sent<T: Send>() {}
+    sent::<Refiner>();
+    sent::<Refiner<presets::Hybrid>>();
+    sent::<Refiner<presets::Search>>();
+}
