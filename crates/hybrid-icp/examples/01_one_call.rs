@@ -1,4 +1,5 @@
-//! One call: a depth image, a mask, a camera, a mesh and a rough pose go in, a better pose and how far to trust it come out.
+//! One call: from a depth image, a mask, a camera, a mesh and a rough pose to a better pose and a
+//! measure of trust.
 //!
 //! `cargo run --release -p hybrid-icp --example 01_one_call`
 

@@ -1,4 +1,4 @@
-//! A pipeline of one's own: the five components of an ICP stage, and stages made of stages.
+//! A custom pipeline: the five components of an ICP stage, and stages made of stages.
 //!
 //! `cargo run --release -p hybrid-icp --example 02_own_pipeline`
 

@@ -1,4 +1,4 @@
-//! A pipeline from a TOML file: another experiment without another compilation.
+//! A pipeline from a TOML file: experiments without recompiling.
 //!
 //! `cargo run --release -p hybrid-icp --example 03_pipeline_file`
 

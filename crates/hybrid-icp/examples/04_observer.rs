@@ -1,4 +1,4 @@
-//! An observer: what happens in every iteration, switch and stage.
+//! An observer: reports every iteration, switch and stage.
 //!
 //! `cargo run --release -p hybrid-icp --example 04_observer`
 
@@ -13,7 +13,7 @@ use hybrid_icp::{
 
 mod scene;
 
-/// Prints a line per event. With a known truth, as here, also how far off every pose is.
+/// Prints a line per event, and the error of every pose if the truth is known.
 struct Table {
     truth: Isometry3<f64>,
 }

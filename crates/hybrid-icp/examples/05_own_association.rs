@@ -1,4 +1,4 @@
-//! A data association of one's own: which model point belongs to which observed point.
+//! A custom data association: pairs model points with observed points.
 //!
 //! `cargo run --release -p hybrid-icp --example 05_own_association`
 
@@ -11,7 +11,7 @@ use hybrid_icp::{
 
 mod scene;
 
-/// The observed point on the pixel that the model point falls on, if the two surfaces face the same way.
+/// Pairs a model point with the observed point at its pixel, if both surfaces face the same way.
 struct SamePixelSameWay {
     min_cosine: f32,
 }

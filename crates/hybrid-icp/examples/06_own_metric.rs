@@ -1,4 +1,4 @@
-//! An error metric of one's own: what a pair costs, and how that changes with the pose.
+//! A custom error metric: the cost of a pair, and its derivative by the pose.
 //!
 //! `cargo run --release -p hybrid-icp --example 06_own_metric`
 

@@ -1,4 +1,4 @@
-//! A stop rule of one's own: when enough is enough.
+//! A custom stop rule: ends a stage.
 //!
 //! `cargo run --release -p hybrid-icp --example 07_own_stop_rule`
 
@@ -11,8 +11,8 @@ use hybrid_icp::{
 
 mod scene;
 
-/// Ends a stage when two increments in a row would move the image of the object by less than some pixels: what nobody
-/// sees is not worth another turn.
+/// Ends a stage when two increments in a row would move the image of the object by less than some
+/// pixels.
 struct SubPixel {
     pixels: f64,
     focal_length: f64,

@@ -1,4 +1,4 @@
-//! A switcher of one's own: which stage suits the estimate at hand.
+//! A custom switcher: selects the stage for an estimate.
 //!
 //! `cargo run --release -p hybrid-icp --example 08_own_switcher`
 
@@ -8,8 +8,8 @@ use hybrid_icp::{Context, Isometry3, Preset, Regime, RegimeEvent, Repeat, Switch
 
 mod scene;
 
-/// Misaligned when too many pixels of the rendered model lie beside the mask. It looks at the outline alone, where the mean VSD
-/// estimate of the paper looks at depth.
+/// Misaligned when too many pixels of the rendered model lie next to the mask. It uses the outline
+/// alone; the mean VSD estimate of the paper uses depth.
 struct BesideTheMask {
     limit: f64,
 }

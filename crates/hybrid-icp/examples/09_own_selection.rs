@@ -1,4 +1,4 @@
-//! A point selection of one's own: which part of the model is registered.
+//! A custom point selection: the part of the model that is registered.
 //!
 //! `cargo run --release -p hybrid-icp --example 09_own_selection`
 
@@ -11,7 +11,8 @@ use hybrid_icp::{
 
 mod scene;
 
-/// What another selection chooses, but for surface that the camera sees at a grazing angle: its depth is the least certain.
+/// Drops surface that the camera sees at a grazing angle from another selection: its depth is the
+/// least certain.
 struct NotGrazing<P> {
     inner: P,
     min_cosine: f32,

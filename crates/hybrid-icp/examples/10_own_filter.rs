@@ -1,4 +1,4 @@
-//! An outlier filter of one's own: which pairs count, and how much.
+//! A custom outlier filter: removes and weighs pairs.
 //!
 //! `cargo run --release -p hybrid-icp --example 10_own_filter`
 
@@ -11,7 +11,7 @@ use hybrid_icp::{
 
 mod scene;
 
-/// Keeps the pairs nearer than a limit that halves from iteration to iteration down to a last one.
+/// Keeps the pairs nearer than a limit that halves with every iteration, down to a smallest one.
 struct Narrowing {
     first_meters: f32,
     last_meters: f32,

@@ -1,4 +1,4 @@
-//! A score of one's own: how bad a pose is, judged from the image alone.
+//! A custom score: judges a pose from the image alone.
 //!
 //! `cargo run --release -p hybrid-icp --example 11_own_score`
 
@@ -8,7 +8,8 @@ use hybrid_icp::{Context, Isometry3, KeepBest, Preset, Score};
 
 mod scene;
 
-/// The mean difference of depth over the masked pixels, each up to a limit, which is also what a pixel without render costs.
+/// The mean difference of depth over the masked pixels, each up to a limit, which is also the cost of
+/// a pixel without a render.
 struct DepthError {
     limit_meters: f32,
 }

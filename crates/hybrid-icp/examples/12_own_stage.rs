@@ -1,4 +1,4 @@
-//! A stage of one's own: how a better pose is made from a pose.
+//! A custom stage: computes a better pose from a pose.
 //!
 //! `cargo run --release -p hybrid-icp --example 12_own_stage`
 
@@ -10,8 +10,8 @@ use hybrid_icp::{
 
 mod scene;
 
-/// Starts another stage from several distances along the viewing ray, where detectors that look at colour err most, and
-/// returns what explains the image best.
+/// Starts another stage from several distances along the viewing ray, where detectors that use color
+/// err most, and returns the pose that explains the image best.
 struct AlongTheRay<S> {
     stage: S,
     offsets_meters: Vec<f64>,

@@ -1,32 +1,35 @@
-//! Factors that make the covariance of a registration what its errors say.
+//! Factors that match the covariance of a registration to its errors.
 
 use hicp_fusion::{Gate, InflatedCovariance, UnitCovariance, probability_within};
 
 use crate::preset::Preset;
 
-/// How far to trust the covariance of a pipeline's registration: factors of [`InflatedCovariance`], in units of the object (its radius
-/// and 1 rad), the error that all estimates along a trajectory share, and the tails of the errors.
+/// Factors that match the covariance of a pipeline's registration to its errors.
 ///
-/// The constants are fitted along trajectories toward the tuning objects, reconstructed with errors of 5 mm and 1.1° and seen with a
-/// D435's noise (`cargo run --release -p hicp-experiments --example calibration`). They belong to such models: of an exact
-/// model the shared error is much smaller.
+/// They are the factors of [`InflatedCovariance`] in units of the object (its radius and 1 rad), the
+/// error that all estimates along a trajectory share, and the tails of the errors.
+///
+/// The constants are fitted along trajectories toward the tuning objects, reconstructed with errors
+/// of 5 mm and 1.1° and seen with the noise of a D435 (`cargo run --release -p hicp-experiments
+/// --example calibration`). They hold for such models: with an exact model the shared error is much
+/// smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     /// Factor on the standard deviations of the registration.
     pub scale: f64,
-    /// Standard deviation that no estimate is better than, the shared error apart.
+    /// Smallest standard deviation of an estimate, without the shared error.
     pub floor: f64,
-    /// Standard deviation at an MVE of 1, as the growth below it has it.
+    /// Standard deviation at an MVE of 1, by the growth of `mve_power`.
     pub mve_gain: f64,
-    /// How fast it grows with the MVE.
+    /// Exponent of its growth with the MVE.
     pub mve_power: f64,
-    /// Standard deviation where the registration determines no covariance.
+    /// Standard deviation if the registration determines no covariance.
     pub undetermined: f64,
-    /// Standard deviation of the error that all estimates share: the model's.
+    /// Standard deviation of the error that all estimates share: that of the model.
     pub shared: f64,
     /// ν of Student's distribution of the errors; ∞ for normal errors. See [`Calibration::probability_within`].
     pub degrees_of_freedom: f64,
-    /// What is not fused.
+    /// Estimates that are not fused.
     pub gate: Gate,
 }
 
@@ -54,7 +57,7 @@ impl Calibration {
         ..Self::HYBRID
     };
 
-    /// Returns the factors that were fitted to a preset; nothing was fitted to others than the two above, which get those of `hybrid`.
+    /// Returns the factors that were fitted to a preset; for all but the two above, those of `hybrid`.
     #[must_use]
     pub fn of(preset: Preset) -> Self {
         match preset {
@@ -63,7 +66,7 @@ impl Calibration {
         }
     }
 
-    /// The covariance of an estimate without the shared error.
+    /// Returns the covariance of an estimate without the shared error.
     #[must_use]
     pub fn covariance(&self, unit: UnitCovariance) -> InflatedCovariance {
         InflatedCovariance {
@@ -76,8 +79,8 @@ impl Calibration {
         }
     }
 
-    /// Returns the probability that the squared Mahalanobis distance of the fused pose from the truth, by the stated covariance,
-    /// is at most so much.
+    /// Returns the probability that the squared Mahalanobis distance of the fused pose from the truth,
+    /// by the stated covariance, is at most `mahalanobis_squared`.
     #[must_use]
     pub fn probability_within(&self, mahalanobis_squared: f64) -> f64 {
         probability_within(mahalanobis_squared, self.degrees_of_freedom)

@@ -39,14 +39,19 @@
 //! Start with [`presets`] (the pipelines), [`Refiner`] (one call), [`pipeline`] (files), [`fusion`] (a moving camera).
 
 mod calibration;
+mod checks;
 mod preset;
 pub mod presets;
 mod refiner;
 mod sequential;
+mod sequential_step;
 mod trace;
 mod warning;
 
 pub use calibration::Calibration;
+pub use checks::{
+    EXPLAINS_NOTHING, warning_of_diameter, warnings, warnings_of_model, warnings_of_result,
+};
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
@@ -93,11 +98,10 @@ pub use hicp_switch::{
 };
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
-pub use sequential::{SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep};
+pub use sequential::SequentialEstimator;
+pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
-pub use warning::{
-    EXPLAINS_NOTHING, Warning, warning_of_diameter, warnings, warnings_of_model, warnings_of_result,
-};
+pub use warning::Warning;
 
 /// Compiles the README's examples.
 #[cfg(doctest)]

@@ -5,8 +5,9 @@ use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{Flatness, MeanVsd, Score};
 
+use crate::checks::warnings_of_result;
 use crate::preset::{BoxedStage, Preset};
-use crate::warning::{Warning, warnings_of_result};
+use crate::warning::Warning;
 
 /// The result of a refinement: a pose, how it was found, and how well it explains the image.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,71 +3,26 @@
 use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
 use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
-    Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance, Update,
+    Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
 };
-use hicp_icp::{Observer, Outcome, Quality, Session, Stage, Termination, Workspace};
+use hicp_icp::{Observer, Outcome, Quality, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
 use crate::calibration::Calibration;
 use crate::preset::BoxedStage;
+use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 
-/// How a [`SequentialEstimator`] judges each estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SequentialConfig {
-    /// Where the covariance of an estimate comes from.
-    pub covariance: CovarianceModel,
-    /// The score of each estimate against its image; `None` saves its render where the fuser and the covariance need no MVE.
-    pub score: Option<MeanVsd>,
-}
-
-impl Default for SequentialConfig {
-    /// e_MVE·I₆ with the MVE that recognises occlusion.
-    fn default() -> Self {
-        Self {
-            covariance: CovarianceModel::default(),
-            score: Some(MeanVsd::default()),
-        }
-    }
-}
-
-/// What became of one image.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SequentialEvent {
-    /// There was an estimate, and this is what the fuser did with it.
-    Estimated(Update),
-    /// No pair was ever found, for instance because nothing was seen: there is no estimate, and what was held stands.
-    NoEstimate(Termination),
-    /// The estimate or its covariance was refused; what was held stands.
-    Refused(FusionError),
-}
-
-/// The object's pose after one image, and how it came about. Poses and covariances are in the camera frame of that image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SequentialStep {
-    /// The fused pose; the initial one, carried along, while there is no estimate.
-    pub camera_from_object: Isometry3<f64>,
-    /// Its covariance (ξ = [ρ; φ], left perturbation, metres and radians); `None` while there is no estimate.
-    pub covariance: Option<Matrix6<f64>>,
-    /// Where ICP started: what was fused before, moved with the camera.
-    pub init: Isometry3<f64>,
-    /// What ICP made of this image alone.
-    pub outcome: Outcome,
-    /// The mean VSD estimate of `outcome`, where it was scored.
-    pub mve: Option<f64>,
-    /// What became of it.
-    pub event: SequentialEvent,
-}
-
-/// Estimates the pose of an object that stands still from images along the path of a moving camera (§V).
+/// Estimates the pose of a static object from images along the path of a moving camera (§V).
 ///
-/// Each image is registered from the pose fused so far, moved with the camera; the fuser takes the result, and its estimate is the
-/// answer and the next start (§V-A). The estimator keeps no time, starts no thread and reads nothing: feed it images and motions as they come.
+/// Each image is registered from the pose fused so far, moved with the camera. The fuser receives
+/// the result, and its estimate is the answer and the next initial pose (§V-A). The estimator has no
+/// clock and starts no thread: the caller passes images and motions as they arrive.
 ///
-/// A pose that ICP could not evaluate (no pairs at all) is not an estimate, and is not fused: it would be the fused pose once more.
+/// If ICP finds no pairs, nothing is fused: the pose would be the fused pose once more.
 ///
-/// Cost of a step: the pipeline's, one render and one score for the MVE where asked for, and the fuser's, which is microseconds.
+/// Cost of a step: that of the pipeline, one render and one score if the MVE is computed, and that
+/// of the fuser, which takes microseconds.
 ///
 /// ```
 /// use hybrid_icp::fusion::{CameraMotion, FusionMethod};
@@ -104,7 +59,9 @@ pub struct SequentialEstimator {
 }
 
 impl SequentialEstimator {
-    /// Makes an estimator from any stage and any fuser; `init` is the rough pose in the first camera frame.
+    /// Creates an estimator from any stage and any fuser.
+    ///
+    /// `init` is the rough pose in the first camera frame.
     ///
     /// # Errors
     ///
@@ -126,8 +83,10 @@ impl SequentialEstimator {
         Ok(estimator)
     }
 
-    /// Makes an estimator for an object: uncertainty is the MVE about the object's centre, rotations count by its radius, estimates
-    /// with an MVE above 0.4 are left out, and symmetric poses are brought together.
+    /// Creates an estimator for an object.
+    ///
+    /// Uncertainty is the MVE around the object's center, and rotations count by its radius.
+    /// Estimates with an MVE above 0.4 are skipped, and symmetric poses are brought together.
     ///
     /// # Errors
     ///
@@ -152,8 +111,10 @@ impl SequentialEstimator {
         Self::of_object(stage, gated, CovarianceModel::Mve(mve), model, init)
     }
 
-    /// Makes an estimator for an object whose uncertainty is the registration's own 6×6 covariance, calibrated: with it go the error
-    /// that all estimates share, and a gate on the Mahalanobis distance. Otherwise as [`SequentialEstimator::for_object`].
+    /// Creates an estimator for an object from the calibrated 6×6 covariance of its registration.
+    ///
+    /// It also uses the error that all estimates share, and a gate on the Mahalanobis distance.
+    /// Otherwise as [`SequentialEstimator::for_object`].
     ///
     /// # Errors
     ///
@@ -188,8 +149,10 @@ impl SequentialEstimator {
         Self::new(stage, fuser, config, init)
     }
 
-    /// Makes the estimator of §V to the letter: covariances e_MVE·I₆, kept as they are when the camera moves, no gate; the MVE
-    /// is computed only for the methods that need it.
+    /// Creates the estimator of §V to the letter.
+    ///
+    /// Covariances are e_MVE·I₆ and do not change when the camera moves. There is no gate. The MVE is
+    /// computed only for the methods that need it.
     ///
     /// # Errors
     ///
@@ -206,7 +169,7 @@ impl SequentialEstimator {
         Self::new(stage, method.build(FuserConfig::paper()), config, init)
     }
 
-    /// Forgets everything but the memory, and starts from a rough pose in the current camera frame.
+    /// Restarts from a rough pose in the current camera frame, and keeps the scratch memory.
     ///
     /// # Errors
     ///
@@ -218,13 +181,14 @@ impl SequentialEstimator {
         Ok(())
     }
 
-    /// Moves the camera without an image: the pose is then that in the new frame.
+    /// Moves the camera without an image: the pose is then stated in the new frame.
     pub fn move_camera(&mut self, motion: &CameraMotion) {
         self.fuser.propagate(motion);
         self.init = motion.apply(&self.init);
     }
 
-    /// The pose in the current camera frame: fused, or while there is no estimate the initial one.
+    /// Returns the pose in the current camera frame: the fused one, or the initial one while there is
+    /// no estimate.
     #[must_use]
     pub fn camera_from_object(&self) -> Isometry3<f64> {
         self.fuser
@@ -232,21 +196,22 @@ impl SequentialEstimator {
             .map_or(self.init, |fused| *fused.camera_from_object())
     }
 
-    /// The fused estimate in the current camera frame, once there is one.
+    /// Returns the fused estimate in the current camera frame, if there is one.
     #[must_use]
     pub fn estimate(&self) -> Option<PoseEstimate> {
         self.fuser.estimate()
     }
 
-    /// The fuser.
+    /// Returns the fuser.
     #[must_use]
     pub fn fuser(&self) -> &dyn Fuser {
         &*self.fuser
     }
 
-    /// Takes in an image of the object and how the camera moved since the one before ([`CameraMotion::none`] for the first).
+    /// Registers an image of the object and fuses the result.
     ///
-    /// Never fails on data: what happened is in the step. Deterministic.
+    /// `motion` is that of the camera since the image before, [`CameraMotion::none`] for the first.
+    /// Never fails on data: [`SequentialStep::event`] reports what happened. Deterministic.
     pub fn step(
         &mut self,
         model: &Model,
@@ -256,7 +221,8 @@ impl SequentialEstimator {
         self.step_observed(model, observation, motion, &mut ())
     }
 
-    /// Takes in an image and tells an observer what ICP does.
+    /// Registers an image as [`SequentialEstimator::step`] does, and reports every step of ICP to an
+    /// observer.
     pub fn step_observed(
         &mut self,
         model: &Model,
@@ -284,7 +250,7 @@ impl SequentialEstimator {
         }
     }
 
-    /// Judges what ICP made of an image and gives it to the fuser.
+    /// Scores the outcome of ICP and passes it to the fuser.
     fn take(&mut self, problem: &Problem<'_>, outcome: &Outcome) -> (Option<f64>, SequentialEvent) {
         if outcome.evaluation.is_none() {
             return (None, SequentialEvent::NoEstimate(outcome.termination));
@@ -313,7 +279,7 @@ impl SequentialEstimator {
     }
 }
 
-/// A method behind the gate of an object.
+/// Puts a method behind the gate of an object.
 fn gated(
     method: FusionMethod,
     unit: UnitCovariance,

@@ -5,7 +5,7 @@ use hicp_icp::{Observer, Outcome, RegimeEvent, StageEvent};
 /// One ICP stage that ran.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageRecord {
-    /// What the switch decided before this stage, if it was the first to run after a decision.
+    /// Decision of the switch, if this is the first stage after one.
     pub switched: Option<RegimeEvent>,
     /// Name of the point selection.
     pub selection: &'static str,
@@ -15,11 +15,11 @@ pub struct StageRecord {
     pub metric: &'static str,
     /// Number of points selected.
     pub n_source: usize,
-    /// How it ended.
+    /// Its outcome.
     pub outcome: Outcome,
 }
 
-/// An observer that keeps one record per ICP stage.
+/// An observer that stores one record per ICP stage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// The stages in the order in which they ran.
@@ -28,13 +28,13 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Makes an empty trace.
+    /// Creates an empty trace.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Forgets everything and keeps the memory.
+    /// Removes all records and keeps the memory.
     pub fn clear(&mut self) {
         self.stages.clear();
         self.pending = None;

@@ -1,4 +1,4 @@
-//! What the examples look at: a clothes iron, simulated as a depth camera would see it, and the rough pose of a detector.
+//! The scene of the examples: a clothes iron in a simulated depth image, and a rough pose.
 
 #![allow(dead_code)] // Not every example uses everything.
 

@@ -1,0 +1,238 @@
+//! Checks of inputs and results, each of which is well-formed by itself.
+
+use std::f64::consts::FRAC_PI_4;
+
+use hicp_core::{Isometry3, Model, Observation, diameter};
+use hicp_score::Flatness;
+use hicp_switch::PAPER_ALPHA;
+
+use crate::warning::Warning;
+
+/// Diameters that a depth camera can see. A coin in meters or a car in millimeters is outside.
+const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
+
+/// Share of the diameter that rounding the coordinates may cost.
+const COARSE: f64 = 1e-3;
+
+/// Largest factor between the measured depth and that of the initial pose.
+const DEPTH_RATIO: f64 = 3.0;
+
+/// Largest number of pixels of the mask, as a multiple of what the model can cover.
+const MASK_RATIO: f64 = 10.0;
+
+/// Largest number of pixels of the smallest side of the model's box, as a multiple of the mask's.
+///
+/// Nineteen twentieths may be occluded. A unit that is wrong by ten makes a hundred times the pixels.
+const SLIVER_RATIO: f64 = 20.0;
+
+/// MVE from which on an initial pose explains nothing of the mask ([`Warning::FoundElsewhere`]).
+///
+/// Of 71 poses that four estimators gave for their own object one has it, and so has everything that
+/// was found in the mask of another object (`docs/robustness.md`).
+pub const EXPLAINS_NOTHING: f64 = 0.9;
+
+/// Share of the mesh's diameter by which a stated one may differ: BOP's are those of other versions
+/// of the mesh, with more vertices.
+const DIAMETER_TOLERANCE: f64 = 0.05;
+
+/// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, meters.
+///
+/// Nothing is refused for it. Cost: O(pixels of the mask's box + vertices).
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// // The wall is 0.8 m away, but the depth was read at a tenth of its scale.
+/// let depth = DepthImage::from_meters(64, 48, vec![0.08; 64 * 48])?;
+/// let camera = PinholeCamera::new(60.0, 60.0, 31.5, 23.5, 64, 48)?;
+/// let observation = Observation::new(depth, Mask::full(64, 48), camera)?;
+/// let warnings = warnings(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.8));
+/// assert!(matches!(warnings[0], Warning::Depth { .. }));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Warning> {
+    let mut warnings = warnings_of_model(model);
+    let diameter = model.diameter();
+    let distance = (init * model.center()).z;
+    if distance.is_nan() || distance <= 0.0 {
+        warnings.push(Warning::BehindCamera { z: distance });
+        return warnings;
+    }
+    let (pixels, median) = inside_mask(observation);
+    let plausible = distance / DEPTH_RATIO..=distance * DEPTH_RATIO;
+    match median {
+        None if pixels > 0 => warnings.push(Warning::NoDepth),
+        Some(measured) if !plausible.contains(&measured) => warnings.push(Warning::Depth {
+            measured,
+            expected: distance,
+        }),
+        _ => {}
+    }
+    // No silhouette of that diameter is larger than a disc.
+    let camera = observation.camera();
+    let at_most =
+        FRAC_PI_4 * (camera.fx() * diameter / distance) * (camera.fy() * diameter / distance);
+    // One warning about the same numbers is enough.
+    if !warnings.is_empty() || pixels == 0 {
+        return warnings;
+    }
+    if pixels as f64 > MASK_RATIO * at_most.max(1.0) {
+        warnings.push(Warning::Mask {
+            pixels,
+            at_most,
+            diameter,
+            distance,
+        });
+    }
+    let at_least = camera.fx() * camera.fy() * smallest_side(model) / distance.powi(2);
+    if at_least > SLIVER_RATIO * pixels as f64 && !touches_border(observation) {
+        warnings.push(Warning::Sliver {
+            pixels,
+            at_least,
+            diameter,
+            distance,
+        });
+    }
+    warnings
+}
+
+/// Returns what looks wrong about a model by itself: the [`warnings`] that need no image.
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A mesh of 80 mm that was read as metres.
+/// let corners = [[0., 0., 0.], [80., 0., 0.], [0., 80., 0.]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// assert!(matches!(warnings_of_model(&model)[..], [Warning::Diameter { .. }]));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let diameter = model.diameter();
+    if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
+        warnings.push(Warning::Diameter { diameter });
+    }
+    let step = model.mesh().coordinate_step();
+    if step > COARSE * diameter {
+        warnings.push(Warning::CoarseCoordinates { step, diameter });
+    }
+    warnings
+}
+
+/// Returns [`Warning::StatedDiameter`] if the diameter that a model was created with differs by more
+/// than a twentieth from that of its mesh ([`ModelConfig::diameter`](crate::ModelConfig::diameter)).
+///
+/// The file of a dataset can be wrong or belong to other models, and everything that is measured in
+/// diameters is then wrong. [`warnings_of_model`] does not include this check, because it costs
+/// about O(n log n) of the vertices: call it once per model.
+///
+/// ```
+/// use hybrid_icp::*;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?;
+/// assert_eq!(warning_of_diameter(&Model::new(mesh.clone())), None);
+/// let config = ModelConfig { diameter: Some(1.4), ..ModelConfig::default() };
+/// let warning = warning_of_diameter(&Model::with_config(mesh, config));
+/// assert!(matches!(warning, Some(Warning::StatedDiameter { .. })));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
+    let vertices: Vec<_> = model.mesh().used_points().collect();
+    let (stated, measured) = (model.diameter(), diameter(&vertices));
+    let differ = (stated - measured).abs() > DIAMETER_TOLERANCE * measured;
+    differ.then_some(Warning::StatedDiameter { stated, measured })
+}
+
+/// Returns what looks wrong about the result of a refinement, by the scores of its two poses.
+///
+/// The arguments are [`Refinement::mve_initial`](crate::Refinement::mve_initial),
+/// [`Refinement::mve`](crate::Refinement::mve) and
+/// [`Refinement::flatness`](crate::Refinement::flatness).
+///
+/// Without a warning the pose can still be wrong: an object that looks nearly the same from two
+/// sides explains the image in both orientations, and an object of similar shape may have an MVE of
+/// 0.2 or 0.3.
+///
+/// ```
+/// use hybrid_icp::*;
+/// // A rough pose that became a good one.
+/// let at = |residual| Some(Flatness { residual, measured: 0.0025, rendered: 0.009, diameter: 0.2 });
+/// assert_eq!(warnings_of_result(0.6, 0.1, at(0.002)), []);
+/// // Something was found in the mask, but nothing that the detector had seen there.
+/// assert!(matches!(warnings_of_result(0.95, 0.2, None)[..], [Warning::FoundElsewhere { .. }]));
+/// // Nothing was found.
+/// assert!(matches!(warnings_of_result(0.95, 0.7, None)[..], [Warning::Unexplained { .. }]));
+/// // It got worse, but not bad.
+/// assert!(matches!(warnings_of_result(0.1, 0.2, None)[..], [Warning::Worse { .. }]));
+/// // The object was found on a wall.
+/// assert!(matches!(warnings_of_result(0.6, 0.1, at(0.008))[..], [Warning::Flat { .. }]));
+/// ```
+#[must_use]
+pub fn warnings_of_result(mve_initial: f64, mve: f64, flatness: Option<Flatness>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if mve > mve_initial {
+        warnings.push(Warning::Worse { mve_initial, mve });
+    }
+    if mve >= PAPER_ALPHA {
+        warnings.push(Warning::Unexplained { mve });
+        return warnings;
+    }
+    if mve_initial >= EXPLAINS_NOTHING {
+        warnings.push(Warning::FoundElsewhere { mve_initial, mve });
+    }
+    if let Some(flatness) = flatness.filter(Flatness::is_flat) {
+        warnings.push(Warning::Flat { flatness });
+    }
+    warnings
+}
+
+/// Area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
+fn smallest_side(model: &Model) -> f64 {
+    let vertices: Vec<_> = model.mesh().used_points().collect();
+    let mut sides = [0, 1, 2].map(|axis| {
+        let along = vertices.iter().map(|p| f64::from(p[axis]));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        (high - low).max(0.0)
+    });
+    sides.sort_by(f64::total_cmp);
+    sides[0] * sides[1]
+}
+
+/// Whether the mask may continue beyond the image.
+fn touches_border(observation: &Observation) -> bool {
+    let (camera, region) = (observation.camera(), observation.region());
+    region.u_min == 0
+        || region.v_min == 0
+        || region.u_max == camera.width()
+        || region.v_max == camera.height()
+}
+
+/// The number of pixels of the mask, and the median of their measured depths, meters.
+fn inside_mask(observation: &Observation) -> (usize, Option<f64>) {
+    let width = observation.camera().width() as usize;
+    let region = observation.region();
+    let columns = region.u_min as usize..region.u_max as usize;
+    let mut pixels = 0;
+    let mut inside: Vec<f32> = Vec::new();
+    for v in region.v_min as usize..region.v_max as usize {
+        let row = v * width + columns.start..v * width + columns.end;
+        let depth = &observation.depth().pixels()[row.clone()];
+        let mask = &observation.mask().pixels()[row];
+        for (z, _) in depth.iter().zip(mask).filter(|(_, set)| **set) {
+            pixels += 1;
+            inside.extend(Some(*z).filter(|z| *z > 0.0));
+        }
+    }
+    inside.sort_by(f32::total_cmp);
+    let median = inside.get(inside.len() / 2).copied();
+    (pixels, median.map(f64::from))
+}

@@ -1,0 +1,61 @@
+//! One step of a sequential estimator.
+
+use hicp_core::{Isometry3, Matrix6};
+use hicp_fusion::{CovarianceModel, FusionError, Update};
+use hicp_icp::{Outcome, Termination};
+use hicp_score::MeanVsd;
+
+/// The covariance and the score of the estimates of a
+/// [`SequentialEstimator`](crate::SequentialEstimator).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SequentialConfig {
+    /// Source of the covariance of an estimate.
+    pub covariance: CovarianceModel,
+    /// The score of each estimate against its image.
+    ///
+    /// If neither the fuser nor the covariance needs an MVE, `None` saves a render.
+    pub score: Option<MeanVsd>,
+}
+
+impl Default for SequentialConfig {
+    /// e_MVE·I₆ with the MVE that recognizes occlusion.
+    fn default() -> Self {
+        Self {
+            covariance: CovarianceModel::default(),
+            score: Some(MeanVsd::default()),
+        }
+    }
+}
+
+/// The effect of one image.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SequentialEvent {
+    /// There was an estimate, and the fuser returned this.
+    Estimated(Update),
+    /// ICP found no pair, for instance because nothing was seen. The fused pose stays.
+    NoEstimate(Termination),
+    /// The estimate or its covariance was refused. The fused pose stays.
+    Refused(FusionError),
+}
+
+/// The object's pose after one image, and how it was found.
+///
+/// Poses and covariances are in the camera frame of that image.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SequentialStep {
+    /// The fused pose; while there is no estimate, the initial one, moved with the camera.
+    pub camera_from_object: Isometry3<f64>,
+    /// Its covariance (ξ = [ρ; φ], left perturbation, meters and radians); `None` while there is no
+    /// estimate.
+    pub covariance: Option<Matrix6<f64>>,
+    /// The initial pose of ICP: the pose fused before, moved with the camera.
+    pub init: Isometry3<f64>,
+    /// The outcome of ICP for this image alone.
+    pub outcome: Outcome,
+    /// The mean VSD estimate of `outcome`; `None` if it was not scored.
+    pub mve: Option<f64>,
+    /// The effect on the fused pose.
+    pub event: SequentialEvent,
+}
