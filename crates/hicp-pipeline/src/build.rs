@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use hicp_core::suggest::nearest;
 use hicp_icp::MAX_ITERATIONS;
-use toml::Spanned;
 use toml::de::DeValue;
 
 use crate::error::PipelineError;
@@ -83,12 +82,8 @@ impl<'a> Context<'a> {
         match name.and_then(|name| name.as_str()) {
             Some(name) => self.named(name, &spot, fields),
             None => {
-                let expected = format!(
-                    "the name of {}: {}",
-                    kind.any(),
-                    self.names(kind).join(", ")
-                );
-                Err(self.refuse(name, &spot, expected))
+                let known = self.names(kind).join(", ");
+                Err(self.refuse(name, &spot, format!("the name of {}: {known}", kind.any())))
             }
         }
     }
@@ -218,7 +213,8 @@ impl Parameters<'_> {
         let (kind, default) = (K::KIND, default.into());
         let accepts = Accepts::Part { kind, default };
         let Some((context, fields)) = &self.reading else {
-            self.declared.push(Parameter::new(name, meaning, accepts));
+            self.declared
+                .push(Parameter::new(name, "", meaning, accepts));
             return Ok(K::stand_in());
         };
         let (part, iterations) = match (fields.field(name), default) {
@@ -245,30 +241,33 @@ impl Parameters<'_> {
         let (kind, default) = (K::KIND, default.into());
         let accepts = Accepts::Parts { kind, default };
         let Some((context, fields)) = &self.reading else {
-            self.declared.push(Parameter::new(name, meaning, accepts));
+            self.declared
+                .push(Parameter::new(name, "", meaning, accepts));
             return Ok(Vec::new());
         };
         let (found, spot) = fields.field(name);
-        let built: Vec<(K, u64)> = match (found, default) {
+        let mut parts = Vec::new();
+        let mut add = |built: Result<(K, u64), PipelineError>| {
+            let (part, iterations) = built?;
+            self.inner.push((name, iterations));
+            parts.push(part);
+            Ok::<_, PipelineError>(())
+        };
+        match (found, default) {
             (Some(DeValue::Array(items)), _) => {
-                let spots = items.iter().enumerate().map(|(index, item)| {
-                    (item, spot.inside(&index.to_string(), item.span().start))
-                });
-                let build = |(item, spot)| context.part(Spanned::get_ref(item), spot);
-                spots.map(build).collect::<Result<_, _>>()?
+                for (index, item) in items.iter().enumerate() {
+                    let spot = spot.inside(&index.to_string(), item.span().start);
+                    add(context.part(item.get_ref(), spot))?;
+                }
             }
-            (None, Some(parts)) => {
-                let build = |part| context.named(part, &spot, Fields::new(None, spot.clone()));
-                parts
-                    .iter()
-                    .map(|part| build(part))
-                    .collect::<Result<_, _>>()?
+            (None, Some(defaults)) => {
+                for default in defaults {
+                    add(context.named(default, &spot, Fields::new(None, spot.clone())))?;
+                }
             }
             _ => return Err(context.refuse(found, &spot, accepts.to_string())),
-        };
-        self.inner
-            .extend(built.iter().map(|(_, iterations)| (name, *iterations)));
-        Ok(built.into_iter().map(|(part, _)| part).collect())
+        }
+        Ok(parts)
     }
 
     /// Returns the error of a value that is wrong only together with others.

@@ -10,7 +10,7 @@ use hicp_switch::{Switcher, Threshold};
 use crate::build::{Entry, Parameters};
 use crate::error::PipelineError;
 use crate::kind::{BoxedPart, PartKind};
-use crate::part::{Parameter, Part};
+use crate::part::Part;
 
 /// Start of the catalog page.
 const HEADING: &str = "# Catalog of parts
@@ -124,20 +124,12 @@ impl Catalog {
             if !part.parameters.is_empty() {
                 page += "\n| parameter | accepts | default | meaning |\n|---|---|---|---|\n";
             }
-            for Parameter {
-                name,
-                unit,
-                meaning,
-                accepts,
-            } in &part.parameters
-            {
-                let unit = if unit.is_empty() {
-                    String::new()
-                } else {
-                    format!("; {unit}")
-                };
-                let default = accepts.default().unwrap_or_else(|| "required".to_owned());
-                page += &format!("| `{name}` | {accepts}{unit} | {default} | {meaning} |\n");
+            for p in &part.parameters {
+                let between = if p.unit.is_empty() { "" } else { "; " };
+                let default = p.accepts.default();
+                let default = default.as_deref().unwrap_or("required");
+                let accepts = format!("{}{between}{}", p.accepts, p.unit);
+                page += &format!("| `{}` | {accepts} | {default} | {} |\n", p.name, p.meaning);
             }
         }
         page
@@ -150,11 +142,8 @@ impl Catalog {
     /// Adds an entry after those of its kind, or in place of the one that has its name.
     fn add(&mut self, entry: Entry) {
         let key = |entry: &Entry| (entry.part.kind, entry.part.name);
-        match self
-            .entries
-            .iter()
-            .position(|other| key(other) == key(&entry))
-        {
+        let twin = |other: &Entry| key(other) == key(&entry);
+        match self.entries.iter().position(twin) {
             Some(index) => self.entries[index] = entry,
             None => self.entries.push(entry),
         }

@@ -1,7 +1,5 @@
 //! Parameters that are values: declared and read by the same call.
 
-use toml::de::DeValue;
-
 use crate::build::Parameters;
 use crate::error::PipelineError;
 use crate::part::{Accepts, Parameter};
@@ -21,10 +19,7 @@ impl Number for f64 {
 }
 
 impl Number for f32 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "f32 is the precision of buffers"
-    )]
+    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
     fn of(number: f64) -> Self {
         number as Self
     }
@@ -42,15 +37,11 @@ impl Parameters<'_> {
         let Range { min, max, unit } = range;
         let default = default.into();
         let accepts = Accepts::Number { min, max, default };
-        let parameter = Parameter {
-            name,
-            unit,
-            meaning,
-            accepts,
-        };
-        let accepted =
-            |value: &DeValue<'_>| number(value).filter(|number| (min..=max).contains(number));
-        self.read(parameter, default, min, accepted).map(T::of)
+        let parameter = Parameter::new(name, unit, meaning, accepts);
+        let accepted = self.read(parameter, default, min, |value| {
+            number(value).filter(|number| (min..=max).contains(number))
+        });
+        accepted.map(T::of)
     }
 
     /// Reads a whole number of at least `min`, as `u32`, `u64` or `usize`.
@@ -62,17 +53,11 @@ impl Parameters<'_> {
         meaning: &'static str,
     ) -> Result<T, PipelineError> {
         let default = default.into();
-        let accepts = Accepts::Count { min, default };
-        let accepted = |value: &DeValue<'_>| {
+        let parameter = Parameter::new(name, "", meaning, Accepts::Count { min, default });
+        let count = self.read(parameter, default, min, |value| {
             let count = u32::try_from(integer(value)?).ok();
             count.filter(|count| *count >= min)
-        };
-        let count = self.read(
-            Parameter::new(name, meaning, accepts),
-            default,
-            min,
-            accepted,
-        )?;
+        })?;
         Ok(T::try_from(count).unwrap_or_else(|_| unreachable!("the type holds every u32")))
     }
 
@@ -83,33 +68,28 @@ impl Parameters<'_> {
         default: bool,
         meaning: &'static str,
     ) -> Result<bool, PipelineError> {
-        let parameter = Parameter::new(name, meaning, Accepts::Flag { default });
+        let parameter = Parameter::new(name, "", meaning, Accepts::Flag { default });
         self.read(parameter, Some(default), default, |value| value.as_bool())
     }
 
     /// Reads a word and returns the value next to it; the first word is the default.
+    ///
+    /// # Panics
+    ///
+    /// Panics if there are no words.
     pub fn word<T: Copy>(
         &mut self,
         name: &'static str,
         words: &[(&'static str, T)],
         meaning: &'static str,
     ) -> Result<T, PipelineError> {
-        let accepts = Accepts::Word {
-            words: words.iter().map(|(word, _)| *word).collect(),
-        };
         let (_, first) = words[0];
-        self.read(
-            Parameter::new(name, meaning, accepts),
-            Some(first),
-            first,
-            |value| {
-                let text = value.as_str()?;
-                words
-                    .iter()
-                    .find(|(word, _)| *word == text)
-                    .map(|(_, value)| *value)
-            },
-        )
+        let known = words.iter().map(|(word, _)| *word).collect();
+        let parameter = Parameter::new(name, "", meaning, Accepts::Word { words: known });
+        self.read(parameter, Some(first), first, |value| {
+            let named = words.iter().find(|(word, _)| value.as_str() == Some(*word));
+            named.map(|(_, value)| *value)
+        })
     }
 
     /// Reads a list of numbers, which is required.
@@ -118,7 +98,7 @@ impl Parameters<'_> {
         name: &'static str,
         meaning: &'static str,
     ) -> Result<Vec<f64>, PipelineError> {
-        let parameter = Parameter::new(name, meaning, Accepts::NumberList);
+        let parameter = Parameter::new(name, "", meaning, Accepts::NumberList);
         self.read(parameter, None, Vec::new(), |value| list(value, number))
     }
 
@@ -128,7 +108,7 @@ impl Parameters<'_> {
         name: &'static str,
         meaning: &'static str,
     ) -> Result<[bool; N], PipelineError> {
-        let parameter = Parameter::new(name, meaning, Accepts::Flags { count: N });
+        let parameter = Parameter::new(name, "", meaning, Accepts::Flags { count: N });
         self.read(parameter, Some([false; N]), [false; N], |value| {
             list(value, |flag| flag.as_bool())?.try_into().ok()
         })

@@ -87,11 +87,15 @@ pub enum Accepts {
 }
 
 impl Parameter {
-    /// Creates a parameter without a unit.
-    pub(crate) fn new(name: &'static str, meaning: &'static str, accepts: Accepts) -> Self {
+    pub(crate) fn new(
+        name: &'static str,
+        unit: &'static str,
+        meaning: &'static str,
+        accepts: Accepts,
+    ) -> Self {
         Self {
             name,
-            unit: "",
+            unit,
             meaning,
             accepts,
         }

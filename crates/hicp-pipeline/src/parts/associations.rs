@@ -11,7 +11,7 @@ use crate::build::Parameters;
 use crate::catalog::{BoxedAssociation, Catalog};
 use crate::error::PipelineError;
 use crate::range::Range;
-use crate::work::Limited;
+use crate::work::Limited::{Neighbors, Samples};
 
 pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_association("nearest-neighbor", |p| {
@@ -41,7 +41,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_association("k-nearest", |p| {
         p.about = "Pairs a point with the k closest observed points, each with weight 1/k. \
             Cost: O(k n log m).";
-        let k = p.limited(Limited::Neighbors, "k", 1, 3, "number of neighbors")?;
+        let k = p.limited(Neighbors, "k", 1, 3, "number of neighbors")?;
         Ok(KNearest::new(k, searched(p)?))
     });
     catalog.add_association("normal-compatible", |p| {
@@ -87,13 +87,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             and O(s log s) once per model.";
         Ok(ObservationToModel {
             stride: asking(p)?,
-            samples: p.limited(
-                Limited::Samples,
-                "samples",
-                1,
-                20_000,
-                "model samples in the index",
-            )?,
+            samples: p.limited(Samples, "samples", 1, 20_000, "model samples in the index")?,
             visible_only: visible_only(p)?,
         })
     });
@@ -118,13 +112,9 @@ fn asking(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
 }
 
 fn considered(p: &mut Parameters<'_>) -> Result<usize, PipelineError> {
-    p.limited(Limited::Neighbors, "k", 1, 10, "neighbors to consider")
+    p.limited(Neighbors, "k", 1, 10, "neighbors to consider")
 }
 
 fn visible_only(p: &mut Parameters<'_>) -> Result<bool, PipelineError> {
-    p.flag(
-        "visible_only",
-        true,
-        "leaves out what faces away from the camera",
-    )
+    p.flag("visible_only", true, "skips surface that faces away")
 }

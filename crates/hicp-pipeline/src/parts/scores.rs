@@ -4,7 +4,7 @@ use hicp_score::{MeanVsd, SampledMve};
 
 use crate::catalog::Catalog;
 use crate::range::Range;
-use crate::work::Limited;
+use crate::work::Limited::Samples;
 
 /// What an occlusion tolerance means.
 const HIDES: &str = "what something outside the mask must stand in front of the object to hide it; below 0 it may \
@@ -24,7 +24,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_score("sampled-mve", |p| {
         p.about = "Computes the MVE at low resolution from points of the model instead of a \
             render, for ranking many poses. Cost: O(samples), whatever the mesh.";
-        let samples = p.limited(Limited::Samples, "samples", 0, 1500, "points on the model")?;
+        let samples = p.limited(Samples, "samples", 0, 1500, "points on the model")?;
         let pixels = p.count("pixels", 1, 200, "pixels of the mask, about")?;
         let mut score = SampledMve::new(samples, pixels);
         score.occlusion_tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
