@@ -7,6 +7,8 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hicp_benches::fused::Fused;
 use hicp_benches::{OBJECTS, case};
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
     Correspondences, DataAssociation, ErrorMetric, PointSelection, PointToPlane, Problem,
     Projective, Rasterizer, Stride, VisibleSurface, Workspace,
@@ -40,7 +42,7 @@ fn fused(criterion: &mut Criterion) {
             bencher.iter(|| {
                 pairs.begin(black_box(&case.init), source.len());
                 association.associate(&mut context, &source, &case.init, &mut pairs);
-                metric.minimize(&pairs)
+                metric.minimize(&Iteration::default(), &pairs)
             });
         });
     }

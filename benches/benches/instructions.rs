@@ -14,6 +14,8 @@ use gungraun::{
 };
 use hicp_benches::{Case, case};
 use hicp_sim::Household;
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
     AllSamples, Correspondences, DataAssociation, DepthImage, ErrorMetric, Isometry3, Mask,
     MeanVsd, NearestNeighbor, Observation, PinholeCamera, PointSelection, PointToPlane,
@@ -139,14 +141,14 @@ fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
 #[library_benchmark]
 #[bench::mug(setup = projective, config = limit(113_012))]
 fn metric_point_to_point(ready: Ready) -> (Ready, Option<Step>) {
-    let step = PointToPoint.minimize(&ready.pairs);
+    let step = PointToPoint.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
 }
 
 #[library_benchmark]
 #[bench::mug(setup = projective, config = limit(196_330))]
 fn metric_point_to_plane(ready: Ready) -> (Ready, Option<Step>) {
-    let step = PointToPlane.minimize(&ready.pairs);
+    let step = PointToPlane.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
 }
 

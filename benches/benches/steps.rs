@@ -6,10 +6,12 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hicp_benches::{Case, OBJECTS, case};
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
-    AllSamples, Correspondences, DataAssociation, ErrorMetric, MeanVsd, NearestNeighbor,
-    Observation, PointSelection, PointToPlane, PointToPoint, Problem, Projective, Rasterizer,
-    RenderedView, Renderer, Score, Surfel, VisibleSurface, Workspace,
+    AllSamples, Correspondences, DataAssociation, MeanVsd, NearestNeighbor, Observation,
+    PointSelection, PointToPlane, PointToPoint, Problem, Projective, Rasterizer, RenderedView,
+    Renderer, Score, Surfel, VisibleSurface, Workspace,
 };
 
 fn cases() -> Vec<Case> {
@@ -115,11 +117,10 @@ fn metric(criterion: &mut Criterion) {
         let mut context = workspace.context(&problem);
         Projective.associate(&mut context, &source, &case.init, &mut pairs);
         group.throughput(Throughput::Elements(pairs.len() as u64));
-        let mut metrics: [Box<dyn ErrorMetric>; 2] =
-            [Box::new(PointToPoint), Box::new(PointToPlane)];
+        let mut metrics: [Box<dyn Minimize>; 2] = [Box::new(PointToPoint), Box::new(PointToPlane)];
         for metric in &mut metrics {
-            group.bench_function(BenchmarkId::new(metric.name(), case.name), |bencher| {
-                bencher.iter(|| metric.minimize(black_box(&pairs)));
+            group.bench_function(BenchmarkId::new(metric.label(), case.name), |bencher| {
+                bencher.iter(|| metric.minimize(&Iteration::default(), black_box(&pairs)));
             });
         }
     }

@@ -8,13 +8,15 @@ use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use hicp_benches::{Case, OBJECTS, case, forget_renders};
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::presets::paper_stop;
 use hybrid_icp::{
     AllSamples, Cascade, Context, Correspondences, DataAssociation, ErrorMetric, Icp, Isometry3,
-    MeanVsd, NormalEquations, Observation, PAPER_ALPHA, Pair, PinholeCamera, PixelRegion,
-    PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective, Rasterizer,
-    RenderedView, Renderer, Repeat, Score, Session, Stage, Step, Surfel, Switch, Threshold,
-    TriMesh, VisibleSurface, WarmNearestNeighbor, Workspace,
+    MeanVsd, NormalEquations, Observation, PAPER_ALPHA, PinholeCamera, PixelRegion, PointSelection,
+    PointToPlane, PointToPoint, Preset, Problem, Projective, Rasterizer, RenderedView, Renderer,
+    Repeat, Score, Session, Stage, Step, Surfel, Switch, Threshold, TriMesh, VisibleSurface,
+    WarmNearestNeighbor, Workspace,
 };
 
 /// What time is spent on.
@@ -94,21 +96,37 @@ impl<T: DataAssociation> DataAssociation for Timed<T> {
     }
 }
 
-impl<T: ErrorMetric> ErrorMetric for Timed<T> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.0.linearize(pair, system);
+impl<T: Minimize> Minimize for Timed<T> {
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        timed(METRIC, || self.0.system(iteration, pairs))
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        timed(METRIC, || self.0.system(pairs))
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        timed(METRIC, || self.0.mean_loss(iteration, pairs))
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        timed(METRIC, || self.0.mean_loss(pairs))
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        timed(METRIC, || {
+            self.0.add_squared_errors(iteration, pairs, factor, errors);
+        });
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        timed(METRIC, || self.0.minimize(pairs))
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        timed(METRIC, || self.0.minimize(iteration, pairs))
+    }
+
+    fn label(&self) -> &'static str {
+        self.0.label()
     }
 }
 

@@ -15,7 +15,8 @@ use std::fmt::Write as _;
 use hicp_benches::work::{CountingRenderer, StageWork};
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::{Counting, allocations};
-use hybrid_icp::{Isometry3, Preset, Problem, Session, Work, Workspace};
+use hybrid_icp::internal::Work;
+use hybrid_icp::{Isometry3, Preset, Problem, Session, Workspace};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;

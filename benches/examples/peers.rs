@@ -302,9 +302,8 @@ impl Bench {
 
     /// The score beyond its render, which is in the cache; items are the pixels of the union.
     fn mve(&mut self, loaded: &Loaded) -> Value {
-        let problem = Problem::new(&loaded.model, &loaded.observation);
-        let mut context = self.workspace.context(&problem);
-        let view = context.view(&loaded.init);
+        let camera = loaded.observation.camera();
+        let view = self.workspace.view(&loaded.model, camera, &loaded.init);
         let region = view.region();
         let width = loaded.mask.width();
         let union = (region.v_min..region.v_max)
@@ -314,6 +313,8 @@ impl Bench {
             .count()
             + loaded.observation.n_measured();
         let start = Instant::now();
+        let problem = Problem::new(&loaded.model, &loaded.observation);
+        let mut context = self.workspace.context(&problem);
         let mve = MeanVsd::default().score(&mut context, &loaded.init);
         json!({ "ns": nanoseconds(start), "items": union, "score": mve })
     }

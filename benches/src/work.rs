@@ -181,7 +181,10 @@ mod tests {
                 assert_eq!(work.queries, stage.association.points, "{outcome:?}");
                 assert!(work.queries > 0);
                 assert_eq!(renderer.take().renders, workspace.renders());
-                if outcome.termination.is_rollback() {
+                if matches!(
+                    outcome.termination,
+                    Termination::PairsLost | Termination::LossIncreased
+                ) {
                     rolled_back += 1;
                 } else {
                     others += 1;

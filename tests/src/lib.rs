@@ -120,7 +120,7 @@ pub fn render(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> (
     let mut workspace = Workspace::new(Rasterizer::default());
     let problem = Problem::new(model, &empty);
     let mut context: Context<'_> = workspace.context(&problem);
-    let view = context.view(pose);
+    let view = context.view(pose).expect("a model and an image");
     let depths: Vec<f32> = (0..camera.height())
         .flat_map(|v| (0..camera.width()).map(move |u| (u, v)))
         .map(|(u, v)| view.depth_at(u, v))

@@ -1,8 +1,10 @@
 //! Monte-Carlo consistency of covariances: the normalised estimation error squared (NEES).
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
+use hybrid_icp::ErrorMetric;
+use hybrid_icp::Iteration;
 use hybrid_icp::{
-    BoundaryTargets, Context, Correspondences, DataAssociation, ErrorMetric, Icp, IterationLimit,
+    BoundaryTargets, Context, Correspondences, DataAssociation, Icp, IterationLimit, Minimize,
     Observation, OutlierFilter, Pair, PinholeCamera, PointSelection, Problem, Rasterizer, Repeat,
     Session, SmallMotion, Stage, Surfel, Vector6, Workspace, sandwich_covariance, se3,
 };
@@ -116,7 +118,7 @@ where
             pairs.begin(&pose, source.len());
             association.associate(&mut context, &source, &pose, &mut pairs);
             if let Some(filter) = &mut filter {
-                filter.filter(&problem, &mut pairs);
+                filter.filter(&Iteration::new(0, &init, problem), &mut pairs);
             }
             pose
         } else {
@@ -135,7 +137,9 @@ where
             }
             let mut pose = truth;
             for _ in 0..4 {
-                let step = metric.minimize(&pairs).expect("enough pairs");
+                let step = metric
+                    .minimize(&Iteration::default(), &pairs)
+                    .expect("enough pairs");
                 pose = step.increment * pose;
                 let moved = |pair: &Pair| Pair {
                     source: Surfel {
@@ -150,13 +154,16 @@ where
             }
             pose
         };
-        let Some(covariance) = metric.system(&pairs).and_then(|s| s.covariance()) else {
+        let Some(covariance) = metric
+            .system(&Iteration::default(), &pairs)
+            .and_then(|s| s.covariance())
+        else {
             continue;
         };
         let error = se3::log(&(pose * truth.inverse()));
         let factor = covariance.cholesky().expect("positive definite");
         let white = factor.l().solve_lower_triangular(&error).expect("regular");
-        let robust = sandwich_covariance(&mut metric, &pairs);
+        let robust = sandwich_covariance(&metric, &pairs);
         totals.0 += 1;
         totals.1 += white.norm_squared();
         let inverse = robust.and_then(|covariance| covariance.try_inverse());

@@ -1,6 +1,6 @@
 //! Lengths that are absolute or scale with the object.
 
-use hicp_core::Model;
+use hicp_core::Problem;
 
 /// A length in metres, or as a fraction of the model's diameter so that one value fits objects of any size.
 ///
@@ -9,18 +9,22 @@ use hicp_core::Model;
 pub enum Length {
     /// Metres.
     Meters(f32),
-    /// A fraction of [`Model::diameter`].
+    /// A fraction of the model's diameter.
     Diameters(f32),
 }
 
 impl Length {
-    /// Returns the length in metres for a model.
+    /// Returns the length in meters for a problem; NaN for a fraction of the diameter if the problem has no model.
+    ///
+    /// No distance is within NaN: a gate that is undefined keeps nothing.
     #[must_use]
-    pub fn meters(self, model: &Model) -> f32 {
+    pub fn meters(self, problem: &Problem<'_>) -> f32 {
         match self {
             Self::Meters(length) => length,
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-            Self::Diameters(fraction) => fraction * model.diameter() as f32,
+            Self::Diameters(fraction) => problem
+                .model()
+                .map_or(f32::NAN, |model| fraction * model.diameter() as f32),
         }
     }
 }

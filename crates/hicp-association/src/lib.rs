@@ -6,13 +6,14 @@
 //!
 //! ```
 //! use hicp_association::{DataAssociation, MaxDistance, MaxNormalAngle, OutlierFilter, Projective};
-//! use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
+//! use hicp_core::{Context, Correspondences, Isometry3, Iteration, Surfel};
 //!
 //! fn gated_pairs(context: &mut Context<'_>, source: &[Surfel], pose: &Isometry3<f64>) -> Correspondences {
 //!     let mut pairs = Correspondences::new();
 //!     Projective.associate(context, source, pose, &mut pairs);
 //!     let problem = context.problem;
-//!     (MaxDistance::diameters(0.25), MaxNormalAngle::degrees(60.0)).filter(&problem, &mut pairs);
+//!     let filter = &mut (MaxDistance::diameters(0.25), MaxNormalAngle::degrees(60.0));
+//!     filter.filter(&Iteration::new(0, pose, problem), &mut pairs);
 //!     pairs
 //! }
 //! ```

@@ -4,7 +4,7 @@
 ///
 /// ```
 /// struct MyAssociation<T>(T);
-/// assert_eq!(hicp_core::type_label::<MyAssociation<Vec<u8>>>(), "MyAssociation");
+/// assert_eq!(hicp_core::internal::type_label::<MyAssociation<Vec<u8>>>(), "MyAssociation");
 /// ```
 #[must_use]
 pub fn type_label<T: ?Sized>() -> &'static str {

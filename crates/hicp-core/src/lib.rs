@@ -52,6 +52,14 @@ mod symmetry;
 mod vectorized;
 mod work;
 
+/// What the crates of this workspace share and users do not need. No stability is promised.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::label::type_label;
+    pub use crate::vectorized::{VectorLoop, vectorized};
+    pub use crate::work::Work;
+}
+
 pub use camera::{MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters};
 pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
@@ -59,7 +67,6 @@ pub use diameter::diameter;
 pub use error::{CameraError, ImageError, MeshError, RotationError, SymmetryError};
 pub use id::Id;
 pub use image::{DepthImage, DistanceImage, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask};
-pub use label::type_label;
 pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, TriMesh};
 pub use mesh_survey::MeshSurvey;
 pub use model::{Model, ModelConfig};
@@ -68,7 +75,7 @@ pub use nalgebra::{
     UnitVector3, Vector3, Vector6,
 };
 pub use observation::Observation;
-pub use problem::{Context, Problem};
+pub use problem::{Context, Iteration, Problem};
 pub use region::PixelRegion;
 pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
 pub use rotation::{ROTATION_TOLERANCE, rotation_from_matrix};
@@ -76,5 +83,3 @@ pub use rotation_grid::rotation_grid;
 pub use sampling::{MAX_SAMPLES, sample_surface};
 pub use surfel::Surfel;
 pub use symmetry::{CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis};
-pub use vectorized::{VectorLoop, vectorized};
-pub use work::Work;

@@ -1,4 +1,4 @@
-//! What is registered to what, and what components may ask for.
+//! What is registered to what, and what components receive while they work.
 
 use nalgebra::Isometry3;
 
@@ -7,31 +7,86 @@ use crate::observation::Observation;
 use crate::render::{RenderCache, RenderedView};
 
 /// The two sides of a registration: the model (source, moves) and the observation (target, stands still).
-#[derive(Clone, Copy, Debug)]
+///
+/// Either side may be absent: [`Problem::default`] has neither and serves pairs that come from elsewhere. A component
+/// that needs a side does without pairs, points or agreement where it is absent; it never guesses. The sides are
+/// methods, so that later kinds of source and target (point clouds, color) do not change this type.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Problem<'a> {
-    /// The object.
-    pub model: &'a Model,
-    /// The segmented depth image.
-    pub observation: &'a Observation,
+    model: Option<&'a Model>,
+    observation: Option<&'a Observation>,
 }
 
 impl<'a> Problem<'a> {
     /// Pairs a model with an observation.
     #[must_use]
     pub fn new(model: &'a Model, observation: &'a Observation) -> Self {
-        Self { model, observation }
+        Self {
+            model: Some(model),
+            observation: Some(observation),
+        }
+    }
+
+    /// Returns the object, if the source is a model.
+    #[must_use]
+    #[inline]
+    pub fn model(&self) -> Option<&'a Model> {
+        self.model
+    }
+
+    /// Returns the segmented depth image, if the target is one.
+    #[must_use]
+    #[inline]
+    pub fn observation(&self) -> Option<&'a Observation> {
+        self.observation
+    }
+
+    /// Returns both sides, if the problem is a model and a depth image.
+    #[must_use]
+    #[inline]
+    pub fn sides(&self) -> Option<(&'a Model, &'a Observation)> {
+        Some((self.model?, self.observation?))
     }
 }
 
-/// What a component sees while it works: the problem, and the render cache of the run.
+/// One iteration of a stage, as filters, metrics and stop rules see it.
 ///
-/// Selections, associations, scores and switchers get one. Copy `context.problem` out before borrowing a view, then both
-/// are at hand:
+/// Components are pure: equal iterations and equal pairs give equal results, whichever iteration came before. A stage
+/// that returns to an earlier pose after a rejected one passes that pose's iteration again.
+///
+/// [`Iteration::default`] is the first iteration of a stage that starts at the identity, without a problem: for pairs
+/// that come from elsewhere.
+#[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
+pub struct Iteration<'a> {
+    /// Index within the stage, from 0.
+    pub index: usize,
+    /// The pose that the stage started from: `camera_from_object`.
+    pub init: Isometry3<f64>,
+    /// The model and the observation.
+    pub problem: Problem<'a>,
+}
+
+impl<'a> Iteration<'a> {
+    /// Creates the iteration `index` of a stage that started from `init`.
+    #[must_use]
+    pub fn new(index: usize, init: &Isometry3<f64>, problem: Problem<'a>) -> Self {
+        Self {
+            index,
+            init: *init,
+            problem,
+        }
+    }
+}
+
+/// The problem and the render cache of the run: what selections, associations, scores and switchers receive.
+///
+/// Copy `context.problem` before borrowing a view to use both:
 ///
 /// ```
 /// use hicp_core::{Context, Isometry3};
 /// fn visible_pixels(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> usize {
-///     context.view(camera_from_object).n_rendered()
+///     context.view(camera_from_object).map_or(0, |view| view.n_rendered())
 /// }
 /// ```
 #[derive(Debug)]
@@ -42,18 +97,19 @@ pub struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// Puts a problem and a render cache together.
+    /// Combines a problem and a render cache.
     #[must_use]
     pub fn new(problem: Problem<'a>, renders: &'a mut RenderCache) -> Self {
         Self { problem, renders }
     }
 
-    /// Returns the model rendered at a pose in the observation's camera; rendered at most once per pose while it is remembered.
-    pub fn view(&mut self, camera_from_object: &Isometry3<f64>) -> &RenderedView {
-        self.renders.view(
-            self.problem.model,
-            self.problem.observation.camera(),
-            camera_from_object,
-        )
+    /// Returns the model rendered at a pose in the observation's camera.
+    ///
+    /// Renders at most once per pose while the cache holds it. Returns `None` if the problem has no model to render or no
+    /// camera to render it for.
+    pub fn view(&mut self, camera_from_object: &Isometry3<f64>) -> Option<&RenderedView> {
+        let (model, observation) = self.problem.sides()?;
+        let camera = observation.camera();
+        Some(self.renders.view(model, camera, camera_from_object))
     }
 }

@@ -1,6 +1,6 @@
 //! The trait of fusers.
 
-use hicp_core::type_label;
+use hicp_core::internal::type_label;
 
 use crate::estimate::PoseEstimate;
 use crate::fusion::Solution;

@@ -32,6 +32,6 @@ pub use stage::{
     Repeat, Rotations, SearchOptions, Stage,
 };
 pub use stop::{
-    AbsoluteLoss, Bound, Convergence, Deadline, Divergence, IterationLimit, LossRule, Oscillation,
-    Progress, SmallMotion, StopRule, TimeLimit,
+    AbsoluteLoss, Bound, Convergence, Deadline, Divergence, IterationLimit, Judgment, LossRule,
+    Oscillation, Progress, SmallMotion, StopRule, TimeLimit,
 };

@@ -81,8 +81,12 @@ pub struct StageEvent<'a> {
     pub selection: &'static str,
     /// Name of the data association.
     pub association: &'static str,
+    /// Names of the outlier filters and weights, in order.
+    pub filters: &'a [&'static str],
     /// Name of the error metric.
     pub metric: &'static str,
+    /// Names of the stop rules, in order.
+    pub stop_rules: &'a [&'static str],
     /// Number of points selected.
     pub n_source: usize,
     /// What the stage returned.

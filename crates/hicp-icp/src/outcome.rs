@@ -1,7 +1,7 @@
 //! How a stage ended, and what it returns.
 
-use hicp_core::{Correspondences, Isometry3, Matrix6};
-use hicp_metric::{ErrorMetric, NormalEquations, Observability};
+use hicp_core::{Correspondences, Isometry3, Iteration, Matrix6};
+use hicp_metric::{Minimize, NormalEquations, Observability};
 
 /// Why a stage ended. Ending is not an error: whatever the data, a stage returns a pose and says why it stopped there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -29,10 +29,12 @@ pub enum Termination {
     Stopped,
     /// A guard's score did not improve.
     ScoreNotImproved,
+    /// A custom stop rule ended the stage for a reason of its own, named as in traces and files (`snake_case`).
+    Custom(&'static str),
 }
 
 impl Termination {
-    /// Every way to end.
+    /// Every way to end that the library knows: all but [`Termination::Custom`].
     pub const ALL: [Self; 11] = [
         Self::Converged,
         Self::IterationLimit,
@@ -46,20 +48,6 @@ impl Termination {
         Self::Stopped,
         Self::ScoreNotImproved,
     ];
-
-    /// Returns whether the last candidate was rejected, so that an earlier pose was returned.
-    #[must_use]
-    pub fn is_rollback(self) -> bool {
-        matches!(
-            self,
-            Self::NoPairs
-                | Self::PairsLost
-                | Self::LossIncreased
-                | Self::Degenerate
-                | Self::OutOfBounds
-                | Self::ScoreNotImproved
-        )
-    }
 
     /// Name in traces and files.
     #[must_use]
@@ -76,6 +64,7 @@ impl Termination {
             Self::Deadline => "deadline",
             Self::Stopped => "stopped",
             Self::ScoreNotImproved => "score_not_improved",
+            Self::Custom(name) => name,
         }
     }
 
@@ -96,6 +85,7 @@ impl Termination {
             Self::Deadline => "the time was up",
             Self::Stopped => "the observer asked to stop",
             Self::ScoreNotImproved => "the score did not improve",
+            Self::Custom(name) => name,
         }
     }
 }
@@ -129,10 +119,14 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Measures pairs by a metric; `None` without any.
+    /// Measures the pairs of an iteration by a metric; `None` without any.
     #[must_use]
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
-    pub fn of<M: ErrorMetric + ?Sized>(pairs: &Correspondences, metric: &mut M) -> Option<Self> {
+    pub fn of<M: Minimize + ?Sized>(
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        metric: &mut M,
+    ) -> Option<Self> {
         if pairs.is_empty() {
             return None;
         }
@@ -148,7 +142,7 @@ impl Quality {
             fitness: (count / pairs.n_candidates().max(1) as f64).min(1.0),
             point_rmse: (points / count).sqrt(),
             plane_rmse: (planes / count).sqrt(),
-            system: metric.system(pairs),
+            system: metric.system(iteration, pairs),
         })
     }
 

@@ -13,6 +13,8 @@ pub struct Workspace {
     pub(crate) renders: RenderCache,
     pub(crate) source: Vec<Surfel>,
     pub(crate) pairs: Correspondences,
+    /// Names of filters and stop rules, for the observer.
+    pub(crate) names: Vec<&'static str>,
 }
 
 impl Workspace {
@@ -22,6 +24,7 @@ impl Workspace {
             renders: RenderCache::new(renderer),
             source: Vec::new(),
             pairs: Correspondences::new(),
+            names: Vec::new(),
         }
     }
 

@@ -13,7 +13,7 @@
 //!     .into_iter()
 //!     .map(|(x, y, z)| Pair::new(0, surfel(x, y, z), 0, surfel(x + 0.5, y, z)))
 //!     .collect();
-//! let step = PointToPoint.minimize(&pairs).ok_or("undetermined").unwrap();
+//! let step = PointToPoint.minimize(&Iteration::default(), &pairs).ok_or("undetermined").unwrap();
 //! assert!((step.increment.translation.vector - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-6);
 //! assert!((step.mean_loss - 0.25).abs() < 1e-6);
 //! ```
@@ -49,10 +49,10 @@ mod system;
 
 pub use decorator::{
     Conditioned, Frame, Frozen, GaussNewton, Kernel, LevenbergMarquardt, MetricSchedule, PosePrior,
-    Prior, Robust, Scale,
+    Prior, Robust, RobustKernel, Scale,
 };
 pub use metric::{
-    ErrorMetric, Generalized, PlaneToPoint, PointToPlane, PointToPoint, Step, Symmetric,
-    WeightedSum,
+    ErrorMetric, Generalized, Minimize, PlaneToPoint, PointToPlane, PointToPoint, Step, Symmetric,
+    Terms, WeightedSum,
 };
 pub use system::{Degeneracy, NormalEquations, Observability, sandwich_covariance};

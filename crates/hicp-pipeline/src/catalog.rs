@@ -1,9 +1,9 @@
 //! The catalog: every part that a pipeline file can name.
 
 use hicp_association::{AllSamples, DataAssociation, OutlierFilter, PointSelection, Projective};
-use hicp_core::type_label;
+use hicp_core::internal::type_label;
 use hicp_icp::{Cascade, IterationLimit, Stage, StopRule};
-use hicp_metric::{ErrorMetric, PointToPoint};
+use hicp_metric::{Minimize, PointToPoint};
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{Switcher, Threshold};
 
@@ -98,7 +98,7 @@ kinds! {
     Selection: BoxedSelection = dyn PointSelection, add_selection, AllSamples;
     Association: BoxedAssociation = dyn DataAssociation, add_association, Projective;
     Filter: BoxedFilter = dyn OutlierFilter, add_filter, ();
-    Metric: BoxedMetric = dyn ErrorMetric, add_metric, PointToPoint;
+    Metric: BoxedMetric = dyn Minimize, add_metric, PointToPoint;
     Stop: BoxedStop = dyn StopRule, add_stop_rule, IterationLimit::default();
     Score: BoxedScore = dyn Score, add_score, MeanVsd::default();
     Switcher: BoxedSwitcher = dyn Switcher, add_switcher, Threshold { score: MeanVsd::default(), alpha: 0.4 };

@@ -1,7 +1,8 @@
 //! Depth of covered pixels.
 
 use glam::DVec3;
-use hicp_core::{PixelRegion, RenderedView, VectorLoop, Work, vectorized};
+use hicp_core::internal::{VectorLoop, Work, vectorized};
+use hicp_core::{PixelRegion, RenderedView};
 
 use crate::edge::{Coverage, Edge};
 use crate::projection::ProjectedVertex;

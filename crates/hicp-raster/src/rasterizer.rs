@@ -1,9 +1,7 @@
 //! The rasterizer: configuration, scratch and the triangle loop.
 
-use hicp_core::{
-    Facing, Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh, VectorLoop,
-    vectorized,
-};
+use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::{Facing, Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
 
 use crate::clip::Clipper;
 use crate::edge::{Coverage, Keep};

@@ -1,6 +1,6 @@
 //! Counting agreeing pixels, many at a time.
 
-use hicp_core::VectorLoop;
+use hicp_core::internal::VectorLoop;
 
 use crate::tolerances::{N_TOLERANCES, tolerances};
 

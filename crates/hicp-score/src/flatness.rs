@@ -46,9 +46,8 @@ impl Flatness {
     /// a small part of their boxes. Allocates nothing.
     #[must_use]
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
-        let problem = context.problem;
-        let observation = problem.observation;
-        let view = context.view(camera_from_object);
+        let (model, observation) = context.problem.sides()?;
+        let view = context.view(camera_from_object)?;
         let region = view.region().intersection(&observation.region());
         let mut pixels = [Pixel::default(); MAX_PIXELS];
         let mut step = (region.area() / MAX_PIXELS).isqrt().max(1);
@@ -84,7 +83,7 @@ impl Flatness {
             residual: nearest(distances, SHARE),
             measured: from_plane(pixels, |pixel| pixel.measured, distances)?,
             rendered: from_plane(pixels, |pixel| pixel.rendered, distances)?,
-            diameter: problem.model.diameter(),
+            diameter: model.diameter(),
         })
     }
 

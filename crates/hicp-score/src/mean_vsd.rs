@@ -1,6 +1,7 @@
 //! The mean VSD estimate.
 
-use hicp_core::{Context, Isometry3, vectorized};
+use hicp_core::internal::vectorized;
+use hicp_core::{Context, Isometry3};
 
 use crate::agreement::{Agreement, Row};
 use crate::score::Score;
@@ -54,14 +55,17 @@ impl MeanVsd {
         camera_from_object: &Isometry3<f64>,
     ) -> [f64; N_TOLERANCES] {
         let problem = context.problem;
-        let observation = problem.observation;
+        let (Some((model, observation)), Some(view)) =
+            (problem.sides(), context.view(camera_from_object))
+        else {
+            return [1.0; N_TOLERANCES];
+        };
         let (camera, depth, mask) = (
             observation.camera(),
             observation.depth().pixels(),
             observation.mask().pixels(),
         );
         let image_width = observation.depth().width() as usize;
-        let view = context.view(camera_from_object);
         let region = view.region();
         let rendered = view.depth().chunks_exact(region.width().max(1));
         let inverse_fy = 1.0 / camera.fy();
@@ -82,7 +86,7 @@ impl MeanVsd {
             rows,
             cx: camera.cx(),
             inverse_fx: 1.0 / camera.fx(),
-            diameter: problem.model.diameter(),
+            diameter: model.diameter(),
             occlusion_tolerance: self.occlusion_tolerance.unwrap_or(f64::INFINITY),
         });
         errors(

@@ -143,12 +143,13 @@ impl Default for SampledMve {
 
 impl Score for SampledMve {
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
-        let problem = context.problem;
-        let factor = self.factor(problem.observation);
-        let coarse = problem.observation.decimated(factor);
-        let surface = Surface::of(problem.model, self.samples);
+        let Some((model, observation)) = context.problem.sides() else {
+            return 1.0;
+        };
+        let coarse = observation.decimated(self.factor(observation));
+        let surface = Surface::of(model, self.samples);
         self.splat(&coarse, &surface, camera_from_object);
-        self.compare(&coarse, problem.model.diameter())
+        self.compare(&coarse, model.diameter())
     }
 
     fn name(&self) -> &'static str {

@@ -1,6 +1,7 @@
 //! The trait of scores.
 
-use hicp_core::{Context, Isometry3, type_label};
+use hicp_core::internal::type_label;
+use hicp_core::{Context, Isometry3};
 
 /// Says how bad a pose is: 0 is perfect, higher is worse.
 ///

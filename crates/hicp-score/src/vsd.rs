@@ -142,13 +142,20 @@ impl Vsd {
         camera_from_object: &Isometry3<f64>,
     ) -> [f64; N_TOLERANCES] {
         let problem = context.problem;
-        let camera = problem.observation.camera();
+        let Some((model, observation)) = problem.sides() else {
+            return [1.0; N_TOLERANCES];
+        };
+        let camera = observation.camera();
         // The cache hands out one view at a time, so the truth's is copied.
-        self.scratch.copy_from(context.view(&self.truth));
+        if let Some(truth) = context.view(&self.truth) {
+            self.scratch.copy_from(truth);
+        }
         let truth = &self.scratch;
-        let estimate = context.view(camera_from_object);
+        let Some(estimate) = context.view(camera_from_object) else {
+            return [1.0; N_TOLERANCES];
+        };
         let mut union = truth.depth().iter().filter(|z| **z > 0.0).count() as u64;
-        let mut counts = AgreementCounts::new(problem.model.diameter());
+        let mut counts = AgreementCounts::new(model.diameter());
         let region = estimate.region();
         let mut depths = estimate.depth().iter();
         for v in region.v_min..region.v_max {

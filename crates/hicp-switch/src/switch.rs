@@ -35,6 +35,10 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for Switch<W, A, M> {
             self.misaligned.run(problem, init, session)
         }
     }
+
+    fn name(&self) -> &'static str {
+        "switch"
+    }
 }
 
 /// Runs one of any number of stages, chosen from the image at the initial estimate.
@@ -64,5 +68,9 @@ impl<W: Switcher, S: Stage> Stage for SwitchAmong<W, S> {
             Some(stage) => stage.run(problem, init, session),
             None => Outcome::kept(init, Termination::IterationLimit),
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "switch-among"
     }
 }

@@ -86,4 +86,8 @@ impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
         }
         Outcome { iterations, ..best }
     }
+
+    fn name(&self) -> &'static str {
+        "alternate"
+    }
 }

@@ -1,11 +1,17 @@
 //! The trait of switchers.
 
-use hicp_core::{Context, Isometry3, type_label};
+use hicp_core::internal::type_label;
+use hicp_core::{Context, Isometry3};
 use hicp_icp::{Regime, RegimeEvent};
 
 /// Decides from the image which regime the current estimate is in (Dynamic Switching, §IV-A).
 ///
 /// Pure: equal inputs give equal answers; `&mut self` is scratch.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a switcher",
+    label = "this must implement `Switcher`",
+    note = "`Switch::switcher` accepts a `Switcher`, such as `Threshold`, or a fixed `Regime`"
+)]
 pub trait Switcher {
     /// Judges a pose.
     fn regime(
@@ -14,25 +20,30 @@ pub trait Switcher {
         camera_from_object: &Isometry3<f64>,
     ) -> RegimeEvent;
 
-    /// Name in traces.
+    /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
 }
 
-impl<T: Switcher + ?Sized> Switcher for Box<T> {
-    fn regime(
-        &mut self,
-        context: &mut Context<'_>,
-        camera_from_object: &Isometry3<f64>,
-    ) -> RegimeEvent {
-        (**self).regime(context, camera_from_object)
-    }
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: Switcher + ?Sized> Switcher for $pointer {
+            fn regime(
+                &mut self,
+                context: &mut Context<'_>,
+                camera_from_object: &Isometry3<f64>,
+            ) -> RegimeEvent {
+                (**self).regime(context, camera_from_object)
+            }
 
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )+};
 }
+forward!(Box<T>, &mut T);
 
 /// Always the same regime: switches Dynamic Switching off.
 impl Switcher for Regime {

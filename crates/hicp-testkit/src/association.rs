@@ -6,7 +6,7 @@ use hybrid_icp::{
 };
 
 use crate::law::{BOXED, NAMED, PURE, Subject, bits};
-use crate::scenes::{cases, workspace};
+use crate::scenes::{cases, sides, workspace};
 
 /// What [`check_association`] may take for granted of an association beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ pub fn check_association<T: DataAssociation + 'static>(
                 })
             };
             let expected = associate(&mut make());
-            let observation = case.problem.observation;
+            let observation = sides(&case.problem).1;
             contract(&subject, input, laws, &source, observation, &expected);
             subject.holds(
                 "the pose noted in the pairs stays",
@@ -92,7 +92,7 @@ fn run<A: DataAssociation + ?Sized>(
 }
 
 fn sources(problem: &Problem<'_>) -> [(&'static str, Vec<Surfel>); 4] {
-    let samples = problem.model.samples();
+    let samples = sides(problem).0.samples();
     let some: Vec<Surfel> = samples.iter().step_by(8).copied().collect();
     let mut broken = some.clone();
     broken.truncate(20);

@@ -1,6 +1,6 @@
 //! The laws of outlier filters.
 
-use hybrid_icp::{Correspondences, OutlierFilter, Pair};
+use hybrid_icp::{Correspondences, Isometry3, Iteration, OutlierFilter, Pair};
 
 use crate::association::finite;
 use crate::law::{BOXED, PURE, Subject, bits};
@@ -23,7 +23,7 @@ pub struct FilterLaws {
 /// - Weights of finite pairs stay finite and not negative.
 /// - The pose and the number of candidates noted in the pairs stay.
 /// - Pure: a fresh and a used instance give the same bits, and so does a boxed one and a chain of it alone.
-/// - Pure given the iteration: what [`OutlierFilter::begin`] announced last decides, not which iterations were begun before.
+/// - Pure given the iteration: the index decides, not which iterations came before.
 /// - Never panics: also with no pair, one, equal distances, and numbers that are not finite.
 /// - As declared in [`FilterLaws`].
 ///
@@ -98,8 +98,8 @@ fn run(
     pairs: &Correspondences,
 ) -> Correspondences {
     let mut pairs = pairs.clone();
-    filter.begin(iteration);
-    filter.filter(&set.problem, &mut pairs);
+    let init = Isometry3::translation(0.0, 0.0, 0.5);
+    filter.filter(&Iteration::new(iteration, &init, set.problem), &mut pairs);
     pairs
 }
 

@@ -32,7 +32,8 @@
 //! | `PointSelection` | [`check_selection`] | – |
 //! | `DataAssociation` | [`check_association`] | [`AssociationLaws`] |
 //! | `OutlierFilter` | [`check_filter`] | [`FilterLaws`] |
-//! | `ErrorMetric` | [`check_metric`], [`check_metric_forwards`] | [`MetricLaws`] |
+//! | `ErrorMetric` | [`check_metric`] | [`MetricLaws`] |
+//! | `Minimize` | [`check_minimize`], [`check_metric_forwards`] | [`MetricLaws`] |
 //! | `StopRule` | [`check_stop_rule`] | [`StopRuleLaws`] |
 //! | `Score` | [`check_score`] | [`ScoreLaws`] |
 //! | `Switcher` | [`check_switcher`] | [`SwitcherLaws`] |
@@ -70,7 +71,7 @@ mod stop;
 pub use association::{AssociationLaws, check_association};
 pub use filter::{FilterLaws, check_filter};
 pub use fuser::{FuserLaws, check_fuser};
-pub use metric::{MetricLaws, check_metric, check_metric_forwards};
+pub use metric::{MetricLaws, check_metric, check_metric_forwards, check_minimize};
 pub use renderer::{RendererLaws, check_renderer};
 pub use scenes::{Scene, scenes};
 pub use score::{ScoreLaws, SwitcherLaws, check_score, check_switcher};

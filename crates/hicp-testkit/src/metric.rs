@@ -1,8 +1,8 @@
 //! The laws of error metrics.
 
 use hybrid_icp::{
-    Correspondences, ErrorMetric, Isometry3, NormalEquations, Pair, RigidTransform, Step, Surfel,
-    Vector3, se3,
+    Correspondences, ErrorMetric, Isometry3, Iteration, Minimize, NormalEquations, Pair, Problem,
+    RigidTransform, Step, Surfel, Vector3, se3,
 };
 
 use crate::law::{BOXED, NAMED, PURE, Subject};
@@ -41,7 +41,26 @@ impl Default for MetricLaws {
     }
 }
 
-/// Checks an [`ErrorMetric`]; `make` makes a fresh one.
+/// Checks an [`ErrorMetric`]; `make` creates a fresh one.
+///
+/// # Laws
+///
+/// Those of [`check_minimize`], and the `rows` of [`MetricLaws`].
+///
+/// # Panics
+///
+/// Panics with the law, the input and what was found when a law is broken.
+pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
+    check_minimize(&make, laws);
+    if laws.rows {
+        let subject = Subject::new::<T>(Some(make().name()));
+        for set in good_pairs() {
+            rows(&subject, &set.label, &make(), &set.pairs);
+        }
+    }
+}
+
+/// Checks a [`Minimize`], for example a decorator around a metric; `make` creates a fresh one.
 ///
 /// # Laws
 ///
@@ -49,28 +68,29 @@ impl Default for MetricLaws {
 /// - Never panics, and never returns what is not finite: without pairs, with too few, with pairs that determine nothing or are
 ///   not finite, `minimize`, `system` and `mean_loss` return `None` or finite numbers.
 /// - Losses are not negative; `minimize` reports the `mean_loss`.
-/// - Those of [`MetricLaws`].
+/// - Those of [`MetricLaws`] but for `rows`.
 ///
 /// # Panics
 ///
 /// Panics with the law, the input and what was found when a law is broken.
-pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
-    let subject = Subject::new::<T>(Some(make().name()));
+pub fn check_minimize<T: Minimize + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
+    let subject = Subject::new::<T>(Some(make().label()));
     let mut used = make();
     for (set, good) in (good_pairs().into_iter().map(|set| (set, true)))
         .chain(hard_pairs().into_iter().map(|set| (set, false)))
     {
         let (input, pairs) = (set.label.as_str(), &set.pairs);
+        let first = Iteration::default();
         let answers =
-            |metric: &mut dyn ErrorMetric| subject.calm(input, || Answers::of(metric, pairs));
+            |metric: &mut dyn Minimize| subject.calm(input, || Answers::of(metric, &first, pairs));
         let expected = answers(&mut make());
         expected.are_finite(&subject, input);
         subject.same(PURE, input, &expected, &answers(&mut used));
         subject.same(PURE, input, &expected, &answers(&mut used));
-        let mut boxed: Box<dyn ErrorMetric> = Box::new(make());
-        let through_box = subject.calm(input, || Answers::of(&mut boxed, pairs));
+        let mut boxed: Box<dyn Minimize> = Box::new(make());
+        let through_box = subject.calm(input, || Answers::of(&mut boxed, &first, pairs));
         subject.same(BOXED, input, &expected, &through_box);
-        subject.same(BOXED, input, &make().name(), &boxed.name());
+        subject.same(BOXED, input, &make().label(), &boxed.label());
         if let (Some(step), Some(loss)) = (&expected.step, expected.mean_loss) {
             subject.holds(
                 "minimize reports the mean loss",
@@ -91,8 +111,8 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
             check.laws(&make, laws);
         }
     }
-    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
-    subject.same(NAMED, "any", &make().name(), &used.name());
+    subject.holds(NAMED, "any", !used.label().is_empty(), String::new);
+    subject.same(NAMED, "any", &make().label(), &used.label());
 }
 
 /// Checks that a metric that wraps another changes nothing: every method gives the same bits on all inputs of the kit.
@@ -102,53 +122,50 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
 /// # Panics
 ///
 /// Panics with the law, the input and what was found when a method is not forwarded.
-pub fn check_metric_forwards<A: ErrorMetric, B: ErrorMetric>(
+pub fn check_metric_forwards<A: Minimize, B: Minimize>(
     inner: impl Fn() -> A,
     wrapper: impl Fn() -> B,
 ) {
-    let subject = Subject::new::<B>(Some(wrapper().name()));
+    let subject = Subject::new::<B>(Some(wrapper().label()));
+    // A metric tied to where the stage starts shows whether it receives the iteration.
+    let init = Isometry3::translation(0.01, 0.02, 0.5);
+    let later = Iteration::new(1, &init, Problem::default());
     for set in good_pairs().into_iter().chain(hard_pairs()) {
         let input = set.label.as_str();
-        let expected = Answers::of(&mut inner(), &set.pairs);
-        let found = subject.calm(input, || Answers::of(&mut wrapper(), &set.pairs));
-        let law = "forwards every method to what it wraps";
-        subject.same(law, input, &expected, &found);
-        // A metric tied to where the stage begins shows whether it is told.
-        let (mut expected, mut found) = (inner(), wrapper());
-        let init = Isometry3::translation(0.01, 0.02, 0.5);
-        expected.begin(1, &init);
-        found.begin(1, &init);
-        let (expected, found) = (
-            Answers::of(&mut expected, &set.pairs),
-            Answers::of(&mut found, &set.pairs),
-        );
-        subject.same(law, input, &expected, &found);
+        for iteration in [Iteration::default(), later] {
+            let expected = Answers::of(&mut inner(), &iteration, &set.pairs);
+            let found = subject.calm(input, || {
+                Answers::of(&mut wrapper(), &iteration, &set.pairs)
+            });
+            let law = "forwards every method to what it wraps";
+            subject.same(law, input, &expected, &found);
+        }
     }
 }
 
-/// What a metric says of pairs.
+/// What a metric returns for a set of pairs.
 #[derive(Debug)]
 struct Answers {
     step: Option<Step>,
     mean_loss: Option<f64>,
     system: Option<NormalEquations>,
-    /// Squared error and rows of the first pairs.
     #[allow(dead_code)] // Compared by its text.
-    single: Vec<(f64, NormalEquations)>,
+    squared_errors: Vec<f64>,
 }
 
 impl Answers {
-    fn of<M: ErrorMetric + ?Sized>(metric: &mut M, pairs: &Correspondences) -> Self {
-        let single = pairs.as_slice().iter().take(50).map(|pair| {
-            let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
-            metric.linearize(&unweighted(pair), &mut rows);
-            (metric.squared_error(pair), rows)
-        });
+    fn of<M: Minimize + ?Sized>(
+        metric: &mut M,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Self {
+        let mut squared_errors = vec![0.0; pairs.len()];
+        metric.add_squared_errors(iteration, pairs, 1.0, &mut squared_errors);
         Self {
-            single: single.collect(),
-            step: metric.minimize(pairs),
-            mean_loss: metric.mean_loss(pairs),
-            system: metric.system(pairs),
+            squared_errors,
+            step: metric.minimize(iteration, pairs),
+            mean_loss: metric.mean_loss(iteration, pairs),
+            system: metric.system(iteration, pairs),
         }
     }
 
@@ -195,11 +212,8 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    fn laws<T: ErrorMetric>(&self, make: &impl Fn() -> T, laws: MetricLaws) {
+    fn laws<T: Minimize>(&self, make: &impl Fn() -> T, laws: MetricLaws) {
         let own = self.step(&mut make(), self.pairs);
-        if laws.rows {
-            self.rows(&make());
-        }
         if laws.order {
             let reversed = self.with(self.pairs.as_slice().iter().rev().copied());
             let law = "the order of the pairs does not matter";
@@ -248,8 +262,10 @@ impl Check<'_> {
         }
     }
 
-    fn step(&self, metric: &mut dyn ErrorMetric, pairs: &Correspondences) -> Step {
-        let step = self.subject.calm(self.input, || metric.minimize(pairs));
+    fn step(&self, metric: &mut dyn Minimize, pairs: &Correspondences) -> Step {
+        let step = self
+            .subject
+            .calm(self.input, || metric.minimize(&Iteration::default(), pairs));
         step.unwrap_or_else(|| {
             let law = "well-determined pairs give a step";
             self.subject.broken(law, self.input, "None")
@@ -310,27 +326,9 @@ impl Check<'_> {
         });
     }
 
-    fn rows(&self, metric: &dyn ErrorMetric) {
-        for pair in self.pairs.as_slice().iter().take(100) {
-            let error = metric.squared_error(pair);
-            for (weight, factor) in [(1.0, 1.0), (2.0, 2.0)] {
-                let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
-                metric.linearize(&Pair { weight, ..*pair }, &mut rows);
-                let law = "squared_error is the sum of the squared rows, and rows carry the weight";
-                let agree = close(rows.loss(), factor * error, 1e-6);
-                self.subject.holds(law, self.input, agree, || {
-                    format!(
-                        "rows of {} at a weight of {weight}, a squared error of {error}, for {pair:?}",
-                        rows.loss()
-                    )
-                });
-            }
-        }
-    }
-
-    fn downhill(&self, metric: &mut dyn ErrorMetric, step: &Step) {
+    fn downhill(&self, metric: &mut dyn Minimize, step: &Step) {
         let tenth = se3::exp(&(se3::log(&step.increment) * 0.1));
-        let after = metric.mean_loss(&self.moved(&tenth, false));
+        let after = metric.mean_loss(&Iteration::default(), &self.moved(&tenth, false));
         let lower = after.is_some_and(|after| after <= step.mean_loss * (1.0 + 1e-4) + 1e-13);
         let law = "downhill: a tenth of the increment does not raise the mean loss";
         self.subject.holds(law, self.input, lower, || {
@@ -339,10 +337,21 @@ impl Check<'_> {
     }
 }
 
-fn unweighted(pair: &Pair) -> Pair {
-    Pair {
-        weight: 1.0,
-        ..*pair
+fn rows(subject: &Subject, input: &str, metric: &dyn ErrorMetric, pairs: &Correspondences) {
+    for pair in pairs.as_slice().iter().take(100) {
+        let error = metric.squared_error(pair);
+        for (weight, factor) in [(1.0, 1.0), (2.0, 2.0)] {
+            let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
+            metric.linearize(&Pair { weight, ..*pair }, &mut rows);
+            let law = "squared_error is the sum of the squared rows, and rows carry the weight";
+            let agree = close(rows.loss(), factor * error, 1e-6);
+            subject.holds(law, input, agree, || {
+                format!(
+                    "rows of {} at a weight of {weight}, a squared error of {error}, for {pair:?}",
+                    rows.loss()
+                )
+            });
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! The laws of renderers.
 
-use hybrid_icp::{NO_TRIANGLE, PixelRegion, Problem, Rasterizer, RenderedView, Renderer};
+use hybrid_icp::{NO_TRIANGLE, PixelRegion, Rasterizer, RenderedView, Renderer};
 
 use crate::law::{BOXED, PURE, Subject};
-use crate::scenes::{Case, cases};
+use crate::scenes::{Case, cases, sides};
 
 /// What [`check_renderer`] may take for granted of a renderer beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,7 @@ pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: Rendere
     let (mut used, mut used_view) = (make(), RenderedView::default());
     for case in cases() {
         let input = case.label.as_str();
-        let camera = case.problem.observation.camera();
+        let camera = sides(&case.problem).1.camera();
         let part = PixelRegion {
             u_min: 70,
             v_min: 40,
@@ -81,7 +81,7 @@ fn draw<R: Renderer + ?Sized>(
     region: &PixelRegion,
     view: &mut RenderedView,
 ) {
-    let Problem { model, observation } = case.problem;
+    let (model, observation) = sides(&case.problem);
     renderer.render(model.mesh(), observation.camera(), &case.pose, region, view);
 }
 
@@ -96,7 +96,7 @@ fn contract(
     subject.holds("the view lies within the region", input, inside, || {
         format!("{:?} for {region:?}", view.region())
     });
-    let triangles = case.problem.model.mesh().triangles().len();
+    let triangles = sides(&case.problem).0.mesh().triangles().len();
     for (depth, triangle) in view.depth().iter().zip(view.triangles()) {
         let found = || format!("a depth of {depth} and the triangle {triangle}");
         let law = "depths are finite and not negative";
@@ -114,7 +114,7 @@ fn contract(
 }
 
 fn behind(case: &Case) -> bool {
-    let model = case.problem.model;
+    let model = sides(&case.problem).0;
     (case.pose * model.center()).z < -model.radius()
 }
 
@@ -125,7 +125,7 @@ fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> {
 
 #[allow(clippy::cast_precision_loss)] // Counts of pixels.
 fn agrees(subject: &Subject, input: &str, case: &Case, view: &RenderedView, share: f64) {
-    let region = case.problem.observation.camera().region();
+    let region = sides(&case.problem).1.camera().region();
     let mut reference = RenderedView::default();
     draw(&mut Rasterizer::default(), case, &region, &mut reference);
     let (mut shown, mut differing) = (0_usize, 0_usize);

@@ -142,3 +142,11 @@ fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 9] {
         ),
     ]
 }
+
+/// Returns the model and the observation of a case.
+pub(crate) fn sides<'a>(problem: &Problem<'a>) -> (&'a Model, &'a Observation) {
+    let Some(sides) = problem.sides() else {
+        unreachable!("every case of the kit has a model and an observation");
+    };
+    sides
+}

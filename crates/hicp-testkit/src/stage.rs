@@ -7,7 +7,7 @@ use hybrid_icp::{
 };
 
 use crate::law::{BOXED, PURE, Subject, bits};
-use crate::scenes::{cases, workspace};
+use crate::scenes::{cases, sides, workspace};
 
 /// What [`check_stage`] may take for granted of a stage beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
             run(&mut make(), &mut workspace(), &case.problem, &case.pose)
         });
         contract(&subject, input, laws, &case.pose, &expected, &told);
-        if case.problem.observation.n_surfels() == 0 {
+        if sides(&case.problem).1.n_surfels() == 0 {
             subject.same(
                 "where nothing was observed the initial pose is returned bit for bit",
                 input,

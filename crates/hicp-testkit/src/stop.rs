@@ -1,8 +1,8 @@
 //! The laws of stop rules.
 
-use std::ops::ControlFlow;
-
-use hybrid_icp::{Evaluation, Isometry3, Progress, StopRule, Termination, Vector3, se3};
+use hybrid_icp::{
+    Evaluation, Isometry3, Iteration, Judgment, Problem, Progress, StopRule, Vector3, se3,
+};
 
 use crate::law::{BOXED, PURE, Subject};
 
@@ -82,12 +82,8 @@ pub fn check_stop_rule<T: StopRule + 'static>(make: impl Fn() -> T, laws: StopRu
     }
 }
 
-/// Starts the rule and lets it judge until it breaks; at most `limit` turns.
-fn verdicts<S: StopRule + ?Sized>(
-    rule: &mut S,
-    course: &Course,
-    limit: usize,
-) -> Vec<ControlFlow<Termination>> {
+/// Starts the rule and lets it judge until it ends the stage; at most `limit` iterations.
+fn verdicts<S: StopRule + ?Sized>(rule: &mut S, course: &Course, limit: usize) -> Vec<Judgment> {
     rule.start();
     let mut verdicts = Vec::new();
     let evaluation = |turn: &(usize, f64, Isometry3<f64>)| Evaluation {
@@ -96,19 +92,21 @@ fn verdicts<S: StopRule + ?Sized>(
     };
     for (iteration, turn) in course.turns.iter().enumerate().take(limit) {
         let next = course.turns.get(iteration + 1).unwrap_or(turn).2;
-        let verdict = rule.check(&Progress {
-            iteration,
-            current: evaluation(turn),
-            first: evaluation(&course.turns[0]),
-            previous: iteration
-                .checked_sub(1)
-                .map(|i| evaluation(&course.turns[i])),
-            camera_from_object: &turn.2,
-            init: &course.turns[0].2,
-            increment: &(next * turn.2.inverse()),
-        });
+        let at = Iteration::new(iteration, &course.turns[0].2, Problem::default());
+        let verdict = rule.check(
+            &at,
+            &Progress {
+                current: evaluation(turn),
+                first: evaluation(&course.turns[0]),
+                previous: iteration
+                    .checked_sub(1)
+                    .map(|i| evaluation(&course.turns[i])),
+                camera_from_object: &turn.2,
+                increment: &(next * turn.2.inverse()),
+            },
+        );
         verdicts.push(verdict);
-        if verdict.is_break() {
+        if verdict != Judgment::Continue {
             break;
         }
     }

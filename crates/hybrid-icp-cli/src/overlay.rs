@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Refiner, RenderedView,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Refiner, RenderedView,
 };
 
 use crate::contour::contours;
@@ -116,9 +116,8 @@ impl Picture {
         camera_from_object: &Isometry3<f64>,
         color: Rgb,
     ) {
-        let problem = Problem::new(model, observation);
-        let mut context = refiner.workspace_mut().context(&problem);
-        let view = context.view(camera_from_object);
+        let workspace = refiner.workspace_mut();
+        let view = workspace.view(model, observation.camera(), camera_from_object);
         let mut ink = Ink::of(self);
         ink.outline(view, Line::solid(color), |_, _, _| false);
         self.draw(&ink);

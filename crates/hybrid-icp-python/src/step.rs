@@ -1,8 +1,10 @@
 //! Single steps of the error metrics.
 
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
-    Correspondences, ErrorMetric, Isometry3, Pair, Point3, PointToPlane, PointToPoint, Step,
-    Surfel, UnitVector3, Vector3,
+    Correspondences, Isometry3, Pair, Point3, PointToPlane, PointToPoint, Step, Surfel,
+    UnitVector3, Vector3,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -48,7 +50,11 @@ pub(crate) fn point_to_point_step<'py>(
     targets: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
     let pairs = pairs(sources, targets, None)?;
-    finish(py, PointToPoint.minimize(&pairs), pairs.len())
+    finish(
+        py,
+        PointToPoint.minimize(&Iteration::default(), &pairs),
+        pairs.len(),
+    )
 }
 
 /// One step of point-to-plane ICP on given pairs: Gauss–Newton on Σ(nᵢ·(T pᵢ − cᵢ))².
@@ -82,7 +88,11 @@ pub(crate) fn point_to_plane_step<'py>(
     normals: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
     let pairs = pairs(sources, targets, Some(normals))?;
-    finish(py, PointToPlane.minimize(&pairs), pairs.len())
+    finish(
+        py,
+        PointToPlane.minimize(&Iteration::default(), &pairs),
+        pairs.len(),
+    )
 }
 
 #[allow(clippy::type_complexity)]

@@ -24,7 +24,9 @@ impl DataAssociation for SamePixelSameWay {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         let mover = RigidTransform::new(camera_from_object);
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel); // In the camera frame now, as pairs are.

@@ -3,8 +3,9 @@
 //! `cargo run --release -p hybrid-icp --example 07_own_stop_rule`
 
 use std::error::Error;
-use std::ops::ControlFlow;
 
+use hybrid_icp::Iteration;
+use hybrid_icp::Judgment;
 use hybrid_icp::{
     Icp, IterationLimit, PointToPlane, Progress, Projective, StopRule, Termination, VisibleSurface,
 };
@@ -25,7 +26,7 @@ impl StopRule for SubPixel {
         self.quiet = 0; // A rule is used again and again.
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         // The increment turns about the camera; what counts is how far it moves the object.
         let position = progress.camera_from_object.translation.vector;
         let moved = (progress.increment * progress.camera_from_object)
@@ -39,9 +40,9 @@ impl StopRule for SubPixel {
             0
         };
         if self.quiet >= 2 {
-            ControlFlow::Break(Termination::Converged)
+            Judgment::Accept(Termination::Custom("sub_pixel"))
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
     }
 }

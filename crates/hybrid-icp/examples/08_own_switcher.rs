@@ -20,9 +20,17 @@ impl Switcher for BesideTheMask {
         context: &mut Context<'_>,
         camera_from_object: &Isometry3<f64>,
     ) -> RegimeEvent {
-        let mask = context.problem.observation.mask();
-        // Ask the context: the stage that selects from this render gets it for nothing.
-        let view = context.view(camera_from_object);
+        let problem = context.problem;
+        // The context renders once per pose: the stage that selects from this render gets it for free.
+        let (Some(observation), Some(view)) =
+            (problem.observation(), context.view(camera_from_object))
+        else {
+            return RegimeEvent {
+                regime: Regime::MISALIGNED,
+                score: None,
+            };
+        };
+        let mask = observation.mask();
         let region = view.region();
         let (mut rendered, mut beside) = (0_u32, 0_u32);
         for v in region.v_min..region.v_max {

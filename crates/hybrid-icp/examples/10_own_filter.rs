@@ -5,8 +5,8 @@
 use std::error::Error;
 
 use hybrid_icp::{
-    Correspondences, Icp, IterationLimit, MaxNormalAngle, NearestNeighbor, OutlierFilter,
-    PointToPlane, Problem, SmallMotion, VisibleSurface,
+    Correspondences, Icp, Iteration, IterationLimit, MaxNormalAngle, NearestNeighbor,
+    OutlierFilter, PointToPlane, SmallMotion, VisibleSurface,
 };
 
 mod scene;
@@ -15,18 +15,14 @@ mod scene;
 struct Narrowing {
     first_meters: f32,
     last_meters: f32,
-    limit: f32,
 }
 
 impl OutlierFilter for Narrowing {
-    // From the iteration's number alone, not from the limit before: a stage goes back by one after a rejected pose.
-    fn begin(&mut self, iteration: usize) {
-        let halvings = i32::try_from(iteration).unwrap_or(i32::MAX);
-        self.limit = (self.first_meters * 0.5_f32.powi(halvings)).max(self.last_meters);
-    }
-
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
-        pairs.retain(|pair| pair.distance() < self.limit);
+    // The limit follows from the index alone, not from the limit before: a stage goes back by one after a rejected pose.
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        let halvings = i32::try_from(iteration.index).unwrap_or(i32::MAX);
+        let limit = (self.first_meters * 0.5_f32.powi(halvings)).max(self.last_meters);
+        pairs.retain(|pair| pair.distance() < limit);
     }
 }
 
@@ -34,7 +30,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let narrowing = Narrowing {
         first_meters: 0.02,
         last_meters: 0.005,
-        limit: 0.02,
     };
     scene::Scene::new()?.refine(Icp {
         selection: VisibleSurface::default(),

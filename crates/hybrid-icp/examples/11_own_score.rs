@@ -16,8 +16,12 @@ struct DepthError {
 
 impl Score for DepthError {
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
-        let observation = context.problem.observation;
-        let view = context.view(camera_from_object);
+        let problem = context.problem;
+        let (Some(observation), Some(view)) =
+            (problem.observation(), context.view(camera_from_object))
+        else {
+            return 1.0;
+        };
         let region = observation.region();
         let (mut sum, mut count) = (0.0, 0_u32);
         for v in region.v_min..region.v_max {

@@ -31,7 +31,10 @@ impl<S: Stage> Stage for AlongTheRay<S> {
         let mut best = self.stage.run(problem, init, session);
         let mut best_mve = mve(session, &best);
         let mut iterations = best.iterations;
-        let ray = (init * problem.model.center()).coords.normalize();
+        let Some(model) = problem.model() else {
+            return best;
+        };
+        let ray = (init * model.center()).coords.normalize();
         for offset in &self.offsets_meters {
             let start = Translation3::from(ray * *offset) * init;
             let outcome = self.stage.run(problem, &start, session);

@@ -61,28 +61,30 @@ pub use hicp_association::{
     Schedule, SensorNoise, SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount,
     VarTrimmed, VisibleSurface, VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
 };
+#[doc(hidden)]
+pub use hicp_core::internal;
 pub use hicp_core::{
     CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
-    ImageError, Isometry3, MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Mask, Matrix3, Matrix6, MeshError,
-    MeshSurvey, Model, ModelConfig, NO_TRIANGLE, Observation, Pair, PinholeCamera, PixelCenters,
-    PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer, RigidTransform,
-    RotationError, Surfel, Symmetries, SymmetryAxis, SymmetryError, Translation3, TriMesh,
-    UnitQuaternion, UnitVector3, Vector3, Vector6, Work, rotation_from_matrix, rotation_grid, se3,
-    so3,
+    ImageError, Isometry3, Iteration, MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Mask, Matrix3, Matrix6,
+    MeshError, MeshSurvey, Model, ModelConfig, NO_TRIANGLE, Observation, Pair, PinholeCamera,
+    PixelCenters, PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer,
+    RigidTransform, RotationError, Surfel, Symmetries, SymmetryAxis, SymmetryError, Translation3,
+    TriMesh, UnitQuaternion, UnitVector3, Vector3, Vector6, rotation_from_matrix, rotation_grid,
+    se3, so3,
 };
 pub use hicp_fusion as fusion;
 pub use hicp_icp::{
     AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
-    Evaluation, Guard, HypothesisSearch, Icp, IterationEvent, IterationLimit, KeepBest, LossRule,
-    Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat, Rotations,
-    SearchOptions, Session, SmallMotion, Stage, StageEvent, StopRule, Termination, TimeLimit,
-    Verdict, Workspace,
+    Evaluation, Guard, HypothesisSearch, Icp, IterationEvent, IterationLimit, Judgment, KeepBest,
+    LossRule, Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat,
+    Rotations, SearchOptions, Session, SmallMotion, Stage, StageEvent, StopRule, Termination,
+    TimeLimit, Verdict, Workspace,
 };
 pub use hicp_metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, MetricSchedule, NormalEquations, Observability, PlaneToPoint, PointToPlane,
-    PointToPoint, PosePrior, Prior, Robust, Scale, Step, Symmetric, WeightedSum,
-    sandwich_covariance,
+    LevenbergMarquardt, MetricSchedule, Minimize, NormalEquations, Observability, PlaneToPoint,
+    PointToPlane, PointToPoint, PosePrior, Prior, Robust, RobustKernel, Scale, Step, Symmetric,
+    Terms, WeightedSum, sandwich_covariance,
 };
 #[cfg(feature = "pipeline")]
 pub use hicp_pipeline::{self as pipeline, PipelineError, PipelineFile, PipelineLimits};

@@ -27,7 +27,9 @@ impl DataAssociation for SoftProjective {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         let mover = RigidTransform::new(camera_from_object);
         let radius = i16::from(self.radius_pixels);
         for (source_index, surfel) in (0..).zip(source) {

@@ -3,9 +3,10 @@
 use hicp_sim::MEAN_ROTATION_ERROR_DEGREES;
 use hicp_testkit::{FilterLaws, check_filter};
 use hicp_tests::starts::{Start, measure_stage, starts};
+use hybrid_icp::Iteration;
 use hybrid_icp::{
-    Correspondences, Icp, IterationLimit, OutlierFilter, PointToPlane, Problem, Projective,
-    SmallMotion, Stage, VisibleSurface,
+    Correspondences, Icp, IterationLimit, OutlierFilter, PointToPlane, Projective, SmallMotion,
+    Stage, VisibleSurface,
 };
 
 // --- The component ---
@@ -21,17 +22,13 @@ struct Graduated {
     start: f32,
     /// What μ is divided by from one iteration to the next, until it is 1.
     rate: f32,
-    mu: f32,
 }
 
 impl OutlierFilter for Graduated {
-    fn begin(&mut self, iteration: usize) {
-        let turns = i32::try_from(iteration).unwrap_or(i32::MAX);
-        self.mu = (self.start / self.rate.powi(turns)).max(1.0);
-    }
-
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
-        let width = self.mu * self.sigma_meters.powi(2);
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        let index = i32::try_from(iteration.index).unwrap_or(i32::MAX);
+        let mu = (self.start / self.rate.powi(index)).max(1.0);
+        let width = mu * self.sigma_meters.powi(2);
         for pair in pairs.as_mut_slice() {
             let offset = pair.source.point - pair.target.point;
             let residual = pair.target.normal.dot(&offset);
@@ -47,7 +44,6 @@ fn graduated() -> Graduated {
         sigma_meters: 0.002,
         start: 30.0,
         rate: 1.4,
-        mu: 30.0,
     }
 }
 

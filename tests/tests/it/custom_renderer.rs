@@ -114,7 +114,7 @@ fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
         let problem = Problem::new(&scene.model, &scene.observation);
         let shown = |workspace: &mut Workspace| {
             let mut context = workspace.context(&problem);
-            let depth = context.view(&scene.truth).depth();
+            let depth = context.view(&scene.truth).unwrap().depth();
             depth.iter().filter(|z| **z > 0.0).count()
         };
         let (few, all) = (shown(&mut mine), shown(&mut plain));

@@ -16,14 +16,18 @@ struct Silhouette;
 
 impl Score for Silhouette {
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
-        let observation = context.problem.observation;
+        let problem = context.problem;
+        let (Some(observation), Some(view)) =
+            (problem.observation(), context.view(camera_from_object))
+        else {
+            return 1.0;
+        };
         let (mask, box_of_mask) = (observation.mask(), observation.region());
         let rows = box_of_mask.v_min..box_of_mask.v_max;
         let masked = rows
             .flat_map(|v| (box_of_mask.u_min..box_of_mask.u_max).map(move |u| (u, v)))
             .filter(|(u, v)| mask.get(*u, *v) == Some(true))
             .count();
-        let view = context.view(camera_from_object);
         let region = view.region();
         let (mut both, mut union) = (0_u32, masked as u32);
         for v in region.v_min..region.v_max {

@@ -25,7 +25,9 @@ impl<P: PointSelection> PointSelection for Unhidden<P> {
         source: &mut Vec<Surfel>,
     ) {
         self.inner.select(context, camera_from_object, source);
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         source.retain(|surfel| {
             let point = camera_from_object * surfel.point.cast::<f64>();
             let Some(pixel) = observation.camera().project(&point) else {

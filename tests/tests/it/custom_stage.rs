@@ -6,8 +6,8 @@ use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{StageLaws, check_stage};
 use hicp_tests::scene;
 use hybrid_icp::{
-    Isometry3, MeanVsd, Outcome, Preset, Problem, Refiner, Score, Session, Stage, Translation3,
-    UnitQuaternion, UnitVector3, Vector3, Verdict, se3,
+    Isometry3, MeanVsd, Model, Outcome, Point3, Preset, Problem, Refiner, Score, Session, Stage,
+    Translation3, UnitQuaternion, UnitVector3, Vector3, Verdict, se3,
 };
 
 // --- The component ---
@@ -29,7 +29,8 @@ impl<S: Stage, C: Score> Stage for BothWays<S, C> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
-        let center = Translation3::from(problem.model.center().coords);
+        let center = problem.model().map_or(Point3::origin(), Model::center);
+        let center = Translation3::from(center.coords);
         let turn = UnitQuaternion::from_axis_angle(&self.axis, PI);
         let turned = init * center * turn * center.inverse();
         let mut outcomes = [init, &turned].map(|start| self.stage.run(problem, start, session));

@@ -1,9 +1,9 @@
 //! A stop rule of one's own: patience.
 
-use std::ops::ControlFlow;
-
 use hicp_testkit::{StopRuleLaws, check_stop_rule};
 use hicp_tests::starts::{measure_stage, starts};
+use hybrid_icp::Iteration;
+use hybrid_icp::Judgment;
 use hybrid_icp::{
     Icp, IterationLimit, PointToPlane, Progress, Projective, Stage, StopRule, Termination,
     VisibleSurface,
@@ -38,7 +38,7 @@ impl StopRule for Patience {
         *self = Self::new(self.turns, self.gain);
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let loss = progress.current.mean_loss;
         if loss < self.best * (1.0 - self.gain) {
             (self.best, self.waited) = (loss, 0);
@@ -46,9 +46,9 @@ impl StopRule for Patience {
             self.waited += 1;
         }
         if self.waited >= self.turns {
-            return ControlFlow::Break(Termination::Converged);
+            return Judgment::Accept(Termination::Custom("out_of_patience"));
         }
-        ControlFlow::Continue(())
+        Judgment::Continue
     }
 }
 

@@ -24,8 +24,14 @@ impl Switcher for Planarity {
         context: &mut Context<'_>,
         camera_from_object: &Isometry3<f64>,
     ) -> RegimeEvent {
-        let mesh = context.problem.model.mesh();
-        let view = context.view(camera_from_object);
+        let problem = context.problem;
+        let (Some(model), Some(view)) = (problem.model(), context.view(camera_from_object)) else {
+            return RegimeEvent {
+                regime: Regime::MISALIGNED,
+                score: None,
+            };
+        };
+        let mesh = model.mesh();
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
         for triangle in view.triangles().iter().filter(|t| **t != NO_TRIANGLE) {
             if let Some(normal) = mesh.normal(*triangle as usize) {

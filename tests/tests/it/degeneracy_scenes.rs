@@ -6,11 +6,13 @@
 
 use std::f64::consts::PI;
 
+use hybrid_icp::Iteration;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
-    Conditioned, Context, Correspondences, DataAssociation, Degeneracy, DepthImage, ErrorMetric,
-    Isometry3, Mask, Model, Observability, Observation, Pair, PinholeCamera, Point3,
-    PointSelection, PointToPlane, PointToPoint, Problem, Projective, Rasterizer, Surfel, TriMesh,
-    UnitVector3, Vector3, Vector6, Workspace, se3,
+    Conditioned, Context, Correspondences, DataAssociation, Degeneracy, DepthImage, Isometry3,
+    Mask, Model, Observability, Observation, Pair, PinholeCamera, Point3, PointSelection,
+    PointToPlane, PointToPoint, Problem, Projective, Rasterizer, Surfel, TriMesh, UnitVector3,
+    Vector3, Vector6, Workspace, se3,
 };
 
 /// Distance of the surfaces' origin from the camera.
@@ -117,15 +119,23 @@ fn run(
     for _ in 0..12 {
         pairs.begin(&pose, exact.0.len());
         Projective.associate(&mut context, &exact.0, &pose, &mut pairs);
-        let observability = metric.system(&pairs).unwrap().observability().unwrap();
-        let step = metric.minimize(&pairs).unwrap();
+        let observability = metric
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .observability()
+            .unwrap();
+        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
         let (pivot, length) = (observability.pivot.coords, observability.length);
         let shift = |by: Vector3<f64>| Isometry3::translation(by.x, by.y, by.z);
         let twist = se3::log(&(shift(-pivot) * step.increment * shift(pivot)));
         let scaled = Vector6::from_fn(|i, _| if i < 3 { twist[i] } else { twist[i] * length });
         let (observability, size) = *first.get_or_insert((observability, scaled.norm()));
         let n = observability.n_degenerate(Degeneracy::THRESHOLD);
-        let open = metric.system(&pairs).unwrap().observability().unwrap();
+        let open = metric
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .observability()
+            .unwrap();
         for direction in &open.directions[..n] {
             slide = slide.max(direction.dot(&scaled).abs() / size);
         }
@@ -134,7 +144,10 @@ fn run(
     }
     pairs.begin(&pose, exact.0.len());
     Projective.associate(&mut context, &exact.0, &pose, &mut pairs);
-    let after = metric.mean_loss(&pairs).unwrap().sqrt();
+    let after = metric
+        .mean_loss(&Iteration::default(), &pairs)
+        .unwrap()
+        .sqrt();
     Run {
         observability: first.unwrap().0,
         slide,
@@ -279,12 +292,19 @@ fn a_line_of_points_leaves_the_turn_about_it() {
             policy,
             threshold: Degeneracy::THRESHOLD,
         };
-        let found = metric.system(&pairs).unwrap().observability().unwrap();
+        let found = metric
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .observability()
+            .unwrap();
         assert_eq!(found.n_degenerate(Degeneracy::THRESHOLD), 1, "{found:?}");
         let turn = unit_twist(&found, Vector3::zeros(), along, middle);
         assert!(turn.dot(&found.directions[0]).abs() > 0.999, "{found:?}");
         // The shift between the pairs is found whole, and nothing turns about the line.
-        let increment = metric.minimize(&pairs).unwrap().increment;
+        let increment = metric
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let left = (motion.inverse() * increment).translation.vector.norm();
         assert!(left < 1e-6, "{policy:?}: {increment}");
         assert!(increment.rotation.scaled_axis().dot(&along).abs() < 1e-6 * 0.0037 / 0.06);
@@ -314,18 +334,29 @@ fn five_points_determine_a_motion_by_distances_and_no_step_by_planes() {
             policy,
             threshold,
         };
-        assert_eq!(planes.minimize(&pairs), None);
-        let open = planes.system(&pairs).unwrap().observability().unwrap();
+        assert_eq!(planes.minimize(&Iteration::default(), &pairs), None);
+        let open = planes
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .observability()
+            .unwrap();
         assert_eq!(open.n_degenerate(threshold), 3, "{open:?}");
         let mut distances = Conditioned {
             metric: PointToPoint,
             policy,
             threshold,
         };
-        let open = distances.system(&pairs).unwrap().observability().unwrap();
+        let open = distances
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .observability()
+            .unwrap();
         assert_eq!(open.n_degenerate(threshold), 0, "{open:?}");
         // A Gauss–Newton step of 2·10⁻³ rad is off by its square.
-        let increment = distances.minimize(&pairs).unwrap().increment;
+        let increment = distances
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let (angle, distance) = se3::pose_distance(&increment, &motion);
         assert!(
             angle < 1e-5 && distance < 1e-5,

@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
+use hybrid_icp::Iteration;
 use hybrid_icp::{
     AllSamples, BoxedStage, Context, Convergence, Correspondences, DataAssociation, DepthImage,
-    ErrorMetric, GaussNewton, Generalized, Icp, Isometry3, IterationEvent, IterationLimit,
-    LevenbergMarquardt, Mask, Observation, Observer, Outcome, Pair, PinholeCamera, PlaneToPoint,
+    GaussNewton, Generalized, Icp, Isometry3, IterationEvent, IterationLimit, LevenbergMarquardt,
+    Mask, Minimize, Observation, Observer, Outcome, Pair, PinholeCamera, PlaneToPoint,
     PointToPlane, PointToPoint, Preset, Problem, Projective, Quality, Rasterizer, Refiner,
     RigidTransform, Session, Stage, StageEvent, Surfel, Symmetric, UnitVector3, Vector3, Verdict,
     VisibleSurface, Workspace, se3,
@@ -59,7 +60,11 @@ fn nothing_is_measured_without_pairs_and_the_initial_pose_stays() {
         );
     }
     assert_eq!(
-        Quality::of(&Correspondences::new(), &mut PointToPlane),
+        Quality::of(
+            &Iteration::default(),
+            &Correspondences::new(),
+            &mut PointToPlane
+        ),
         None
     );
 }
@@ -124,7 +129,7 @@ impl DataAssociation for TruePairs {
 fn the_returned_pose_carries_the_points_onto_their_targets_far_from_the_origin() {
     let scene = scene(Household::Hammer, 0.0, &mut rng(35));
     let mut rng = rng(36);
-    let metrics: [fn() -> Box<dyn ErrorMetric + Send>; 7] = [
+    let metrics: [fn() -> Box<dyn Minimize + Send>; 7] = [
         || Box::new(PointToPoint),
         || Box::new(PointToPlane),
         || Box::new(PlaneToPoint),
@@ -138,7 +143,7 @@ fn the_returned_pose_carries_the_points_onto_their_targets_far_from_the_origin()
         let init = perturb(&mut rng, &truth, meters, degrees.to_radians());
         for metric in metrics {
             let metric = metric();
-            let name = metric.name();
+            let name = metric.label();
             let mut stage = Icp {
                 selection: AllSamples,
                 association: TruePairs(truth),
@@ -274,7 +279,8 @@ fn rmse_is_the_distance_in_metres_at_the_pose_and_zero_for_a_perfect_fit() {
             })
             .collect()
     };
-    let quality = |offset| Quality::of(&at(offset), &mut PointToPlane).unwrap();
+    let quality =
+        |offset| Quality::of(&Iteration::default(), &at(offset), &mut PointToPlane).unwrap();
     let perfect = quality(Vector3::zeros());
     assert_eq!((perfect.point_rmse, perfect.plane_rmse), (0.0, 0.0));
     // 11 mm along the normal, and 11 mm across it.

@@ -49,8 +49,10 @@ impl DataAssociation for ClosestPointOnMesh {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
-        let faces = MeshFaces::of(context.problem.model);
+        let Some((model, observation)) = context.problem.sides() else {
+            return;
+        };
+        let faces = MeshFaces::of(model);
         let view = ObjectView::new(camera_from_object);
         let stride = self.stride.pixels(observation.n_surfels());
         let mut candidates = 0;

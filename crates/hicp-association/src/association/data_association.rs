@@ -1,6 +1,7 @@
 //! The trait of data associations.
 
-use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
+use hicp_core::internal::type_label;
+use hicp_core::{Context, Correspondences, Isometry3, Surfel};
 
 /// Pairs model points with observed points: Algorithm 1, line 1 (and the transform of line 2).
 ///
@@ -32,7 +33,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
 ///         camera_from_object: &Isometry3<f64>,
 ///         pairs: &mut Correspondences,
 ///     ) {
-///         let observation = context.problem.observation;
+///         let Some(observation) = context.problem.observation() else { return };
 ///         let mover = RigidTransform::new(camera_from_object);
 ///         for (source_index, surfel) in (0..).zip(source) {
 ///             let source = mover.surfel(surfel);
@@ -45,6 +46,11 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel, type_label};
 ///     }
 /// }
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a data association",
+    label = "this must implement `DataAssociation`",
+    note = "`Icp::association` accepts a single `DataAssociation`, such as `Projective` or `NearestNeighbor`"
+)]
 pub trait DataAssociation {
     /// Fills `pairs`.
     fn associate(
@@ -55,24 +61,29 @@ pub trait DataAssociation {
         pairs: &mut Correspondences,
     );
 
-    /// Name in traces.
+    /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
 }
 
-impl<T: DataAssociation + ?Sized> DataAssociation for Box<T> {
-    fn associate(
-        &mut self,
-        context: &mut Context<'_>,
-        source: &[Surfel],
-        camera_from_object: &Isometry3<f64>,
-        pairs: &mut Correspondences,
-    ) {
-        (**self).associate(context, source, camera_from_object, pairs);
-    }
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: DataAssociation + ?Sized> DataAssociation for $pointer {
+            fn associate(
+                &mut self,
+                context: &mut Context<'_>,
+                source: &[Surfel],
+                camera_from_object: &Isometry3<f64>,
+                pairs: &mut Correspondences,
+            ) {
+                (**self).associate(context, source, camera_from_object, pairs);
+            }
 
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )+};
 }
+forward!(Box<T>, &mut T);

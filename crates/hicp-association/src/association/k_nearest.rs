@@ -51,7 +51,10 @@ impl DataAssociation for KNearest {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
+        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
         let mover = RigidTransform::new(camera_from_object);
         let found = &mut self.found.0;
         pairs.reserve(source.len().saturating_mul(self.k.max(1).min(index.len())));

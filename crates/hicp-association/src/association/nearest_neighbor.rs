@@ -35,7 +35,10 @@ impl DataAssociation for NearestNeighbor {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets, KdTree::new);
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
+        let index = ObservedPoints::of(observation, self.targets, KdTree::new);
         let mover = RigidTransform::new(camera_from_object);
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {

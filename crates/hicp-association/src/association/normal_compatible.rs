@@ -54,7 +54,10 @@ impl DataAssociation for NormalCompatible {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
+        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
         let mover = RigidTransform::new(camera_from_object);
         let min_cosine = min_cosine(self.max_angle_degrees);
         let found = &mut self.found.0;

@@ -58,11 +58,14 @@ impl DataAssociation for NormalShooting {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets, PointTree::new);
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
+        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
         let mover = RigidTransform::new(camera_from_object);
         let limit = self
             .max_offset
-            .map_or(f32::INFINITY, |length| length.meters(context.problem.model));
+            .map_or(f32::INFINITY, |length| length.meters(&context.problem));
         let found = &mut self.found.0;
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {

@@ -55,8 +55,10 @@ impl DataAssociation for ObservationToModel {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
-        let model = ModelPoints::of(context.problem.model, self.samples);
+        let Some((model, observation)) = context.problem.sides() else {
+            return;
+        };
+        let model = ModelPoints::of(model, self.samples);
         let view = ObjectView::new(camera_from_object);
         let stride = self.stride.pixels(observation.n_surfels());
         let mut candidates = 0;

@@ -1,8 +1,9 @@
 //! Projective data association.
 
+use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{
     Context, Correspondences, Isometry3, Observation, Pair, Point3, RigidTransform, Surfel,
-    UnitVector3, Vector3, VectorLoop, vectorized,
+    UnitVector3, Vector3,
 };
 
 use crate::association::data_association::DataAssociation;
@@ -24,7 +25,9 @@ impl DataAssociation for Projective {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         pairs.reserve(source.len());
         vectorized(Project {
             observation,

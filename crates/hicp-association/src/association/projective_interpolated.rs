@@ -37,7 +37,9 @@ impl DataAssociation for ProjectiveInterpolated {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         let projection = PixelProjection::new(observation.camera());
         let mover = RigidTransform::new(camera_from_object);
         pairs.reserve(source.len());

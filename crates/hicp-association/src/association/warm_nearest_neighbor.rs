@@ -1,8 +1,7 @@
 //! Nearest neighbours that are searched from those of the last iteration.
 
-use hicp_core::{
-    Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel, VectorLoop, vectorized,
-};
+use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
@@ -55,7 +54,10 @@ impl DataAssociation for WarmNearestNeighbor {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let index = ObservedPoints::of(context.problem.observation, self.targets, WideTree::new);
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
+        let index = ObservedPoints::of(observation, self.targets, WideTree::new);
         let last = &mut self.last.0;
         // Any element is a valid start, so what another run left behind costs time at worst.
         last.resize(source.len(), 0);

@@ -1,6 +1,6 @@
 //! Rejection of pairs at the edge of what was observed.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::boundary::{BoundaryMap, BoundaryRule};
 use crate::filter::outlier_filter::OutlierFilter;
@@ -41,10 +41,18 @@ impl Default for BoundaryTargets {
 }
 
 impl OutlierFilter for BoundaryTargets {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        let camera = problem.observation.camera();
-        let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, camera);
-        let boundary = BoundaryMap::of(problem.observation, rule);
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        let Some(observation) = iteration.problem.observation() else {
+            // Without an image no target is known to be inside of it.
+            pairs.retain(|_| false);
+            return;
+        };
+        let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, observation.camera());
+        let boundary = BoundaryMap::of(observation, rule);
         pairs.retain(|pair| !boundary.contains(pair.target_index));
+    }
+
+    fn name(&self) -> &'static str {
+        "boundary-targets"
     }
 }

@@ -1,6 +1,6 @@
 //! The same weight for all.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -22,7 +22,7 @@ impl Default for ConstantWeight {
 }
 
 impl OutlierFilter for ConstantWeight {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let weight = if self.weight.is_finite() {
             self.weight.max(0.0)
         } else {
@@ -31,5 +31,9 @@ impl OutlierFilter for ConstantWeight {
         for pair in pairs.as_mut_slice() {
             pair.weight *= weight;
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "constant-weight"
     }
 }

@@ -1,6 +1,6 @@
 //! Weights that fall with the distance.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
@@ -26,8 +26,8 @@ impl Default for DistanceWeight {
 }
 
 impl OutlierFilter for DistanceWeight {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        let max = self.max.meters(problem.model);
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        let max = self.max.meters(&iteration.problem);
         keep_within(pairs, f32::INFINITY);
         for pair in pairs.as_mut_slice() {
             let distance = pair.distance();
@@ -38,5 +38,9 @@ impl OutlierFilter for DistanceWeight {
                 0.0
             };
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "distance-weight"
     }
 }

@@ -1,6 +1,6 @@
 //! Rejection by the median absolute deviation.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, median};
 use crate::filter::max_distance::keep_within;
@@ -46,7 +46,7 @@ impl Default for MadDistance {
 }
 
 impl OutlierFilter for MadDistance {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
         let center = median(distances).unwrap_or(0.0);
@@ -58,5 +58,9 @@ impl OutlierFilter for MadDistance {
             pairs,
             center + self.factor * deviation.max(self.floor.max(0.0)),
         );
+    }
+
+    fn name(&self) -> &'static str {
+        "mad-distance"
     }
 }

@@ -1,6 +1,6 @@
 //! Rejection by distance.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::length::Length;
@@ -30,8 +30,12 @@ impl MaxDistance {
 }
 
 impl OutlierFilter for MaxDistance {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        keep_within(pairs, self.0.meters(problem.model));
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        keep_within(pairs, self.0.meters(&iteration.problem));
+    }
+
+    fn name(&self) -> &'static str {
+        "max-distance"
     }
 }
 

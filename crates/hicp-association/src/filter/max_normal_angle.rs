@@ -1,6 +1,6 @@
 //! Rejection by the angle between normals.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -21,8 +21,12 @@ impl MaxNormalAngle {
 }
 
 impl OutlierFilter for MaxNormalAngle {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         pairs.retain(|pair| pair.source.normal.dot(&pair.target.normal) >= self.min_cosine);
+    }
+
+    fn name(&self) -> &'static str {
+        "max-normal-angle"
     }
 }
 

@@ -1,6 +1,6 @@
 //! Rejection by a multiple of the median distance.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, median};
 use crate::filter::max_distance::keep_within;
@@ -38,9 +38,13 @@ impl Default for MedianDistance {
 }
 
 impl OutlierFilter for MedianDistance {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
         keep_within(pairs, self.factor * median(distances).unwrap_or(0.0));
+    }
+
+    fn name(&self) -> &'static str {
+        "median-distance"
     }
 }

@@ -1,6 +1,6 @@
 //! A floor for the number of pairs.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -21,9 +21,13 @@ impl Default for MinPairs {
 }
 
 impl OutlierFilter for MinPairs {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         if pairs.len() < self.count {
             pairs.retain(|_| false);
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "min-pairs"
     }
 }

@@ -1,6 +1,6 @@
 //! Weights that fall with the angle between normals.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -12,11 +12,15 @@ use crate::filter::outlier_filter::OutlierFilter;
 pub struct NormalWeight;
 
 impl OutlierFilter for NormalWeight {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         for pair in pairs.as_mut_slice() {
             let cosine = pair.source.normal.dot(&pair.target.normal);
             // False for NaN; rounding may leave a cosine just above 1.
             pair.weight *= if cosine > 0.0 { cosine.min(1.0) } else { 0.0 };
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "normal-weight"
     }
 }

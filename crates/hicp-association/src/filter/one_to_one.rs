@@ -1,6 +1,6 @@
 //! One pair per observed point.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
@@ -30,7 +30,7 @@ impl OneToOne {
 }
 
 impl OutlierFilter for OneToOne {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let Buffers { claims, kept } = &mut self.scratch.0;
         claims.clear();
         claims.extend(
@@ -51,5 +51,9 @@ impl OutlierFilter for OneToOne {
         }
         let mut kept = kept.iter();
         pairs.retain(|_| kept.next() == Some(&true));
+    }
+
+    fn name(&self) -> &'static str {
+        "one-to-one"
     }
 }

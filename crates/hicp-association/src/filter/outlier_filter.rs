@@ -1,64 +1,94 @@
 //! The trait of outlier filters, and how they chain.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::internal::type_label;
+use hicp_core::{Correspondences, Iteration};
 
 /// Removes or re-weights pairs (the third and fourth ICP components, §II).
 ///
-/// `()` keeps everything; tuples apply their members in order.
+/// `()` keeps everything. A tuple of up to eight filters applies them in order, and so does a `Vec` of any length.
+///
+/// Pure given the iteration: a filter that changes from one iteration to the next reads [`Iteration::index`], not how
+/// often it was called.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an outlier filter",
+    label = "this must implement `OutlierFilter`",
+    note = "`Icp::filter` accepts an `OutlierFilter`, `()`, an `Option` of one, a `Vec` of one type (for example `Vec<Box<dyn OutlierFilter>>`), or a tuple of one to eight of them"
+)]
 pub trait OutlierFilter {
-    /// Filters the pairs of one iteration, keeping their order.
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences);
+    /// Filters the pairs of one iteration and keeps their order.
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences);
 
-    /// Says which iteration of a stage, from 0, the next pairs belong to, for filters that change from one to the next.
-    ///
-    /// Pure given the iteration: only the number announced last counts, not which came before. A stage announces 0 to a filter
-    /// that has seen others, and goes back by one to measure the pose that it returns after a rejected one.
-    fn begin(&mut self, iteration: usize) {
-        let _ = iteration;
+    /// Returns the name in traces.
+    fn name(&self) -> &'static str {
+        type_label::<Self>()
+    }
+
+    /// Appends the names of the filters that this one applies, in order: its own name, or those of a chain's members.
+    fn names(&self, names: &mut Vec<&'static str>) {
+        names.push(self.name());
     }
 }
 
 impl OutlierFilter for () {
-    fn filter(&mut self, _problem: &Problem<'_>, _pairs: &mut Correspondences) {}
-}
+    fn filter(&mut self, _iteration: &Iteration<'_>, _pairs: &mut Correspondences) {}
 
-impl<T: OutlierFilter + ?Sized> OutlierFilter for Box<T> {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        (**self).filter(problem, pairs);
+    fn name(&self) -> &'static str {
+        "none"
     }
 
-    fn begin(&mut self, iteration: usize) {
-        (**self).begin(iteration);
-    }
+    fn names(&self, _names: &mut Vec<&'static str>) {}
 }
+
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: OutlierFilter + ?Sized> OutlierFilter for $pointer {
+            fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+                (**self).filter(iteration, pairs);
+            }
+
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+
+            fn names(&self, names: &mut Vec<&'static str>) {
+                (**self).names(names);
+            }
+        }
+    )+};
+}
+forward!(Box<T>, &mut T);
 
 /// `None` keeps everything.
 impl<T: OutlierFilter> OutlierFilter for Option<T> {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        if let Some(inner) = self {
-            inner.filter(problem, pairs);
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        for filter in self.iter_mut() {
+            filter.filter(iteration, pairs);
         }
     }
 
-    fn begin(&mut self, iteration: usize) {
-        for member in self.iter_mut() {
-            member.begin(iteration);
-        }
+    fn name(&self) -> &'static str {
+        self.as_ref().map_or("none", OutlierFilter::name)
+    }
+
+    fn names(&self, names: &mut Vec<&'static str>) {
+        self.iter().for_each(|filter| filter.names(names));
     }
 }
 
 /// Applies the members in order.
 impl<T: OutlierFilter> OutlierFilter for Vec<T> {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
-        for member in self {
-            member.filter(problem, pairs);
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        for filter in self.iter_mut() {
+            filter.filter(iteration, pairs);
         }
     }
 
-    fn begin(&mut self, iteration: usize) {
-        for member in self.iter_mut() {
-            member.begin(iteration);
-        }
+    fn name(&self) -> &'static str {
+        "chain"
+    }
+
+    fn names(&self, names: &mut Vec<&'static str>) {
+        self.iter().for_each(|filter| filter.names(names));
     }
 }
 
@@ -66,15 +96,19 @@ macro_rules! chain {
     ($($member:ident),+) => {
         impl<$($member: OutlierFilter),+> OutlierFilter for ($($member,)+) {
             #[allow(non_snake_case)]
-            fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+            fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
                 let ($($member,)+) = self;
-                $($member.filter(problem, pairs);)+
+                $($member.filter(iteration, pairs);)+
+            }
+
+            fn name(&self) -> &'static str {
+                "chain"
             }
 
             #[allow(non_snake_case)]
-            fn begin(&mut self, iteration: usize) {
+            fn names(&self, names: &mut Vec<&'static str>) {
                 let ($($member,)+) = self;
-                $($member.begin(iteration);)+
+                $($member.names(names);)+
             }
         }
     };

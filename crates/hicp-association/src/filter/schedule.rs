@@ -1,6 +1,6 @@
 //! Filters that change from iteration to iteration.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -12,32 +12,25 @@ use crate::filter::outlier_filter::OutlierFilter;
 pub struct Schedule<F> {
     /// The filters by iteration.
     pub filters: Vec<F>,
-    iteration: usize,
 }
 
 impl<F> Schedule<F> {
-    /// Makes the schedule.
+    /// Creates the schedule.
     #[must_use]
     pub fn new(filters: Vec<F>) -> Self {
-        Self {
-            filters,
-            iteration: 0,
-        }
+        Self { filters }
     }
 }
 
 impl<F: OutlierFilter> OutlierFilter for Schedule<F> {
-    fn filter(&mut self, problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let last = self.filters.len().saturating_sub(1);
-        if let Some(filter) = self.filters.get_mut(self.iteration.min(last)) {
-            filter.filter(problem, pairs);
+        if let Some(filter) = self.filters.get_mut(iteration.index.min(last)) {
+            filter.filter(iteration, pairs);
         }
     }
 
-    fn begin(&mut self, iteration: usize) {
-        self.iteration = iteration;
-        for filter in &mut self.filters {
-            filter.begin(iteration);
-        }
+    fn name(&self) -> &'static str {
+        "schedule"
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use hicp_core::{Correspondences, Problem, Surfel};
+use hicp_core::{Correspondences, Iteration, Surfel};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -96,7 +96,7 @@ impl Default for SensorNoise {
 }
 
 impl OutlierFilter for SensorNoiseWeight {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let sum: f64 = (pairs.as_slice().iter())
             .map(|pair| self.noise.precision(&pair.target))
             .sum();
@@ -109,5 +109,9 @@ impl OutlierFilter for SensorNoiseWeight {
             let weight = (self.noise.precision(&pair.target) * per_mean) as f32;
             pair.weight *= weight;
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "sensor-noise-weight"
     }
 }

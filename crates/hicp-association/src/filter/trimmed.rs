@@ -1,6 +1,6 @@
 //! Rejection of a fixed share.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, nth_smallest, share_of};
 use crate::filter::max_distance::keep_within;
@@ -37,12 +37,16 @@ impl Default for Trimmed {
 }
 
 impl OutlierFilter for Trimmed {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
         let limit = share_of(self.keep, distances.len())
             .checked_sub(1)
             .and_then(|rank| nth_smallest(distances, rank));
         keep_within(pairs, limit.unwrap_or(f32::NAN));
+    }
+
+    fn name(&self) -> &'static str {
+        "trimmed"
     }
 }

@@ -1,6 +1,6 @@
 //! Rejection of a share that the distances decide.
 
-use hicp_core::{Correspondences, Problem};
+use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, share_of};
 use crate::filter::max_distance::keep_within;
@@ -44,7 +44,7 @@ impl Default for VarTrimmed {
 }
 
 impl OutlierFilter for VarTrimmed {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
         distances.sort_unstable_by(f32::total_cmp);
@@ -66,5 +66,9 @@ impl OutlierFilter for VarTrimmed {
             }
         }
         keep_within(pairs, best.1);
+    }
+
+    fn name(&self) -> &'static str {
+        "var-trimmed"
     }
 }

@@ -1,6 +1,7 @@
 //! A tree of axis-aligned boxes for exact nearest-element queries.
 
-use hicp_core::{Point3, Work};
+use hicp_core::Point3;
+use hicp_core::internal::Work;
 
 /// Elements per leaf: small enough to prune, large enough that a leaf is a short scan.
 const LEAF_SIZE: usize = 8;

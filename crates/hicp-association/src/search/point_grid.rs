@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Observation, VectorLoop, Work, vectorized};
+use hicp_core::Observation;
+use hicp_core::internal::{VectorLoop, Work, vectorized};
 
 use crate::search::wide_tree::Nearest;
 use crate::stride::Stride;

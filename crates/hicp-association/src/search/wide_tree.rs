@@ -1,6 +1,7 @@
 //! Exact nearest points, eight at a time.
 
-use hicp_core::{Point3, Work};
+use hicp_core::Point3;
+use hicp_core::internal::Work;
 
 /// Children of a node.
 const WIDTH: usize = 8;

@@ -18,7 +18,9 @@ impl PointSelection for AllSamples {
         _camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        source.extend_from_slice(context.problem.model.samples());
+        if let Some(model) = context.problem.model() {
+            source.extend_from_slice(model.samples());
+        }
     }
 
     fn name(&self) -> &'static str {

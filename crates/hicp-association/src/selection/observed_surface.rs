@@ -38,7 +38,9 @@ impl PointSelection for ObservedSurface {
             return;
         }
         let mover = RigidTransform::new(&object_from_camera);
-        let observation = context.problem.observation;
+        let Some(observation) = context.problem.observation() else {
+            return;
+        };
         let stride = self.stride.pixels(observation.n_surfels());
         source.extend(
             observation

@@ -1,6 +1,7 @@
 //! The trait of point selections.
 
-use hicp_core::{Context, Isometry3, Surfel, type_label};
+use hicp_core::internal::type_label;
+use hicp_core::{Context, Isometry3, Surfel};
 
 /// Chooses the model points oᵢ that a stage registers (the first of the five ICP components, §II).
 ///
@@ -8,6 +9,11 @@ use hicp_core::{Context, Isometry3, Surfel, type_label};
 /// `source` arrives empty. Selecting nothing is no error: the stage then ends with "no pairs".
 ///
 /// A selection is pure: equal inputs give equal points, and `&mut self` is for scratch memory only.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a point selection",
+    label = "this must implement `PointSelection`",
+    note = "`Icp::selection` accepts a `PointSelection`, or `()` for an association that starts from the observation"
+)]
 pub trait PointSelection {
     /// Fills `source` with the chosen surfels.
     fn select(
@@ -17,23 +23,37 @@ pub trait PointSelection {
         source: &mut Vec<Surfel>,
     );
 
-    /// Name in traces.
+    /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
 }
 
-impl<T: PointSelection + ?Sized> PointSelection for Box<T> {
-    fn select(
-        &mut self,
-        context: &mut Context<'_>,
-        camera_from_object: &Isometry3<f64>,
-        source: &mut Vec<Surfel>,
-    ) {
-        (**self).select(context, camera_from_object, source);
-    }
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: PointSelection + ?Sized> PointSelection for $pointer {
+            fn select(
+                &mut self,
+                context: &mut Context<'_>,
+                camera_from_object: &Isometry3<f64>,
+                source: &mut Vec<Surfel>,
+            ) {
+                (**self).select(context, camera_from_object, source);
+            }
+
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )+};
+}
+forward!(Box<T>, &mut T);
+
+/// Selects no model points: for an association that starts from the observed points.
+impl PointSelection for () {
+    fn select(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>, _: &mut Vec<Surfel>) {}
 
     fn name(&self) -> &'static str {
-        (**self).name()
+        "none"
     }
 }

@@ -33,8 +33,12 @@ impl PointSelection for VisibleSurface {
         source: &mut Vec<Surfel>,
     ) {
         let problem = context.problem;
-        let (mesh, camera) = (problem.model.mesh(), problem.observation.camera());
-        let view = context.view(camera_from_object);
+        let (Some((model, observation)), Some(view)) =
+            (problem.sides(), context.view(camera_from_object))
+        else {
+            return;
+        };
+        let (mesh, camera) = (model.mesh(), observation.camera());
         let region = view.region();
         let rendered = view.n_rendered();
         if rendered == 0 {

@@ -58,7 +58,7 @@ impl<P: PointSelection> PointSelection for VoxelGrid<P> {
         source: &mut Vec<Surfel>,
     ) {
         self.inner.select(context, camera_from_object, source);
-        let edge = self.cell.meters(context.problem.model);
+        let edge = self.cell.meters(&context.problem);
         if edge.is_nan() || edge <= 0.0 {
             return;
         }

@@ -44,10 +44,16 @@ impl<P: PointSelection> PointSelection for WithoutBoundary<P> {
         source: &mut Vec<Surfel>,
     ) {
         self.inner.select(context, camera_from_object, source);
-        let camera = *context.problem.observation.camera();
+        let problem = context.problem;
+        let (Some(observation), Some(view)) =
+            (problem.observation(), context.view(camera_from_object))
+        else {
+            source.clear();
+            return;
+        };
+        let camera = observation.camera();
         let image = camera.region();
-        let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, &camera);
-        let view = context.view(camera_from_object);
+        let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, camera);
         source.retain(|surfel| {
             let point = camera_from_object * surfel.point.cast::<f64>();
             let Some(pixel) = camera.project(&point) else {

@@ -2,6 +2,7 @@
 
 use crate::support::{Numbers, cuboid, depth_image};
 use hicp_association::{MaxDistance, MaxNormalAngle, OutlierFilter};
+use hicp_core::Iteration;
 use hicp_core::{
     Correspondences, Mask, Model, ModelConfig, Observation, Pair, PinholeCamera, Point3, Problem,
     Surfel, UnitVector3, Vector3,
@@ -44,7 +45,7 @@ fn kept(filter: &mut dyn OutlierFilter, pairs: &[Pair]) -> Vec<u32> {
         Model::with_config(cuboid(0.1, 0.1, 0.1), config),
         observation(),
     );
-    filter.filter(&Problem::new(&model, &observation), &mut pairs);
+    filter.filter(&at(Problem::new(&model, &observation)), &mut pairs);
     pairs.as_slice().iter().map(|p| p.source_index).collect()
 }
 
@@ -104,7 +105,7 @@ fn equal_and_opposite_normals_survive_their_rounding() {
 struct Doubling;
 
 impl OutlierFilter for Doubling {
-    fn filter(&mut self, _: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _: &Iteration<'_>, pairs: &mut Correspondences) {
         pairs
             .as_mut_slice()
             .iter_mut()
@@ -116,7 +117,7 @@ impl OutlierFilter for Doubling {
 struct Half;
 
 impl OutlierFilter for Half {
-    fn filter(&mut self, _: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _: &Iteration<'_>, pairs: &mut Correspondences) {
         let keep = pairs.len() / 2;
         let mut seen = 0;
         pairs.retain(|_| {
@@ -174,7 +175,12 @@ fn filters_may_weigh_and_keep_the_order() {
         })
         .collect();
     let (model, observation) = (Model::new(cuboid(0.1, 0.1, 0.1)), observation());
-    (Doubling, Doubling).filter(&Problem::new(&model, &observation), &mut pairs);
+    (Doubling, Doubling).filter(&at(Problem::new(&model, &observation)), &mut pairs);
     assert!(pairs.as_slice().iter().all(|p| p.weight == 4.0));
     assert!(pairs.as_slice().iter().map(|p| p.source_index).eq(0..5));
+}
+
+/// The first iteration of a stage over a problem.
+fn at(problem: Problem<'_>) -> Iteration<'_> {
+    Iteration::new(0, &hicp_core::Isometry3::identity(), problem)
 }

@@ -466,9 +466,10 @@ fn boundary_targets_follow_their_definition() {
 fn strides_and_lengths_take_any_value() {
     assert_eq!(Stride::Pixels(0).pixels(100), 1);
     assert_eq!(Stride::AboutPoints(0).pixels(0), 1);
-    let model = &scene().model;
-    assert_eq!(Length::Meters(-1.0).meters(model), -1.0);
-    assert!(Length::Diameters(f32::NAN).meters(model).is_nan());
+    let scene = scene();
+    let problem = scene.problem();
+    assert_eq!(Length::Meters(-1.0).meters(&problem), -1.0);
+    assert!(Length::Diameters(f32::NAN).meters(&problem).is_nan());
 }
 
 /// A limit in depth per pixel that fits one camera takes slanted surface for an edge in the next, with a quarter of the pixels.

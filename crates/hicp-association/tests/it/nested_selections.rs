@@ -384,7 +384,7 @@ fn boundary_reference(
 ) -> Vec<Surfel> {
     let mut renders = RenderCache::new(crate::common::RayCaster);
     let mut context = Context::new(scene.problem(), &mut renders);
-    let view = context.view(pose);
+    let view = context.view(pose).unwrap();
     let depth = |u: i64, v: i64| view.depth_at(u as u32, v as u32);
     let width = i64::from(width);
     let keep = |surfel: &&Surfel| {

@@ -1,6 +1,7 @@
 //! Names of components.
 
-use hicp_core::{Derived, type_label};
+use hicp_core::Derived;
+use hicp_core::internal::type_label;
 
 mod inner {
     pub(super) struct Part<T>(#[allow(dead_code)] T);

@@ -298,17 +298,23 @@ fn a_context_shows_the_model_in_the_observations_camera() {
     let truth = pose(0.0, 0.01, 0.4, 0.2, 0.1, -0.3);
     let observation = observe(&model, &camera, &truth);
     let problem = Problem::new(&model, &observation);
-    assert!(std::ptr::eq(problem.model, &raw const model));
-    assert!(std::ptr::eq(problem.observation, &raw const observation));
+    assert!(std::ptr::eq(problem.model().unwrap(), &raw const model));
+    assert!(std::ptr::eq(
+        problem.observation().unwrap(),
+        &raw const observation
+    ));
     let (mut cache, renders) = counted(None);
     let nearby = truth * Isometry3::translation(0.01, 0.0, 0.0);
     let away = Isometry3::from_parts(Vector3::new(0.0, 0.0, -1.0).into(), truth.rotation);
     for pose in [truth, nearby, away, truth] {
         let mut context = Context::new(problem, &mut cache);
         let expected = fresh(model.mesh(), &camera, &pose, &camera.region());
-        assert_eq!(*context.view(&pose), expected);
+        assert_eq!(*context.view(&pose).unwrap(), expected);
         assert_eq!(expected.region().is_empty(), pose == away);
-        assert!(std::ptr::eq(context.problem.model, &raw const model));
+        assert!(std::ptr::eq(
+            context.problem.model().unwrap(),
+            &raw const model
+        ));
     }
     assert_eq!(renders.load(Ordering::Relaxed), 3);
 }

@@ -120,6 +120,10 @@ impl<S: Stage> Stage for Anderson<S> {
             None => Outcome::kept(init, termination),
         }
     }
+
+    fn name(&self) -> &'static str {
+        "anderson"
+    }
 }
 
 /// Differences of the last residuals and iterates, newest overwriting oldest.

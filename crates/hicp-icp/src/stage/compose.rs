@@ -8,8 +8,9 @@ use crate::stage::stage_trait::Stage;
 
 /// Runs stages one after the other, each from where the one before ended (Cascading ICP, §IV-B).
 ///
-/// A stage that diverges hands on the last pose before it did, so a cascade whose first stage diverges starts the second
-/// from the initial pose, and one in which all diverge returns it. Losses are never compared across stages.
+/// A stage that diverges hands on the pose that it accepted last. If the first stage diverges in its first step, the second
+/// starts from the initial pose; if it diverges later, the second starts from the last pose before the divergence. Losses are
+/// never compared across stages.
 ///
 /// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,6 +32,10 @@ macro_rules! cascade {
                     let outcome = outcome.then($next.run(problem, &outcome.camera_from_object, session));
                 )*
                 outcome
+            }
+
+            fn name(&self) -> &'static str {
+                "cascade"
             }
         }
     };
@@ -55,6 +60,10 @@ impl<T: Stage> Stage for Cascade<Vec<T>> {
             outcome = Some(outcome.map_or(next, |o| o.then(next)));
         }
         outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+    }
+
+    fn name(&self) -> &'static str {
+        "cascade"
     }
 }
 
@@ -87,5 +96,9 @@ impl<S: Stage> Stage for Repeat<S> {
             }
         }
         outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+    }
+
+    fn name(&self) -> &'static str {
+        "repeat"
     }
 }

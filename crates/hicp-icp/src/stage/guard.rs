@@ -42,6 +42,10 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
             }
         }
     }
+
+    fn name(&self) -> &'static str {
+        "guard"
+    }
 }
 
 /// Repeats a stage, each time from where it ended, and returns the best pose met, the initial one included, by a score.
@@ -88,5 +92,9 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
             iterations: last.iterations,
             ..best.1
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "keep-best"
     }
 }

@@ -42,15 +42,16 @@ impl<'a> Hypotheses<'a> {
         init: &Isometry3<f64>,
         bound: Option<Bound>,
     ) -> Option<Self> {
-        let centroid = centroid(problem.observation)?;
+        let (model, observation) = problem.sides()?;
+        let centroid = centroid(observation)?;
         let ray = centroid.coords.try_normalize(f64::EPSILON)?;
         se3::is_finite(init).then(|| Self {
-            model: problem.model,
+            model,
             init: *init,
             bound,
             centroid,
             ray,
-            oriented: problem.model.mesh().is_closed(),
+            oriented: model.mesh().is_closed(),
         })
     }
 

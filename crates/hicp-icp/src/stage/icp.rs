@@ -1,24 +1,22 @@
 //! Algorithm 1: generic ICP.
 
-use std::ops::ControlFlow;
-
 use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
-use hicp_core::{Context, Isometry3, Problem, se3};
-use hicp_metric::ErrorMetric;
+use hicp_core::{Context, Isometry3, Iteration, Problem, se3};
+use hicp_metric::Minimize;
 
 use crate::observer::{IterationEvent, StageEvent};
 use crate::outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
-use crate::stop::stop_rule::{Progress, StopRule};
+use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
 /// The most evaluations that a stage makes, whatever its stop rules say.
 pub const MAX_ITERATIONS: usize = 1000;
 
 /// Generic ICP (Algorithm 1 of the paper) from its five components, each a public field.
 ///
-/// The points are selected once, at the initial pose. A turn then associates at the candidate pose, filters, and minimises,
-/// which gives the loss *there* and the next increment; the stop rule judges. A candidate is accepted only after it was
+/// The points are selected once, at the initial pose. An iteration then associates at the candidate pose, filters, and
+/// minimizes, which gives the loss *there* and the next increment; the stop rule judges. A candidate is accepted only after it was
 /// evaluated, so the returned pose is the last one that the rules let stand, and rolling back costs nothing.
 ///
 /// Whatever the stop rules say, a stage ends after [`MAX_ITERATIONS`] evaluations: a rule set without a limit may never fire.
@@ -58,9 +56,13 @@ where
     P: PointSelection,
     A: DataAssociation,
     F: OutlierFilter,
-    M: ErrorMetric,
+    M: Minimize,
     S: StopRule,
 {
+    fn name(&self) -> &'static str {
+        "icp"
+    }
+
     fn run(
         &mut self,
         problem: &Problem<'_>,
@@ -77,25 +79,24 @@ where
         }
         self.stop.start();
 
-        let mut accepted: Option<(Isometry3<f64>, Evaluation)> = None;
+        let mut accepted: Option<Accepted<'_>> = None;
         let mut candidate = *init;
         let mut first = None;
-        let mut iteration = 0;
+        let mut evaluations = 0;
         let termination = loop {
+            let iteration = Iteration::new(evaluations, init, *problem);
             pairs.begin(&candidate, source.len());
             if finite {
                 // Even without a source: an association may start from the observation.
                 self.association
                     .associate(&mut context, source, &candidate, pairs);
-                self.filter.begin(iteration);
-                self.filter.filter(problem, pairs);
-                self.metric.begin(iteration, init);
+                self.filter.filter(&iteration, pairs);
             }
-            iteration += 1;
+            evaluations += 1;
             if pairs.is_empty() {
                 break Termination::NoPairs;
             }
-            let Some(step) = self.metric.minimize(pairs) else {
+            let Some(step) = self.metric.minimize(&iteration, pairs) else {
                 break Termination::Degenerate;
             };
             let current = Evaluation {
@@ -103,33 +104,35 @@ where
                 mean_loss: step.mean_loss,
             };
             let first = *first.get_or_insert(current);
-            let wish = session.observer.on_iteration(&IterationEvent {
-                iteration: iteration - 1,
+            let request = session.observer.on_iteration(&IterationEvent {
+                iteration: iteration.index,
                 camera_from_object: &candidate,
                 evaluation: current,
                 increment: &step.increment,
             });
-            let verdict = self.stop.check(&Progress {
-                iteration: iteration - 1,
+            let progress = Progress {
                 current,
                 first,
-                previous: accepted.map(|(_, evaluation)| evaluation),
+                previous: accepted.map(|a| a.evaluation),
                 camera_from_object: &candidate,
-                init,
                 increment: &step.increment,
-            });
-            match verdict {
-                ControlFlow::Break(termination) if termination.is_rollback() => break termination,
-                ControlFlow::Break(termination) => {
-                    accepted = Some((candidate, current));
-                    break termination;
-                }
-                ControlFlow::Continue(()) => accepted = Some((candidate, current)),
+            };
+            let judgment = self.stop.check(&iteration, &progress);
+            if let Judgment::Reject(termination) = judgment {
+                break termination;
             }
-            if wish.is_break() {
+            accepted = Some(Accepted {
+                camera_from_object: candidate,
+                evaluation: current,
+                iteration,
+            });
+            if let Judgment::Accept(termination) = judgment {
+                break termination;
+            }
+            if request.is_break() {
                 break Termination::Stopped;
             }
-            if iteration >= MAX_ITERATIONS {
+            if evaluations >= MAX_ITERATIONS {
                 break Termination::IterationLimit;
             }
             let mut next = step.increment * candidate;
@@ -141,21 +144,17 @@ where
             candidate = next;
         };
 
-        let pose = accepted.map_or(*init, |(pose, _)| pose);
-        let mut quality = None;
-        if accepted.is_some() {
+        let pose = accepted.map_or(*init, |a| a.camera_from_object);
+        let quality = accepted.and_then(|accepted| {
             if *pairs.camera_from_object() != pose {
-                // Rolled back: the pairs in hand are those of the rejected pose, one iteration after the accepted one.
+                // Rolled back: the pairs in hand are those of the rejected pose.
                 pairs.begin(&pose, source.len());
                 self.association
                     .associate(&mut context, source, &pose, pairs);
-                let accepted_in = iteration.saturating_sub(2);
-                self.filter.begin(accepted_in);
-                self.filter.filter(problem, pairs);
-                self.metric.begin(accepted_in, init);
+                self.filter.filter(&accepted.iteration, pairs);
             }
-            quality = Quality::of(pairs, &mut self.metric);
-        }
+            Quality::of(&accepted.iteration, pairs, &mut self.metric)
+        });
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
@@ -164,14 +163,22 @@ where
             } else {
                 Verdict::Refined
             },
-            iterations: iteration,
-            evaluation: accepted.map(|(_, evaluation)| evaluation),
+            iterations: evaluations,
+            evaluation: accepted.map(|a| a.evaluation),
             quality,
         };
+        let names = &mut workspace.names;
+        names.clear();
+        self.filter.names(names);
+        let n_filters = names.len();
+        self.stop.names(names);
+        let (filters, stop_rules) = names.split_at(n_filters);
         session.observer.on_stage_end(&StageEvent {
             selection: self.selection.name(),
             association: self.association.name(),
-            metric: self.metric.name(),
+            filters,
+            metric: self.metric.label(),
+            stop_rules,
             n_source: source.len(),
             outcome: &outcome,
         });
@@ -179,7 +186,15 @@ where
     }
 }
 
-/// Whether two poses are one to the bit; by value a pose with a NaN would differ from itself.
+/// The pose accepted last, and the iteration that evaluated it.
+#[derive(Clone, Copy)]
+struct Accepted<'a> {
+    camera_from_object: Isometry3<f64>,
+    evaluation: Evaluation,
+    iteration: Iteration<'a>,
+}
+
+/// Returns whether two poses are equal to the bit; by value a pose with a NaN would differ from itself.
 fn same_bits(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     let coordinates = |pose: &Isometry3<f64>| {
         let (t, q) = (pose.translation.vector, pose.rotation.coords);

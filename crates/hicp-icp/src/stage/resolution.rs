@@ -29,8 +29,14 @@ impl<S: Stage> Stage for AtResolution<S> {
         if self.factor <= 1 {
             return self.stage.run(problem, init, session);
         }
-        let coarse = problem.observation.decimated(self.factor);
-        let problem = Problem::new(problem.model, &coarse);
-        self.stage.run(&problem, init, session)
+        let Some((model, observation)) = problem.sides() else {
+            return self.stage.run(problem, init, session);
+        };
+        let coarse = observation.decimated(self.factor);
+        self.stage.run(&Problem::new(model, &coarse), init, session)
+    }
+
+    fn name(&self) -> &'static str {
+        "at-resolution"
     }
 }

@@ -260,7 +260,11 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
     ) -> Outcome {
         let clock = Clock::start(self.options.time_limit);
         let mut local = self.stage.run(problem, init, session);
-        if !se3::is_finite(init) || problem.observation.n_surfels() == 0 {
+        if !se3::is_finite(init)
+            || problem
+                .observation()
+                .is_none_or(|seen| seen.n_surfels() == 0)
+        {
             return local;
         }
         let stopped = local.termination == Termination::Stopped;
@@ -297,6 +301,10 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
             iterations,
             ..local
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "hypothesis-search"
     }
 }
 

@@ -1,11 +1,12 @@
 //! The trait of stages: the one verb, closed under composition.
 
+use hicp_core::internal::type_label;
 use hicp_core::{Isometry3, Problem};
 
 use crate::outcome::Outcome;
 use crate::session::Session;
 
-/// Makes a better pose from a pose.
+/// Refines a pose.
 ///
 /// [`crate::Icp`], [`crate::Cascade`], [`crate::Repeat`] and `Switch` are stages, and so is any composition of them:
 /// Hybrid ICP is a struct literal.
@@ -16,6 +17,11 @@ use crate::session::Session;
 /// - The returned pose was evaluated, or is `init` bit for bit.
 /// - Pure: equal inputs give equal bits, whatever ran before; `&mut self` and the session's workspace are scratch.
 /// - A warm run (the same stage and workspace before, on inputs no larger) makes no heap allocation.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a stage",
+    label = "this must implement `Stage`",
+    note = "stages are `Icp` (whose five fields must implement `PointSelection`, `DataAssociation`, `OutlierFilter`, `ErrorMetric` and `StopRule`), `Cascade` of a tuple of one to four stages or of a `Vec`, `Repeat`, `Switch`, and compositions of them; a `Preset` becomes one by `.build()`"
+)]
 pub trait Stage {
     /// Runs the stage from `init`, the initial `camera_from_object`.
     fn run(
@@ -24,15 +30,29 @@ pub trait Stage {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome;
-}
 
-impl<T: Stage + ?Sized> Stage for Box<T> {
-    fn run(
-        &mut self,
-        problem: &Problem<'_>,
-        init: &Isometry3<f64>,
-        session: &mut Session<'_>,
-    ) -> Outcome {
-        (**self).run(problem, init, session)
+    /// Returns the name in traces.
+    fn name(&self) -> &'static str {
+        type_label::<Self>()
     }
 }
+
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: Stage + ?Sized> Stage for $pointer {
+            fn run(
+                &mut self,
+                problem: &Problem<'_>,
+                init: &Isometry3<f64>,
+                session: &mut Session<'_>,
+            ) -> Outcome {
+                (**self).run(problem, init, session)
+            }
+
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )+};
+}
+forward!(Box<T>, &mut T);

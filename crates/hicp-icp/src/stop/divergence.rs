@@ -1,9 +1,9 @@
 //! The divergence rules of Cascading ICP.
 
-use std::ops::ControlFlow;
+use hicp_core::Iteration;
 
 use crate::outcome::Termination;
-use crate::stop::stop_rule::{Progress, StopRule};
+use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
 /// When a rising mean loss counts as divergence (rule 3 of §IV-B).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,15 +62,15 @@ impl Default for Divergence {
 }
 
 impl StopRule for Divergence {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let Some(previous) = progress.previous else {
-            return ControlFlow::Continue(());
+            return Judgment::Continue;
         };
         let n_pairs = progress.current.n_pairs;
         #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
         let lost = |before: usize| (n_pairs as f64) < (1.0 - self.pairs_lost) * before as f64;
         if lost(progress.first.n_pairs) || lost(previous.n_pairs) {
-            return ControlFlow::Break(Termination::PairsLost);
+            return Judgment::Reject(Termination::PairsLost);
         }
         let judged = match self.loss_rule {
             LossRule::Strict => true,
@@ -78,8 +78,12 @@ impl StopRule for Divergence {
         };
         let rose = progress.current.mean_loss > previous.mean_loss * (1.0 + self.rise_tolerance);
         if judged && rose {
-            return ControlFlow::Break(Termination::LossIncreased);
+            return Judgment::Reject(Termination::LossIncreased);
         }
-        ControlFlow::Continue(())
+        Judgment::Continue
+    }
+
+    fn name(&self) -> &'static str {
+        "divergence"
     }
 }

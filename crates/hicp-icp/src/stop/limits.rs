@@ -1,41 +1,34 @@
-//! Stop rules on loss and time.
+//! Stop rules on counts and time.
 
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use hicp_core::Iteration;
+
 use crate::outcome::Termination;
-use crate::stop::stop_rule::{Progress, StopRule};
+use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// Ends a stage as converged when the mean loss changes by less than an absolute amount, or has fallen below one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AbsoluteLoss {
-    /// Change against the previous iteration, m².
-    pub change: f64,
-    /// Loss that is good enough, m².
-    pub good_enough: f64,
-}
+/// Ends a stage after a number of evaluations, with the last one accepted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IterationLimit(pub usize);
 
-impl Default for AbsoluteLoss {
-    /// The squares of a micrometre and of ten micrometres.
+impl Default for IterationLimit {
+    /// 50; the divergence rules end nearly all stages long before.
     fn default() -> Self {
-        Self {
-            change: 1e-12,
-            good_enough: 1e-10,
-        }
+        Self(50)
     }
 }
 
-impl StopRule for AbsoluteLoss {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        let now = progress.current.mean_loss;
-        let settled = progress
-            .previous
-            .is_some_and(|previous| (previous.mean_loss - now).abs() < self.change);
-        if settled || now < self.good_enough {
-            ControlFlow::Break(Termination::Converged)
+impl StopRule for IterationLimit {
+    fn check(&mut self, iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
+        if iteration.index + 1 >= self.0 {
+            Judgment::Accept(Termination::IterationLimit)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "iteration-limit"
     }
 }
 
@@ -65,13 +58,17 @@ impl StopRule for TimeLimit {
         self.started = Some(Instant::now());
     }
 
-    fn check(&mut self, _progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
         let started = *self.started.get_or_insert_with(Instant::now);
         if started.elapsed() >= self.limit {
-            ControlFlow::Break(Termination::Deadline)
+            Judgment::Accept(Termination::Deadline)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "time-limit"
     }
 }
 
@@ -82,11 +79,15 @@ impl StopRule for TimeLimit {
 pub struct Deadline(pub Instant);
 
 impl StopRule for Deadline {
-    fn check(&mut self, _progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
         if Instant::now() >= self.0 {
-            ControlFlow::Break(Termination::Deadline)
+            Judgment::Accept(Termination::Deadline)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "deadline"
     }
 }

@@ -1,11 +1,9 @@
 //! Stop rules on how the pose moves.
 
-use std::ops::ControlFlow;
-
-use hicp_core::{Isometry3, se3};
+use hicp_core::{Isometry3, Iteration, se3};
 
 use crate::outcome::Termination;
-use crate::stop::stop_rule::{Progress, StopRule};
+use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
 /// Ends a stage as converged when the next increment would move the object by less than a distance *and* turn it by less
 /// than an angle, each in its own unit. The distance is that of the object's origin.
@@ -28,16 +26,20 @@ impl Default for SmallMotion {
 }
 
 impl StopRule for SmallMotion {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let next = progress.increment * progress.camera_from_object;
         let (angle, distance) = se3::pose_distance(&next, progress.camera_from_object);
         let still =
             distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
         if still {
-            ControlFlow::Break(Termination::Converged)
+            Judgment::Accept(Termination::Converged)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "motion"
     }
 }
 
@@ -71,12 +73,16 @@ impl Bound {
 }
 
 impl StopRule for Bound {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        if self.contains(progress.init, progress.camera_from_object) {
-            ControlFlow::Continue(())
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+        if self.contains(&iteration.init, progress.camera_from_object) {
+            Judgment::Continue
         } else {
-            ControlFlow::Break(Termination::OutOfBounds)
+            Judgment::Reject(Termination::OutOfBounds)
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "bound"
     }
 }
 
@@ -122,7 +128,7 @@ impl StopRule for Oscillation {
         self.recent = [None; 3];
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let pose = progress.camera_from_object;
         let [last, older @ ..] = &self.recent;
         // A pose that stands still is converged, not oscillating.
@@ -131,10 +137,14 @@ impl StopRule for Oscillation {
         self.recent.rotate_right(1);
         self.recent[0] = Some(*pose);
         if moved && returned {
-            ControlFlow::Break(Termination::Oscillating)
+            Judgment::Accept(Termination::Oscillating)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
+    }
+
+    fn name(&self) -> &'static str {
+        "oscillation"
     }
 }
 
@@ -151,20 +161,22 @@ mod tests {
         rule: &mut dyn StopRule,
         pose: &Isometry3<f64>,
         increment: &Isometry3<f64>,
-    ) -> ControlFlow<Termination> {
+    ) -> Judgment {
         let current = Evaluation {
             n_pairs: 10,
             mean_loss: 1.0,
         };
-        rule.check(&Progress {
-            iteration: 0,
-            current,
-            first: current,
-            previous: None,
-            camera_from_object: pose,
-            init: &at(0.0),
-            increment,
-        })
+        let iteration = Iteration::new(0, &at(0.0), hicp_core::Problem::default());
+        rule.check(
+            &iteration,
+            &Progress {
+                current,
+                first: current,
+                previous: None,
+                camera_from_object: pose,
+                increment,
+            },
+        )
     }
 
     #[test]
@@ -172,13 +184,19 @@ mod tests {
         let mut rule = SmallMotion::default();
         let turn = Isometry3::rotation(hicp_core::Vector3::z() * 1e-3);
         let judge = |rule: &mut SmallMotion, increment| check(rule, &at(0.0), &increment);
-        assert!(judge(&mut rule, Isometry3::translation(0.9e-4, 0.0, 0.0)).is_break());
-        assert!(judge(&mut rule, Isometry3::translation(1.1e-4, 0.0, 0.0)).is_continue());
-        assert!(judge(&mut rule, turn).is_continue());
+        assert_ne!(
+            judge(&mut rule, Isometry3::translation(0.9e-4, 0.0, 0.0)),
+            Judgment::Continue
+        );
+        assert_eq!(
+            judge(&mut rule, Isometry3::translation(1.1e-4, 0.0, 0.0)),
+            Judgment::Continue
+        );
+        assert_eq!(judge(&mut rule, turn), Judgment::Continue);
         // The angle is judged by itself: a turn about the object's origin moves that origin nowhere.
         let about =
             Isometry3::translation(0.0, 0.0, 0.5) * turn * Isometry3::translation(0.0, 0.0, -0.5);
-        assert!(judge(&mut rule, about).is_continue());
+        assert_eq!(judge(&mut rule, about), Judgment::Continue);
     }
 
     /// Lengths compared with squares of lengths, cosines with angles: thresholds that are off by orders of magnitude.
@@ -200,15 +218,30 @@ mod tests {
             let mut oscillation = Oscillation::new(meters, degrees);
             for (by, small) in [(0.999, true), (1.001, false)] {
                 for moved in [shift(meters * by), turn(degrees * by)] {
-                    assert_eq!(check(&mut motion, &origin, &moved).is_break(), small);
+                    assert_eq!(
+                        check(&mut motion, &origin, &moved) != Judgment::Continue,
+                        small
+                    );
                     // The initial pose is `at(0.0)`.
                     let pose = at(0.0) * moved;
-                    assert_eq!(check(&mut bound, &pose, &origin).is_continue(), small);
+                    assert_eq!(
+                        check(&mut bound, &pose, &origin) == Judgment::Continue,
+                        small
+                    );
                     // There, far away, and back to almost there.
                     oscillation.start();
-                    assert!(check(&mut oscillation, &origin, &origin).is_continue());
-                    assert!(check(&mut oscillation, &at(10.0), &origin).is_continue());
-                    assert_eq!(check(&mut oscillation, &moved, &origin).is_break(), small);
+                    assert_eq!(
+                        check(&mut oscillation, &origin, &origin),
+                        Judgment::Continue
+                    );
+                    assert_eq!(
+                        check(&mut oscillation, &at(10.0), &origin),
+                        Judgment::Continue
+                    );
+                    assert_eq!(
+                        check(&mut oscillation, &moved, &origin) != Judgment::Continue,
+                        small
+                    );
                 }
             }
         }
@@ -218,10 +251,9 @@ mod tests {
     fn bounds_reject_what_is_outside() {
         let mut rule = Bound::default();
         let still = Isometry3::identity();
-        assert!(check(&mut rule, &at(0.1), &still).is_continue());
+        assert_eq!(check(&mut rule, &at(0.1), &still), Judgment::Continue);
         let verdict = check(&mut rule, &at(0.101), &still);
-        assert_eq!(verdict, ControlFlow::Break(Termination::OutOfBounds));
-        assert!(Termination::OutOfBounds.is_rollback());
+        assert_eq!(verdict, Judgment::Reject(Termination::OutOfBounds));
     }
 
     #[test]
@@ -231,7 +263,7 @@ mod tests {
             rule.start();
             poses
                 .iter()
-                .map(|x| check(rule, &at(*x), &still).is_break())
+                .map(|x| check(rule, &at(*x), &still) != Judgment::Continue)
                 .collect::<Vec<_>>()
         };
         let mut rule = Oscillation::default();

@@ -1,16 +1,13 @@
-//! Stop rules: convergence, divergence and limits alike.
+//! The trait of stop rules, and how they combine.
 
-use std::ops::ControlFlow;
-
-use hicp_core::Isometry3;
+use hicp_core::internal::type_label;
+use hicp_core::{Isometry3, Iteration};
 
 use crate::outcome::{Evaluation, Termination};
 
-/// What a stop rule sees of an iteration.
+/// What the evaluation of a pose found: the input of a stop rule, next to the [`Iteration`].
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// Iteration within the stage, from 0.
-    pub iteration: usize,
     /// Pairs and loss at the pose just evaluated.
     pub current: Evaluation,
     /// Those of the first iteration.
@@ -19,53 +16,125 @@ pub struct Progress<'a> {
     pub previous: Option<Evaluation>,
     /// The pose just evaluated.
     pub camera_from_object: &'a Isometry3<f64>,
-    /// The stage's initial pose.
-    pub init: &'a Isometry3<f64>,
     /// The increment that the next iteration would apply.
     pub increment: &'a Isometry3<f64>,
 }
 
-/// Decides after every evaluation whether the stage goes on.
+/// What a stop rule decides about the pose just evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum Judgment {
+    /// Accept the pose and go on.
+    Continue,
+    /// Accept the pose and end the stage for this reason.
+    Accept(Termination),
+    /// Reject the pose and end the stage for this reason: the stage returns the pose accepted before it.
+    Reject(Termination),
+}
+
+impl Judgment {
+    /// Returns this judgment, or `other` if this one continues.
+    fn or(self, other: Self) -> Self {
+        if self == Self::Continue { other } else { self }
+    }
+}
+
+/// Decides after every evaluation whether the stage goes on, and whether the pose just evaluated is accepted.
 ///
-/// A termination for which [`Termination::is_rollback`] holds rejects the pose just evaluated, and the stage returns the
-/// one accepted before it; any other accepts it. Tuples: all see every iteration, the first `Break` wins.
+/// A tuple of up to six rules, or a `Vec` of any number, shows every iteration to all of them; the first that does not
+/// continue decides.
+///
+/// A rule can end a stage for a reason of its own:
+///
+/// ```
+/// use hicp_core::Iteration;
+/// use hicp_icp::{Judgment, Progress, StopRule, Termination};
+///
+/// /// Ends a stage once the model points are within a distance of their counterparts.
+/// #[derive(Debug)]
+/// struct CloseEnough {
+///     mean_loss: f64,
+/// }
+///
+/// impl StopRule for CloseEnough {
+///     fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+///         if progress.current.mean_loss <= self.mean_loss {
+///             Judgment::Accept(Termination::Custom("close_enough"))
+///         } else {
+///             Judgment::Continue
+///         }
+///     }
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a stop rule",
+    label = "this must implement `StopRule`",
+    note = "`Icp::stop` accepts a `StopRule`, a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to six of them"
+)]
 pub trait StopRule {
-    /// Begins a stage; rules with memory forget.
+    /// Starts a stage; rules with memory forget.
     fn start(&mut self) {}
 
-    /// Judges an iteration.
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination>;
-}
+    /// Judges the pose that an iteration evaluated.
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment;
 
-impl<T: StopRule + ?Sized> StopRule for Box<T> {
-    fn start(&mut self) {
-        (**self).start();
+    /// Returns the name in traces.
+    fn name(&self) -> &'static str {
+        type_label::<Self>()
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        (**self).check(progress)
+    /// Appends the names of the rules that this one consists of, in order: its own name, or those of a list's members.
+    fn names(&self, names: &mut Vec<&'static str>) {
+        names.push(self.name());
     }
 }
 
-/// As tuples: all see every iteration, the first `Break` wins.
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: StopRule + ?Sized> StopRule for $pointer {
+            fn start(&mut self) {
+                (**self).start();
+            }
+
+            fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+                (**self).check(iteration, progress)
+            }
+
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+
+            fn names(&self, names: &mut Vec<&'static str>) {
+                (**self).names(names);
+            }
+        }
+    )+};
+}
+forward!(Box<T>, &mut T);
+
+/// As tuples: all see every iteration, the first that does not continue decides.
 impl<T: StopRule> StopRule for Vec<T> {
     fn start(&mut self) {
         self.iter_mut().for_each(StopRule::start);
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        let mut verdict = ControlFlow::Continue(());
-        for rule in self {
-            let judged = rule.check(progress);
-            if verdict.is_continue() {
-                verdict = judged;
-            }
-        }
-        verdict
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+        let rules = self.iter_mut();
+        rules.fold(Judgment::Continue, |judgment, rule| {
+            judgment.or(rule.check(iteration, progress))
+        })
+    }
+
+    fn name(&self) -> &'static str {
+        "any-of"
+    }
+
+    fn names(&self, names: &mut Vec<&'static str>) {
+        self.iter().for_each(|rule| rule.names(names));
     }
 }
 
-macro_rules! all_of {
+macro_rules! any_of {
     ($($member:ident),+) => {
         impl<$($member: StopRule),+> StopRule for ($($member,)+) {
             #[allow(non_snake_case)]
@@ -75,77 +144,28 @@ macro_rules! all_of {
             }
 
             #[allow(non_snake_case)]
-            fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
+            fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
                 let ($($member,)+) = self;
-                let mut verdict = ControlFlow::Continue(());
-                $(
-                    let judged = $member.check(progress);
-                    if verdict.is_continue() {
-                        verdict = judged;
-                    }
-                )+
-                verdict
+                let judgment = Judgment::Continue;
+                $(let judgment = judgment.or($member.check(iteration, progress));)+
+                judgment
+            }
+
+            fn name(&self) -> &'static str {
+                "any-of"
+            }
+
+            #[allow(non_snake_case)]
+            fn names(&self, names: &mut Vec<&'static str>) {
+                let ($($member,)+) = self;
+                $($member.names(names);)+
             }
         }
     };
 }
-all_of!(A);
-all_of!(A, B);
-all_of!(A, B, C);
-all_of!(A, B, C, D);
-all_of!(A, B, C, D, E);
-all_of!(A, B, C, D, E, F);
-
-/// Ends a stage after a number of evaluations, with the last one accepted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IterationLimit(pub usize);
-
-impl Default for IterationLimit {
-    /// 50; the divergence rules end nearly all stages long before.
-    fn default() -> Self {
-        Self(50)
-    }
-}
-
-impl StopRule for IterationLimit {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        if progress.iteration + 1 >= self.0 {
-            ControlFlow::Break(Termination::IterationLimit)
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-}
-
-/// Ends a stage when the mean loss has stopped changing ("terminated early if the ICP loss converges", §IV-B).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Convergence {
-    /// Relative change of the mean loss against the previous iteration, up or down, below which the stage has converged.
-    pub relative_change: f64,
-    /// Mean loss (m²) below which there is nothing left to gain: the square of what `f32` resolves at arm's length.
-    pub negligible_loss: f64,
-}
-
-impl Default for Convergence {
-    fn default() -> Self {
-        Self {
-            relative_change: 1e-3,
-            negligible_loss: 1e-14,
-        }
-    }
-}
-
-impl StopRule for Convergence {
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        let Some(previous) = progress.previous else {
-            return ControlFlow::Continue(());
-        };
-        let (before, now) = (previous.mean_loss, progress.current.mean_loss);
-        let settled = (before - now).abs() < self.relative_change * before;
-        if settled || (before.max(now) <= self.negligible_loss) {
-            ControlFlow::Break(Termination::Converged)
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-}
+any_of!(A);
+any_of!(A, B);
+any_of!(A, B, C);
+any_of!(A, B, C, D);
+any_of!(A, B, C, D, E);
+any_of!(A, B, C, D, E, F);

@@ -2,9 +2,12 @@
 
 use crate::script::support::{bits, pose};
 use crate::script::{Line, Log, returned, run, run_observed, scripted};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair};
+use hicp_icp::Judgment;
 use hicp_icp::{
-    Convergence, Divergence, Evaluation, Icp, IterationLimit, Stage, StopRule, Termination, Verdict,
+    Convergence, Divergence, Evaluation, Icp, IterationLimit, Progress, Stage, StopRule,
+    Termination, Verdict,
 };
 use hicp_metric::{ErrorMetric, NormalEquations, Step};
 
@@ -244,8 +247,8 @@ struct Breaking {
 impl ErrorMetric for Breaking {
     fn linearize(&self, _: &Pair, _: &mut NormalEquations) {}
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let step = self.script.minimize(pairs)?;
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
+        let step = self.script.step(pairs)?;
         let broken = pairs.as_slice()[0].source.point.x >= self.from;
         let by = if broken { self.with } else { 1.0 };
         Some(Step {
@@ -317,19 +320,19 @@ fn the_observer_sees_every_evaluation_and_the_end() {
 struct Checking;
 
 impl StopRule for Checking {
-    fn check(&mut self, progress: &hicp_icp::Progress<'_>) -> std::ops::ControlFlow<Termination> {
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let at = |i: usize| Evaluation {
             n_pairs: FALLING[i].0,
             mean_loss: FALLING[i].1.unwrap(),
         };
-        let i = progress.iteration;
+        let i = iteration.index;
         assert_eq!(progress.current, at(i));
         assert_eq!(progress.first, at(0));
         assert_eq!(progress.previous, i.checked_sub(1).map(at));
         assert_eq!(progress.camera_from_object.translation.vector.x, i as f64);
-        assert_eq!(progress.init.translation.vector.x, 0.0);
+        assert_eq!(iteration.init.translation.vector.x, 0.0);
         assert_eq!(progress.increment.translation.vector.x, 1.0);
-        std::ops::ControlFlow::Continue(())
+        Judgment::Continue
     }
 }
 

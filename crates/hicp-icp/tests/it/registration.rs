@@ -7,6 +7,7 @@ use hicp_association::{
     AllSamples, DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection,
     Projective, Stride, VisibleSurface,
 };
+use hicp_core::Iteration;
 use hicp_core::{
     Correspondences, Isometry3, Model, Observation, PinholeCamera, Problem, Surfel, Vector3, se3,
 };
@@ -14,6 +15,7 @@ use hicp_icp::{
     Cascade, Convergence, Divergence, Icp, IterationLimit, Outcome, Session, Stage, StopRule,
     Verdict, Workspace,
 };
+use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, PointToPlane, PointToPoint};
 
 fn camera() -> PinholeCamera {
@@ -200,9 +202,13 @@ fn pitfall_7_the_report_is_about_the_returned_pose() {
                         &outcome.camera_from_object,
                         &mut pairs,
                     );
-                    MaxDistance::meters(0.03).filter(&problem, &mut pairs);
+                    MaxDistance::meters(0.03)
+                        .filter(&Iteration::new(0, &init, problem), &mut pairs);
                     assert_eq!(pairs.len(), evaluation.n_pairs);
-                    let loss = metrics()[m].minimize(&pairs).unwrap().mean_loss;
+                    let loss = metrics()[m]
+                        .minimize(&Iteration::default(), &pairs)
+                        .unwrap()
+                        .mean_loss;
                     assert_eq!(loss.to_bits(), evaluation.mean_loss.to_bits());
                 }
             }
@@ -274,7 +280,7 @@ fn boxed_components_are_static_ones_to_the_bit() {
     }
     assert!(refined >= 4, "{refined}");
     // A box that forgot to forward `minimize` would walk by Gauss–Newton where the closed form is exact.
-    let mut boxed: Box<dyn ErrorMetric> = Box::new(PointToPoint);
+    let boxed: Box<dyn ErrorMetric> = Box::new(PointToPoint);
     let pairs: Correspondences = model
         .samples()
         .iter()
@@ -290,10 +296,10 @@ fn boxed_components_are_static_ones_to_the_bit() {
         })
         .collect();
     assert_eq!(
-        ErrorMetric::minimize(&mut boxed, &pairs),
-        PointToPoint.minimize(&pairs)
+        boxed.step(&pairs),
+        PointToPoint.minimize(&Iteration::default(), &pairs)
     );
-    let names: Vec<_> = metrics().iter().map(ErrorMetric::name).collect();
+    let names: Vec<_> = metrics().iter().map(|metric| metric.name()).collect();
     assert_eq!(names, ["point-to-point", "point-to-plane"]);
 }
 

@@ -1,10 +1,11 @@
 //! The divergence rules of §IV-B to the pair and to the digit, and how rules combine (pitfall 10).
 
-use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 
 use crate::script::{Line, returned, run, scripted};
 use hicp_core::Isometry3;
+use hicp_core::Iteration;
+use hicp_icp::Judgment;
 use hicp_icp::{
     Divergence, Evaluation, IterationLimit, LossRule, Outcome, Progress, StopRule, Termination,
     Verdict,
@@ -166,13 +167,13 @@ fn the_count_aware_rule_forgives_a_rise_that_comes_with_new_pairs() {
 #[derive(Clone)]
 struct Noting {
     break_at: Option<usize>,
-    with: Termination,
+    with: Judgment,
     seen: Arc<Mutex<Vec<usize>>>,
     starts: Arc<Mutex<usize>>,
 }
 
 impl Noting {
-    fn new(break_at: Option<usize>, with: Termination) -> Self {
+    fn new(break_at: Option<usize>, with: Judgment) -> Self {
         Self {
             break_at,
             with,
@@ -187,18 +188,18 @@ impl StopRule for Noting {
         *self.starts.lock().unwrap() += 1;
     }
 
-    fn check(&mut self, progress: &Progress<'_>) -> ControlFlow<Termination> {
-        self.seen.lock().unwrap().push(progress.iteration);
-        if self.break_at == Some(progress.iteration) {
-            ControlFlow::Break(self.with)
+    fn check(&mut self, iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
+        self.seen.lock().unwrap().push(iteration.index);
+        if self.break_at == Some(iteration.index) {
+            self.with
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
     }
 }
 
 #[test]
-fn all_rules_of_a_tuple_see_every_iteration_and_the_first_break_wins() {
+fn all_rules_of_a_tuple_see_every_iteration_and_the_first_to_end_decides() {
     let lines: Vec<Line> = (0..6_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
     for (a, b, expected, at) in [
         (Some(2), Some(2), Termination::Converged, 2),
@@ -206,9 +207,9 @@ fn all_rules_of_a_tuple_see_every_iteration_and_the_first_break_wins() {
         (None, Some(4), Termination::PairsLost, 4),
         (Some(0), None, Termination::Converged, 0),
     ] {
-        let first = Noting::new(a, Termination::Converged);
-        let second = Noting::new(b, Termination::PairsLost);
-        let third = Noting::new(None, Termination::IterationLimit);
+        let first = Noting::new(a, Judgment::Accept(Termination::Converged));
+        let second = Noting::new(b, Judgment::Reject(Termination::PairsLost));
+        let third = Noting::new(None, Judgment::Accept(Termination::IterationLimit));
         let stop = (first.clone(), second.clone(), third.clone());
         let outcome = run(&mut scripted(&lines, stop), &Isometry3::identity());
         assert_eq!(outcome.termination, expected);
@@ -232,7 +233,7 @@ fn all_rules_of_a_tuple_see_every_iteration_and_the_first_break_wins() {
 #[test]
 fn rules_start_afresh_with_every_run_also_when_boxed() {
     let lines: Vec<Line> = (0..3_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
-    let rule = Noting::new(Some(1), Termination::Converged);
+    let rule = Noting::new(Some(1), Judgment::Accept(Termination::Converged));
     let boxed: Box<dyn StopRule> = Box::new((rule.clone(),));
     let mut stage = scripted(&lines, boxed);
     for runs in 1..4 {
@@ -243,21 +244,36 @@ fn rules_start_afresh_with_every_run_also_when_boxed() {
 }
 
 #[test]
-fn terminations_have_names_and_know_whether_they_roll_back() {
+fn terminations_have_names() {
     use Termination::{Converged, Degenerate, IterationLimit, LossIncreased, NoPairs, PairsLost};
     let all = [
-        (Converged, false, "converged"),
-        (IterationLimit, false, "iteration_limit"),
-        (NoPairs, true, "no_pairs"),
-        (PairsLost, true, "pairs_lost"),
-        (LossIncreased, true, "loss_increased"),
-        (Degenerate, true, "degenerate"),
+        (Converged, "converged"),
+        (IterationLimit, "iteration_limit"),
+        (NoPairs, "no_pairs"),
+        (PairsLost, "pairs_lost"),
+        (LossIncreased, "loss_increased"),
+        (Degenerate, "degenerate"),
     ];
-    for (termination, rollback, name) in all {
-        assert_eq!(termination.is_rollback(), rollback);
+    for (termination, name) in all {
         assert_eq!(
             (termination.name(), termination.to_string()),
             (name, name.to_string())
         );
+    }
+}
+
+/// A rule may name a reason of its own; whether the pose is accepted is its judgment, not a property of the reason.
+#[test]
+fn custom_reasons_accept_or_reject_as_the_rule_says() {
+    let lines: Vec<Line> = (0..6_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
+    let reason = Termination::Custom("battery_low");
+    for (judgment, x) in [
+        (Judgment::Accept(reason), 2.0),
+        (Judgment::Reject(reason), 1.0),
+    ] {
+        let stop = Noting::new(Some(2), judgment);
+        let outcome = run(&mut scripted(&lines, stop), &Isometry3::identity());
+        assert_eq!((outcome.termination, returned(&outcome)), (reason, x));
+        assert_eq!(outcome.termination.to_string(), "battery_low");
     }
 }

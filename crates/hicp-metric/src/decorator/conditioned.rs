@@ -1,8 +1,9 @@
 //! A metric with a policy for degenerate directions.
 
-use hicp_core::{Correspondences, Isometry3, Pair};
+use hicp_core::{Correspondences, Iteration};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::degeneracy::Degeneracy;
 use crate::system::normal_equations::NormalEquations;
 
@@ -30,36 +31,39 @@ impl<M: Default> Default for Conditioned<M> {
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for Conditioned<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for Conditioned<M> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.metric.mean_loss(iteration, pairs)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(pairs)
-    }
-
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let system = self.metric.system(pairs)?;
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        let system = self.metric.system(iteration, pairs)?;
         Some(system.with_policy(self.policy, self.threshold))
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         Some(Step {
-            increment: self.system(pairs)?.solve()?,
-            mean_loss: self.mean_loss(pairs)?,
+            increment: self.system(iteration, pairs)?.solve()?,
+            mean_loss: self.mean_loss(iteration, pairs)?,
         })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "conditioned"
     }
 }

@@ -1,8 +1,9 @@
 //! Degrees of freedom that are not refined.
 
-use hicp_core::{Correspondences, Isometry3, Pair, Point3, UnitQuaternion};
+use hicp_core::{Correspondences, Iteration, Point3, UnitQuaternion};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// The axes along which motion is frozen.
@@ -36,21 +37,28 @@ pub struct Frozen<M> {
     pub rotation: [bool; 3],
 }
 
-impl<M: ErrorMetric> ErrorMetric for Frozen<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for Frozen<M> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.metric.mean_loss(iteration, pairs)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(pairs)
-    }
-
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let mut system = self.metric.system(pairs)?;
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        let mut system = self.metric.system(iteration, pairs)?;
         let pose = pairs.camera_from_object();
         let axes = match self.frame {
             Frame::Camera => UnitQuaternion::identity(),
@@ -61,21 +69,17 @@ impl<M: ErrorMetric> ErrorMetric for Frozen<M> {
         Some(system)
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         if !self.translation.contains(&true) && !self.rotation.contains(&true) {
-            return self.metric.minimize(pairs);
+            return self.metric.minimize(iteration, pairs);
         }
         Some(Step {
-            increment: self.system(pairs)?.solve()?,
-            mean_loss: self.mean_loss(pairs)?,
+            increment: self.system(iteration, pairs)?.solve()?,
+            mean_loss: self.mean_loss(iteration, pairs)?,
         })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "frozen"
     }
 }

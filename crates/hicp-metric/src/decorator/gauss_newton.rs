@@ -1,15 +1,16 @@
 //! Gauss–Newton iterations over fixed pairs.
 
-use hicp_core::{Correspondences, Isometry3, Pair, se3};
+use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
 use crate::decorator::moved::{compose, move_sources};
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// Iterates Gauss–Newton over one set of pairs: the sources are moved by the increment so far and linearised anew.
 ///
 /// Worth it where a turn of association costs more than a few passes over its pairs, and turns are large: one linearised step
-/// of point-to-plane leaves 4° of 15°. Whatever the metric does in `minimize`, this solves its [`ErrorMetric::system`]. The increment is the
+/// of point-to-plane leaves 4° of 15°. Whatever the metric does in `minimize`, this solves its [`Minimize::system`]. The increment is the
 /// product of the inner ones; the mean loss is the one *before* it. The loss may rise, see [`crate::LevenbergMarquardt`].
 ///
 /// No step where the first linearisation gives none; a later one ends the iterations.
@@ -43,35 +44,42 @@ impl<M: Default> Default for GaussNewton<M> {
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for GaussNewton<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for GaussNewton<M> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.metric.mean_loss(iteration, pairs)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(pairs)
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        self.metric.system(iteration, pairs)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        self.metric.system(pairs)
-    }
-
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let mean_loss = self.metric.mean_loss(pairs)?;
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        let mean_loss = self.metric.mean_loss(iteration, pairs)?;
         let mut increment = Isometry3::identity();
-        for iteration in 0..self.max_iterations {
-            let system = if iteration == 0 {
-                self.metric.system(pairs)
+        for pass in 0..self.max_iterations {
+            let system = if pass == 0 {
+                self.metric.system(iteration, pairs)
             } else {
                 move_sources(pairs, &increment, &mut self.moved);
-                self.metric.system(&self.moved)
+                self.metric.system(iteration, &self.moved)
             };
             let Some(solution) = system.and_then(|system| system.solution(0.0)) else {
-                if iteration == 0 {
+                if pass == 0 {
                     return None;
                 }
                 break;
@@ -91,11 +99,7 @@ impl<M: ErrorMetric> ErrorMetric for GaussNewton<M> {
         })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "gauss-newton"
     }
 }

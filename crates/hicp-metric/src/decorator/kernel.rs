@@ -1,5 +1,54 @@
 //! Robust kernels: how much a residual counts, by its size.
 
+/// A robust loss ρ(x) of a residual x = r/σ, with its weight for iteratively re-weighted least squares.
+///
+/// [`Kernel`] holds the usual ones; implement this trait for another one.
+///
+/// ```
+/// use hicp_metric::{PointToPlane, Robust, RobustKernel, Scale};
+///
+/// /// Student's t with ν degrees of freedom, scaled so that w(0) = 1.
+/// #[derive(Clone, Copy, Debug)]
+/// struct StudentT(f64);
+///
+/// impl RobustKernel for StudentT {
+///     fn weight(&self, x: f64) -> f64 {
+///         self.0 / (self.0 + x * x)
+///     }
+///
+///     fn loss(&self, x: f64) -> f64 {
+///         0.5 * self.0 * (x * x / self.0).ln_1p()
+///     }
+/// }
+///
+/// let metric = Robust::new(PointToPlane, StudentT(5.0), Scale::default());
+/// # let _ = metric;
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a robust kernel",
+    label = "this must implement `RobustKernel`",
+    note = "`Robust::kernel` accepts a `Kernel` or any type with `weight` and `loss`"
+)]
+pub trait RobustKernel {
+    /// Returns w(x) = ρ′(x)/x; x = r/σ has no unit. At most 1, w(0) = 1, even, and not increasing with |x|.
+    fn weight(&self, x: f64) -> f64;
+
+    /// Returns ρ(x), ρ(0) = 0 and ρ(x) ≈ x²/2 near zero.
+    fn loss(&self, x: f64) -> f64;
+}
+
+impl RobustKernel for Kernel {
+    #[inline]
+    fn weight(&self, x: f64) -> f64 {
+        Kernel::weight(self, x)
+    }
+
+    #[inline]
+    fn loss(&self, x: f64) -> f64 {
+        Kernel::loss(self, x)
+    }
+}
+
 /// Smaller ones would overflow in the square.
 const MIN_CONSTANT: f64 = 1e-9;
 
@@ -13,6 +62,7 @@ const MIN_CONSTANT: f64 = 1e-9;
 /// `Welsch` and `Tukey` reject what is far off, which asks for a start that is not.
 /// Constants below 10⁻⁹ are taken as 10⁻⁹.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Kernel {
     /// ρ = x²/2: no kernel. w = 1.
     L2,

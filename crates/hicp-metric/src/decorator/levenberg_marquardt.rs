@@ -2,10 +2,11 @@
 
 use std::mem;
 
-use hicp_core::{Correspondences, Isometry3, Pair, se3};
+use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
 use crate::decorator::moved::{compose, move_sources};
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// How much the damping grows when a step is rejected and shrinks when one is accepted.
@@ -18,7 +19,7 @@ const MIN_DAMPING: f64 = 1e-12;
 ///
 /// The normal equations are damped by λ diag(JᵀWJ) (Levenberg 1944; Marquardt 1963) in scaled unknowns, each diagonal entry at
 /// least 10⁻⁶ of the mean; so λ has no unit. A step is tried on a copy of the pairs: if the metric's
-/// [`ErrorMetric::mean_loss`] there is lower, λ falls by 10; if not, the step is discarded and λ grows by 10. The mean loss after
+/// [`Minimize::mean_loss`] there is lower, λ falls by 10; if not, the step is discarded and λ grows by 10. The mean loss after
 /// the increment is therefore never above the one before, which is the one reported.
 ///
 /// No step where the first linearisation gives none. Where no step lowers the loss the increment is the identity.
@@ -58,31 +59,38 @@ impl<M: Default> Default for LevenbergMarquardt<M> {
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for LevenbergMarquardt<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for LevenbergMarquardt<M> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.metric.mean_loss(iteration, pairs)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(pairs)
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        self.metric.system(iteration, pairs)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        self.metric.system(pairs)
-    }
-
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let mean_loss = self.metric.mean_loss(pairs)?;
-        let mut system = self.metric.system(pairs)?;
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        let mean_loss = self.metric.mean_loss(iteration, pairs)?;
+        let mut system = self.metric.system(iteration, pairs)?;
         let (mut increment, mut loss) = (Isometry3::identity(), mean_loss);
         let mut damping = self.initial_damping.clamp(MIN_DAMPING, MAX_DAMPING);
-        for iteration in 0..self.max_iterations {
+        for pass in 0..self.max_iterations {
             let Some(solution) = system.solution(damping) else {
-                if iteration == 0 {
+                if pass == 0 {
                     return None;
                 }
                 break;
@@ -90,7 +98,7 @@ impl<M: ErrorMetric> ErrorMetric for LevenbergMarquardt<M> {
             let next = compose(&solution.increment, &increment);
             let tried = if se3::is_finite(&next) {
                 move_sources(pairs, &next, &mut self.trial);
-                self.metric.mean_loss(&self.trial)
+                self.metric.mean_loss(iteration, &self.trial)
             } else {
                 None
             };
@@ -100,7 +108,7 @@ impl<M: ErrorMetric> ErrorMetric for LevenbergMarquardt<M> {
                     mem::swap(&mut self.current, &mut self.trial);
                     (increment, loss) = (next, lower);
                     damping = (damping / FACTOR).max(MIN_DAMPING);
-                    match self.metric.system(&self.current) {
+                    match self.metric.system(iteration, &self.current) {
                         Some(anew) if !done => system = anew,
                         _ => break,
                     }
@@ -115,11 +123,7 @@ impl<M: ErrorMetric> ErrorMetric for LevenbergMarquardt<M> {
         })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "levenberg-marquardt"
     }
 }

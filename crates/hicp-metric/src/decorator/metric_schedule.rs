@@ -1,8 +1,9 @@
 //! Metrics that change from iteration to iteration.
 
-use hicp_core::{Correspondences, Isometry3, Pair};
+use hicp_core::{Correspondences, Iteration};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// One metric per iteration: the k-th in the k-th iteration of a stage, and the last from then on.
@@ -14,61 +15,51 @@ use crate::system::normal_equations::NormalEquations;
 pub struct MetricSchedule<M> {
     /// The metrics by iteration.
     pub metrics: Vec<M>,
-    iteration: usize,
 }
 
 impl<M> MetricSchedule<M> {
-    /// Makes the schedule.
+    /// Creates the schedule.
     #[must_use]
     pub fn new(metrics: Vec<M>) -> Self {
-        Self {
-            metrics,
-            iteration: 0,
-        }
+        Self { metrics }
     }
 
-    fn index(&self) -> usize {
-        self.iteration.min(self.metrics.len().saturating_sub(1))
-    }
-
-    fn current(&mut self) -> Option<&mut M> {
-        let index = self.index();
-        self.metrics.get_mut(index)
+    fn current(&mut self, iteration: &Iteration<'_>) -> Option<&mut M> {
+        let last = self.metrics.len().saturating_sub(1);
+        self.metrics.get_mut(iteration.index.min(last))
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for MetricSchedule<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        if let Some(metric) = self.metrics.get(self.index()) {
-            metric.linearize(pair, system);
+impl<M: Minimize> Minimize for MetricSchedule<M> {
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        self.current(iteration)?.system(iteration, pairs)
+    }
+
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.current(iteration)?.mean_loss(iteration, pairs)
+    }
+
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        if let Some(metric) = self.current(iteration) {
+            metric.add_squared_errors(iteration, pairs, factor, errors);
         }
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        let metric = self.metrics.get(self.index());
-        metric.map_or(0.0, |metric| metric.squared_error(pair))
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        self.current(iteration)?.minimize(iteration, pairs)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        self.current()?.mean_loss(pairs)
-    }
-
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        self.current()?.system(pairs)
-    }
-
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        self.current()?.minimize(pairs)
-    }
-
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.iteration = iteration;
-        for metric in &mut self.metrics {
-            metric.begin(iteration, init);
-        }
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "metric-schedule"
     }
 }

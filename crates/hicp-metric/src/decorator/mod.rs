@@ -13,7 +13,7 @@ pub(crate) mod robust;
 pub use conditioned::Conditioned;
 pub use frozen::{Frame, Frozen};
 pub use gauss_newton::GaussNewton;
-pub use kernel::Kernel;
+pub use kernel::{Kernel, RobustKernel};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use metric_schedule::MetricSchedule;
 pub use pose_prior::{PosePrior, Prior};

@@ -1,9 +1,11 @@
 //! A Gaussian prior of the pose.
 
-use hicp_core::{Correspondences, Isometry3, Matrix3, Matrix6, Pair, Vector6, se3, so3::hat};
+use hicp_core::{Correspondences, Isometry3, Iteration, Matrix3, Matrix6, Vector6, se3, so3::hat};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
-use crate::system::normal_equations::{NormalEquations, blocks};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
+use crate::system::freedom::blocks;
+use crate::system::normal_equations::NormalEquations;
 
 /// A Gaussian of the pose: its mean and its information Λ, the inverse of the covariance.
 ///
@@ -66,7 +68,7 @@ impl Prior {
 /// also for metrics with a closed form; without information it is the metric's own, bit for bit. A strong prior leads to T₀ in one
 /// step. The mean loss is the sum over Σ w. Six components of information make up for missing rows, not for missing pairs.
 ///
-/// [`Prior::AboutInitial`] needs to be told where a stage begins, which [`ErrorMetric::begin`] does; until then it is flat.
+/// [`Prior::AboutInitial`] reads the pose that the stage started from in [`Iteration::init`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PosePrior<M> {
     /// The data term.
@@ -75,8 +77,6 @@ pub struct PosePrior<M> {
     pub prior: Prior,
     /// σ of a residual of weight 1, metres; default 1 mm.
     pub sigma_meters: f64,
-    /// T₀ and Λ of this stage.
-    resolved: Option<(Isometry3<f64>, Matrix6<f64>)>,
 }
 
 impl<M: Default> Default for PosePrior<M> {
@@ -89,38 +89,40 @@ impl<M> PosePrior<M> {
     /// Adds a prior to a metric; `sigma_meters` is the standard deviation of a residual of weight 1.
     #[must_use]
     pub fn new(metric: M, prior: Prior, sigma_meters: f64) -> Self {
-        let resolved = match prior {
-            Prior::AboutInitial { .. } => None,
-            _ => prior.resolve(&Isometry3::identity()),
-        };
         Self {
             metric,
             prior,
             sigma_meters,
-            resolved,
         }
     }
 
     /// ξ at the pose of the pairs, and σ² Λ.
-    fn term(&self, pairs: &Correspondences) -> Option<(Vector6<f64>, Matrix6<f64>)> {
-        let (mean, information) = self.resolved?;
+    fn term(
+        &self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(Vector6<f64>, Matrix6<f64>)> {
+        let (mean, information) = self.prior.resolve(&iteration.init)?;
         let error = se3::log(&(pairs.camera_from_object() * mean.inverse()));
         Some((error, information * self.sigma_meters.powi(2)))
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for PosePrior<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for PosePrior<M> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
-    }
-
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        let data = self.metric.mean_loss(pairs)?;
-        let Some((error, information)) = self.term(pairs) else {
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        let data = self.metric.mean_loss(iteration, pairs)?;
+        let Some((error, information)) = self.term(iteration, pairs) else {
             return Some(data);
         };
         let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
@@ -128,30 +130,29 @@ impl<M: ErrorMetric> ErrorMetric for PosePrior<M> {
         mean.is_finite().then_some(mean)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let mut system = self.metric.system(pairs)?;
-        if let Some((error, information)) = self.term(pairs) {
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        let mut system = self.metric.system(iteration, pairs)?;
+        if let Some((error, information)) = self.term(iteration, pairs) {
             system.add_twist(&error, &se3::left_jacobian_inverse(&error), &information);
         }
         Some(system)
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        if self.resolved.is_none() {
-            return self.metric.minimize(pairs);
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        if self.prior.resolve(&iteration.init).is_none() {
+            return self.metric.minimize(iteration, pairs);
         }
         Some(Step {
-            increment: self.system(pairs)?.solve()?,
-            mean_loss: self.mean_loss(pairs)?,
+            increment: self.system(iteration, pairs)?.solve()?,
+            mean_loss: self.mean_loss(iteration, pairs)?,
         })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-        self.resolved = self.prior.resolve(init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "pose-prior"
     }
 }

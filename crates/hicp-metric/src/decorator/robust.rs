@@ -1,9 +1,10 @@
 //! Robust kernels over any metric.
 
-use hicp_core::{Correspondences, Isometry3, Pair};
+use hicp_core::{Correspondences, Iteration, Pair};
 
-use crate::decorator::kernel::Kernel;
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::decorator::kernel::{Kernel, RobustKernel};
+use crate::metric::error_metric::Step;
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// σ of a Gaussian over the median of its absolute values.
@@ -41,15 +42,15 @@ impl Default for Scale {
 /// σ (w r² is part of a majoriser), rises when pairs drift into the tail although their weights vanish there, and falls and rises
 /// with σ; so the rules that judge a mean loss keep their meaning. It equals the inner loss for [`Kernel::L2`] and for small residuals.
 ///
-/// The kernel belongs to the set of pairs: [`ErrorMetric::linearize`] and [`ErrorMetric::squared_error`] are those of the metric
-/// inside; [`ErrorMetric::system`] carries the weights.
+/// The kernel belongs to the set of pairs: squared errors are those of the metric inside; [`Minimize::system`] carries the
+/// weights. Any [`RobustKernel`] can be given.
 /// Cost: one pass for the residuals, one to copy the pairs, a selection for the median, and the metric inside.
 #[derive(Clone, Debug, Default)]
-pub struct Robust<M> {
+pub struct Robust<M, K = Kernel> {
     /// What is minimised.
     pub metric: M,
     /// How much a residual counts; default [`Kernel::HUBER`].
-    pub kernel: Kernel,
+    pub kernel: K,
     /// What residuals are measured by; default the median, floored at 1 mm.
     pub scale: Scale,
     reweighted: Correspondences,
@@ -57,10 +58,10 @@ pub struct Robust<M> {
     sorted: Vec<f64>,
 }
 
-impl<M: ErrorMetric> Robust<M> {
+impl<M: Minimize, K: RobustKernel> Robust<M, K> {
     /// Makes a metric robust.
     #[must_use]
-    pub fn new(metric: M, kernel: Kernel, scale: Scale) -> Self {
+    pub fn new(metric: M, kernel: K, scale: Scale) -> Self {
         Self {
             metric,
             kernel,
@@ -72,12 +73,15 @@ impl<M: ErrorMetric> Robust<M> {
     }
 
     /// Fills the residuals and returns σ; `None` where it is not finite.
-    fn measure(&mut self, pairs: &Correspondences) -> Option<f64> {
-        let pairs = pairs.as_slice();
+    fn measure(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.residuals.clear();
-        let metric = &self.metric;
-        self.residuals
-            .extend(pairs.iter().map(|pair| metric.squared_error(pair).sqrt()));
+        self.residuals.resize(pairs.len(), 0.0);
+        self.metric
+            .add_squared_errors(iteration, pairs, 1.0, &mut self.residuals);
+        for residual in &mut self.residuals {
+            *residual = residual.sqrt();
+        }
+        let pairs = pairs.as_slice();
         let sigma = match self.scale {
             Scale::Meters(sigma) => sigma,
             Scale::Mad { floor_meters } => {
@@ -105,9 +109,9 @@ impl<M: ErrorMetric> Robust<M> {
     }
 
     /// Fills the copy with the kernel's weights; returns the robust mean loss.
-    fn reweigh(&mut self, pairs: &Correspondences) -> Option<f64> {
-        let sigma = self.measure(pairs)?;
-        let kernel = self.kernel;
+    fn reweigh(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        let sigma = self.measure(iteration, pairs)?;
+        let kernel = &self.kernel;
         self.reweighted
             .begin(pairs.camera_from_object(), pairs.n_candidates());
         let weighted = pairs.as_slice().iter().zip(&self.residuals);
@@ -132,36 +136,39 @@ impl<M: ErrorMetric> Robust<M> {
     }
 }
 
-impl<M: ErrorMetric> ErrorMetric for Robust<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize, K: RobustKernel> Minimize for Robust<M, K> {
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
-    }
-
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        let sigma = self.measure(pairs)?;
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        let sigma = self.measure(iteration, pairs)?;
         self.loss(pairs, sigma)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        self.reweigh(pairs)?;
-        self.metric.system(&self.reweighted)
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        self.reweigh(iteration, pairs)?;
+        self.metric.system(iteration, &self.reweighted)
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let mean_loss = self.reweigh(pairs)?;
-        let step = self.metric.minimize(&self.reweighted)?;
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        let mean_loss = self.reweigh(iteration, pairs)?;
+        let step = self.metric.minimize(iteration, &self.reweighted)?;
         Some(Step { mean_loss, ..step })
     }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.metric.begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "robust"
     }
 }

@@ -1,28 +1,29 @@
 //! The trait of error metrics.
 
-use hicp_core::{Correspondences, Isometry3, Pair, VectorLoop, type_label, vectorized};
+use hicp_core::internal::{VectorLoop, type_label, vectorized};
+use hicp_core::{Correspondences, Isometry3, Pair};
 
 use crate::system::moments::Moments;
 use crate::system::normal_equations::NormalEquations;
 
-/// What one minimisation found: the loss where it stands, and the way from there.
+/// The result of one minimization: the loss at the present pose, and the increment from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// The increment T_k of Algorithm 1: the next estimate is `increment * camera_from_object`. Camera frame.
     pub increment: Isometry3<f64>,
-    /// Weighted mean of the metric's squared residuals *before* the increment, at the pose that the pairs were made at; m².
+    /// Weighted mean of the squared residuals *before* the increment, at the pose that the pairs were made at; m².
     pub mean_loss: f64,
 }
 
-/// An error metric E(c, n, o, m, T) and its minimiser: Algorithm 1, line 3.
+/// An error metric E(c, n, o, m, T) of one pair (Algorithm 1, line 3).
 ///
-/// Pairs are in the camera frame with the source already moved, so a metric is linearised at the identity increment
+/// Pairs are in the camera frame with the source already moved, so a metric is linearized at the identity increment
 /// ξ = [ρ; φ] (translation first, left perturbation).
 ///
-/// Implement [`ErrorMetric::linearize`] and get the rest: Gauss–Newton from the provided [`ErrorMetric::minimize`]; override
-/// `minimize` where there is a closed form or a batch kernel. What acts on the set of pairs rather than on one of them (a
-/// kernel with a scale, a prior, a frozen direction) overrides [`ErrorMetric::system`], and [`ErrorMetric::mean_loss`] if it
-/// changes the loss; decorators therefore ask the metric inside for its `system`, not for its rows.
+/// Implement [`ErrorMetric::linearize`]; the rest is provided. Override [`ErrorMetric::squared_error`] if it is a short
+/// formula, [`ErrorMetric::linearize_all`] if there is a faster loop over many pairs, and [`ErrorMetric::step`] if the
+/// minimum has a closed form. Every error metric is a [`Minimize`](crate::Minimize), which is what a stage requires. What
+/// acts on the whole set of pairs (a robust kernel, a prior, a frozen axis) implements `Minimize` instead.
 ///
 /// ```
 /// use hicp_core::{Pair, Vector3};
@@ -40,14 +41,18 @@ pub struct Step {
 ///     }
 /// }
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an error metric",
+    label = "this must implement `ErrorMetric` (or `Minimize`)",
+    note = "`Icp::metric` accepts an `ErrorMetric`, a decorator such as `Robust<M>` around one, or a `Box<dyn Minimize>`"
+)]
 pub trait ErrorMetric {
-    /// Adds the residual rows of one pair, linearised at the identity increment.
+    /// Adds the residual rows of one pair, linearized at the identity increment.
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations);
 
     /// Returns E(c, n, o, m, I) of one pair at the pose that it was made at, without its weight; m².
     ///
-    /// The provided method sums the squares of the pair's own rows. Override it where that is a short formula: kernels and
-    /// [`ErrorMetric::mean_loss`] ask once per pair.
+    /// The provided method sums the squares of the pair's own rows. Robust kernels and mean losses call it once per pair.
     fn squared_error(&self, pair: &Pair) -> f64 {
         let mut system = NormalEquations::new(pair.source.point.cast(), 1.0);
         let unweighted = Pair {
@@ -58,11 +63,9 @@ pub trait ErrorMetric {
         system.loss()
     }
 
-    /// Returns the weighted mean of the errors at the pose that the pairs were made at, as [`ErrorMetric::minimize`] reports
-    /// it; m². Pure: `&mut self` is scratch.
-    ///
-    /// `None` without weight or with numbers that are not finite.
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+    /// Returns the weighted mean of the errors at the pose that the pairs were made at, as [`ErrorMetric::step`] reports
+    /// it; m². `None` without weight or with numbers that are not finite.
+    fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for pair in pairs.as_slice() {
             let w = f64::from(pair.weight);
@@ -73,12 +76,11 @@ pub trait ErrorMetric {
         (weight > 0.0 && mean.is_finite()).then_some(mean)
     }
 
-    /// Returns all pairs linearised: what one Gauss–Newton step solves, and what information, covariance and observability at
-    /// that pose are read from. Pure: `&mut self` is scratch.
+    /// Returns all pairs linearized. `None` without weight or with points that are not finite.
     ///
-    /// `None` without weight or with points that are not finite. The provided method sums the rows of
-    /// [`ErrorMetric::linearize`] about the centroid, with lengths scaled by the RMS radius.
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+    /// The provided method sums the rows of [`ErrorMetric::linearize`] around the centroid, with lengths scaled by the RMS
+    /// radius.
+    fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
         let system = vectorized(Linearize {
             metric: self,
             pairs: pairs.as_slice(),
@@ -87,15 +89,12 @@ pub trait ErrorMetric {
         system.loss().is_finite().then_some(system)
     }
 
-    /// Takes one step of minimisation over all pairs. Pure: `&mut self` is scratch.
+    /// Takes one step of minimization over all pairs.
     ///
-    /// A metric that depends on the pose (a prior, a frozen direction of the object frame) finds it in
-    /// [`Correspondences::camera_from_object`].
-    ///
-    /// `None` when the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
-    /// that are not finite. The provided method is one Gauss–Newton step: it solves [`ErrorMetric::system`].
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let system = self.system(pairs)?;
+    /// `None` if the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
+    /// that are not finite. The provided method is one Gauss–Newton step.
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
+        let system = self.linearize_all(pairs)?;
         let sum = || pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
         let weight: f64 = system.weight().unwrap_or_else(sum);
         let mean_loss = system.loss() / weight;
@@ -106,15 +105,7 @@ pub trait ErrorMetric {
         })
     }
 
-    /// Says which iteration of a stage, from 0, the next pairs belong to, and the pose that the stage began at: for metrics
-    /// that change from one to the next ([`crate::MetricSchedule`]) or are tied to the start ([`crate::PosePrior`]).
-    ///
-    /// Pure all the same: equal calls of `begin` and equal pairs give equal results. Decorators pass it on.
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        let _ = (iteration, init);
-    }
-
-    /// Name in traces.
+    /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
@@ -131,7 +122,7 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        // One pass: about any point near by at first, and where the centroid and the radius turned out to be after.
+        // One pass: relative to any point nearby at first, then moved to the centroid and scaled by the radius found.
         let mut moments = Moments::about_first(self.pairs)?;
         let mut system = NormalEquations::new(moments.origin(), 1.0);
         for pair in self.pairs {
@@ -143,32 +134,33 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
     }
 }
 
-impl<T: ErrorMetric + ?Sized> ErrorMetric for Box<T> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        (**self).linearize(pair, system);
-    }
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: ErrorMetric + ?Sized> ErrorMetric for $pointer {
+            fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+                (**self).linearize(pair, system);
+            }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        (**self).squared_error(pair)
-    }
+            fn squared_error(&self, pair: &Pair) -> f64 {
+                (**self).squared_error(pair)
+            }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-        (**self).mean_loss(pairs)
-    }
+            fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
+                (**self).mean_squared_error(pairs)
+            }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        (**self).system(pairs)
-    }
+            fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
+                (**self).linearize_all(pairs)
+            }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        (**self).minimize(pairs)
-    }
+            fn step(&self, pairs: &Correspondences) -> Option<Step> {
+                (**self).step(pairs)
+            }
 
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        (**self).begin(iteration, init);
-    }
-
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )+};
 }
+forward!(Box<T>, &T, &mut T);

@@ -2,6 +2,7 @@
 
 pub(crate) mod error_metric;
 pub(crate) mod generalized;
+pub(crate) mod minimize;
 pub(crate) mod plane_to_point;
 pub(crate) mod point_to_plane;
 pub(crate) mod point_to_point;
@@ -10,8 +11,9 @@ pub(crate) mod weighted_sum;
 
 pub use error_metric::{ErrorMetric, Step};
 pub use generalized::Generalized;
+pub use minimize::Minimize;
 pub use plane_to_point::PlaneToPoint;
 pub use point_to_plane::PointToPlane;
 pub use point_to_point::PointToPoint;
 pub use symmetric::Symmetric;
-pub use weighted_sum::WeightedSum;
+pub use weighted_sum::{Terms, WeightedSum};

@@ -46,7 +46,7 @@ impl ErrorMetric for PlaneToPoint {
         pair.source.normal.cast::<f64>().dot(&offset).powi(2)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+    fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
         system_of_rows(pairs.as_slice(), Self::row)
     }
 

@@ -1,8 +1,8 @@
 //! The point-to-point error metric.
 
+use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{
     Correspondences, Isometry3, Matrix3, Pair, Point3, Translation3, UnitQuaternion, Vector3,
-    VectorLoop, vectorized,
 };
 use nalgebra::{Matrix2, Quaternion, Rotation3, SymmetricEigen};
 
@@ -37,11 +37,11 @@ impl ErrorMetric for PointToPoint {
         system.add_row(&point, &Vector3::z(), difference.z, weight);
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+    fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
         system_of_points(pairs.as_slice())
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let pairs = pairs.as_slice();
         // Sums relative to the first pair that counts, so that objects far from the camera lose no digits, and points all
         // in one place give sums of exact zeros.

@@ -57,7 +57,7 @@ impl ErrorMetric for Symmetric {
         Self::residual(pair).map_or(0.0, |(_, residual)| residual * residual)
     }
 
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+    fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for pair in pairs.as_slice() {
             if let Some((_, residual)) = Self::residual(pair) {
@@ -69,7 +69,7 @@ impl ErrorMetric for Symmetric {
         (weight > 0.0 && mean.is_finite()).then_some(mean)
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let pairs = pairs.as_slice();
         let origin = pairs.first()?.source.point.cast::<f64>();
         let counting = || {

@@ -1,8 +1,8 @@
 //! Several metrics in one normal system.
 
-use hicp_core::{Correspondences, Isometry3, Pair};
+use hicp_core::{Correspondences, Iteration};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
 /// E = Σₖ αₖ Eₖ: several metrics over the same pairs, minimised together by Gauss–Newton.
@@ -11,7 +11,7 @@ use crate::system::normal_equations::NormalEquations;
 /// the sum of both with α and 1 − α. Terms are `(factor, metric)`: a tuple of two or three, or a `Vec` of any number of one type
 /// (boxed ones, for instance). Factors are not negative; a term of factor 0 is left out.
 ///
-/// Terms contribute their [`ErrorMetric::system`]s, so kernels and priors inside keep their effect; what solves (closed forms,
+/// Terms contribute their [`Minimize::system`]s, so kernels and priors inside keep their effect; what solves (closed forms,
 /// solvers, held components, policies) belongs outside: `Frozen` around the sum, not in it. The system is solved with the
 /// policy and the held components of the first term.
 ///
@@ -29,163 +29,92 @@ pub struct WeightedSum<T> {
     pub terms: T,
 }
 
-/// The terms of a sum, in order.
-struct Total {
-    system: Option<NormalEquations>,
+/// The terms of a [`WeightedSum`]: one to three pairs `(factor, metric)` as a tuple, or a `Vec` of any number.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a list of terms",
+    note = "`WeightedSum::terms` accepts a tuple of one to three `(f64, M)` or a `Vec<(f64, M)>`, each `M` an error metric"
+)]
+pub trait Terms {
+    /// Calls `visit` with every term of positive factor, in order, until it returns `None`.
+    fn visit(&mut self, visit: &mut dyn FnMut(f64, &mut dyn Minimize) -> Option<()>) -> Option<()>;
 }
 
-impl Total {
-    /// Adds a term's system; `None` where the term has none.
-    fn add<M: ErrorMetric>(
-        &mut self,
-        (factor, metric): &mut (f64, M),
-        pairs: &Correspondences,
-    ) -> Option<()> {
-        if *factor > 0.0 {
-            let term = metric.system(pairs)?;
-            match &mut self.system {
-                Some(system) => system.merge(&term, *factor),
-                None => self.system = Some(term.scaled(*factor)),
-            }
+impl<M: Minimize> Terms for (f64, M) {
+    fn visit(&mut self, visit: &mut dyn FnMut(f64, &mut dyn Minimize) -> Option<()>) -> Option<()> {
+        if self.0 > 0.0 {
+            visit(self.0, &mut self.1)?;
         }
         Some(())
     }
 }
 
-/// A term's part of the mean loss.
-fn mean_loss<M: ErrorMetric>(
-    (factor, metric): &mut (f64, M),
-    pairs: &Correspondences,
-) -> Option<f64> {
-    if *factor > 0.0 {
-        Some(*factor * metric.mean_loss(pairs)?)
-    } else {
-        Some(0.0)
+impl<M: Minimize> Terms for Vec<(f64, M)> {
+    fn visit(&mut self, visit: &mut dyn FnMut(f64, &mut dyn Minimize) -> Option<()>) -> Option<()> {
+        self.iter_mut().try_for_each(|term| term.visit(visit))
     }
 }
 
-fn squared_error<M: ErrorMetric>((factor, metric): &(f64, M), pair: &Pair) -> f64 {
-    if *factor > 0.0 {
-        factor * metric.squared_error(pair)
-    } else {
-        0.0
-    }
-}
-
-fn linearize<M: ErrorMetric>(
-    (factor, metric): &(f64, M),
-    pair: &Pair,
-    system: &mut NormalEquations,
-) {
-    if *factor > 0.0 {
-        #[allow(clippy::cast_possible_truncation)] // The weight of a pair is an f32.
-        let weight = (f64::from(pair.weight) * factor) as f32;
-        metric.linearize(&Pair { weight, ..*pair }, system);
-    }
-}
-
-/// Gauss–Newton over the whole sum.
-fn step(system: Option<NormalEquations>, mean_loss: Option<f64>) -> Option<Step> {
-    Some(Step {
-        increment: system?.solve()?,
-        mean_loss: mean_loss?,
-    })
-}
-
-macro_rules! sum {
+macro_rules! terms {
     ($($member:ident),+) => {
-        impl<$($member: ErrorMetric),+> ErrorMetric for WeightedSum<($((f64, $member),)+)> {
+        impl<$($member: Minimize),+> Terms for ($((f64, $member),)+) {
             #[allow(non_snake_case)]
-            fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-                let ($($member,)+) = &self.terms;
-                $(linearize($member, pair, system);)+
-            }
-
-            #[allow(non_snake_case)]
-            fn squared_error(&self, pair: &Pair) -> f64 {
-                let ($($member,)+) = &self.terms;
-                let mut sum = 0.0;
-                $(sum += squared_error($member, pair);)+
-                sum
-            }
-
-            #[allow(non_snake_case)]
-            fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
-                let ($($member,)+) = &mut self.terms;
-                let mut sum = 0.0;
-                $(sum += mean_loss($member, pairs)?;)+
-                Some(sum)
-            }
-
-            #[allow(non_snake_case)]
-            fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-                let ($($member,)+) = &mut self.terms;
-                let mut total = Total { system: None };
-                $(total.add($member, pairs)?;)+
-                total.system
-            }
-
-            fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-                step(self.system(pairs), self.mean_loss(pairs))
-            }
-
-            #[allow(non_snake_case)]
-            fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-                let ($($member,)+) = &mut self.terms;
-                $($member.1.begin(iteration, init);)+
-            }
-
-            fn name(&self) -> &'static str {
-                "weighted-sum"
+            fn visit(
+                &mut self,
+                visit: &mut dyn FnMut(f64, &mut dyn Minimize) -> Option<()>,
+            ) -> Option<()> {
+                let ($($member,)+) = self;
+                $($member.visit(visit)?;)+
+                Some(())
             }
         }
     };
 }
-sum!(A);
-sum!(A, B);
-sum!(A, B, C);
+terms!(A);
+terms!(A, B);
+terms!(A, B, C);
 
-impl<M: ErrorMetric> ErrorMetric for WeightedSum<Vec<(f64, M)>> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        for term in &self.terms {
-            linearize(term, pair, system);
-        }
+impl<T: Terms> Minimize for WeightedSum<T> {
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        let mut total: Option<NormalEquations> = None;
+        self.terms.visit(&mut |factor, metric| {
+            let term = metric.system(iteration, pairs)?;
+            match &mut total {
+                Some(total) => total.merge(&term, factor),
+                None => total = Some(term.scaled(factor)),
+            }
+            Some(())
+        })?;
+        total
     }
 
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.terms
-            .iter()
-            .map(|term| squared_error(term, pair))
-            .sum()
-    }
-
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         let mut sum = 0.0;
-        for term in &mut self.terms {
-            sum += mean_loss(term, pairs)?;
-        }
+        self.terms.visit(&mut |factor, metric| {
+            sum += factor * metric.mean_loss(iteration, pairs)?;
+            Some(())
+        })?;
         Some(sum)
     }
 
-    fn system(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let mut total = Total { system: None };
-        for term in &mut self.terms {
-            total.add(term, pairs)?;
-        }
-        total.system
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        // Every term adds something to each error, so the visit never ends early.
+        let _ = self.terms.visit(&mut |own, metric| {
+            metric.add_squared_errors(iteration, pairs, factor * own, errors);
+            Some(())
+        });
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        step(self.system(pairs), self.mean_loss(pairs))
-    }
-
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        for (_, metric) in &mut self.terms {
-            metric.begin(iteration, init);
-        }
-    }
-
-    fn name(&self) -> &'static str {
+    fn label(&self) -> &'static str {
         "weighted-sum"
     }
 }

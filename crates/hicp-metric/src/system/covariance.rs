@@ -3,9 +3,9 @@
 use hicp_core::{Correspondences, Matrix6, Vector6};
 
 use crate::metric::error_metric::ErrorMetric;
-use crate::system::degeneracy::eigen;
 use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
+use crate::system::solve::eigen;
 
 /// Ratio to the largest eigenvalue below which a direction is without information: points of 5 cm at 1 m in `f32` leave
 /// 10⁻¹² of it where there should be none.
@@ -79,12 +79,12 @@ impl NormalEquations {
 /// projective Generalized ICP at 0.2 % of noise: 5.6 to 6.2 in place of 22 to 29, and 5.6 to 5.9 at 0.5 %; nearest neighbours are drawn to the
 /// noise and give 20 at 0.5 % (`cargo run --release -p hicp-tests --example nees_report 300`).
 ///
-/// For metrics that do not override [`ErrorMetric::system`]. `None` where the pairs do not determine all six directions. Cost: two linearisations.
+/// `None` where the pairs do not determine all six directions. Cost: two linearisations.
 pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
-    metric: &mut M,
+    metric: &M,
     pairs: &Correspondences,
 ) -> Option<Matrix6<f64>> {
-    let system = metric.system(pairs)?;
+    let system = metric.linearize_all(pairs)?;
     let hessian = system.scaled_hessian();
     let eigenvalues = eigen(hessian)?.eigenvalues;
     if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {

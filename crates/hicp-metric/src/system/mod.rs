@@ -3,6 +3,7 @@
 pub(crate) mod covariance;
 pub(crate) mod degeneracy;
 pub(crate) mod freedom;
+mod held;
 pub(crate) mod moments;
 pub(crate) mod normal_equations;
 pub(crate) mod observability;
@@ -10,6 +11,7 @@ pub(crate) mod pair_block;
 pub(crate) mod point_blocks;
 pub(crate) mod row_blocks;
 pub(crate) mod row_sums;
+pub(crate) mod solve;
 
 pub use covariance::sandwich_covariance;
 pub use degeneracy::Degeneracy;

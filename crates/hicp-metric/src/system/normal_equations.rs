@@ -3,7 +3,7 @@
 use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, so3::hat};
 
 use crate::system::degeneracy::Degeneracy;
-use crate::system::freedom::Freedom;
+use crate::system::freedom::{Freedom, blocks};
 use crate::system::row_sums::RowSums;
 
 /// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
@@ -65,7 +65,7 @@ impl NormalEquations {
         moved
     }
 
-    /// Σ w over the pairs, if this is the sum over pairs that [`crate::ErrorMetric::system`] provides.
+    /// Σ w over the pairs, if this is the sum over pairs that [`crate::ErrorMetric::linearize_all`] provides.
     pub(crate) fn weight(&self) -> Option<f64> {
         self.weight
     }
@@ -204,15 +204,6 @@ impl NormalEquations {
             &(Matrix3::identity() * self.length),
         )
     }
-}
-
-/// [a b; 0 d]
-pub(crate) fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut matrix = Matrix6::zeros();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
-    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(b);
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(d);
-    matrix
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use hicp_core::{Isometry3, Point3, Translation3, Vector3, Vector6, se3};
 
-use crate::system::degeneracy::eigen;
 use crate::system::normal_equations::NormalEquations;
+use crate::system::solve::eigen;
 
 /// The six motions that a set of pairs determines from worst to best: the eigen-decomposition of the scaled JᵀWJ.
 ///

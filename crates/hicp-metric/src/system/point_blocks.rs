@@ -1,13 +1,14 @@
 //! Normal equations of the distances between points, many pairs at a time.
 
-use hicp_core::{Pair, VectorLoop, vectorized};
+use hicp_core::Pair;
+use hicp_core::internal::{VectorLoop, vectorized};
 
 use crate::system::moments::Moments;
 use crate::system::normal_equations::NormalEquations;
 use crate::system::pair_block::{BLOCK, LANES, PairBlock, add, add_products, product};
 use crate::system::row_sums::RowSums;
 
-/// Returns what [`crate::ErrorMetric::system`] provides for the residuals p − c of all pairs, up to rounding, in a sixth of the time.
+/// Returns what [`crate::ErrorMetric::linearize_all`] provides for the residuals p − c of all pairs, up to rounding, in a sixth of the time.
 ///
 /// The three rows of a pair at p are [eₖ, p × eₖ], so that JᵀJ is made of Σ w, Σ w p and Σ w p pᵀ alone.
 pub(crate) fn system_of_points(pairs: &[Pair]) -> Option<NormalEquations> {

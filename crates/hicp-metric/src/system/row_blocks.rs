@@ -1,6 +1,7 @@
 //! Sums over pairs that have one residual row each, many pairs at a time.
 
-use hicp_core::{Pair, Point3, Vector3, VectorLoop, vectorized};
+use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::{Pair, Point3, Vector3};
 
 use crate::system::moments::Moments;
 use crate::system::normal_equations::NormalEquations;
@@ -18,7 +19,7 @@ pub(crate) struct Row {
     pub(crate) residual: f64,
 }
 
-/// Returns what [`crate::ErrorMetric::system`] provides for a metric of one row per pair, up to rounding, in half the time: rows
+/// Returns what [`crate::ErrorMetric::linearize_all`] provides for a metric of one row per pair, up to rounding, in half the time: rows
 /// lie across the lanes of vectors instead of along them.
 pub(crate) fn system_of_rows(
     pairs: &[Pair],

@@ -1,8 +1,10 @@
 //! Covariance and information against Monte Carlo and under changes of frame.
 
 use crate::scenes::{Numbers, carried, center, ellipsoid, exact, messy};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Surfel, Vector3, Vector6, se3};
-use hicp_metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint};
+use hicp_metric::Minimize;
+use hicp_metric::{NormalEquations, PointToPlane, PointToPoint};
 
 const TRIALS: u32 = 4000;
 
@@ -29,11 +31,7 @@ fn noisy(
 }
 
 /// Mean predicted and sample covariance of the increment at the minimum of each trial.
-fn monte_carlo(
-    metric: &mut dyn ErrorMetric,
-    sigma: f64,
-    plane: bool,
-) -> (Matrix6<f64>, Matrix6<f64>) {
+fn monte_carlo(metric: &mut dyn Minimize, sigma: f64, plane: bool) -> (Matrix6<f64>, Matrix6<f64>) {
     let mut numbers = Numbers(91);
     let source = ellipsoid(&mut numbers, 60);
     let weights: Vec<f32> = (0..60)
@@ -42,9 +40,15 @@ fn monte_carlo(
     let (mut predicted, mut sample) = (Matrix6::zeros(), Matrix6::zeros());
     for _ in 0..TRIALS {
         let pairs = noisy(&mut numbers, &source, &weights, sigma, plane);
-        let increment = metric.minimize(&pairs).unwrap().increment;
+        let increment = metric
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let system = metric
-            .system(&crate::scenes::advanced(&pairs, &increment))
+            .system(
+                &Iteration::default(),
+                &crate::scenes::advanced(&pairs, &increment),
+            )
             .unwrap();
         predicted += system.covariance().unwrap() / f64::from(TRIALS);
         let xi = se3::log(&increment);
@@ -82,7 +86,11 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
     let at = |sigma| {
         let mut numbers = Numbers(93);
         let pairs = noisy(&mut numbers, &source, &weights, sigma, true);
-        PointToPlane.system(&pairs).unwrap().covariance().unwrap()
+        PointToPlane
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance()
+            .unwrap()
     };
     let (one, three) = (at(1e-3), at(3e-3));
     // Targets are rounded to f32: 3e-8 m of 1e-3 m.
@@ -94,8 +102,16 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
         pair.weight *= 2.0;
     }
     let (a, b) = (
-        PointToPlane.system(&pairs).unwrap().covariance().unwrap(),
-        PointToPlane.system(&heavy).unwrap().covariance().unwrap(),
+        PointToPlane
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance()
+            .unwrap(),
+        PointToPlane
+            .system(&Iteration::default(), &heavy)
+            .unwrap()
+            .covariance()
+            .unwrap(),
     );
     assert!((a - b).amax() < 1e-12 * a.amax());
 }
@@ -173,10 +189,18 @@ fn a_common_motion_carries_the_covariance_by_the_adjoint() {
     let pairs = messy(&mut numbers, 60);
     let motion = numbers.motion(&center(), 70.0, 0.3);
     let moved = carried(&pairs, &motion);
-    let metrics: [Box<dyn ErrorMetric>; 2] = [Box::new(PointToPlane), Box::new(PointToPoint)];
+    let metrics: [Box<dyn Minimize>; 2] = [Box::new(PointToPlane), Box::new(PointToPoint)];
     for mut metric in metrics {
-        let here = metric.system(&pairs).unwrap().covariance().unwrap();
-        let there = metric.system(&moved).unwrap().covariance().unwrap();
+        let here = metric
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance()
+            .unwrap();
+        let there = metric
+            .system(&Iteration::default(), &moved)
+            .unwrap()
+            .covariance()
+            .unwrap();
         let adjoint = se3::adjoint(&motion);
         let expected = adjoint * here * adjoint.transpose();
         assert!((there - expected).amax() < 1e-4 * expected.amax());
@@ -194,16 +218,34 @@ fn what_is_not_determined_has_no_covariance() {
         })
         .collect();
     let pairs = exact(&plane, &Isometry3::translation(0.0, 0.0, 0.001));
-    assert_eq!(PointToPlane.system(&pairs).unwrap().covariance(), None);
+    assert_eq!(
+        PointToPlane
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance(),
+        None
+    );
     // Six rows determine the pose but leave nothing to estimate the noise from.
     let six = messy(&mut numbers, 6);
-    assert_eq!(PointToPlane.system(&six).unwrap().covariance(), None);
+    assert_eq!(
+        PointToPlane
+            .system(&Iteration::default(), &six)
+            .unwrap()
+            .covariance(),
+        None
+    );
     // Pairs without weight are no rows.
     let mut eight = messy(&mut numbers, 8);
     for pair in &mut eight.as_mut_slice()[..3] {
         pair.weight = 0.0;
     }
-    assert_eq!(PointToPlane.system(&eight).unwrap().covariance(), None);
+    assert_eq!(
+        PointToPlane
+            .system(&Iteration::default(), &eight)
+            .unwrap()
+            .covariance(),
+        None
+    );
     // A sphere leaves its turns open.
     let sphere: Vec<_> = (0..100)
         .map(|_| {
@@ -215,6 +257,18 @@ fn what_is_not_determined_has_no_covariance() {
     for pair in pairs.as_mut_slice() {
         pair.target.point.z += 1e-3;
     }
-    assert_eq!(PointToPlane.system(&pairs).unwrap().covariance(), None);
-    assert!(PointToPoint.system(&pairs).unwrap().covariance().is_some());
+    assert_eq!(
+        PointToPlane
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance(),
+        None
+    );
+    assert!(
+        PointToPoint
+            .system(&Iteration::default(), &pairs)
+            .unwrap()
+            .covariance()
+            .is_some()
+    );
 }

@@ -3,8 +3,10 @@
 use std::collections::VecDeque;
 
 use crate::scenes::center;
-use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Vector3, Vector6, so3};
-use hicp_metric::{Degeneracy, ErrorMetric, LevenbergMarquardt, NormalEquations};
+use hicp_core::Iteration;
+use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Vector3, Vector6, so3};
+use hicp_metric::Minimize;
+use hicp_metric::{Degeneracy, LevenbergMarquardt, NormalEquations};
 
 /// L of the systems here.
 const LENGTH: f64 = 0.1;
@@ -123,10 +125,8 @@ struct Scripted {
     asked: Vec<Isometry3<f64>>,
 }
 
-impl ErrorMetric for Scripted {
-    fn linearize(&self, _: &Pair, _: &mut NormalEquations) {}
-
-    fn mean_loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+impl Minimize for Scripted {
+    fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.asked.push(*pairs.camera_from_object());
         if self.losses.len() > 1 {
             self.losses.pop_front()
@@ -135,8 +135,21 @@ impl ErrorMetric for Scripted {
         }
     }
 
-    fn system(&mut self, _: &Correspondences) -> Option<NormalEquations> {
+    fn system(&mut self, _: &Iteration<'_>, _: &Correspondences) -> Option<NormalEquations> {
         Some(self.system)
+    }
+
+    fn add_squared_errors(
+        &mut self,
+        _: &Iteration<'_>,
+        _: &Correspondences,
+        _: f64,
+        _: &mut [f64],
+    ) {
+    }
+
+    fn label(&self) -> &'static str {
+        "scripted"
     }
 }
 
@@ -169,7 +182,10 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
             let mut once = solver(system.with_policy(policy, 0.0), &[2.0, 1.0]);
             once.initial_damping = lambda;
             once.max_iterations = 1;
-            let increment = once.minimize(&Correspondences::new()).unwrap().increment;
+            let increment = once
+                .minimize(&Iteration::default(), &Correspondences::new())
+                .unwrap()
+                .increment;
             let expected = h / (h + lambda * h.max(1e-6 * mean) + tikhonov);
             let found = turn(&increment) / (-RESIDUAL / LENGTH);
             assert!(
@@ -181,7 +197,10 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
         let mut once = solver(system.with_policy(Degeneracy::Freeze, 0.0), &[2.0, 1.0]);
         once.initial_damping = lambda;
         once.max_iterations = 1;
-        let increment = once.minimize(&Correspondences::new()).unwrap().increment;
+        let increment = once
+            .minimize(&Iteration::default(), &Correspondences::new())
+            .unwrap()
+            .increment;
         let found = turn(&increment) / (-RESIDUAL / LENGTH);
         assert!((found * (1.0 + lambda) - 1.0).abs() < 1e-9, "{found}");
     }
@@ -193,7 +212,9 @@ fn the_damping_follows_the_loss() {
     let system = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
     let mut solver = solver(system, &[10.0, 9.0, 9.5, 9.0, 8.0, 7.0, 7.0]);
     solver.max_iterations = 6;
-    let step = solver.minimize(&Correspondences::new()).unwrap();
+    let step = solver
+        .minimize(&Iteration::default(), &Correspondences::new())
+        .unwrap();
     let way = |lambda: f64| 1.0 / (1.0 + lambda);
     let accepted = way(1.0) + way(10.0);
     let expected = [
@@ -220,7 +241,7 @@ fn iterations_end_where_no_step_is_left() {
     let whole = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
     // Never lower: once the damping has left next to nothing of the step.
     let mut never = solver(whole, &[1.0]);
-    let step = never.minimize(&pairs).unwrap();
+    let step = never.minimize(&Iteration::default(), &pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     let found = tried(&never);
     assert!(found.len() < 20, "{}", found.len());
@@ -231,14 +252,14 @@ fn iterations_end_where_no_step_is_left() {
         content.add_row(&center(), &Vector3::x(), 0.0, 1.0);
     }
     let mut content = solver(content, &[1.0]);
-    let step = content.minimize(&pairs).unwrap();
+    let step = content.minimize(&Iteration::default(), &pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     assert_eq!(tried(&content).len(), 1);
     // A step within the tolerance is the last, lower or not: here all are, relative to L.
     for losses in [[2.0, 1.0, 0.5], [2.0, 3.0, 4.0]] {
         let mut tolerant = solver(whole, &losses);
         tolerant.tolerance = RESIDUAL / LENGTH;
-        tolerant.minimize(&pairs).unwrap();
+        tolerant.minimize(&Iteration::default(), &pairs).unwrap();
         assert_eq!(tried(&tolerant).len(), 1, "{losses:?}");
     }
 }

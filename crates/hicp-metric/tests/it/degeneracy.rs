@@ -1,10 +1,10 @@
 //! Which motions are open on which shapes, and that nothing moves along them.
 
 use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Surfel, Vector3};
-use hicp_metric::{
-    Conditioned, Degeneracy, ErrorMetric, NormalEquations, PointToPlane, PointToPoint,
-};
+use hicp_metric::Minimize;
+use hicp_metric::{Conditioned, Degeneracy, NormalEquations, PointToPlane, PointToPoint};
 
 fn at_rest(source: &[Surfel]) -> Correspondences {
     exact(source, &Isometry3::identity())
@@ -45,8 +45,8 @@ fn line(numbers: &mut Numbers) -> Vec<Surfel> {
     (0..100).map(|_| one()).collect()
 }
 
-fn degenerate(metric: &mut dyn ErrorMetric, pairs: &Correspondences) -> usize {
-    let system = metric.system(pairs).unwrap();
+fn degenerate(metric: &mut dyn Minimize, pairs: &Correspondences) -> usize {
+    let system = metric.system(&Iteration::default(), pairs).unwrap();
     let found = system.observability().unwrap();
     found.n_degenerate(Degeneracy::THRESHOLD)
 }
@@ -61,7 +61,7 @@ fn shapes_leave_open_what_they_should() {
     for _ in 0..10 {
         let motion = numbers.motion(&center(), 100.0, 0.2);
         for factor in [1.0, 1000.0] {
-            let count = |metric: &mut dyn ErrorMetric, source: &[Surfel]| {
+            let count = |metric: &mut dyn Minimize, source: &[Surfel]| {
                 degenerate(
                     metric,
                     &resized(&carried(&at_rest(source), &motion), factor),
@@ -92,7 +92,7 @@ fn directions_are_unit_orthogonal_and_leave_the_residuals_alone() {
     ] {
         let motion = numbers.motion(&center(), 100.0, 0.2);
         let pairs = carried(&at_rest(&source), &motion);
-        let system = PointToPlane.system(&pairs).unwrap();
+        let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
         let found = system.observability().unwrap();
         assert!(found.eigenvalues.is_sorted());
         assert!((found.eigenvalues[5] - 1.0).abs() < 1e-15);
@@ -102,7 +102,10 @@ fn directions_are_unit_orthogonal_and_leave_the_residuals_alone() {
         for (i, direction) in found.directions.iter().enumerate() {
             let along = found.motion(direction, 1e-3);
             let moved = advanced(&pairs, &along);
-            let rms = PointToPlane.mean_loss(&moved).unwrap().sqrt();
+            let rms = PointToPlane
+                .mean_loss(&Iteration::default(), &moved)
+                .unwrap()
+                .sqrt();
             // A millimetre along an open direction moves by roundings and by the curvature over a millimetre.
             assert_eq!(rms < 2e-5, i < n, "{i} of {n}: {rms}");
         }
@@ -132,7 +135,9 @@ fn nothing_slides_along_a_plane() {
         let (pairs, normal) = lifted(&mut numbers, &motion);
         let middle = motion * center();
         for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
-            let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+            let step = conditioned(PointToPlane, policy)
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap();
             let shift = step.increment * middle - middle;
             let slide = shift - normal * shift.dot(&normal);
             assert!((shift.dot(&normal) - 0.004).abs() < 1e-6, "{policy:?}");
@@ -141,7 +146,7 @@ fn nothing_slides_along_a_plane() {
             assert!(turn.abs() < 1e-5, "{policy:?}: {turn}");
         }
         assert_eq!(
-            conditioned(PointToPlane, Degeneracy::Refuse).minimize(&pairs),
+            conditioned(PointToPlane, Degeneracy::Refuse).minimize(&Iteration::default(), &pairs),
             None
         );
     }
@@ -162,7 +167,9 @@ fn noisy_normals_do_not_make_a_plane_slide_when_frozen() {
             pair.target.point += (normal * (numbers.gaussian() * 0.001)).cast::<f32>();
         }
         let slide = |policy| {
-            let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+            let step = conditioned(PointToPlane, policy)
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap();
             let shift = step.increment * center() - center();
             (shift - normal * shift.dot(&normal)).norm()
         };
@@ -179,10 +186,12 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     let mut numbers = Numbers(85);
     let pairs = messy(&mut numbers, 200);
     let expected = conditioned(PointToPlane, Degeneracy::Ignore)
-        .minimize(&pairs)
+        .minimize(&Iteration::default(), &pairs)
         .unwrap();
     for policy in [Degeneracy::Damp, Degeneracy::Freeze, Degeneracy::Refuse] {
-        let step = conditioned(PointToPlane, policy).minimize(&pairs).unwrap();
+        let step = conditioned(PointToPlane, policy)
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap();
         let (angle, distance) = crate::scenes::difference(&step.increment, &expected.increment);
         assert!(
             angle < 1e-5 && distance < 1e-6,
@@ -192,13 +201,16 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     }
     // Damping is what the metric does by itself.
     let damped = conditioned(PointToPlane, Degeneracy::Damp)
-        .minimize(&pairs)
+        .minimize(&Iteration::default(), &pairs)
         .unwrap();
     assert_eq!(
         damped.increment,
-        PointToPlane.minimize(&pairs).unwrap().increment
+        PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment
     );
-    let system = PointToPlane.system(&pairs).unwrap();
+    let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
     assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
 }
 
@@ -207,7 +219,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
 fn thresholds_bound_what_moves() {
     let mut numbers = Numbers(86);
     let pairs = messy(&mut numbers, 200);
-    let system = PointToPlane.system(&pairs).unwrap();
+    let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
     let still = system.solve_with(Degeneracy::Freeze, 2.0).unwrap();
     assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
     assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
@@ -262,7 +274,10 @@ fn numbers_that_are_none_end_in_none() {
         assert_eq!(empty.solve_with(policy, 1e-3), None);
         assert_eq!(silent.solve_with(policy, 1e-3), None, "{policy:?}");
         let mut metric = conditioned(PointToPlane, policy);
-        assert_eq!(metric.minimize(&Correspondences::new()), None);
+        assert_eq!(
+            metric.minimize(&Iteration::default(), &Correspondences::new()),
+            None
+        );
         let one: Correspondences = [Pair::new(
             0,
             surfel(center(), Vector3::z()),
@@ -271,6 +286,6 @@ fn numbers_that_are_none_end_in_none() {
         )]
         .into_iter()
         .collect();
-        assert_eq!(metric.minimize(&one), None);
+        assert_eq!(metric.minimize(&Iteration::default(), &one), None);
     }
 }

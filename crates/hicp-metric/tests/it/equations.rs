@@ -1,11 +1,15 @@
 //! Normal equations in the hands of someone who writes a metric of their own.
 
 use crate::scenes::{Numbers, messy};
+use hicp_core::Iteration;
 use hicp_core::{Matrix6, Point3, UnitQuaternion, Vector3, Vector6, se3, so3};
-use hicp_metric::{Degeneracy, ErrorMetric, NormalEquations, PointToPlane};
+use hicp_metric::Minimize;
+use hicp_metric::{Degeneracy, NormalEquations, PointToPlane};
 
 fn system(seed: u64) -> NormalEquations {
-    PointToPlane.system(&messy(&mut Numbers(seed), 60)).unwrap()
+    PointToPlane
+        .system(&Iteration::default(), &messy(&mut Numbers(seed), 60))
+        .unwrap()
 }
 
 #[test]

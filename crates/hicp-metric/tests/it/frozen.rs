@@ -1,10 +1,12 @@
 //! Held components are exactly zero, and the rest is the constrained minimum.
 
 use crate::scenes::{Numbers, at, difference, exact, messy};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Point3, Vector3, Vector6, se3, so3};
+use hicp_metric::Minimize;
 use hicp_metric::{
-    Conditioned, ErrorMetric, Frame, Frozen, GaussNewton, LevenbergMarquardt, PointToPlane,
-    PointToPoint, Symmetric,
+    Conditioned, Frame, Frozen, GaussNewton, LevenbergMarquardt, PointToPlane, PointToPoint,
+    Symmetric,
 };
 
 /// Displacement of the object's origin and rotation vector, in the axes of the frame.
@@ -47,12 +49,14 @@ fn frozen<M>(
 
 #[test]
 fn held_components_are_zero_and_the_others_move() {
-    fn check<M: ErrorMetric + Copy>(metric: M) {
+    fn check<M: Minimize + Copy>(metric: M) {
         let mut numbers = Numbers(51);
         let pairs = posed(&mut numbers, 80);
         for frame in [Frame::Camera, Frame::Object] {
             for mask in masks() {
-                let step = frozen(metric, frame, mask).minimize(&pairs).unwrap();
+                let step = frozen(metric, frame, mask)
+                    .minimize(&Iteration::default(), &pairs)
+                    .unwrap();
                 let found = components(frame, pairs.camera_from_object(), &step.increment);
                 let held = [mask.0, mask.1].concat();
                 for (i, (x, held)) in found.iter().zip(held).enumerate() {
@@ -79,11 +83,11 @@ fn exactly_zero_means_the_bits() {
     let none = [false; 3];
     for frame in [Frame::Camera, Frame::Object] {
         let step = frozen(PointToPlane, frame, (all, all))
-            .minimize(&pairs)
+            .minimize(&Iteration::default(), &pairs)
             .unwrap();
         assert_eq!(step.increment, Isometry3::identity());
         let step = frozen(PointToPlane, frame, (none, all))
-            .minimize(&pairs)
+            .minimize(&Iteration::default(), &pairs)
             .unwrap();
         assert_eq!(step.increment.rotation, Isometry3::identity().rotation);
     }
@@ -93,7 +97,10 @@ fn exactly_zero_means_the_bits() {
             metric: frozen(PointToPlane, Frame::Camera, mask),
             ..Conditioned::default()
         };
-        let increment = metric.minimize(&pairs).unwrap().increment;
+        let increment = metric
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let turn = increment.rotation.imag();
         for axis in 0..3 {
             assert!(!mask.1[axis] || turn[axis] == 0.0, "{mask:?} {turn}");
@@ -103,7 +110,7 @@ fn exactly_zero_means_the_bits() {
     }
     let hold = ([false, false, true], all);
     let step = frozen(PointToPoint, Frame::Camera, hold)
-        .minimize(&pairs)
+        .minimize(&Iteration::default(), &pairs)
         .unwrap();
     assert_eq!(step.increment.translation.z.to_bits(), 0.0_f64.to_bits());
 }
@@ -115,17 +122,17 @@ fn nothing_held_is_the_metric_itself() {
     let none = ([false; 3], [false; 3]);
     for frame in [Frame::Camera, Frame::Object] {
         assert_eq!(
-            frozen(PointToPoint, frame, none).minimize(&pairs),
-            PointToPoint.minimize(&pairs)
+            frozen(PointToPoint, frame, none).minimize(&Iteration::default(), &pairs),
+            PointToPoint.minimize(&Iteration::default(), &pairs)
         );
         assert_eq!(
-            frozen(PointToPlane, frame, none).system(&pairs),
-            PointToPlane.system(&pairs)
+            frozen(PointToPlane, frame, none).system(&Iteration::default(), &pairs),
+            PointToPlane.system(&Iteration::default(), &pairs)
         );
     }
     assert_eq!(
-        Frozen::<PointToPoint>::default().minimize(&pairs),
-        PointToPoint.minimize(&pairs)
+        Frozen::<PointToPoint>::default().minimize(&Iteration::default(), &pairs),
+        PointToPoint.minimize(&Iteration::default(), &pairs)
     );
 }
 
@@ -146,7 +153,7 @@ fn the_free_components_are_at_the_constrained_minimum() {
         Frame::Camera,
         ([false, true, false], [true; 3]),
     )
-    .minimize(&pairs)
+    .minimize(&Iteration::default(), &pairs)
     .unwrap()
     .increment
     .translation
@@ -165,7 +172,10 @@ fn the_free_components_are_at_the_constrained_minimum() {
         for mask in masks() {
             let mut solved = GaussNewton::new(frozen(PointToPoint, frame, mask));
             (solved.max_iterations, solved.tolerance) = (30, 0.0);
-            let end = solved.minimize(&pairs).unwrap().increment;
+            let end = solved
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap()
+                .increment;
             let held = [mask.0, mask.1].concat();
             for component in (0..6).filter(|i| !held[*i]) {
                 // Along one component, from wherever the object is after a motion.
@@ -209,7 +219,7 @@ fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
         let pairs = at(&pose, &exact(&source, &motion));
         let only_z = ([true; 3], [true, true, false]);
         let mut metric = GaussNewton::new(frozen(PointToPoint, Frame::Object, only_z));
-        let step = metric.minimize(&pairs).unwrap();
+        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
         // Held, it does not turn.
@@ -221,7 +231,10 @@ fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
         let found = components(
             Frame::Object,
             &pose,
-            &held.minimize(&pairs).unwrap().increment,
+            &held
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap()
+                .increment,
         );
         assert!(found[5].abs() < 1e-15);
     }
@@ -231,12 +244,15 @@ fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
 fn as_few_rows_as_unknowns_do() {
     let mut numbers = Numbers(56);
     let pairs = posed(&mut numbers, 3);
-    assert_eq!(PointToPlane.minimize(&pairs), None);
+    assert_eq!(PointToPlane.minimize(&Iteration::default(), &pairs), None);
     let mut shift = frozen(PointToPlane, Frame::Camera, ([false; 3], [true; 3]));
-    assert!(shift.minimize(&pairs).is_some());
+    assert!(shift.minimize(&Iteration::default(), &pairs).is_some());
     let one: Correspondences = pairs.as_slice()[..1].iter().copied().collect();
-    assert_eq!(shift.minimize(&one), None);
-    assert_eq!(shift.minimize(&Correspondences::new()), None);
+    assert_eq!(shift.minimize(&Iteration::default(), &one), None);
+    assert_eq!(
+        shift.minimize(&Iteration::default(), &Correspondences::new()),
+        None
+    );
 }
 
 #[test]
@@ -250,7 +266,7 @@ fn solvers_and_policies_heed_what_is_held() {
         metric: frozen,
         ..Conditioned::default()
     };
-    let metrics: [Box<dyn ErrorMetric>; 5] = [
+    let metrics: [Box<dyn Minimize>; 5] = [
         Box::new(frozen),
         Box::new(conditioned),
         Box::new(GaussNewton::new(frozen)),
@@ -258,15 +274,20 @@ fn solvers_and_policies_heed_what_is_held() {
         Box::new(LevenbergMarquardt::new(frozen)),
     ];
     for mut metric in metrics {
-        let step = metric.minimize(&pairs).unwrap();
+        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
         let found = components(Frame::Object, &pose, &step.increment);
         for (i, x) in found.iter().enumerate() {
-            assert!(i == 1 || x.abs() < 1e-14, "{}: {i} {x}", metric.name());
+            assert!(i == 1 || x.abs() < 1e-14, "{}: {i} {x}", metric.label());
         }
-        assert!(found[1].abs() > 1e-6, "{}", metric.name());
+        assert!(found[1].abs() > 1e-6, "{}", metric.label());
     }
     // Its covariance is that of the free components.
-    let covariance = frozen.clone().system(&pairs).unwrap().covariance().unwrap();
+    let covariance = frozen
+        .clone()
+        .system(&Iteration::default(), &pairs)
+        .unwrap()
+        .covariance()
+        .unwrap();
     let direction = pose.rotation * Vector3::y();
     let block = covariance.fixed_view::<3, 3>(0, 0);
     let variance = direction.dot(&(block * direction));

@@ -1,7 +1,9 @@
 //! What a metric of one's own gets from the trait.
 
-use crate::scenes::{Numbers, center, ellipsoid, exact, messy, same_information};
+use crate::scenes::{Numbers, ellipsoid, exact, messy, same_information};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Vector3};
+use hicp_metric::Minimize;
 use hicp_metric::{
     ErrorMetric, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
 };
@@ -64,10 +66,21 @@ fn its_name_is_that_of_its_type() {
 fn points_that_are_not_finite_give_no_system() {
     let mut numbers = Numbers(402);
     let mut pairs = messy(&mut numbers, 30);
-    assert!(DepthDifference.system(&pairs).is_some());
+    assert!(
+        DepthDifference
+            .system(&Iteration::default(), &pairs)
+            .is_some()
+    );
     pairs.as_mut_slice()[7].source.point.x = f32::INFINITY;
-    assert!(DepthDifference.system(&pairs).is_none());
-    assert_eq!(DepthDifference.minimize(&pairs), None);
+    assert!(
+        DepthDifference
+            .system(&Iteration::default(), &pairs)
+            .is_none()
+    );
+    assert_eq!(
+        DepthDifference.minimize(&Iteration::default(), &pairs),
+        None
+    );
 }
 
 /// Centred at the centroid of the points that the rows act at, and scaled by their RMS radius.
@@ -91,24 +104,24 @@ fn systems_are_centred_and_scaled() {
     };
     let source: Place = |pair| pair.source.point.coords.cast();
     let target: Place = |pair| pair.target.point.coords.cast();
-    let metrics: [(Box<dyn ErrorMetric>, Place); 4] = [
+    let metrics: [(Box<dyn Minimize>, Place); 4] = [
         (Box::new(DepthDifference), source),
         (Box::new(PointToPoint), source),
         (Box::new(PointToPlane), source),
         (Box::new(PlaneToPoint), target),
     ];
     for (mut metric, of) in metrics {
-        let system = metric.system(&pairs).unwrap();
+        let system = metric.system(&Iteration::default(), &pairs).unwrap();
         let (centroid, radius) = expected(of);
         assert!(
             (system.pivot().coords - centroid).norm() < 1e-14,
             "{}",
-            metric.name()
+            metric.label()
         );
         assert!(
             (system.length() - radius).abs() < 1e-14,
             "{}",
-            metric.name()
+            metric.label()
         );
     }
     // Points all in one place have no radius.
@@ -116,7 +129,13 @@ fn systems_are_centred_and_scaled() {
         &vec![ellipsoid(&mut numbers, 1)[0]; 9],
         &Isometry3::identity(),
     );
-    assert_eq!(PointToPoint.system(&one).unwrap().length(), 1.0);
+    assert_eq!(
+        PointToPoint
+            .system(&Iteration::default(), &one)
+            .unwrap()
+            .length(),
+        1.0
+    );
 }
 
 /// A pair without weight costs no digits, however far off it is and wherever in the list.
@@ -131,7 +150,7 @@ fn what_has_no_weight_does_not_matter_wherever_it_is() {
     let with: Correspondences = std::iter::once(far)
         .chain(pairs.as_slice().iter().copied())
         .collect();
-    let metrics: [Box<dyn ErrorMetric>; 5] = [
+    let metrics: [Box<dyn Minimize>; 5] = [
         Box::new(Rows(PointToPlane)),
         Box::new(PointToPoint),
         Box::new(PointToPlane),
@@ -140,21 +159,25 @@ fn what_has_no_weight_does_not_matter_wherever_it_is() {
     ];
     for mut metric in metrics {
         let (a, b) = (
-            metric.system(&pairs).unwrap(),
-            metric.system(&with).unwrap(),
+            metric.system(&Iteration::default(), &pairs).unwrap(),
+            metric.system(&Iteration::default(), &with).unwrap(),
         );
-        assert!((a.length() - b.length()).abs() < 1e-14, "{}", metric.name());
-        assert!((a.pivot() - b.pivot()).norm() < 1e-14, "{}", metric.name());
-        assert!(same_information(&a, &b, 1e-13), "{}", metric.name());
+        assert!(
+            (a.length() - b.length()).abs() < 1e-14,
+            "{}",
+            metric.label()
+        );
+        assert!((a.pivot() - b.pivot()).norm() < 1e-14, "{}", metric.label());
+        assert!(same_information(&a, &b, 1e-13), "{}", metric.label());
         let (a, b) = (
-            metric.minimize(&pairs).unwrap(),
-            metric.minimize(&with).unwrap(),
+            metric.minimize(&Iteration::default(), &pairs).unwrap(),
+            metric.minimize(&Iteration::default(), &with).unwrap(),
         );
         let (angle, distance) = crate::scenes::difference(&a.increment, &b.increment);
         assert!(
             angle < 1e-10 && distance < 1e-11,
             "{}: {angle} {distance}",
-            metric.name()
+            metric.label()
         );
     }
 }
@@ -166,7 +189,7 @@ impl ErrorMetric for Never {
     fn linearize(&self, _: &Pair, _: &mut NormalEquations) {
         unreachable!("asked for rows");
     }
-    fn mean_loss(&mut self, _: &Correspondences) -> Option<f64> {
+    fn mean_squared_error(&self, _: &Correspondences) -> Option<f64> {
         None
     }
 }
@@ -178,15 +201,22 @@ fn a_term_of_factor_zero_is_left_out() {
     let mut sum = WeightedSum {
         terms: ((1.0, PointToPlane), (0.0, Never)),
     };
-    assert_eq!(sum.minimize(&pairs), PointToPlane.minimize(&pairs));
-    assert_eq!(sum.mean_loss(&pairs), PointToPlane.mean_loss(&pairs));
-    for pair in pairs.as_slice() {
-        assert_eq!(sum.squared_error(pair), PointToPlane.squared_error(pair));
-        let rows = |metric: &dyn ErrorMetric| {
-            let mut system = NormalEquations::new(center(), 0.1);
-            metric.linearize(pair, &mut system);
-            system
-        };
-        assert_eq!(rows(&sum), rows(&PointToPlane));
-    }
+    assert_eq!(
+        sum.minimize(&Iteration::default(), &pairs),
+        PointToPlane.minimize(&Iteration::default(), &pairs)
+    );
+    assert_eq!(
+        sum.mean_loss(&Iteration::default(), &pairs),
+        PointToPlane.mean_loss(&Iteration::default(), &pairs)
+    );
+    let squared_errors = |metric: &mut dyn Minimize| {
+        let mut errors = vec![0.0; pairs.len()];
+        metric.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut errors);
+        errors
+    };
+    assert_eq!(squared_errors(&mut sum), squared_errors(&mut PointToPlane));
+    assert_eq!(
+        sum.system(&Iteration::default(), &pairs),
+        PointToPlane.system(&Iteration::default(), &pairs)
+    );
 }

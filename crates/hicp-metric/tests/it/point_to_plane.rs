@@ -2,8 +2,10 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Matrix6, Pair, Point3, Vector3, Vector6, se3, so3};
-use hicp_metric::{ErrorMetric, PointToPlane};
+use hicp_metric::Minimize;
+use hicp_metric::PointToPlane;
 
 /// n · (exp(ξ) p − q) by its definition.
 fn residual(pair: &Pair, xi: &Vector6<f64>) -> f64 {
@@ -41,7 +43,9 @@ fn the_step_is_gauss_newtons_for_the_residual_as_defined() {
             weight += w;
         }
         let expected = se3::exp(&-(hessian.try_inverse().unwrap() * gradient));
-        let step = PointToPlane.minimize(&pairs).unwrap();
+        let step = PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap();
         let (angle, distance) = se3::pose_distance(&step.increment, &expected);
         // Damping of 1e-6 of the mean diagonal shortens a step by up to 1e-6 · mean/smallest eigenvalue, some 2e-5 here,
         // of 0.1 rad and 3 cm.
@@ -58,7 +62,13 @@ fn pitfall_2_the_residual_is_a_projection_not_an_elementwise_product() {
     let pairs: Correspondences = points
         .map(|p| pair(p, p + Vector3::new(0.5, -0.5, 7.0), normal, 1.0))
         .collect();
-    assert!(PointToPlane.minimize(&pairs).unwrap().mean_loss < 1e-12);
+    assert!(
+        PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .mean_loss
+            < 1e-12
+    );
 }
 
 #[test]
@@ -69,8 +79,12 @@ fn pitfall_2_loss_and_step_do_not_depend_on_the_frame() {
         let pairs = ellipsoid(&mut numbers, 80, &off, &Vector3::zeros());
         let frame = numbers.pose(0.5);
         let (here, there) = (
-            PointToPlane.minimize(&pairs).unwrap(),
-            PointToPlane.minimize(&moved(&pairs, &frame)).unwrap(),
+            PointToPlane
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap(),
+            PointToPlane
+                .minimize(&Iteration::default(), &moved(&pairs, &frame))
+                .unwrap(),
         );
         // Points of up to 2 m round by 1e-7 m, residuals of 5 mm with them; levers are 4 cm.
         assert!((here.mean_loss - there.mean_loss).abs() < 4e-5 * here.mean_loss);
@@ -98,7 +112,10 @@ fn pitfall_12_a_plane_moves_along_its_normal_only() {
                 pair(p, p + normal * 0.05, normal, 1.0)
             })
             .collect();
-        let increment = PointToPlane.minimize(&pairs).unwrap().increment;
+        let increment = PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let center = frame * Point3::origin();
         let shift = increment * center - center;
         // The roundings of the points (1e-7 m) make the residuals uneven over levers of 1 m.
@@ -129,7 +146,10 @@ fn pitfall_12_a_sphere_does_not_turn_and_a_cylinder_neither_slides_nor_spins() {
                 pair(q + shift, q, frame.rotation * n, 1.0)
             })
             .collect();
-        let increment = PointToPlane.minimize(&sphere).unwrap().increment;
+        let increment = PointToPlane
+            .minimize(&Iteration::default(), &sphere)
+            .unwrap()
+            .increment;
         let center = Point3::from(frame.translation.vector) + shift;
         assert!((increment * center - center + shift).norm() < 1e-6);
         // Rounded normals pull at the free turn with up to 1e-7 of the residuals (1 mm RMS), 1/√300 of that together, against
@@ -157,7 +177,10 @@ fn pitfall_12_a_sphere_does_not_turn_and_a_cylinder_neither_slides_nor_spins() {
                 pair(q + shift, q, frame.rotation * n, 1.0)
             })
             .collect();
-        let increment = PointToPlane.minimize(&cylinder).unwrap().increment;
+        let increment = PointToPlane
+            .minimize(&Iteration::default(), &cylinder)
+            .unwrap()
+            .increment;
         let center = Point3::from(frame.translation.vector) + shift;
         let step = increment * center - center;
         let across = shift - axis * shift.dot(&axis);

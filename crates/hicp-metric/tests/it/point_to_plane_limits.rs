@@ -2,8 +2,10 @@
 
 use crate::pairs::support::{Numbers, median};
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3, so3};
-use hicp_metric::{ErrorMetric, PointToPlane};
+use hicp_metric::Minimize;
+use hicp_metric::PointToPlane;
 
 #[test]
 fn pitfall_13_metres_and_millimetres_take_the_same_step() {
@@ -20,9 +22,13 @@ fn pitfall_13_metres_and_millimetres_take_the_same_step() {
             }
             scaled
         };
-        let a = PointToPlane.minimize(&metres).unwrap();
+        let a = PointToPlane
+            .minimize(&Iteration::default(), &metres)
+            .unwrap();
         for by in [1024.0, 1.0 / 64.0] {
-            let b = PointToPlane.minimize(&scale(&metres, by)).unwrap();
+            let b = PointToPlane
+                .minimize(&Iteration::default(), &scale(&metres, by))
+                .unwrap();
             let by = f64::from(by);
             let (angle, distance) = se3::pose_distance(
                 &Isometry3::from_parts(
@@ -63,8 +69,8 @@ fn pitfall_20_a_kilometre_away_the_step_is_the_same() {
             &Isometry3::from_parts(offset.into(), hicp_core::UnitQuaternion::identity()),
         );
         let (a, b) = (
-            PointToPlane.minimize(&near).unwrap(),
-            PointToPlane.minimize(&far).unwrap(),
+            PointToPlane.minimize(&Iteration::default(), &near).unwrap(),
+            PointToPlane.minimize(&Iteration::default(), &far).unwrap(),
         );
         assert!(se3::pose_distance(&a.increment, &b.increment).0 < 1e-12);
         let shifted = b.increment * Point3::from(offset) - offset;
@@ -94,7 +100,9 @@ fn one_step_leaves_an_error_of_second_order() {
                         pair(off * q, q, normal, 1.0)
                     })
                     .collect();
-                let step = PointToPlane.minimize(&pairs).unwrap();
+                let step = PointToPlane
+                    .minimize(&Iteration::default(), &pairs)
+                    .unwrap();
                 so3::angle(&(step.increment.rotation * off.rotation)).to_degrees()
             })
             .collect();
@@ -117,13 +125,21 @@ fn fewer_than_six_pairs_and_no_information_determine_nothing() {
     let pairs = ellipsoid(&mut numbers, 20, &off, &Vector3::zeros());
     let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
     for n in 0..6 {
-        assert_eq!(PointToPlane.minimize(&first(n)), None, "{n} pairs");
+        assert_eq!(
+            PointToPlane.minimize(&Iteration::default(), &first(n)),
+            None,
+            "{n} pairs"
+        );
     }
-    assert!(PointToPlane.minimize(&first(6)).is_some());
+    assert!(
+        PointToPlane
+            .minimize(&Iteration::default(), &first(6))
+            .is_some()
+    );
     let changed = |change: &dyn Fn(&mut Pair)| {
         let mut pairs = pairs.clone();
         pairs.as_mut_slice().iter_mut().for_each(change);
-        PointToPlane.minimize(&pairs)
+        PointToPlane.minimize(&Iteration::default(), &pairs)
     };
     let normal = |n: [f32; 3]| hicp_core::UnitVector3::new_unchecked(n.into());
     for weight in [0.0, f32::NAN] {
@@ -138,7 +154,7 @@ fn fewer_than_six_pairs_and_no_information_determine_nothing() {
     five.as_mut_slice()[5..]
         .iter_mut()
         .for_each(|p| p.weight = 0.0);
-    assert_eq!(PointToPlane.minimize(&five), None);
+    assert_eq!(PointToPlane.minimize(&Iteration::default(), &five), None);
 }
 
 #[test]
@@ -156,8 +172,12 @@ fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
             repeated.extend(std::iter::repeat_n(*pair, i % 3));
         }
         let (a, b) = (
-            PointToPlane.minimize(&weighted).unwrap(),
-            PointToPlane.minimize(&repeated).unwrap(),
+            PointToPlane
+                .minimize(&Iteration::default(), &weighted)
+                .unwrap(),
+            PointToPlane
+                .minimize(&Iteration::default(), &repeated)
+                .unwrap(),
         );
         let (angle, distance) = se3::pose_distance(&a.increment, &b.increment);
         assert!(angle < 1e-13 && distance < 1e-13, "{angle} {distance}");
@@ -193,7 +213,7 @@ fn nothing_makes_a_nan() {
                 )
             })
             .collect();
-        if let Some(step) = PointToPlane.minimize(&pairs) {
+        if let Some(step) = PointToPlane.minimize(&Iteration::default(), &pairs) {
             steps += 1;
             assert!(se3::is_finite(&step.increment) && step.mean_loss.is_finite());
             let determinant = crate::pairs::determinant(&step.increment);

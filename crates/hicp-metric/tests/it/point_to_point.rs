@@ -2,7 +2,9 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, loss, pair, rms, rounding};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, Vector6, se3};
+use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, NormalEquations, PointToPoint};
 
 /// The provided Gauss–Newton step with point-to-point's rows.
@@ -53,7 +55,9 @@ fn exact_pairs_are_aligned_in_one_step_to_the_rounding_of_their_points() {
                     .map(|p| turn * p)
                     .collect();
                 let pairs = images(&points, &motion);
-                let step = PointToPoint.minimize(&pairs).unwrap();
+                let step = PointToPoint
+                    .minimize(&Iteration::default(), &pairs)
+                    .unwrap();
                 // The true motion leaves the roundings of both points; the best motion cannot leave more.
                 let bound = 2.0 * rounding(&pairs);
                 assert!(rms(&pairs, &step.increment) <= bound, "{shape:?} {count}");
@@ -78,7 +82,10 @@ fn the_system_is_that_of_its_rows() {
             pair.target.point.z += 0.7;
             pair.weight = [1.0, 0.25, 3.0, 0.0][index % 4];
         }
-        let (found, expected) = (PointToPoint.system(&pairs), Iterative.system(&pairs));
+        let (found, expected) = (
+            PointToPoint.system(&Iteration::default(), &pairs),
+            Iterative.system(&Iteration::default(), &pairs),
+        );
         let (found, expected) = (found.unwrap(), expected.unwrap());
         assert_eq!(found.rows(), expected.rows());
         assert!((found.pivot() - expected.pivot()).norm() < 1e-13);
@@ -102,7 +109,10 @@ fn random_motions_are_recovered() {
         let motion = numbers.pose(0.3);
         let points = cloud(&mut numbers, 200, [0.05, 0.05, 0.05]);
         let pairs = images(&points, &motion);
-        let found = PointToPoint.minimize(&pairs).unwrap().increment;
+        let found = PointToPoint
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let (angle, _) = se3::pose_distance(&found, &motion);
         // Points at 5 cm from the centroid, each off by a rounding: no more than rounding / 5 cm even if all conspired.
         assert!(angle <= 2.0 * rounding(&pairs) / 0.05, "{angle}");
@@ -133,7 +143,10 @@ fn pitfall_12_collinear_points_are_mapped_onto_their_targets_the_short_way() {
                 .map(|i| Point3::from(line * (0.02 * f64::from(i))))
                 .collect();
             let pairs = images(&points, &motion);
-            let found = PointToPoint.minimize(&pairs).unwrap().increment;
+            let found = PointToPoint
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap()
+                .increment;
             assert!(rms(&pairs, &found) <= 2.0 * rounding(&pairs), "{angle}");
             assert!((determinant(&found) - 1.0).abs() < 1e-14);
             let (turned, _) = se3::pose_distance(&found, &Isometry3::identity());
@@ -154,7 +167,10 @@ fn pitfall_18_planar_points_and_noise_give_a_rotation_never_a_reflection() {
             let points = cloud(&mut numbers, 6, [0.05, 0.05, 0.0]);
             let mut pairs = images(&points, &numbers.pose(0.3));
             noisy(&mut numbers, &mut pairs, sigma);
-            let found = PointToPoint.minimize(&pairs).unwrap().increment;
+            let found = PointToPoint
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap()
+                .increment;
             assert!((determinant(&found) - 1.0).abs() < 1e-14);
         }
     }
@@ -170,7 +186,10 @@ fn a_mirror_image_gets_the_best_rotation() {
             .iter()
             .map(|p| pair(*p, turn * Point3::new(p.x, p.y, -p.z), Vector3::z(), 1.0))
             .collect();
-        let found = PointToPoint.minimize(&pairs).unwrap().increment;
+        let found = PointToPoint
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         assert!((determinant(&found) - 1.0).abs() < 1e-14);
         assert_no_better_neighbor(&mut numbers, &pairs, &found, 0.02);
     }
@@ -225,7 +244,10 @@ fn no_perturbation_lowers_the_loss() {
                 for pair in pairs.as_mut_slice() {
                     pair.weight = numbers.between(0.1, 2.0) as f32;
                 }
-                let found = PointToPoint.minimize(&pairs).unwrap().increment;
+                let found = PointToPoint
+                    .minimize(&Iteration::default(), &pairs)
+                    .unwrap()
+                    .increment;
                 assert_no_better_neighbor(&mut numbers, &pairs, &found, 0.05);
             }
         }
@@ -250,7 +272,10 @@ fn thin_rods_keep_their_turn() {
                 .iter()
                 .map(|p| pair(*p, Point3::new(p.x, -p.z, p.y), Vector3::z(), 1.0))
                 .collect();
-            let found = PointToPoint.minimize(&pairs).unwrap().increment;
+            let found = PointToPoint
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap()
+                .increment;
             let (angle, _) = se3::pose_distance(
                 &found,
                 &Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2),
@@ -270,11 +295,14 @@ fn the_closed_form_is_the_fixpoint_of_gauss_newton() {
         let turn = numbers.direction() * 0.4;
         let mut pairs = images(&points, &Isometry3::new(numbers.vector() * 0.1, turn));
         noisy(&mut numbers, &mut pairs, 0.003);
-        let closed = PointToPoint.minimize(&pairs).unwrap().increment;
+        let closed = PointToPoint
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let mut walked = Isometry3::identity();
         for _ in 0..30 {
             walked = Iterative
-                .minimize(&moved(&pairs, &walked))
+                .minimize(&Iteration::default(), &moved(&pairs, &walked))
                 .unwrap()
                 .increment
                 * walked;

@@ -2,8 +2,10 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, pair, rms, rounding};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3};
-use hicp_metric::{ErrorMetric, PointToPoint, Step};
+use hicp_metric::Minimize;
+use hicp_metric::{PointToPoint, Step};
 
 fn cloud(numbers: &mut Numbers, count: usize) -> Vec<Point3<f64>> {
     (0..count)
@@ -35,8 +37,8 @@ fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
             repeated.extend(std::iter::repeat_n(*pair, copies));
         }
         let (a, b) = (
-            PointToPoint.minimize(&weighted),
-            PointToPoint.minimize(&repeated),
+            PointToPoint.minimize(&Iteration::default(), &weighted),
+            PointToPoint.minimize(&Iteration::default(), &repeated),
         );
         assert!(close(&a.unwrap(), &b.unwrap()));
         // Only ratios of weights matter.
@@ -44,7 +46,9 @@ fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
             pair.weight *= 0.125;
         }
         assert!(close(
-            &PointToPoint.minimize(&weighted).unwrap(),
+            &PointToPoint
+                .minimize(&Iteration::default(), &weighted)
+                .unwrap(),
             &b.unwrap()
         ));
     }
@@ -56,23 +60,35 @@ fn too_few_pairs_and_no_weight_determine_nothing() {
     let pairs = images(&cloud(&mut numbers, 10), &numbers.pose(0.2));
     let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
     for n in 0..3 {
-        assert_eq!(PointToPoint.minimize(&first(n)), None, "{n} pairs");
+        assert_eq!(
+            PointToPoint.minimize(&Iteration::default(), &first(n)),
+            None,
+            "{n} pairs"
+        );
     }
-    assert!(PointToPoint.minimize(&first(3)).is_some());
+    assert!(
+        PointToPoint
+            .minimize(&Iteration::default(), &first(3))
+            .is_some()
+    );
     for weight in [0.0, f32::NAN, -1.0] {
         let mut pairs = pairs.clone();
         pairs
             .as_mut_slice()
             .iter_mut()
             .for_each(|p| p.weight = weight);
-        assert_eq!(PointToPoint.minimize(&pairs), None, "weight {weight}");
+        assert_eq!(
+            PointToPoint.minimize(&Iteration::default(), &pairs),
+            None,
+            "weight {weight}"
+        );
     }
     // Pairs of weight zero do not make up the number.
     let mut two = first(8);
     two.as_mut_slice()[2..]
         .iter_mut()
         .for_each(|p| p.weight = 0.0);
-    assert_eq!(PointToPoint.minimize(&two), None);
+    assert_eq!(PointToPoint.minimize(&Iteration::default(), &two), None);
 }
 
 #[test]
@@ -95,7 +111,7 @@ fn points_all_in_one_place_determine_no_rotation() {
             .map(|_| pair(here, there, Vector3::z(), 0.3))
             .collect();
         for mut pairs in [sources, targets, both] {
-            assert_eq!(PointToPoint.minimize(&pairs), None);
+            assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
             // A pair without weight elsewhere changes nothing, wherever it stands in the list.
             let outsider = pair(
                 spread(&mut numbers),
@@ -106,9 +122,9 @@ fn points_all_in_one_place_determine_no_rotation() {
             let with: Correspondences = std::iter::once(outsider)
                 .chain(pairs.as_slice().iter().copied())
                 .collect();
-            assert_eq!(PointToPoint.minimize(&with), None);
+            assert_eq!(PointToPoint.minimize(&Iteration::default(), &with), None);
             pairs.push(outsider);
-            assert_eq!(PointToPoint.minimize(&pairs), None);
+            assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
         }
     }
 }
@@ -126,7 +142,7 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
             .map(|p| pair(Point3::from(p), turn * Point3::from(-p), Vector3::z(), 1.0))
             .collect();
         // Roundings of f32 (6e-8) may break the tie, and the result is a rotation then; exact ties are refused.
-        if let Some(step) = PointToPoint.minimize(&pairs) {
+        if let Some(step) = PointToPoint.minimize(&Iteration::default(), &pairs) {
             assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
         }
         let exact: Correspondences = axes
@@ -134,7 +150,7 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
             .flat_map(|a| [*a, -*a])
             .map(|p| pair(Point3::from(p), Point3::from(-p), Vector3::z(), 1.0))
             .collect();
-        assert_eq!(PointToPoint.minimize(&exact), None);
+        assert_eq!(PointToPoint.minimize(&Iteration::default(), &exact), None);
     }
 }
 
@@ -174,8 +190,8 @@ fn pitfall_20_a_common_offset_of_a_kilometre_costs_only_the_digits_of_the_points
             })
             .collect();
         let (a, b) = (
-            PointToPoint.minimize(&near).unwrap(),
-            PointToPoint.minimize(&far).unwrap(),
+            PointToPoint.minimize(&Iteration::default(), &near).unwrap(),
+            PointToPoint.minimize(&Iteration::default(), &far).unwrap(),
         );
         let angle = se3::pose_distance(&a.increment, &b.increment).0;
         assert!(angle < 1e-14, "{angle}");
@@ -207,7 +223,7 @@ fn nothing_makes_a_nan() {
                 )
             })
             .collect();
-        if let Some(step) = PointToPoint.minimize(&pairs) {
+        if let Some(step) = PointToPoint.minimize(&Iteration::default(), &pairs) {
             steps += 1;
             assert!(se3::is_finite(&step.increment) && step.mean_loss.is_finite());
             assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
@@ -222,7 +238,7 @@ fn nothing_makes_a_nan() {
             Vector3::z(),
             1.0,
         ));
-        assert_eq!(PointToPoint.minimize(&pairs), None);
+        assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
     }
 }
 
@@ -242,7 +258,10 @@ fn pitfall_18_tiny_weights_are_tiny() {
             1e-30,
         ));
     }
-    let found = PointToPoint.minimize(&pairs).unwrap().increment;
+    let found = PointToPoint
+        .minimize(&Iteration::default(), &pairs)
+        .unwrap()
+        .increment;
     let inliers: Correspondences = pairs.as_slice()[..30].iter().copied().collect();
     assert!(rms(&inliers, &found) <= bound);
 }
@@ -259,7 +278,9 @@ fn the_rotation_does_not_depend_on_the_unit_of_length() {
             .iter()
             .map(|[p, q]| pair((p * unit).into(), (q * unit).into(), Vector3::z(), 1.0))
             .collect();
-        PointToPoint.minimize(&pairs).unwrap()
+        PointToPoint
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
     };
     let expected = step(1.0);
     for power in [-149, -100, 100, 115] {
@@ -285,7 +306,10 @@ fn pitfall_12_a_line_is_mapped_onto_one_that_is_all_but_opposite() {
             .map(|at| pair((from * at).into(), (to * at).into(), Vector3::z(), 1.0))
             .into_iter()
             .collect();
-        let found = PointToPoint.minimize(&pairs).unwrap().increment;
+        let found = PointToPoint
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let arrived = found.rotation * from.normalize() - to.normalize();
         assert!(arrived.norm() < 1e-12, "{off:?}: {}", arrived.norm());
     }

@@ -1,9 +1,11 @@
 //! Only ratios of weights count, and only ratios of lengths.
 
 use crate::scenes::{Numbers, carried, center, exact, messy, resized, surfel};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Vector3};
+use hicp_metric::Minimize;
 use hicp_metric::{
-    Conditioned, Degeneracy, ErrorMetric, Frozen, GaussNewton, Generalized, LevenbergMarquardt,
+    Conditioned, Degeneracy, Frozen, GaussNewton, Generalized, Kernel, LevenbergMarquardt,
     PlaneToPoint, PointToPlane, PointToPoint, Robust, Scale, Symmetric, WeightedSum,
     sandwich_covariance,
 };
@@ -32,7 +34,7 @@ fn plane(numbers: &mut Numbers) -> Correspondences {
     )
 }
 
-fn conditioned(policy: Degeneracy) -> Box<dyn ErrorMetric> {
+fn conditioned(policy: Degeneracy) -> Box<dyn Minimize> {
     Box::new(Conditioned {
         metric: PointToPlane,
         policy,
@@ -41,7 +43,7 @@ fn conditioned(policy: Degeneracy) -> Box<dyn ErrorMetric> {
 }
 
 /// Metrics without a length of their own.
-fn metrics() -> Vec<Box<dyn ErrorMetric>> {
+fn metrics() -> Vec<Box<dyn Minimize>> {
     let scale = Scale::Mad { floor_meters: 0.0 };
     vec![
         Box::new(PointToPoint),
@@ -52,7 +54,7 @@ fn metrics() -> Vec<Box<dyn ErrorMetric>> {
         Box::new(WeightedSum {
             terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
         }),
-        Box::new(Robust::new(PointToPlane, Default::default(), scale)),
+        Box::new(Robust::new(PointToPlane, Kernel::default(), scale)),
         Box::new(Frozen {
             metric: PointToPlane,
             rotation: [false, true, false],
@@ -73,8 +75,11 @@ fn steps_depend_on_the_ratios_of_weights_alone() {
         for factor in FACTORS {
             let heavy = weighing(&pairs, factor);
             for mut metric in metrics() {
-                let (name, step) = (metric.name(), metric.minimize(&pairs));
-                let same = metric.minimize(&heavy);
+                let (name, step) = (
+                    metric.label(),
+                    metric.minimize(&Iteration::default(), &pairs),
+                );
+                let same = metric.minimize(&Iteration::default(), &heavy);
                 assert_eq!(step.is_some(), same.is_some(), "{name} {factor}");
                 let (Some(a), Some(b)) = (step, same) else {
                     continue;
@@ -93,10 +98,16 @@ fn covariances_depend_on_the_ratios_of_weights_alone() {
     let pairs = messy(&mut numbers, 60);
     for factor in FACTORS {
         let heavy = weighing(&pairs, factor);
-        let plain = |pairs| PointToPlane.system(pairs).unwrap().covariance().unwrap();
+        let plain = |pairs| {
+            PointToPlane
+                .system(&Iteration::default(), pairs)
+                .unwrap()
+                .covariance()
+                .unwrap()
+        };
         let (a, b) = (plain(&pairs), plain(&heavy));
         assert!((a - b).amax() <= 1e-12 * a.amax(), "{factor}");
-        let sandwich = |pairs| sandwich_covariance(&mut PointToPlane, pairs).unwrap();
+        let sandwich = |pairs| sandwich_covariance(&PointToPlane, pairs).unwrap();
         let (a, b) = (sandwich(&pairs), sandwich(&heavy));
         assert!((a - b).amax() <= 1e-12 * a.amax(), "{factor}");
     }
@@ -110,8 +121,11 @@ fn steps_depend_on_the_ratios_of_lengths_alone() {
     for factor in [1.0 / 1024.0, 1024.0, 1_048_576.0] {
         let resized = resized(&pairs, factor);
         for mut metric in metrics() {
-            let (name, a) = (metric.name(), metric.minimize(&pairs).unwrap());
-            let b = metric.minimize(&resized).unwrap();
+            let (name, a) = (
+                metric.label(),
+                metric.minimize(&Iteration::default(), &pairs).unwrap(),
+            );
+            let b = metric.minimize(&Iteration::default(), &resized).unwrap();
             let turn = a.increment.rotation.inverse() * b.increment.rotation;
             assert!(turn.angle() < 1e-12, "{name} {factor}: {}", turn.angle());
             let factor = f64::from(factor);

@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3};
+use hicp_metric::Minimize;
 use hicp_metric::{
     ErrorMetric, Generalized, Kernel, PointToPlane, PointToPoint, Robust, Scale, Symmetric,
 };
@@ -163,22 +165,24 @@ fn contaminated(numbers: &mut Numbers, motion: &Isometry3<f64>, share: f64) -> C
     pairs
 }
 
-fn settle(metric: &mut dyn ErrorMetric, pairs: &Correspondences) -> Isometry3<f64> {
+fn settle(metric: &mut dyn Minimize, pairs: &Correspondences) -> Isometry3<f64> {
     let mut increment = Isometry3::identity();
     for _ in 0..30 {
-        let step = metric.minimize(&advanced(pairs, &increment)).unwrap();
+        let step = metric
+            .minimize(&Iteration::default(), &advanced(pairs, &increment))
+            .unwrap();
         increment = step.increment * increment;
     }
     increment
 }
 
-fn robust<M: ErrorMetric + Clone + 'static>(metric: &M, kernel: Kernel) -> Robust<M> {
+fn robust<M: Minimize + Clone + 'static>(metric: &M, kernel: Kernel) -> Robust<M> {
     Robust::new(metric.clone(), kernel, Scale::default())
 }
 
 #[test]
 fn with_30_percent_gross_outliers_robust_beats_plain() {
-    fn check<M: ErrorMetric + Clone + 'static>(metric: &M) {
+    fn check<M: Minimize + Clone + 'static>(metric: &M) {
         let mut numbers = Numbers(41);
         let motion = numbers.motion(&center(), 3.0, 0.005);
         let pairs = contaminated(&mut numbers, &motion, 0.3);
@@ -195,7 +199,7 @@ fn with_30_percent_gross_outliers_robust_beats_plain() {
             assert!(
                 found < bound * plain,
                 "{} {kernel:?}: {found} {plain}",
-                metric.name()
+                metric.label()
             );
         }
     }
@@ -211,12 +215,17 @@ fn without_kernel_it_is_the_metric_itself() {
     for scale in [Scale::Meters(0.002), Scale::default()] {
         let mut robust = Robust::new(PointToPoint, Kernel::L2, scale);
         let (found, plain) = (
-            robust.minimize(&pairs).unwrap(),
-            PointToPoint.minimize(&pairs).unwrap(),
+            robust.minimize(&Iteration::default(), &pairs).unwrap(),
+            PointToPoint
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap(),
         );
         assert_eq!(found.increment, plain.increment);
         assert!((found.mean_loss - plain.mean_loss).abs() < 1e-14);
-        assert_eq!(robust.system(&pairs), PointToPoint.system(&pairs));
+        assert_eq!(
+            robust.system(&Iteration::default(), &pairs),
+            PointToPoint.system(&Iteration::default(), &pairs)
+        );
     }
 }
 
@@ -234,10 +243,10 @@ fn weights_depend_on_the_residual_in_units_of_the_scale() {
             ),
         ] {
             let a = Robust::new(PointToPlane, kernel, here)
-                .minimize(&pairs)
+                .minimize(&Iteration::default(), &pairs)
                 .unwrap();
             let b = Robust::new(PointToPlane, kernel, there)
-                .minimize(&resized(&pairs, 1024.0))
+                .minimize(&Iteration::default(), &resized(&pairs, 1024.0))
                 .unwrap();
             assert!((a.increment.rotation.inverse() * b.increment.rotation).angle() < 1e-7);
             assert!((b.mean_loss / a.mean_loss / 1024.0_f64.powi(2) - 1.0).abs() < 1e-12);
@@ -260,8 +269,9 @@ fn the_scale_is_the_median_of_what_counts() {
     residuals.sort_by(f64::total_cmp);
     let sigma = 1.4826 * residuals[25];
     let mad = Scale::Mad { floor_meters: 0.0 };
-    let a = Robust::new(PointToPlane, Kernel::TUKEY, mad).minimize(&pairs);
-    let b = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Meters(sigma)).minimize(&pairs);
+    let a = Robust::new(PointToPlane, Kernel::TUKEY, mad).minimize(&Iteration::default(), &pairs);
+    let b = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Meters(sigma))
+        .minimize(&Iteration::default(), &pairs);
     assert_eq!(a, b);
 }
 
@@ -276,13 +286,17 @@ fn the_mean_loss_falls_with_every_step_and_rises_with_drift() {
         let mut increment = Isometry3::identity();
         let mut last = f64::INFINITY;
         for _ in 0..15 {
-            let step = metric.minimize(&advanced(&pairs, &increment)).unwrap();
+            let step = metric
+                .minimize(&Iteration::default(), &advanced(&pairs, &increment))
+                .unwrap();
             assert!(step.mean_loss <= last * (1.0 + 1e-5), "{kernel:?}");
             last = step.mean_loss;
             increment = step.increment * increment;
         }
         let drift = Isometry3::translation(0.1, 0.0, 0.0) * increment;
-        let drifted = metric.mean_loss(&advanced(&pairs, &drift)).unwrap();
+        let drifted = metric
+            .mean_loss(&Iteration::default(), &advanced(&pairs, &drift))
+            .unwrap();
         assert!(drifted > last, "{kernel:?}");
     }
 }
@@ -307,16 +321,26 @@ fn residuals_that_are_zero_equal_alone_or_infinite() {
     for kernel in KERNELS {
         for scale in scales {
             let mut metric = Robust::new(PointToPoint, kernel, scale);
-            let step = metric.minimize(&fitting).unwrap();
+            let step = metric.minimize(&Iteration::default(), &fitting).unwrap();
             assert!(difference(&step.increment, &Isometry3::identity()).1 < 1e-12);
             assert_eq!(step.mean_loss.to_bits(), 0.0_f64.to_bits());
-            assert_eq!(metric.minimize(&alone), None);
-            assert_eq!(metric.minimize(&infinite), None, "{kernel:?} {scale:?}");
-            assert_eq!(metric.minimize(&Correspondences::new()), None);
-            assert_eq!(metric.mean_loss(&Correspondences::new()), None);
+            assert_eq!(metric.minimize(&Iteration::default(), &alone), None);
+            assert_eq!(
+                metric.minimize(&Iteration::default(), &infinite),
+                None,
+                "{kernel:?} {scale:?}"
+            );
+            assert_eq!(
+                metric.minimize(&Iteration::default(), &Correspondences::new()),
+                None
+            );
+            assert_eq!(
+                metric.mean_loss(&Iteration::default(), &Correspondences::new()),
+                None
+            );
             // Equal distances are not all outliers under a median.
             if matches!(scale, Scale::Mad { .. }) {
-                let step = metric.minimize(&equal).unwrap();
+                let step = metric.minimize(&Iteration::default(), &equal).unwrap();
                 assert!(
                     difference(&step.increment, &shift).1 < 1e-6,
                     "{kernel:?} {scale:?}"
@@ -332,18 +356,24 @@ fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
     let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
     let fresh = Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default());
     let mut used = fresh.clone();
-    let _ = used.minimize(&others);
-    let mut boxed: Box<dyn ErrorMetric> = Box::new(used.clone());
-    let expected = fresh.clone().minimize(&pairs);
+    let _ = used.minimize(&Iteration::default(), &others);
+    let mut boxed: Box<dyn Minimize> = Box::new(used.clone());
+    let expected = fresh.clone().minimize(&Iteration::default(), &pairs);
     assert!(expected.is_some());
-    assert_eq!(used.minimize(&pairs), expected);
-    assert_eq!(boxed.minimize(&pairs), expected);
-    assert_eq!(boxed.mean_loss(&pairs), Some(expected.unwrap().mean_loss));
-    assert_eq!(boxed.system(&pairs), fresh.clone().system(&pairs));
-    let mut inside: Robust<Box<dyn ErrorMetric>> = Robust::new(
+    assert_eq!(used.minimize(&Iteration::default(), &pairs), expected);
+    assert_eq!(boxed.minimize(&Iteration::default(), &pairs), expected);
+    assert_eq!(
+        boxed.mean_loss(&Iteration::default(), &pairs),
+        Some(expected.unwrap().mean_loss)
+    );
+    assert_eq!(
+        boxed.system(&Iteration::default(), &pairs),
+        fresh.clone().system(&Iteration::default(), &pairs)
+    );
+    let mut inside: Robust<Box<dyn Minimize>> = Robust::new(
         Box::new(Generalized::default()),
         Kernel::WELSCH,
         Scale::default(),
     );
-    assert_eq!(inside.minimize(&pairs), expected);
+    assert_eq!(inside.minimize(&Iteration::default(), &pairs), expected);
 }

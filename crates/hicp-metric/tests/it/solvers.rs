@@ -1,13 +1,15 @@
 //! Iterations over fixed pairs.
 
 use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3};
+use hicp_metric::Minimize;
 use hicp_metric::{
-    ErrorMetric, GaussNewton, Generalized, Kernel, LevenbergMarquardt, PlaneToPoint, PointToPlane,
-    PointToPoint, Robust, Scale, Symmetric,
+    GaussNewton, Generalized, Kernel, LevenbergMarquardt, PlaneToPoint, PointToPlane, PointToPoint,
+    Robust, Scale, Symmetric,
 };
 
-fn metrics() -> Vec<Box<dyn ErrorMetric>> {
+fn metrics() -> Vec<Box<dyn Minimize>> {
     vec![
         Box::new(PointToPoint),
         Box::new(PointToPlane),
@@ -25,11 +27,13 @@ fn metrics() -> Vec<Box<dyn ErrorMetric>> {
 
 /// Sources moved as the solvers move them: from the originals, once.
 fn loss_after(
-    metric: &mut dyn ErrorMetric,
+    metric: &mut dyn Minimize,
     pairs: &Correspondences,
     increment: &Isometry3<f64>,
 ) -> f64 {
-    metric.mean_loss(&advanced(pairs, increment)).unwrap()
+    metric
+        .mean_loss(&Iteration::default(), &advanced(pairs, increment))
+        .unwrap()
 }
 
 #[test]
@@ -41,8 +45,10 @@ fn gauss_newton_ends_where_the_closed_form_does() {
         let mut iterated = GaussNewton::new(PointToPoint);
         iterated.tolerance = 0.0;
         let (a, b) = (
-            iterated.minimize(&pairs).unwrap(),
-            PointToPoint.minimize(&pairs).unwrap(),
+            iterated.minimize(&Iteration::default(), &pairs).unwrap(),
+            PointToPoint
+                .minimize(&Iteration::default(), &pairs)
+                .unwrap(),
         );
         let (angle, distance) = difference(&a.increment, &b.increment);
         assert!(
@@ -65,14 +71,14 @@ fn exact_pairs_are_aligned() {
             newton.max_iterations = 30;
             let mut marquardt = LevenbergMarquardt::new(b);
             marquardt.max_iterations = 60;
-            let solvers: [&mut dyn ErrorMetric; 2] = [&mut newton, &mut marquardt];
+            let solvers: [&mut dyn Minimize; 2] = [&mut newton, &mut marquardt];
             for solver in solvers {
-                let step = solver.minimize(&pairs).unwrap();
+                let step = solver.minimize(&Iteration::default(), &pairs).unwrap();
                 let (angle, distance) = difference(&step.increment, &motion);
                 assert!(
                     angle < 2e-5 && distance < 2e-6,
                     "{} {degrees}: {angle} {distance}",
-                    solver.name()
+                    solver.label()
                 );
             }
         }
@@ -86,20 +92,27 @@ fn one_iteration_is_one_step() {
     let mut once = GaussNewton::new(PointToPlane);
     once.max_iterations = 1;
     let (a, b) = (
-        once.minimize(&pairs).unwrap(),
-        PointToPlane.minimize(&pairs).unwrap(),
+        once.minimize(&Iteration::default(), &pairs).unwrap(),
+        PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap(),
     );
     let (angle, distance) = difference(&a.increment, &b.increment);
     assert!(angle < 1e-15 && distance < 1e-15);
     once.max_iterations = 0;
     assert_eq!(
-        once.minimize(&pairs).unwrap().increment,
+        once.minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment,
         Isometry3::identity()
     );
     let mut never = LevenbergMarquardt::new(PointToPlane);
     never.max_iterations = 0;
     assert_eq!(
-        never.minimize(&pairs).unwrap().increment,
+        never
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment,
         Isometry3::identity()
     );
 }
@@ -115,16 +128,16 @@ fn levenberg_marquardt_never_raises_the_loss() {
             pair.target.point += (numbers.vector() * 0.2).cast::<f32>();
         }
         for mut metric in metrics() {
-            let before = metric.mean_loss(&pairs).unwrap();
+            let before = metric.mean_loss(&Iteration::default(), &pairs).unwrap();
             for iterations in [1, 2, 5, 40] {
                 let mut solver = LevenbergMarquardt::new(metric);
                 solver.max_iterations = iterations;
                 solver.initial_damping = 0.0;
-                let step = solver.minimize(&pairs).unwrap();
+                let step = solver.minimize(&Iteration::default(), &pairs).unwrap();
                 assert!((step.mean_loss - before).abs() <= 1e-15 * before);
                 metric = solver.metric;
                 let after = loss_after(&mut metric, &pairs, &step.increment);
-                assert!(after <= before, "{}: {before} {after}", metric.name());
+                assert!(after <= before, "{}: {before} {after}", metric.label());
             }
         }
     }
@@ -138,12 +151,14 @@ fn plain_steps_that_raise_the_loss_are_rejected() {
     for _ in 0..40 {
         let motion = numbers.motion(&center(), 120.0, 0.05);
         let pairs = advanced(&messy(&mut numbers, 12), &motion);
-        let step = PointToPlane.minimize(&pairs).unwrap();
+        let step = PointToPlane
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap();
         if loss_after(&mut PointToPlane, &pairs, &step.increment) > step.mean_loss {
             raised += 1;
             let mut solver = LevenbergMarquardt::new(PointToPlane);
             solver.initial_damping = 0.0;
-            let careful = solver.minimize(&pairs).unwrap();
+            let careful = solver.minimize(&Iteration::default(), &pairs).unwrap();
             assert!(loss_after(&mut PointToPlane, &pairs, &careful.increment) < step.mean_loss);
         }
     }
@@ -156,19 +171,19 @@ fn the_unit_of_length_does_not_matter() {
     let mut numbers = Numbers(76);
     let pairs = messy(&mut numbers, 60);
     let small = resized(&pairs, 1024.0);
-    let solvers: [Box<dyn ErrorMetric>; 2] = [
+    let solvers: [Box<dyn Minimize>; 2] = [
         Box::new(GaussNewton::new(PointToPlane)),
         Box::new(LevenbergMarquardt::new(PointToPlane)),
     ];
     for mut solver in solvers {
         let (a, b) = (
-            solver.minimize(&pairs).unwrap(),
-            solver.minimize(&small).unwrap(),
+            solver.minimize(&Iteration::default(), &pairs).unwrap(),
+            solver.minimize(&Iteration::default(), &small).unwrap(),
         );
         let turn = a.increment.rotation.inverse() * b.increment.rotation;
-        assert!(turn.angle() < 1e-7, "{}", solver.name());
+        assert!(turn.angle() < 1e-7, "{}", solver.label());
         let shift = b.increment.translation.vector / 1024.0 - a.increment.translation.vector;
-        assert!(shift.norm() < 1e-9, "{}", solver.name());
+        assert!(shift.norm() < 1e-9, "{}", solver.label());
     }
 }
 
@@ -177,33 +192,42 @@ fn fitting_few_and_no_pairs() {
     let mut numbers = Numbers(77);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
     let few: Correspondences = messy(&mut numbers, 1);
-    let solvers: [Box<dyn ErrorMetric>; 2] = [
+    let solvers: [Box<dyn Minimize>; 2] = [
         Box::new(GaussNewton::new(PointToPlane)),
         Box::new(LevenbergMarquardt::new(PointToPlane)),
     ];
     for mut solver in solvers {
-        let step = solver.minimize(&fitting).unwrap();
+        let step = solver.minimize(&Iteration::default(), &fitting).unwrap();
         assert!(difference(&step.increment, &Isometry3::identity()).1 < 1e-12);
         assert_eq!(step.mean_loss.to_bits(), 0.0_f64.to_bits());
-        assert_eq!(solver.minimize(&few), None);
-        assert_eq!(solver.minimize(&Correspondences::new()), None);
+        assert_eq!(solver.minimize(&Iteration::default(), &few), None);
+        assert_eq!(
+            solver.minimize(&Iteration::default(), &Correspondences::new()),
+            None
+        );
     }
 }
 
 #[test]
 fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
-    fn check<M: ErrorMetric + Clone + 'static>(fresh: &M) {
+    fn check<M: Minimize + Clone + 'static>(fresh: &M) {
         let mut numbers = Numbers(78);
         let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
         let mut used = fresh.clone();
-        let _ = used.minimize(&others);
-        let mut boxed: Box<dyn ErrorMetric> = Box::new(used.clone());
-        let expected = fresh.clone().minimize(&pairs);
+        let _ = used.minimize(&Iteration::default(), &others);
+        let mut boxed: Box<dyn Minimize> = Box::new(used.clone());
+        let expected = fresh.clone().minimize(&Iteration::default(), &pairs);
         assert!(expected.is_some());
-        assert_eq!(used.minimize(&pairs), expected);
-        assert_eq!(boxed.minimize(&pairs), expected);
-        assert_eq!(boxed.mean_loss(&pairs), fresh.clone().mean_loss(&pairs));
-        assert_eq!(boxed.system(&pairs), fresh.clone().system(&pairs));
+        assert_eq!(used.minimize(&Iteration::default(), &pairs), expected);
+        assert_eq!(boxed.minimize(&Iteration::default(), &pairs), expected);
+        assert_eq!(
+            boxed.mean_loss(&Iteration::default(), &pairs),
+            fresh.clone().mean_loss(&Iteration::default(), &pairs)
+        );
+        assert_eq!(
+            boxed.system(&Iteration::default(), &pairs),
+            fresh.clone().system(&Iteration::default(), &pairs)
+        );
     }
     check(&GaussNewton::new(Symmetric));
     check(&LevenbergMarquardt::new(Robust::<Generalized>::default()));

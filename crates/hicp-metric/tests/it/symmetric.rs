@@ -1,7 +1,9 @@
 //! The symmetric metric: exact in one step, and what it skips.
 
 use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, surfel};
+use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Vector3, Vector6, so3};
+use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, PointToPlane, Symmetric};
 
 #[test]
@@ -12,7 +14,7 @@ fn exact_pairs_are_aligned_in_one_step() {
             let source = ellipsoid(&mut numbers, 300);
             let motion = numbers.motion(&center(), degrees, 0.05);
             let pairs = exact(&source, &motion);
-            let step = Symmetric.minimize(&pairs).unwrap();
+            let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
             let (angle, distance) = difference(&step.increment, &motion);
             // Points rounded to f32 at 0.6 m: 3e-8 m against 5 cm.
             assert!(
@@ -24,7 +26,9 @@ fn exact_pairs_are_aligned_in_one_step() {
     // Point-to-plane is not: that is the point.
     let source = ellipsoid(&mut numbers, 300);
     let motion = numbers.motion(&center(), 30.0, 0.0);
-    let linear = PointToPlane.minimize(&exact(&source, &motion)).unwrap();
+    let linear = PointToPlane
+        .minimize(&Iteration::default(), &exact(&source, &motion))
+        .unwrap();
     assert!(difference(&linear.increment, &motion).0 > 0.01);
 }
 
@@ -34,10 +38,10 @@ fn weights_count_and_its_minimum_is_that_of_its_rows() {
     let mut pairs = messy(&mut numbers, 200);
     // Repeated steps come to rest where the gradient of the linearised rows vanishes, up to terms of the residuals.
     for _ in 0..30 {
-        let step = Symmetric.minimize(&pairs).unwrap();
+        let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
         pairs = advanced(&pairs, &step.increment);
     }
-    let system = Symmetric.system(&pairs).unwrap();
+    let system = Symmetric.system(&Iteration::default(), &pairs).unwrap();
     let rest = system.solve().unwrap();
     let (angle, distance) = difference(&rest, &Isometry3::identity());
     assert!(angle < 5e-3 && distance < 3e-4, "{angle} {distance}");
@@ -48,8 +52,8 @@ fn weights_count_and_its_minimum_is_that_of_its_rows() {
         pair.weight = 0.0;
     }
     let (a, b) = (
-        Symmetric.minimize(&with).unwrap(),
-        Symmetric.minimize(&without).unwrap(),
+        Symmetric.minimize(&Iteration::default(), &with).unwrap(),
+        Symmetric.minimize(&Iteration::default(), &without).unwrap(),
     );
     assert!((a.mean_loss - b.mean_loss).abs() < 1e-15);
     assert!(difference(&a.increment, &b.increment).0 < 1e-12);
@@ -69,14 +73,20 @@ fn pairs_that_see_different_sides_count_for_nothing() {
         assert_eq!(Symmetric.squared_error(&wrong), 0.0);
         more.push(wrong);
     }
-    assert_eq!(Symmetric.minimize(&more), Symmetric.minimize(&pairs));
-    assert_eq!(Symmetric.mean_loss(&more), Symmetric.mean_loss(&pairs));
+    assert_eq!(
+        Symmetric.minimize(&Iteration::default(), &more),
+        Symmetric.minimize(&Iteration::default(), &pairs)
+    );
+    assert_eq!(
+        Symmetric.mean_loss(&Iteration::default(), &more),
+        Symmetric.mean_loss(&Iteration::default(), &pairs)
+    );
     // Perpendicular ones too, and nothing else left is no step.
     let source = surfel(center(), Vector3::x());
     let across = Pair::new(0, source, 0, surfel(center(), Vector3::y()));
     let only: Correspondences = [across; 20].into_iter().collect();
-    assert_eq!(Symmetric.minimize(&only), None);
-    assert_eq!(Symmetric.mean_loss(&only), None);
+    assert_eq!(Symmetric.minimize(&Iteration::default(), &only), None);
+    assert_eq!(Symmetric.mean_loss(&Iteration::default(), &only), None);
 }
 
 #[test]
@@ -90,7 +100,7 @@ fn a_plane_comes_down_without_sliding() {
         .collect();
     // The counterparts are elsewhere on the plane: point pairs would slide by 4 cm.
     let pairs = exact(&source, &Isometry3::translation(0.04, 0.0, 0.005));
-    let step = Symmetric.minimize(&pairs).unwrap();
+    let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
     let expected = Isometry3::translation(0.0, 0.0, 0.005);
     let (angle, distance) = difference(&step.increment, &expected);
     assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
@@ -151,7 +161,10 @@ fn the_step_is_the_stated_one_where_pairs_are_wrong_too() {
             .filter(|pair| pair.source.normal.dot(&pair.target.normal) > 0.0)
             .copied()
             .collect();
-        let found = Symmetric.minimize(&pairs).unwrap().increment;
+        let found = Symmetric
+            .minimize(&Iteration::default(), &pairs)
+            .unwrap()
+            .increment;
         let (angle, distance) = difference(&found, &by_formula(&counting));
         assert!(
             angle < 1e-9 && distance < 1e-10,
@@ -183,7 +196,7 @@ fn a_weak_direction_is_no_free_one() {
         for (pair, weight) in pairs.as_mut_slice().iter_mut().zip(&weights) {
             pair.weight = *weight;
         }
-        let step = Symmetric.minimize(&pairs).unwrap();
+        let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(
             angle < 1e-5 && distance < 1e-6,
@@ -196,18 +209,26 @@ fn a_weak_direction_is_no_free_one() {
 fn pairs_that_fit_stay_and_fewer_than_six_say_nothing() {
     let mut numbers = Numbers(27);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
-    let step = Symmetric.minimize(&fitting).unwrap();
+    let step = Symmetric.minimize(&Iteration::default(), &fitting).unwrap();
     assert_eq!(step.mean_loss, 0.0);
     assert_eq!(difference(&step.increment, &Isometry3::identity()).0, 0.0);
     let pairs = messy(&mut numbers, 7);
     let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
     for n in 0..6 {
-        assert_eq!(Symmetric.minimize(&first(n)), None, "{n}");
+        assert_eq!(
+            Symmetric.minimize(&Iteration::default(), &first(n)),
+            None,
+            "{n}"
+        );
     }
-    assert!(Symmetric.minimize(&first(6)).is_some());
+    assert!(
+        Symmetric
+            .minimize(&Iteration::default(), &first(6))
+            .is_some()
+    );
     // Without weight, or seen from the other side, a pair is none.
     let mut five = pairs.clone();
     five.as_mut_slice()[1].weight = 0.0;
     five.as_mut_slice()[4].target.normal = -five.as_slice()[4].source.normal;
-    assert_eq!(Symmetric.minimize(&five), None);
+    assert_eq!(Symmetric.minimize(&Iteration::default(), &five), None);
 }

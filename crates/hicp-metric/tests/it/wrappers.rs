@@ -4,41 +4,64 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use crate::scenes::{Numbers, center, messy};
-use hicp_core::{Isometry3, Pair};
+use hicp_core::Iteration;
+use hicp_core::{Correspondences, Isometry3, Problem};
+use hicp_metric::Minimize;
 use hicp_metric::{
-    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, MetricSchedule, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint,
-    PosePrior, Prior, Robust, Scale, Symmetric, WeightedSum,
+    Conditioned, Degeneracy, Frame, Frozen, GaussNewton, Generalized, Kernel, LevenbergMarquardt,
+    MetricSchedule, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
+    Robust, Scale, Symmetric, WeightedSum,
 };
 
-type Begun = Rc<RefCell<Vec<(usize, Isometry3<f64>)>>>;
+type Seen = Rc<RefCell<Vec<(usize, Isometry3<f64>)>>>;
 
-/// A metric that tells what it was told.
+/// A decorator that notes the iterations that it receives.
 #[derive(Clone)]
 struct Spy<M> {
     metric: M,
-    begun: Begun,
+    seen: Seen,
 }
 
-impl<M: ErrorMetric> ErrorMetric for Spy<M> {
-    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        self.metric.linearize(pair, system);
+impl<M: Minimize> Minimize for Spy<M> {
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations> {
+        self.seen
+            .borrow_mut()
+            .push((iteration.index, iteration.init));
+        self.metric.system(iteration, pairs)
     }
-    fn squared_error(&self, pair: &Pair) -> f64 {
-        self.metric.squared_error(pair)
+
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.seen
+            .borrow_mut()
+            .push((iteration.index, iteration.init));
+        self.metric.mean_loss(iteration, pairs)
     }
-    fn begin(&mut self, iteration: usize, init: &Isometry3<f64>) {
-        self.begun.borrow_mut().push((iteration, *init));
+
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        self.seen
+            .borrow_mut()
+            .push((iteration.index, iteration.init));
+        self.metric
+            .add_squared_errors(iteration, pairs, factor, errors);
     }
-    fn name(&self) -> &'static str {
+
+    fn label(&self) -> &'static str {
         "spy"
     }
 }
 
 /// What stands around one metric, by the name that it states, and changes neither a pair's error nor the mean of all.
-fn around<M: ErrorMetric + Clone + 'static>(
-    metric: &M,
-) -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
+fn around<M: Minimize + Clone + 'static>(metric: &M) -> Vec<(&'static str, Box<dyn Minimize>)> {
     let metric = || metric.clone();
     let prior = Prior::AboutInitial {
         translation_meters: 0.1,
@@ -90,7 +113,7 @@ fn around<M: ErrorMetric + Clone + 'static>(
     ]
 }
 
-fn every_kind() -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
+fn every_kind() -> Vec<(&'static str, Box<dyn Minimize>)> {
     let mut all = with_kernel(&PointToPoint);
     all.extend(with_kernel(&PointToPlane));
     all.extend(with_kernel(&Symmetric));
@@ -99,9 +122,9 @@ fn every_kind() -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
 }
 
 /// A kernel belongs to the set of pairs: it changes the mean, but no pair's own error.
-fn with_kernel<M: ErrorMetric + Clone + 'static>(
+fn with_kernel<M: Minimize + Clone + 'static>(
     metric: &M,
-) -> Vec<(&'static str, Box<dyn ErrorMetric>)> {
+) -> Vec<(&'static str, Box<dyn Minimize>)> {
     let mut all = around(metric);
     let robust = Robust::new(metric.clone(), Kernel::TUKEY, Scale::Meters(1e-4));
     all.push(("robust", Box::new(robust)));
@@ -109,36 +132,27 @@ fn with_kernel<M: ErrorMetric + Clone + 'static>(
 }
 
 #[test]
-fn errors_and_rows_of_a_pair_are_those_of_the_metric() {
+fn errors_of_a_pair_are_those_of_the_metric() {
     let mut numbers = Numbers(23);
     let pairs = messy(&mut numbers, 20);
-    let inner: [Box<dyn ErrorMetric>; 4] = [
+    let mut inner: [Box<dyn Minimize>; 4] = [
         Box::new(PointToPoint),
         Box::new(PointToPlane),
         Box::new(Symmetric),
         Box::new(Generalized::default()),
     ];
+    let squared_errors = |metric: &mut dyn Minimize| {
+        let mut errors = vec![0.0; pairs.len()];
+        metric.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut errors);
+        errors
+    };
     let kinds = every_kind();
     let each = kinds.len() / inner.len();
-    for (index, (name, wrapped)) in kinds.iter().enumerate() {
-        let inner = &inner[index / each];
-        assert_eq!(wrapped.name(), *name);
-        for pair in pairs.as_slice() {
-            let expected = inner.squared_error(pair);
-            assert_eq!(
-                wrapped.squared_error(pair).to_bits(),
-                expected.to_bits(),
-                "{name}"
-            );
-            let rows = |metric: &dyn ErrorMetric| {
-                let mut system = NormalEquations::new(center(), 0.1);
-                metric.linearize(pair, &mut system);
-                system
-            };
-            let (found, expected) = (rows(&**wrapped), rows(&**inner));
-            assert!(expected.rows() > 0 && expected.loss() > 0.0);
-            assert_eq!(found, expected, "{name}");
-        }
+    for (index, (name, mut wrapped)) in kinds.into_iter().enumerate() {
+        assert_eq!(wrapped.label(), name);
+        let expected = squared_errors(&mut inner[index / each]);
+        assert!(expected.iter().all(|error| *error > 0.0));
+        assert_eq!(squared_errors(&mut wrapped), expected, "{name}");
     }
 }
 
@@ -147,12 +161,14 @@ fn errors_and_rows_of_a_pair_are_those_of_the_metric() {
 fn losses_are_those_of_the_metric() {
     let mut numbers = Numbers(29);
     let pairs = messy(&mut numbers, 50);
-    let expected = PointToPlane.mean_loss(&pairs).unwrap();
+    let expected = PointToPlane
+        .mean_loss(&Iteration::default(), &pairs)
+        .unwrap();
     assert!(expected > 0.0);
     for (name, mut wrapped) in around(&PointToPlane) {
-        let found = wrapped.mean_loss(&pairs).unwrap();
+        let found = wrapped.mean_loss(&Iteration::default(), &pairs).unwrap();
         assert!((found - expected).abs() < 1e-12 * expected, "{name}");
-        let step = wrapped.minimize(&pairs).unwrap();
+        let step = wrapped.minimize(&Iteration::default(), &pairs).unwrap();
         assert!(
             (step.mean_loss - expected).abs() < 1e-12 * expected,
             "{name}"
@@ -165,11 +181,11 @@ fn losses_are_those_of_the_metric() {
 fn systems_are_those_of_the_metric() {
     let mut numbers = Numbers(30);
     let pairs = messy(&mut numbers, 50);
-    let expected = PointToPlane.system(&pairs).unwrap();
+    let expected = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
     let same = ["gauss-newton", "levenberg-marquardt", "metric-schedule"];
     let mut found = 0;
     for (name, mut wrapped) in around(&PointToPlane) {
-        let system = wrapped.system(&pairs).unwrap();
+        let system = wrapped.system(&Iteration::default(), &pairs).unwrap();
         if same.contains(&name) {
             assert_eq!(system, expected, "{name}");
             found += 1;
@@ -178,52 +194,67 @@ fn systems_are_those_of_the_metric() {
     assert_eq!(found, same.len());
 }
 
+/// Everything that a decorator calls inside receives the iteration that the decorator received.
 #[test]
-fn the_beginning_of_an_iteration_reaches_every_metric_inside() {
+fn the_iteration_reaches_every_metric_inside() {
     let mut numbers = Numbers(31);
+    let pairs = messy(&mut numbers, 40);
     let init = numbers.motion(&center(), 20.0, 0.1);
-    let spy = |begun: &Begun| Spy {
+    let iteration = Iteration::new(3, &init, Problem::default());
+    let spy = |seen: &Seen| Spy {
         metric: PointToPlane,
-        begun: Rc::clone(begun),
+        seen: Rc::clone(seen),
     };
-    let begun = Begun::default();
-    let mut wrapped = around(&spy(&begun));
-    let robust = Robust::new(spy(&begun), Kernel::HUBER, Scale::default());
+    let seen = Seen::default();
+    let mut wrapped = around(&spy(&seen));
+    let robust = Robust::new(spy(&seen), Kernel::HUBER, Scale::default());
     wrapped.push(("robust", Box::new(robust)));
-    let boxed: Box<dyn ErrorMetric> = Box::new(spy(&begun));
-    wrapped.push(("spy", Box::new(boxed)));
+    wrapped.push(("spy", Box::new(spy(&seen))));
     for (name, metric) in &mut wrapped {
-        assert_eq!(metric.name(), *name);
-        begun.borrow_mut().clear();
-        metric.begin(3, &init);
-        let told = if *name == "metric-schedule" { 2 } else { 1 };
-        assert_eq!(*begun.borrow(), vec![(3, init); told], "{name}");
+        assert_eq!(metric.label(), *name);
+        let mut errors = vec![0.0; pairs.len()];
+        type Call<'a> = &'a mut dyn FnMut(&mut dyn Minimize);
+        let calls: [Call<'_>; 4] = [
+            &mut |metric| assert!(metric.system(&iteration, &pairs).is_some()),
+            &mut |metric| assert!(metric.mean_loss(&iteration, &pairs).is_some()),
+            &mut |metric| assert!(metric.minimize(&iteration, &pairs).is_some()),
+            &mut |metric| metric.add_squared_errors(&iteration, &pairs, 1.0, &mut errors),
+        ];
+        for call in calls {
+            seen.borrow_mut().clear();
+            call(&mut **metric);
+            let seen = seen.borrow();
+            assert!(
+                !seen.is_empty() && seen.iter().all(|s| *s == (3, init)),
+                "{name}"
+            );
+        }
     }
-    // Every term of a sum.
-    let sums: [(usize, Box<dyn ErrorMetric>); 3] = [
+    // Every term of a sum with a positive factor, once.
+    let sums: [(usize, Box<dyn Minimize>); 3] = [
         (
             2,
             Box::new(WeightedSum {
-                terms: ((1.0, spy(&begun)), (2.0, spy(&begun))),
+                terms: ((1.0, spy(&seen)), (2.0, spy(&seen))),
             }),
         ),
         (
-            3,
+            2,
             Box::new(WeightedSum {
-                terms: ((1.0, spy(&begun)), (2.0, spy(&begun)), (0.0, spy(&begun))),
+                terms: ((1.0, spy(&seen)), (2.0, spy(&seen)), (0.0, spy(&seen))),
             }),
         ),
         (
             4,
             Box::new(WeightedSum {
-                terms: vec![(0.5, spy(&begun)); 4],
+                terms: vec![(0.5, spy(&seen)); 4],
             }),
         ),
     ];
     for (count, mut sum) in sums {
-        begun.borrow_mut().clear();
-        sum.begin(0, &init);
-        assert_eq!(*begun.borrow(), vec![(0, init); count]);
+        seen.borrow_mut().clear();
+        assert!(sum.mean_loss(&iteration, &pairs).is_some());
+        assert_eq!(*seen.borrow(), vec![(3, init); count]);
     }
 }
 
@@ -231,25 +262,31 @@ fn the_beginning_of_an_iteration_reaches_every_metric_inside() {
 fn a_schedule_takes_the_metric_of_its_iteration_and_stays_at_the_last() {
     let mut numbers = Numbers(37);
     let pairs = messy(&mut numbers, 20);
-    let pair = &pairs.as_slice()[0];
-    let metrics: Vec<Box<dyn ErrorMetric>> = vec![Box::new(PointToPoint), Box::new(PointToPlane)];
-    let expected: Vec<f64> = metrics.iter().map(|m| m.squared_error(pair)).collect();
+    let mut metrics: Vec<Box<dyn Minimize>> = vec![Box::new(PointToPoint), Box::new(PointToPlane)];
+    let first = Iteration::default();
+    let losses = metrics.iter_mut().map(|m| m.mean_loss(&first, &pairs));
+    let expected: Vec<Option<f64>> = losses.collect();
     assert_ne!(expected[0], expected[1]);
     let mut schedule = MetricSchedule::new(metrics);
     for (iteration, which) in [(0, 0), (1, 1), (2, 1), (100, 1), (0, 0)] {
-        schedule.begin(iteration, &Isometry3::identity());
-        assert_eq!(schedule.squared_error(pair), expected[which]);
+        let iteration = Iteration::new(iteration, &Isometry3::identity(), Problem::default());
+        assert_eq!(schedule.mean_loss(&iteration, &pairs), expected[which]);
     }
     // Without any it measures nothing.
     let mut empty = MetricSchedule::new(Vec::<PointToPoint>::new());
-    assert_eq!(empty.squared_error(pair), 0.0);
-    assert_eq!(empty.mean_loss(&pairs), None);
-    assert!(empty.minimize(&pairs).is_none() && empty.system(&pairs).is_none());
+    let mut errors = vec![0.0; pairs.len()];
+    empty.add_squared_errors(&first, &pairs, 1.0, &mut errors);
+    assert!(errors.iter().all(|error| *error == 0.0));
+    assert_eq!(empty.mean_loss(&Iteration::default(), &pairs), None);
+    assert!(
+        empty.minimize(&Iteration::default(), &pairs).is_none()
+            && empty.system(&Iteration::default(), &pairs).is_none()
+    );
 }
 
 #[test]
 fn metrics_say_their_names() {
-    let metrics: [(&str, Box<dyn ErrorMetric>); 5] = [
+    let metrics: [(&str, Box<dyn Minimize>); 5] = [
         ("point-to-point", Box::new(PointToPoint)),
         ("point-to-plane", Box::new(PointToPlane)),
         ("plane-to-point", Box::new(PlaneToPoint)),
@@ -257,6 +294,6 @@ fn metrics_say_their_names() {
         ("generalized", Box::new(Generalized::default())),
     ];
     for (name, metric) in metrics {
-        assert_eq!(metric.name(), name);
+        assert_eq!(metric.label(), name);
     }
 }

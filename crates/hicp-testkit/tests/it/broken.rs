@@ -2,19 +2,23 @@
 
 // A helper of tests may fail as a test does.
 
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hicp_testkit::{
     AssociationLaws, FilterLaws, MetricLaws, RendererLaws, ScoreLaws, StageLaws, StopRuleLaws,
     SwitcherLaws, check_association, check_filter, check_metric, check_metric_forwards,
-    check_renderer, check_score, check_selection, check_stage, check_stop_rule, check_switcher,
+    check_minimize, check_renderer, check_score, check_selection, check_stage, check_stop_rule,
+    check_switcher,
 };
+use hybrid_icp::Iteration;
+use hybrid_icp::Judgment;
+use hybrid_icp::Minimize;
 use hybrid_icp::{
-    Context, Correspondences, DataAssociation, ErrorMetric, Isometry3, NormalEquations, Outcome,
-    OutlierFilter, Pair, PinholeCamera, PixelRegion, PointSelection, PointToPlane, PointToPoint,
-    Problem, Progress, Projective, Rasterizer, Regime, RegimeEvent, RenderedView, Renderer, Score,
-    Session, Stage, Step, StopRule, Surfel, Switcher, Termination, TriMesh, Vector3, Verdict,
+    Context, Correspondences, DataAssociation, ErrorMetric, Isometry3, Model, NormalEquations,
+    Observation, Outcome, OutlierFilter, Pair, PinholeCamera, PixelRegion, PointSelection,
+    PointToPlane, PointToPoint, Problem, Progress, Projective, Rasterizer, Regime, RegimeEvent,
+    RenderedView, Renderer, Score, Session, Stage, Step, StopRule, Surfel, Switcher, Termination,
+    TriMesh, Vector3, Verdict,
 };
 
 /// Runs a check that must fail with a message that names the law.
@@ -35,7 +39,6 @@ fn caught(law: &str, check: impl FnOnce()) {
 #[derive(Clone, Copy)]
 enum Fault {
     NanLoss,
-    Stateful(u32),
     WrongSign,
     CameraAxis,
     ForgetsWeights,
@@ -83,17 +86,13 @@ impl ErrorMetric for Fault {
             }
     }
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
-        let increment = self.system(pairs)?.solve()?;
-        let mut mean_loss = self.mean_loss(pairs)?;
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
+        let increment = self.linearize_all(pairs)?.solve()?;
+        let mut mean_loss = self.mean_squared_error(pairs)?;
         match self {
             Self::NanLoss => mean_loss = f64::NAN,
             Self::Negative => mean_loss = -1.0,
             Self::Panics => assert!(pairs.len() != 2, "two pairs"),
-            Self::Stateful(calls) => {
-                *calls += 1;
-                mean_loss *= f64::from(*calls);
-            }
             _ => {}
         }
         Some(Step {
@@ -109,7 +108,6 @@ fn metrics() {
     for (law, fault) in [
         ("the loss is finite", Fault::NanLoss),
         ("the loss is finite and not negative", Fault::Negative),
-        ("pure", Fault::Stateful(0)),
         ("downhill", Fault::WrongSign),
         ("frame", Fault::CameraAxis),
         ("rows carry the weight", Fault::ForgetsWeights),
@@ -118,6 +116,42 @@ fn metrics() {
     ] {
         caught(law, || check_metric(|| fault, all));
     }
+}
+
+/// A decorator whose loss depends on how often it was called.
+#[derive(Clone, Copy)]
+struct Stateful(u32);
+
+impl Minimize for Stateful {
+    fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
+        PointToPlane.linearize_all(pairs)
+    }
+
+    fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.0 += 1;
+        Some(PointToPlane.mean_squared_error(pairs)? * f64::from(self.0))
+    }
+
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        PointToPlane.add_squared_errors(iteration, pairs, factor, errors);
+    }
+
+    fn label(&self) -> &'static str {
+        "stateful"
+    }
+}
+
+#[test]
+fn a_decorator_that_remembers_its_calls() {
+    caught("pure", || {
+        check_minimize(|| Stateful(0), MetricLaws::default())
+    });
 }
 
 /// Forwards what must be implemented, and none of what is provided.
@@ -151,7 +185,8 @@ impl PointSelection for Sloppy {
     ) {
         let skip = self.calls;
         self.calls += 1;
-        source.extend(context.problem.model.samples().iter().skip(skip).take(9));
+        let samples = context.problem.model().map_or(&[][..], Model::samples);
+        source.extend(samples.iter().skip(skip).take(9));
         if self.nan {
             source[0].point.x = pose.translation.x as f32 * f32::INFINITY;
         }
@@ -216,7 +251,7 @@ fn associations() {
 struct By(fn(&mut Correspondences));
 
 impl OutlierFilter for By {
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         self.0(pairs);
     }
 }
@@ -275,11 +310,8 @@ struct Remembers {
 }
 
 impl OutlierFilter for Remembers {
-    fn begin(&mut self, iteration: usize) {
-        self.turns = (self.remember)(self.turns, iteration);
-    }
-
-    fn filter(&mut self, _problem: &Problem<'_>, pairs: &mut Correspondences) {
+    fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+        self.turns = (self.remember)(self.turns, iteration.index);
         let limit = 0.05 / (1.0 + self.turns as f32);
         pairs.retain(|pair| pair.distance() < limit);
     }
@@ -301,16 +333,16 @@ fn filters_that_remember_what_iterations_came_before() {
     check_filter(remembers(|_, iteration| iteration), FilterLaws::default());
 }
 
-/// Counts turns and forgets to begin anew.
+/// Counts iterations and never forgets them.
 struct Forgets(usize);
 
 impl StopRule for Forgets {
-    fn check(&mut self, _progress: &Progress<'_>) -> ControlFlow<Termination> {
+    fn check(&mut self, _iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
         self.0 += 1;
         if self.0 > 4 {
-            ControlFlow::Break(Termination::Converged)
+            Judgment::Accept(Termination::Converged)
         } else {
-            ControlFlow::Continue(())
+            Judgment::Continue
         }
     }
 }
@@ -329,7 +361,10 @@ struct Share {
 
 impl Score for Share {
     fn score(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> f64 {
-        let n = context.problem.observation.n_surfels() as f64;
+        let n = context
+            .problem
+            .observation()
+            .map_or(0, Observation::n_surfels) as f64;
         if self.elsewhere {
             context.view(&(Isometry3::translation(0.0, 0.0, 1e-9) * pose));
             return 0.5;
@@ -370,7 +405,9 @@ impl Stage for Rash {
         init: &Isometry3<f64>,
         _: &mut Session<'_>,
     ) -> Outcome {
-        let nothing = problem.observation.n_surfels() == 0;
+        let nothing = problem
+            .observation()
+            .is_none_or(|seen| seen.n_surfels() == 0);
         let pose = match (self.kept, nothing) {
             (true, true) => Isometry3::identity(),
             (false, false) => Isometry3::translation(0.0, 0.0, 1e-3) * init,

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use hicp_testkit::{
     AssociationLaws, FilterLaws, MetricLaws, RendererLaws, ScoreLaws, StageLaws, StopRuleLaws,
     SwitcherLaws, check_association, check_filter, check_metric, check_metric_forwards,
-    check_renderer, check_score, check_selection, check_stage, check_stop_rule, check_switcher,
-    scenes,
+    check_minimize, check_renderer, check_score, check_selection, check_stage, check_stop_rule,
+    check_switcher, scenes,
 };
 use hybrid_icp::{
     AbsoluteLoss, AllSamples, AtResolution, Bound, BoundaryTargets, ClosestPointOnMesh,
@@ -107,8 +107,8 @@ fn metrics() {
     let sum = || WeightedSum {
         terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
     };
-    check_metric(sum, all);
-    check_metric(
+    check_minimize(sum, all);
+    check_minimize(
         || WeightedSum {
             terms: vec![(0.5, PointToPlane), (0.5, PointToPlane)],
         },
@@ -136,14 +136,14 @@ fn robust_metrics() {
         Kernel::WELSCH,
         Kernel::TUKEY,
     ] {
-        check_metric(
+        check_minimize(
             || Robust::new(PointToPlane, kernel, Scale::Meters(0.003)),
             known,
         );
         let scale = Scale::Mad { floor_meters: 0.0 };
-        check_metric(|| Robust::new(PointToPoint, kernel, scale), median);
+        check_minimize(|| Robust::new(PointToPoint, kernel, scale), median);
     }
-    check_metric(
+    check_minimize(
         Robust::<PointToPoint>::default,
         MetricLaws {
             units: false,
@@ -161,24 +161,24 @@ fn decorated_metrics() {
             policy,
             threshold: Degeneracy::THRESHOLD,
         };
-        check_metric(conditioned, all);
+        check_minimize(conditioned, all);
     }
-    check_metric(GaussNewton::<PointToPlane>::default, all);
+    check_minimize(GaussNewton::<PointToPlane>::default, all);
     // Not over `Symmetric`: λ scales the diagonal of JᵀWJ, which depends on the axes, so steps cut short by the iteration limit far
     // off differ from frame to frame.
-    check_metric(LevenbergMarquardt::<PointToPlane>::default, all);
+    check_minimize(LevenbergMarquardt::<PointToPlane>::default, all);
     let frozen = |frame| Frozen {
         metric: PointToPlane,
         frame,
         translation: [false, true, false],
         rotation: [false, false, true],
     };
-    check_metric(|| frozen(Frame::Object), all);
+    check_minimize(|| frozen(Frame::Object), all);
     let fixed = MetricLaws {
         frame: false,
         ..all
     };
-    check_metric(|| frozen(Frame::Camera), fixed);
+    check_minimize(|| frozen(Frame::Camera), fixed);
     let prior = || {
         let prior = Prior::Gaussian {
             camera_from_object: scenes()[0].truth,
@@ -186,7 +186,7 @@ fn decorated_metrics() {
         };
         PosePrior::new(PointToPlane, prior, 1e-3)
     };
-    check_metric(
+    check_minimize(
         prior,
         MetricLaws {
             units: false,

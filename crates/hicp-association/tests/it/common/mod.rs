@@ -3,6 +3,7 @@
 // Every test file uses a part, and compiles it into itself.
 
 use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
+use hicp_core::Iteration;
 use hicp_core::{
     Context, Correspondences, DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, Pair,
     PinholeCamera, PixelRegion, Point3, Problem, RenderCache, RenderedView, Renderer, Surfel,
@@ -226,7 +227,8 @@ impl Scene {
 
     pub fn filter(&self, filter: &mut impl OutlierFilter, pairs: &[Pair]) -> Vec<Pair> {
         let mut pairs: Correspondences = pairs.iter().copied().collect();
-        filter.filter(&self.problem(), &mut pairs);
+        let iteration = Iteration::new(0, &Isometry3::identity(), self.problem());
+        filter.filter(&iteration, &mut pairs);
         pairs.as_slice().to_vec()
     }
 

@@ -88,7 +88,7 @@ impl DataAssociation for Scripted {
 impl ErrorMetric for Scripted {
     fn linearize(&self, _: &Pair, _: &mut NormalEquations) {}
 
-    fn minimize(&mut self, pairs: &Correspondences) -> Option<Step> {
+    fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let x = pairs.as_slice()[0].source.point.x;
         let (_, loss) = self.line(&Isometry3::translation(x.into(), 0.0, 0.0));
         loss.map(|mean_loss| Step {

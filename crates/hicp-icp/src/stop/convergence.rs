@@ -1,0 +1,80 @@
+//! Stop rules on the loss.
+
+use hicp_core::Iteration;
+
+use crate::outcome::Termination;
+use crate::stop::stop_rule::{Judgment, Progress, StopRule};
+
+/// Ends a stage when the mean loss has stopped changing ("terminated early if the ICP loss converges", §IV-B).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Convergence {
+    /// Relative change of the mean loss against the previous iteration, up or down, below which the stage has converged.
+    pub relative_change: f64,
+    /// Mean loss (m²) below which there is nothing left to gain: the square of what `f32` resolves at arm's length.
+    pub negligible_loss: f64,
+}
+
+impl Default for Convergence {
+    fn default() -> Self {
+        Self {
+            relative_change: 1e-3,
+            negligible_loss: 1e-14,
+        }
+    }
+}
+
+impl StopRule for Convergence {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+        let Some(previous) = progress.previous else {
+            return Judgment::Continue;
+        };
+        let (before, now) = (previous.mean_loss, progress.current.mean_loss);
+        let settled = (before - now).abs() < self.relative_change * before;
+        if settled || (before.max(now) <= self.negligible_loss) {
+            Judgment::Accept(Termination::Converged)
+        } else {
+            Judgment::Continue
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "convergence"
+    }
+}
+
+/// Ends a stage as converged when the mean loss changes by less than an absolute amount, or has fallen below one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AbsoluteLoss {
+    /// Change against the previous iteration, m².
+    pub change: f64,
+    /// Loss that is good enough, m².
+    pub good_enough: f64,
+}
+
+impl Default for AbsoluteLoss {
+    /// The squares of a micrometre and of ten micrometres.
+    fn default() -> Self {
+        Self {
+            change: 1e-12,
+            good_enough: 1e-10,
+        }
+    }
+}
+
+impl StopRule for AbsoluteLoss {
+    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+        let now = progress.current.mean_loss;
+        let settled = progress
+            .previous
+            .is_some_and(|previous| (previous.mean_loss - now).abs() < self.change);
+        if settled || now < self.good_enough {
+            Judgment::Accept(Termination::Converged)
+        } else {
+            Judgment::Continue
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "absolute-loss"
+    }
+}

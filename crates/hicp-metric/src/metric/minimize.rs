@@ -1,0 +1,137 @@
+//! The trait of whatever a stage can minimize over a set of pairs.
+
+use hicp_core::{Correspondences, Iteration};
+
+use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::system::normal_equations::NormalEquations;
+
+/// Minimizes over the pairs of one iteration: every [`ErrorMetric`], and the decorators around one.
+///
+/// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs rather than on one of them. It
+/// implements this trait by calling the same methods of what it wraps, and gets the Gauss–Newton step from the provided
+/// [`Minimize::minimize`].
+///
+/// Pure: `&mut self` is scratch, and equal iterations and pairs give equal results. A metric that depends on the pose finds
+/// it in [`Correspondences::camera_from_object`]; what changes with the iteration or the stage's start is in [`Iteration`].
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an error metric",
+    label = "this must implement `ErrorMetric` (or `Minimize`)",
+    note = "`Icp::metric` accepts an `ErrorMetric`, a decorator such as `Robust<M>` around one, or a `Box<dyn Minimize>`"
+)]
+pub trait Minimize {
+    /// Returns all pairs linearized: what one Gauss–Newton step solves, and what information, covariance and observability
+    /// at that pose are read from. `None` without weight or with points that are not finite.
+    fn system(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<NormalEquations>;
+
+    /// Returns the weighted mean of the errors at the pose that the pairs were made at; m². `None` without weight or with
+    /// numbers that are not finite.
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64>;
+
+    /// Adds `factor` times the squared error of each pair, without its weight, to `errors`, one number per pair; m².
+    fn add_squared_errors(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    );
+
+    /// Takes one step of minimization over all pairs.
+    ///
+    /// `None` if the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
+    /// that are not finite. The provided method is one Gauss–Newton step: it solves [`Minimize::system`].
+    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        Some(Step {
+            increment: self.system(iteration, pairs)?.solve()?,
+            mean_loss: self.mean_loss(iteration, pairs)?,
+        })
+    }
+
+    /// Returns the name in traces; not `name`, so that a metric's own name stays unambiguous.
+    fn label(&self) -> &'static str;
+}
+
+impl<M: ErrorMetric + ?Sized> Minimize for M {
+    fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
+        self.linearize_all(pairs)
+    }
+
+    fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.mean_squared_error(pairs)
+    }
+
+    fn add_squared_errors(
+        &mut self,
+        _: &Iteration<'_>,
+        pairs: &Correspondences,
+        factor: f64,
+        errors: &mut [f64],
+    ) {
+        for (error, pair) in errors.iter_mut().zip(pairs.as_slice()) {
+            *error += factor * self.squared_error(pair);
+        }
+    }
+
+    fn minimize(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        self.step(pairs)
+    }
+
+    fn label(&self) -> &'static str {
+        self.name()
+    }
+}
+
+// Not for any `Box<T>`: a boxed error metric is one already.
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl Minimize for $pointer {
+            fn system(
+                &mut self,
+                iteration: &Iteration<'_>,
+                pairs: &Correspondences,
+            ) -> Option<NormalEquations> {
+                (**self).system(iteration, pairs)
+            }
+
+            fn mean_loss(
+                &mut self,
+                iteration: &Iteration<'_>,
+                pairs: &Correspondences,
+            ) -> Option<f64> {
+                (**self).mean_loss(iteration, pairs)
+            }
+
+            fn add_squared_errors(
+                &mut self,
+                iteration: &Iteration<'_>,
+                pairs: &Correspondences,
+                factor: f64,
+                errors: &mut [f64],
+            ) {
+                (**self).add_squared_errors(iteration, pairs, factor, errors);
+            }
+
+            fn minimize(
+                &mut self,
+                iteration: &Iteration<'_>,
+                pairs: &Correspondences,
+            ) -> Option<Step> {
+                (**self).minimize(iteration, pairs)
+            }
+
+            fn label(&self) -> &'static str {
+                (**self).label()
+            }
+        }
+    )+};
+}
+forward!(
+    Box<dyn Minimize + '_>,
+    Box<dyn Minimize + Send + '_>,
+    &mut (dyn Minimize + '_),
+    &mut (dyn Minimize + Send + '_)
+);
