@@ -1,4 +1,4 @@
-//! What can go wrong with a study.
+//! The errors of studies.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,28 +12,6 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// A number is out of its range.
-    #[error("{what} is {value}, expected {expected}")]
-    Parameter {
-        /// Which one.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// What was expected.
-        expected: &'static str,
-    },
-    /// A study without variants or objects, or with two of the same name.
-    #[error("{what} {name:?} {found}, expected {expected}")]
-    Names {
-        /// What is named: a variant, an object.
-        what: &'static str,
-        /// The name; empty where there is none.
-        name: String,
-        /// What is wrong with it.
-        found: &'static str,
-        /// What was expected.
-        expected: &'static str,
-    },
     /// A folder without meshes.
     #[error("{} holds no mesh, expected files that end in .obj, .ply or .stl", path.display())]
     NoMeshes {
@@ -113,6 +91,9 @@ pub enum ExperimentError {
     /// A mesh cannot be read, or a file not written.
     #[error(transparent)]
     Io(#[from] IoError),
+    /// A camera cannot be used.
+    #[error(transparent)]
+    Camera(#[from] hicp_core::CameraError),
     /// A simulation cannot be set up.
     #[error(transparent)]
     Sim(#[from] SimError),

@@ -1,11 +1,13 @@
 //! The studies of the Hybrid ICP paper, as code: single images (§VI-A, §VI-B, Table I and the tuning of α) and trajectories (§VI-C).
 //!
-//! **Should you use this crate?** To check the paper's claims, or to judge a pipeline of your own against its nine variants on
-//! many objects, yes; `hybrid-icp experiment` is its command line. To refine poses, no: that is `hybrid-icp`.
+//! **Should you use this crate?** Use it to check the paper's claims, or to compare a custom pipeline
+//! with the paper's nine variants on many objects; `hybrid-icp experiment` is its command line. To
+//! refine poses, use `hybrid-icp`.
 //!
-//! A study looks at cases (an object, an image, an initial pose) under one or more levels of noise and gives each to every variant:
-//! differences between variants are paired by construction. It writes a row per case, level and variant as it goes, can be killed
-//! and resumed, and comes out the same on any number of threads, but for the times.
+//! A study presents cases (an object, an image, an initial pose) under one or more levels of noise to
+//! every variant, so that differences between variants are paired. It writes the rows of each case as
+//! it goes, can be killed and resumed, and gives the same rows on any number of threads, except for
+//! times. [`Design`] is what distinguishes kinds of studies: [`Config`] and [`TrajectoryConfig`].
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -21,7 +23,7 @@
 //! let study = Study::read(folder.path())?;
 //! assert_eq!(study.rows.len(), 6 * 9); // six levels of noise, nine variants
 //! let report = Report::of(vec![("mug".to_owned(), study)]);
-//! let (_, analysis) = &report.analyses()[0];
+//! let analysis = &report.entries()[0].analysis;
 //! let hybrid = analysis.mean(Metric::Vsd, analysis.overall(), 0).ok_or("no row")?;
 //! assert!(hybrid.low <= hybrid.estimate && hybrid.estimate <= hybrid.high);
 //! report.write(folder.path())?; // report.html, figure.svg, summary.csv, …
@@ -31,44 +33,43 @@
 // Counts and indices of rows become floating point numbers.
 #![allow(clippy::cast_precision_loss)]
 
-mod aims;
 mod analysis;
 mod claims;
 mod clock;
-mod config;
 mod error;
-mod experiment;
-mod figure;
-mod html;
 mod report;
-mod row;
-mod runner;
 mod sequential;
-mod stored;
-mod streaming;
+mod single;
 mod study;
 mod subject;
-mod tables;
 mod variant;
 
 pub use analysis::{
-    ADD_SHARE, ALL, Analysis, Cell, FAILURE_VSD, FAULTY_MASK, Group, HIGH, Interval, LOW, Metric,
-    NOISY, NOISY_DEPTH, NOISY_MODEL, REPLICATES, WORSE_VSD, never_seen,
+    ADD_SHARE, Analysis, Cell, FAILURE_VSD, Interval, Metric, REPLICATES, WORSE_VSD, never_seen,
 };
-pub use claims::{Claim, ClaimVerdict, TABLE_I, claims};
-pub use config::{CameraRecord, Config, ObjectRecord, VariantRecord};
+pub use claims::{Claim, ClaimVerdict};
 pub use error::ExperimentError;
-pub use experiment::{Condition, Experiment, MaskFault};
-pub use figure::{Curve, Figure, Panel};
-pub use html::{Table, escaped as html_escaped, page as html_page};
-pub use report::Report;
-pub use row::{COLUMNS, Measured, Row};
-pub use sequential::{
-    FusionRule, TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryClock, TrajectoryConfig,
-    TrajectoryReport, TrajectoryRow, TrajectoryStep, TrajectoryStudy, UnderlyingRecord,
-    run_trajectories, watch_trajectories,
+pub use report::{
+    Curve, Document, Entry, Figure, Panel, ReportOf, Reported, Table, html_escaped, html_page,
 };
-pub use stored::{MAX_BINS, MAX_CELLS, MAX_OBJECTS};
-pub use study::{CASES_FILE, CONFIG_FILE, RunOptions, Study, run};
+pub use sequential::{
+    FusionRule, TrajectoryClock, TrajectoryConfig, TrajectoryStep, UnderlyingRecord,
+    watch_trajectories,
+};
+pub use single::{Condition, Config, Experiment, MaskFault, TABLE_I, claims};
+pub use study::{
+    ALL, CONFIG_FILE, CameraRecord, Column, Columns, Design, FAULTY_MASK, Fields, Group, HIGH, LOW,
+    Layout, MAX_BINS, MAX_CELLS, MAX_OBJECTS, Measured, Models, NOISY, NOISY_DEPTH, NOISY_MODEL,
+    ObjectRecord, Row, RunOptions, StudyOf, Worker, run,
+};
 pub use subject::Subject;
 pub use variant::Variant;
+
+/// A study of single images.
+pub type Study = StudyOf<Config>;
+/// A sequential study.
+pub type TrajectoryStudy = StudyOf<TrajectoryConfig>;
+/// A report of studies of single images.
+pub type Report = ReportOf<Config>;
+/// A report of sequential studies.
+pub type TrajectoryReport = ReportOf<TrajectoryConfig>;

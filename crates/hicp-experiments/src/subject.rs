@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use hicp_core::{Model, TriMesh};
+use hicp_core::{Isometry3, Model, Point3};
 use hicp_io::{LengthUnit, read_mesh};
+use hicp_score::{add, adi};
 use hicp_sim::Household;
 
 use crate::error::ExperimentError;
@@ -11,16 +12,16 @@ use crate::error::ExperimentError;
 /// An object of a study.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Name in tables; random numbers follow from it.
+    /// Name in tables; it also seeds the random numbers.
     pub name: String,
-    /// Where it comes from: `household`, or a file's name.
+    /// Its origin: `household`, or the name of a file.
     pub source: String,
-    /// The model, metres.
+    /// The model, meters.
     pub model: Model,
 }
 
 impl Subject {
-    /// Makes household objects in their nominal proportions, with their symmetries.
+    /// Creates household objects in their nominal proportions, with their symmetries.
     ///
     /// # Errors
     ///
@@ -36,11 +37,11 @@ impl Subject {
         made.collect()
     }
 
-    /// Reads every OBJ, PLY and STL file of a folder, in metres, in the order of their names. Symmetries are not known.
+    /// Reads every mesh file of a folder, in meters, in the order of their names, without symmetries.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError`] when the folder or a file cannot be read, there is no mesh, or two files have the same stem.
+    /// [`ExperimentError`] when the folder or a file cannot be read, or there is no mesh.
     pub fn read_folder(folder: &Path) -> Result<Vec<Self>, ExperimentError> {
         let entries = std::fs::read_dir(folder).map_err(ExperimentError::file(folder))?;
         let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
@@ -66,20 +67,31 @@ impl Subject {
         });
         read.collect()
     }
-}
 
-/// Returns a number that tells meshes apart: FNV-1a of the coordinates' bits and the indices.
-pub(crate) fn fingerprint(mesh: &TriMesh) -> u64 {
-    let coordinates = mesh
-        .vertices()
-        .iter()
-        .flat_map(|p| [p.x, p.y, p.z])
-        .map(f32::to_bits);
-    let indices = mesh.triangles().iter().flatten().copied();
-    coordinates
-        .chain(indices)
-        .flat_map(u32::to_le_bytes)
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+    /// Returns whether symmetries are declared.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        let symmetries = self.model.symmetries();
+        !(symmetries.discrete.is_empty() && symmetries.continuous.is_empty())
+    }
+
+    /// Returns ADD over the model's samples, or ADI if symmetries are declared, millimeters.
+    pub(crate) fn add_or_adi_mm(&self, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+        let points: Vec<Point3<f32>> = self.model.samples().iter().map(|s| s.point).collect();
+        1e3 * match self.is_symmetric() {
+            false => add(estimate, truth, &points),
+            true => adi(estimate, truth, &points),
+        }
+    }
+
+    /// Returns a hash of the mesh: FNV-1a of the coordinates' bits and the indices.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mesh = self.model.mesh();
+        let coordinates = mesh.vertices().iter().flat_map(|p| [p.x, p.y, p.z]);
+        let indices = mesh.triangles().iter().flatten().copied();
+        let words = coordinates.map(f32::to_bits).chain(indices);
+        let bytes = words.flat_map(u32::to_le_bytes);
+        bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         })
+    }
 }

@@ -3,30 +3,33 @@
 use std::path::Path;
 
 use hybrid_icp::{BoxedStage, PipelineFile, PipelineLimits, Preset};
+use serde::{Deserialize, Serialize};
 
 use crate::error::ExperimentError;
 
-/// Where the threshold α is in the pipeline of [`Preset::Hybrid`] and in those made like it.
+/// The path of the threshold α in the pipeline of [`Preset::Hybrid`] and its variations.
 const ALPHA_FIELD: &str = "stage.switcher.alpha";
 
-/// A pipeline under a name: a preset, or a file.
-#[derive(Clone, Debug, PartialEq)]
+/// A named pipeline: a preset, or a file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Variant {
     /// Name in tables.
     pub name: String,
-    /// The pipeline as a file's text.
+    /// The text of its pipeline file; `pipeline` in a configuration.
+    #[serde(rename = "pipeline")]
     pub toml: String,
 }
 
 impl Variant {
-    /// The nine variants of the paper, Hybrid ICP first.
+    /// Returns the nine variants of the paper, Hybrid ICP first.
     #[must_use]
     pub fn paper() -> Vec<Self> {
         Preset::PAPER.into_iter().map(Self::preset).collect()
     }
 
-    /// What [`crate::Experiment::Beyond`] compares: Hybrid ICP, the best baseline of either family, and the presets that go
-    /// beyond the paper.
+    /// Returns the variants of [`crate::Experiment::Beyond`]: Hybrid ICP, the best baseline of each
+    /// family, and the presets beyond the paper.
     #[must_use]
     pub fn beyond() -> Vec<Self> {
         [
@@ -42,7 +45,7 @@ impl Variant {
         .to_vec()
     }
 
-    /// Makes the variant of a preset.
+    /// Creates the variant of a preset.
     #[must_use]
     pub fn preset(preset: Preset) -> Self {
         Self {
@@ -51,21 +54,12 @@ impl Variant {
         }
     }
 
-    /// Reads a variant from a pipeline file; its name is the file's without the ending.
+    /// Reads a variant from a pipeline file; its name is the file's without the extension.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Pipeline`] when the file cannot be read, is no pipeline, or asks for more work than
-    /// [`PipelineLimits::DEFAULT`] let it.
-    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
-        Self::read_within(&PipelineLimits::DEFAULT, path)
-    }
-
-    /// Reads a variant from a pipeline file, within limits of one's own.
-    ///
-    /// # Errors
-    ///
-    /// As [`Variant::read`].
+    /// [`ExperimentError::Pipeline`] when the file cannot be read, is not a pipeline, or requires
+    /// more work than the limits allow.
     pub fn read_within(limits: &PipelineLimits, path: &Path) -> Result<Self, ExperimentError> {
         let stem = path.file_stem().unwrap_or_default();
         let variant = Self {
@@ -76,11 +70,13 @@ impl Variant {
         Ok(variant)
     }
 
-    /// Builds the pipeline, with another threshold α if one is given. How much work it asks for was looked at when it was read.
+    /// Builds the pipeline, with another threshold α if one is given. The limits on its work were
+    /// checked when it was read.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Pipeline`] when the text is no pipeline, or α is given and the pipeline does not switch.
+    /// [`ExperimentError::Pipeline`] when the text is not a pipeline, or α is given and the pipeline
+    /// does not switch.
     pub fn build(&self, alpha: Option<f64>) -> Result<BoxedStage, ExperimentError> {
         Ok(self.parse(alpha)?.build_within(&PipelineLimits::NONE)?)
     }
@@ -108,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_ask_for_too_much_are_refused_when_they_are_read() {
+    fn files_that_require_too_much_work_are_refused_when_they_are_read() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("mine.toml");
         let hybrid = Preset::Hybrid.toml();
@@ -116,7 +112,7 @@ mod tests {
         assert_ne!(long, hybrid);
         std::fs::write(&path, long).unwrap();
         assert!(matches!(
-            Variant::read(&path),
+            Variant::read_within(&PipelineLimits::DEFAULT, &path),
             Err(ExperimentError::Pipeline(_))
         ));
         let variant = Variant::read_within(&PipelineLimits::NONE, &path).unwrap();

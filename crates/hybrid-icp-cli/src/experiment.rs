@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::{Args, Subcommand, ValueEnum};
 use hicp_experiments::{
-    Config, Experiment, Report, RunOptions, Study, Subject, Variant, run as run_study,
+    Config, Design, Experiment, Report, RunOptions, Study, Subject, Variant, run as run_rows,
 };
 use hicp_sim::Household;
 use hybrid_icp::{Preset, UnknownPreset};
@@ -155,19 +155,37 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
         resume: arguments.resume,
         limits: limits(),
     };
-    let bar = ProgressBar::new(config.n_cases() as u64);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} cases, {eta} left")
-    {
+    run_study(
+        &config,
+        &subjects,
+        &out,
+        options,
+        [experiment.name(), "cases"],
+    )?;
+    report(std::slice::from_ref(&out), &out)
+}
+
+/// Runs a study with a progress bar, until it is finished or interrupted.
+pub(crate) fn run_study<D: Design>(
+    config: &D,
+    subjects: &[Subject],
+    out: &Path,
+    options: RunOptions,
+    [name, unit]: [&str; 2],
+) -> anyhow::Result<()> {
+    let bar = ProgressBar::new(config.layout().n_cases() as u64);
+    let template = format!("{{msg}} {{bar:40}} {{pos}}/{{len}} {unit}, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
         bar.set_style(style);
     }
-    bar.set_message(experiment.name());
-    let mut begun = false;
+    bar.set_message(name.to_owned());
+    let mut has_started = false;
     interrupt::can_resume();
-    let ran = run_study(&config, &subjects, &out, options, &mut |done| {
+    let ran = run_rows(config, subjects, out, options, &mut |done| {
         bar.set_position(done as u64);
-        if !begun {
+        if !has_started {
             bar.reset_eta();
-            begun = true;
+            has_started = true;
         }
         match interrupt::asked() {
             true => ControlFlow::Break(()),
@@ -175,8 +193,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
         }
     });
     bar.finish_and_clear();
-    ran?;
-    report(std::slice::from_ref(&out), &out)
+    Ok(ran?)
 }
 
 fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Variant>> {

@@ -1,17 +1,15 @@
 //! `hybrid-icp experiment sequential`.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use hicp_experiments::{
     Experiment, RunOptions, Subject, TrajectoryClock, TrajectoryConfig, TrajectoryReport,
-    TrajectoryStudy, run_trajectories,
+    TrajectoryStudy,
 };
 use hybrid_icp::Preset;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::interrupt;
+use crate::experiment::run_study;
 use crate::limits::limits;
 use crate::terminal::say;
 
@@ -86,31 +84,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         resume: arguments.resume,
         limits: limits(),
     };
-    let bar = ProgressBar::new(config.n_trajectories() as u64);
-    let template = "{msg} {bar:40} {pos}/{len} trajectories, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar.set_message("sequential");
     let out = &arguments.out;
-    let mut begun = false;
-    interrupt::can_resume();
-    let ran = run_trajectories(&config, &subjects, out, options, &mut |done| {
-        bar.set_position(done as u64);
-        if !begun {
-            bar.reset_eta();
-            begun = true;
-        }
-        match interrupt::asked() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
-    });
-    bar.finish_and_clear();
-    ran?;
-    let report = TrajectoryReport::of(TrajectoryStudy::read_within(&limits(), out)?);
+    run_study(
+        &config,
+        &subjects,
+        out,
+        options,
+        ["sequential", "trajectories"],
+    )?;
+    let study = TrajectoryStudy::read_within(&limits(), out)?;
+    let report = TrajectoryReport::of(vec![("sequential".to_owned(), study)]);
     report.write(out)?;
-    for claim in report.claims() {
+    for (_, claim) in report.claims() {
         say(format_args!(
             "{}: {} ({})",
             claim.verdict.name(),

@@ -1,59 +1,49 @@
-//! Whether the covariances that methods state are what their errors say.
+//! The share of errors inside the ellipsoids that the stated covariances give.
 
-use super::row::TrajectoryRow;
+use super::config::TrajectoryConfig;
 use super::rule::FusionRule;
-use super::study::TrajectoryStudy;
 use crate::analysis::FAILURE_VSD;
-use crate::html::Table;
+use crate::study::StudyOf;
 
-/// Probabilities of the ellipsoids that errors are counted in.
+/// Probabilities of the ellipsoids.
 const LEVELS: [f64; 3] = [0.5, 0.9, 0.99];
 
-/// Share of final errors inside the ellipsoids that hold 50, 90 and 99 % if the stated covariance is right, per pipeline and method:
-/// of all trajectories, and of those that did not fail.
-pub(super) fn table(study: &TrajectoryStudy) -> Table {
+/// The columns of the table.
+pub(super) const HEAD: &str = "underlying|method|which|trajectories|inside_50|inside_90|inside_99";
+
+/// Returns the share of final errors inside the ellipsoids that hold 50, 90 and 99 % if the stated
+/// covariance is right.
+///
+/// Per pipeline and method, of all trajectories and of those that did not fail.
+pub(super) fn rows(study: &StudyOf<TrajectoryConfig>) -> Vec<Vec<String>> {
+    let mut table = Vec::new();
     let config = &study.config;
-    let pairs = config.underlying.iter().flat_map(|u| {
-        let methods = config.methods.iter();
-        methods.map(|method| (u.name.as_str(), method.as_str()))
-    });
-    let mut rows = Vec::new();
-    for (underlying, method) in pairs {
-        let Some(rule) = FusionRule::from_name(method) else {
-            continue;
-        };
-        for (which, failures) in [("all", true), ("not failed", false)] {
-            let of_pair = study.rows.iter().filter(|row| {
-                let fine = row.vsd().is_some_and(|(_, last)| last <= FAILURE_VSD);
-                row.underlying == underlying && row.method == method && (failures || fine)
-            });
-            let distances = of_pair.filter_map(TrajectoryRow::mahalanobis_squared);
-            let within: Vec<f64> = distances
-                .map(|distance| rule.probability_within(underlying, distance))
-                .collect();
-            if within.is_empty() {
+    for underlying in &config.underlying {
+        for method in &config.methods {
+            let Some(rule) = FusionRule::from_name(method) else {
                 continue;
+            };
+            for (which, with_failures) in [("all", true), ("not failed", false)] {
+                let rows = study.rows.iter();
+                let rows = rows.filter(|r| r.setting == underlying.name && r.variant == *method);
+                let measured = rows.filter_map(|row| row.measured.as_ref());
+                let measured = measured.filter(|m| with_failures || m.vsd_final <= FAILURE_VSD);
+                let within = measured.filter_map(|m| m.mahalanobis_squared);
+                let within =
+                    within.map(|squared| rule.probability_within(&underlying.name, squared));
+                let within: Vec<f64> = within.collect();
+                if within.is_empty() {
+                    continue;
+                }
+                let mut row = vec![underlying.name.clone(), method.clone(), which.to_owned()];
+                row.push(within.len().to_string());
+                row.extend(LEVELS.map(|level| {
+                    let inside = within.iter().filter(|p| **p <= level).count();
+                    format!("{:.1}", 100.0 * inside as f64 / within.len() as f64)
+                }));
+                table.push(row);
             }
-            let mut row = vec![underlying.to_owned(), method.to_owned(), which.to_owned()];
-            row.push(within.len().to_string());
-            row.extend(LEVELS.map(|level| {
-                let inside = within.iter().filter(|p| **p <= level).count();
-                format!("{:.1}", 100.0 * inside as f64 / within.len() as f64)
-            }));
-            rows.push(row);
         }
     }
-    let head = [
-        "underlying",
-        "method",
-        "which",
-        "trajectories",
-        "inside_50",
-        "inside_90",
-        "inside_99",
-    ];
-    Table {
-        head: head.map(str::to_owned).to_vec(),
-        rows,
-    }
+    table
 }

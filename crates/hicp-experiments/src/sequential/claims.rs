@@ -1,12 +1,11 @@
-//! What the paper finds about fusing (§VI-C), held against a study.
+//! The paper's findings about fusing (§VI-C), tested.
 
 use super::config::TrajectoryConfig;
-use super::rule::FusionRule;
-use super::study::variant;
-use crate::analysis::{Analysis, HIGH, Interval, LOW, Metric};
-use crate::claims::{Claim, ClaimVerdict};
+use crate::analysis::{Analysis, Interval, Metric};
+use crate::claims::{Claim, ClaimVerdict, listed};
+use crate::study::{HIGH, LOW};
 
-/// The methods of the paper that make no use of uncertainty, with those that are the same but for it.
+/// The methods of the paper that use uncertainty, each with its counterpart that does not.
 const WEIGHTED: [(&str, &str); 2] = [
     ("weighted-average", "average"),
     ("filtering", "filtering-constant"),
@@ -21,247 +20,163 @@ const HYBRID: &str = "hybrid";
 const CASCADE: &str = "projective-cascade-point-plane";
 const SECTION: &str = "§VI-C";
 
-/// Tests the paper's findings, and what goes beyond it; those whose pipelines or methods the study lacks are left out.
-pub(crate) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Claim> {
+/// Tests the findings, and what goes beyond them; those whose pipelines or methods the study lacks are left out.
+pub(super) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Claim> {
+    let methods = config.paper_methods();
     let mut found = Vec::new();
     for underlying in &config.underlying {
-        let tester = Tester {
+        let judge = Judge {
             analysis,
             underlying: &underlying.name,
-            methods: config
-                .methods
-                .iter()
-                .map(String::as_str)
-                .filter(|m| is_of_paper(m))
-                .collect(),
+            methods: &methods,
         };
-        found.extend(tester.no_clear_best());
-        found.extend(tester.average_as_good());
-        found.extend(tester.weighting_no_better());
-        found.extend(tester.better_than_average());
+        found.extend(judge.no_clear_best());
+        found.extend(judge.average_as_good());
+        found.extend(judge.weighting_no_better());
+        found.extend(
+            BEYOND
+                .iter()
+                .filter_map(|method| judge.better_than_average(method)),
+        );
     }
-    found.extend(pipelines(config, analysis, LOW, CASCADE, HYBRID));
-    found.extend(pipelines(config, analysis, HIGH, HYBRID, CASCADE));
+    found.extend(is_better(analysis, &methods, LOW, [CASCADE, HYBRID]));
+    found.extend(is_better(analysis, &methods, HIGH, [HYBRID, CASCADE]));
     found
 }
 
-struct Tester<'a> {
+/// Tests claims about the methods with one underlying pipeline.
+struct Judge<'a> {
     analysis: &'a Analysis,
     underlying: &'a str,
-    /// The paper's.
-    methods: Vec<&'a str>,
+    /// Those of the paper.
+    methods: &'a [&'a str],
 }
 
-impl Tester<'_> {
+impl Judge<'_> {
     fn variant(&self, method: &str) -> Option<usize> {
-        self.analysis.variant(&variant(self.underlying, method))
+        self.analysis
+            .variant(&TrajectoryConfig::variant(self.underlying, method))
     }
 
-    /// The paired difference A − B of the mean VSD over all bins.
+    /// Returns the paired difference of the mean VSD of two methods over all bins.
     fn difference(&self, a: &str, b: &str) -> Option<Interval> {
         let (a, b) = (self.variant(a)?, self.variant(b)?);
-        let all = self.analysis.overall();
         self.analysis
-            .contrast(Metric::Vsd, &[(all, a, 1.0), (all, b, -1.0)])
+            .difference(Metric::Vsd, self.analysis.overall(), a, b)
     }
 
-    fn mean(&self, method: &str) -> Option<f64> {
-        let all = self.analysis.overall();
-        let mean = self
-            .analysis
-            .mean(Metric::Vsd, all, self.variant(method)?)?;
-        Some(mean.estimate)
-    }
-
-    fn claim(&self, text: &str, verdict: ClaimVerdict, figures: Vec<String>) -> Claim {
-        Claim {
-            section: SECTION,
-            text: format!("{}: {text}", self.underlying),
+    fn claim(
+        &self,
+        section: &'static str,
+        text: &str,
+        verdict: ClaimVerdict,
+        figures: String,
+    ) -> Claim {
+        Claim::new(
+            section,
+            format!("{}: {text}", self.underlying),
             verdict,
-            figures: figures.join("; "),
-        }
+            figures,
+        )
     }
 
     fn no_clear_best(&self) -> Option<Claim> {
-        let mut ranked: Vec<(&str, f64)> = self
-            .methods
-            .iter()
-            .filter_map(|m| Some((*m, self.mean(m)?)))
-            .collect();
+        let mean = |method: &str| {
+            let (all, variant) = (self.analysis.overall(), self.variant(method)?);
+            Some(self.analysis.mean(Metric::Vsd, all, variant)?.estimate)
+        };
+        let means = self.methods.iter().filter_map(|m| Some((*m, mean(m)?)));
+        let mut ranked: Vec<(&str, f64)> = means.collect();
         ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
         let ((best, mean), others) = ranked.split_first()?;
-        let against: Vec<(&str, Interval)> = others
+        let against = others
             .iter()
-            .filter_map(|(m, _)| Some((*m, self.difference(best, m)?)))
-            .collect();
-        if against.is_empty() {
-            return None;
-        }
-        let clear = against.iter().all(|(_, i)| i.high < 0.0);
-        let mut figures = vec![format!("lowest: {best}, {mean:.4}")];
-        figures.extend(against.iter().map(|(m, i)| format!("− {m}: {}", told(*i))));
+            .filter_map(|(m, _)| Some((*m, self.difference(best, m)?)));
+        let against: Vec<(&str, Interval)> = against.collect();
+        against.first()?;
+        let is_clear = against.iter().all(|(_, i)| i.high < 0.0);
+        let figures = against.iter().map(|(m, i)| format!("− {m}: {i:+.4}"));
+        let lowest = format!("lowest: {best}, {mean:.4}");
         Some(self.claim(
+            SECTION,
             "no method is clearly best (better than each other one, its interval excluding zero)",
-            if clear {
-                ClaimVerdict::DoesNotHold
-            } else {
-                ClaimVerdict::Holds
-            },
-            figures,
+            ClaimVerdict::of(!is_clear),
+            listed(std::iter::once(lowest).chain(figures)),
         ))
+    }
+
+    /// Tests that no named difference is above zero.
+    fn not_above(&self, text: &str, differences: Vec<(String, Interval)>) -> Option<Claim> {
+        differences.first()?;
+        let verdict = ClaimVerdict::not_positive(differences.iter().map(|d| &d.1));
+        let figures = differences
+            .iter()
+            .map(|(name, i)| format!("{name}: {i:+.4}"));
+        Some(self.claim(SECTION, text, verdict, listed(figures)))
     }
 
     fn average_as_good(&self) -> Option<Claim> {
         let others = self.methods.iter().filter(|m| **m != AVERAGE);
-        let differences: Vec<(String, Interval)> = others
-            .filter_map(|m| Some((format!("− {m}"), self.difference(AVERAGE, m)?)))
-            .collect();
-        let (verdict, figures) = not_above(&differences)?;
-        Some(self.claim(
+        let differences =
+            others.filter_map(|m| Some((format!("− {m}"), self.difference(AVERAGE, m)?)));
+        self.not_above(
             "average is at least as good as each other method",
-            verdict,
-            figures,
-        ))
+            differences.collect(),
+        )
     }
 
     fn weighting_no_better(&self) -> Option<Claim> {
-        let differences: Vec<(String, Interval)> = WEIGHTED
-            .into_iter()
-            .filter_map(|(with, without)| {
-                Some((
-                    format!("{without} − {with}"),
-                    self.difference(without, with)?,
-                ))
-            })
-            .collect();
-        let (verdict, figures) = not_above(&differences)?;
-        Some(self.claim(
-            "weighting by the MVE is no better than weighing all alike",
-            verdict,
-            figures,
-        ))
-    }
-
-    fn better_than_average(&self) -> Vec<Claim> {
-        let tested = BEYOND.into_iter().filter_map(|method| {
-            let difference = self.difference(method, AVERAGE)?;
-            Some(Claim {
-                section: "beyond §V",
-                ..self.claim(
-                    &format!("{method} is better than average"),
-                    below(&[difference]),
-                    vec![told(difference)],
-                )
-            })
+        let differences = WEIGHTED.iter().filter_map(|(with, without)| {
+            Some((
+                format!("{without} − {with}"),
+                self.difference(without, with)?,
+            ))
         });
-        tested.collect()
+        let text = "weighting by the MVE is no better than weighing all alike";
+        self.not_above(text, differences.collect())
+    }
+
+    fn better_than_average(&self, method: &str) -> Option<Claim> {
+        let difference = self.difference(method, AVERAGE)?;
+        let verdict = ClaimVerdict::negative([&difference]);
+        let (text, figures) = (
+            format!("{method} is better than average"),
+            format!("{difference:+.4}"),
+        );
+        Some(self.claim("beyond §V", &text, verdict, figures))
     }
 }
 
-pub(super) fn is_of_paper(method: &str) -> bool {
-    FusionRule::from_name(method).is_some_and(FusionRule::is_of_paper)
-}
-
-/// Whether one pipeline is better than another in a range of bins, over the paper's methods together and with each.
-fn pipelines(
-    config: &TrajectoryConfig,
+/// Tests whether one pipeline is better than another in a range of bins, over the paper's methods.
+fn is_better(
     analysis: &Analysis,
+    methods: &[&str],
     label: &str,
-    better: &str,
-    worse: &str,
+    [better, worse]: [&str; 2],
 ) -> Option<Claim> {
     let group = analysis.group(label)?;
-    let methods = config.methods.iter().filter(|m| is_of_paper(m));
-    let pairs: Vec<(&str, usize, usize)> = methods
-        .filter_map(|m| {
-            Some((
-                m.as_str(),
-                analysis.variant(&variant(better, m))?,
-                analysis.variant(&variant(worse, m))?,
-            ))
-        })
-        .collect();
-    if pairs.is_empty() {
-        return None;
-    }
+    let variant =
+        |underlying, method| analysis.variant(&TrajectoryConfig::variant(underlying, method));
+    let pairs = methods
+        .iter()
+        .filter_map(|m| Some((*m, variant(better, m)?, variant(worse, m)?)));
+    let pairs: Vec<(&str, usize, usize)> = pairs.collect();
+    pairs.first()?;
     let share = 1.0 / pairs.len() as f64;
-    let terms: Vec<(usize, usize, f64)> = pairs
+    let terms = pairs
         .iter()
-        .flat_map(|(_, a, b)| [(group, *a, share), (group, *b, -share)])
-        .collect();
-    let together = analysis.contrast(Metric::Vsd, &terms)?;
-    let mut figures = vec![format!("mean over the methods: {}", told(together))];
+        .flat_map(|(_, a, b)| [(group, *a, share), (group, *b, -share)]);
+    let together = analysis.contrast(Metric::Vsd, &terms.collect::<Vec<_>>())?;
+    let mut figures = vec![format!("mean over the methods: {together:+.4}")];
     for (method, a, b) in &pairs {
-        let terms = [(group, *a, 1.0), (group, *b, -1.0)];
-        let difference = analysis.contrast(Metric::Vsd, &terms)?;
-        figures.push(format!("{method}: {}", told(difference)));
+        let difference = analysis.difference(Metric::Vsd, group, *a, *b)?;
+        figures.push(format!("{method}: {difference:+.4}"));
     }
-    Some(Claim {
-        section: SECTION,
-        text: format!("{better} is better than {worse} at {label} initial VSD"),
-        verdict: below(&[together]),
-        figures: figures.join("; "),
-    })
-}
-
-/// The verdict on all differences being below zero.
-fn below(differences: &[Interval]) -> ClaimVerdict {
-    if differences.iter().all(|i| i.high < 0.0) {
-        ClaimVerdict::Holds
-    } else if differences.iter().any(|i| i.low > 0.0) {
-        ClaimVerdict::DoesNotHold
-    } else {
-        ClaimVerdict::NotSignificant
-    }
-}
-
-/// The verdict on no difference being above zero, with the figures.
-fn not_above(differences: &[(String, Interval)]) -> Option<(ClaimVerdict, Vec<String>)> {
-    if differences.is_empty() {
-        return None;
-    }
-    let verdict = if differences.iter().all(|(_, i)| i.high <= 0.0) {
-        ClaimVerdict::Holds
-    } else if differences.iter().any(|(_, i)| i.low > 0.0) {
-        ClaimVerdict::DoesNotHold
-    } else {
-        ClaimVerdict::NotSignificant
-    };
-    let figures = differences
-        .iter()
-        .map(|(name, i)| format!("{name}: {}", told(*i)));
-    Some((verdict, figures.collect()))
-}
-
-fn told(i: Interval) -> String {
-    format!("{:+.4} [{:+.4}, {:+.4}]", i.estimate, i.low, i.high)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn verdicts_follow_the_intervals() {
-        let at = |estimate: f64| Interval {
-            estimate,
-            low: estimate - 0.1,
-            high: estimate + 0.1,
-        };
-        assert_eq!(below(&[at(-0.2), at(-0.3)]), ClaimVerdict::Holds);
-        assert_eq!(below(&[at(-0.2), at(0.05)]), ClaimVerdict::NotSignificant);
-        assert_eq!(below(&[at(-0.2), at(0.2)]), ClaimVerdict::DoesNotHold);
-        let named = |x: f64| ("a".to_owned(), at(x));
-        let verdict = |all: &[(String, Interval)]| not_above(all).map(|(verdict, _)| verdict);
-        assert_eq!(verdict(&[named(-0.2)]), Some(ClaimVerdict::Holds));
-        assert_eq!(
-            verdict(&[named(-0.2), named(0.0)]),
-            Some(ClaimVerdict::NotSignificant)
-        );
-        assert_eq!(
-            verdict(&[named(0.2), named(-0.2)]),
-            Some(ClaimVerdict::DoesNotHold)
-        );
-        assert_eq!(verdict(&[]), None);
-    }
+    let text = format!("{better} is better than {worse} at {label} initial VSD");
+    Some(Claim::new(
+        SECTION,
+        text,
+        ClaimVerdict::negative([&together]),
+        listed(figures),
+    ))
 }

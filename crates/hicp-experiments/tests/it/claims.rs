@@ -1,7 +1,7 @@
 //! Means, intervals and claims on rows made by hand.
 
 use hicp_experiments::{
-    Analysis, ClaimVerdict, Config, Experiment, Figure, HIGH, LOW, Measured, Metric, NOISY, Report,
+    Analysis, Claim, ClaimVerdict, Config, Experiment, HIGH, LOW, Measured, Metric, NOISY, Report,
     Row, Study, Subject, Variant, claims, never_seen,
 };
 use hicp_sim::Household;
@@ -30,7 +30,7 @@ fn study(
                         object: object.name.clone(),
                         case,
                         variant: variant.name.clone(),
-                        level: level.clone(),
+                        setting: level.clone(),
                         bin,
                         measured: Some(Measured {
                             vsd_initial: bin.map_or(0.2, |b| 0.05 + b as f64 / 10.0),
@@ -39,9 +39,10 @@ fn study(
                                 + 0.01 * number as f64
                                 + 0.002 * (case % 3) as f64,
                             add_final_mm: 1.0 + case as f64,
-                            iterations: 10,
+                            steps: 10,
                             termination: "converged".to_owned(),
                             cpu_ms: Some(cpu_ms(&variant.name)),
+                            mahalanobis_squared: None,
                         }),
                         note: String::new(),
                     });
@@ -52,11 +53,12 @@ fn study(
     Study { config, rows }
 }
 
-fn verdict(analysis: &Analysis, part: &str) -> ClaimVerdict {
-    let found: Vec<_> = claims(analysis)
-        .into_iter()
-        .filter(|c| c.text.contains(part))
-        .collect();
+fn tested(study: &Study) -> Vec<Claim> {
+    claims(study.config.experiment, &Analysis::of(study))
+}
+
+fn verdict(claims: &[Claim], part: &str) -> ClaimVerdict {
+    let found: Vec<_> = claims.iter().filter(|c| c.text.contains(part)).collect();
     assert_eq!(found.len(), 1, "{part}: {found:?}");
     found[0].verdict
 }
@@ -108,7 +110,7 @@ fn means_and_differences_are_what_was_put_in() {
     assert_eq!((failed(first, hybrid), failed(first, nn)), (0.0, 1.0));
     let cell = analysis.cell(analysis.overall(), hybrid).unwrap();
     assert_eq!(
-        (cell.count, cell.iterations, cell.cpu_deviation_ms),
+        (cell.count, cell.steps, cell.cpu_deviation_ms),
         (80, 10.0, Some(0.0))
     );
     assert!((cell.add_median_mm - 10.5).abs() < 1e-12);
@@ -155,11 +157,11 @@ fn the_interval_covers_what_is_not_known() {
 
 #[test]
 fn claims_of_the_initial_pose_are_told_from_their_opposites() {
-    let holding = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 1.0));
+    let holding = tested(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 1.0));
     let opposite =
         |variant: &str, level: &str, case: u64| 0.9 - as_in_the_paper(variant, level, case);
-    let failing = Analysis::of(&study(Experiment::InitNoise, 20, opposite, |_| 1.0));
-    let same = Analysis::of(&study(Experiment::InitNoise, 20, |_, _, _| 0.3, |_| 1.0));
+    let failing = tested(&study(Experiment::InitNoise, 20, opposite, |_| 1.0));
+    let same = tested(&study(Experiment::InitNoise, 20, |_, _, _| 0.3, |_| 1.0));
     for part in [
         "lower mean VSD than each",
         "at low initial VSD (below 0.3) a projective",
@@ -220,9 +222,10 @@ fn claims_of_depth_noise_are_told_from_their_opposites() {
             0.3 + little + rise * percent + luck + hybrid
         }
     };
-    let holding = Analysis::of(&study(Experiment::DepthNoise, 12, with(1.0), |_| 1.0));
-    let failing = Analysis::of(&study(Experiment::DepthNoise, 12, with(-1.0), |_| 1.0));
-    assert!(holding.group(NOISY).is_some());
+    let holding = tested(&study(Experiment::DepthNoise, 12, with(1.0), |_| 1.0));
+    let failing = tested(&study(Experiment::DepthNoise, 12, with(-1.0), |_| 1.0));
+    let analysis = Analysis::of(&study(Experiment::DepthNoise, 12, with(1.0), |_| 1.0));
+    assert!(analysis.group(NOISY).is_some());
     for part in [
         "every step of depth noise",
         "lower mean VSD than each",
@@ -244,7 +247,7 @@ fn the_order_of_table_one_is_checked_pair_by_pair() {
             .unwrap()
             .1
     };
-    let holding = Analysis::of(&study(
+    let holding = tested(&study(
         Experiment::Timing,
         4,
         |_, _, _| 0.1,
@@ -255,7 +258,7 @@ fn the_order_of_table_one_is_checked_pair_by_pair() {
         verdict(&holding, "every projective variant is faster"),
         ClaimVerdict::Holds
     );
-    let swapped = Analysis::of(&study(
+    let swapped = tested(&study(
         Experiment::Timing,
         4,
         |_, _, _| 0.1,
@@ -268,7 +271,7 @@ fn the_order_of_table_one_is_checked_pair_by_pair() {
         verdict(&swapped, "order of Table I"),
         ClaimVerdict::DoesNotHold
     );
-    let figures = &claims(&swapped)[1].figures;
+    let figures = &swapped[1].figures;
     assert!(figures.starts_with("35 of 36 pairs"), "{figures}");
 }
 
@@ -277,15 +280,7 @@ fn the_minimum_of_alpha_is_found_and_held_against_the_papers() {
     let valley = |at: f64| {
         move |_: &str, level: &str, _: u64| 0.1 + (level.parse::<f64>().unwrap() - at).abs()
     };
-    let at = |alpha: f64| {
-        claims(&Analysis::of(&study(
-            Experiment::Alpha,
-            10,
-            valley(alpha),
-            |_| 1.0,
-        )))
-        .remove(0)
-    };
+    let at = |alpha: f64| tested(&study(Experiment::Alpha, 10, valley(alpha), |_| 1.0)).remove(0);
     let paper = at(0.4);
     assert_eq!(paper.verdict, ClaimVerdict::Holds);
     assert!(
@@ -329,7 +324,7 @@ fn a_report_holds_figures_tables_and_what_could_not_be_made() {
     // Nothing is fetched from anywhere.
     assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("<script"));
     let claims = std::fs::read_to_string(folder.path().join("claims.csv")).unwrap();
-    assert_eq!(claims.lines().count(), 1 + report.claims().len());
+    assert_eq!(claims.lines().count(), 1 + report.claims().count());
     let summary = std::fs::read_to_string(folder.path().join("summary.csv")).unwrap();
     assert_eq!(summary.lines().count(), 1 + 13 * 9);
     let differences = std::fs::read_to_string(folder.path().join("differences.csv")).unwrap();
@@ -341,10 +336,11 @@ fn a_report_holds_figures_tables_and_what_could_not_be_made() {
 
 #[test]
 fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
-    let init = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0));
-    let depth = Analysis::of(&study(Experiment::DepthNoise, 12, as_in_the_paper, |_| 2.0));
-    let figure = Figure::of([&init, &depth]);
-    assert!(!figure.is_empty() && figure.rows.len() == 2);
+    let init = study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0);
+    let depth = study(Experiment::DepthNoise, 12, as_in_the_paper, |_| 2.0);
+    let report = Report::of(vec![("init".to_owned(), init), ("depth".to_owned(), depth)]);
+    let (name, figure) = report.figures().remove(0);
+    assert_eq!((name, figure.rows.len()), ("figure", 2));
     for row in &figure.rows {
         // Nearest neighbours, projective, and the rest with the best of either.
         assert_eq!(row.len(), 3);
@@ -352,8 +348,9 @@ fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
         assert_eq!(row[1].curves.len(), 4);
         assert!(row[2].curves.iter().any(|curve| curve.label == "hybrid"));
     }
-    let timing = Analysis::of(&study(Experiment::Timing, 4, as_in_the_paper, |_| 2.0));
-    assert!(Figure::of([&timing]).is_empty());
+    let timing = study(Experiment::Timing, 4, as_in_the_paper, |_| 2.0);
+    let report = Report::of(vec![("timing".to_owned(), timing)]);
+    assert!(report.figures().iter().all(|(_, figure)| figure.is_empty()));
 }
 
 /// A bootstrap over cases that are all alike is a point; what none of them shows may still happen.

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use hicp_experiments::{
-    ExperimentError, FusionRule, Metric, RunOptions, Subject, TRAJECTORIES_FILE, TrajectoryClock,
-    TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run_trajectories,
+    Design, ExperimentError, FusionRule, Metric, Row, RunOptions, Subject, TrajectoryClock,
+    TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run,
 };
 use hicp_sim::Household;
 use hybrid_icp::Preset;
@@ -41,13 +41,13 @@ fn go(
         resume,
         ..RunOptions::default()
     };
-    run_trajectories(config, &subjects(), folder, options, &mut |_| {
+    run(config, &subjects(), folder, options, &mut |_| {
         ControlFlow::Continue(())
     })
 }
 
 fn bytes(folder: &Path) -> Vec<u8> {
-    std::fs::read(folder.join(TRAJECTORIES_FILE)).unwrap()
+    std::fs::read(folder.join(TrajectoryConfig::ROWS_FILE)).unwrap()
 }
 
 #[test]
@@ -57,33 +57,36 @@ fn a_small_study_runs_to_its_report() {
     let study = TrajectoryStudy::read(folder.path()).unwrap();
     assert_eq!(study.rows.len(), 10 * 2 * FusionRule::ALL.len());
     for row in &study.rows {
-        let (vsd_initial, vsd_final) = row.vsd().unwrap();
+        let measured = row.measured.as_ref().unwrap();
+        let (vsd_initial, vsd_final) = (measured.vsd_initial, measured.vsd_final);
         // The bin is that of the start, and all rows of a trajectory have the same start.
-        let bin = usize::try_from(row.trajectory).unwrap();
+        let bin = usize::try_from(row.case).unwrap();
         assert_eq!(row.bin, Some(bin));
         assert!((vsd_initial * 10.0 - bin as f64 - 0.5).abs() <= 0.5 + 1e-4);
         assert!((0.0..=1.0).contains(&vsd_final), "{row:?}");
         // 12 cm at 0.1 m/s and 0.542 s: images after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
-        let images = if row.underlying == "hybrid" { 3 } else { 4 };
+        let images = if row.setting == "hybrid" { 3 } else { 4 };
         assert_eq!(config.n_images(usize::from(images == 4)), images);
-        assert!(row.n_estimates() <= images, "{row:?}");
-        // Whoever has an estimate states a covariance.
-        let distance = row.mahalanobis_squared();
-        assert_eq!(distance.is_some(), row.n_estimates() > 0, "{row:?}");
+        assert!(measured.steps <= images, "{row:?}");
+        // A method with an estimate states a covariance.
+        let distance = measured.mahalanobis_squared;
+        assert_eq!(distance.is_some(), measured.steps > 0, "{row:?}");
         assert!(distance.is_none_or(|squared| squared >= 0.0));
     }
     // Methods do differ, and from good starts the object is found all the same.
     let differ = study.rows.chunks(FusionRule::ALL.len());
-    let differ = differ.filter(|rows| rows.iter().any(|r| r.vsd() != rows[0].vsd()));
+    let vsd = |row: &Row| row.measured.as_ref().map(|m| (m.vsd_initial, m.vsd_final));
+    let differ = differ.filter(|rows| rows.iter().any(|r| vsd(r) != vsd(&rows[0])));
     assert!(differ.count() > 0);
-    let report = TrajectoryReport::of(study);
-    let analysis = report.analysis();
+    let report = TrajectoryReport::of(vec![("sequential".to_owned(), study)]);
+    let analysis = &report.entries()[0].analysis;
     let average = analysis.variant("hybrid/average").unwrap();
     let first = analysis.mean(Metric::Vsd, 0, average).unwrap();
     assert!(first.estimate < 0.3, "{first:?}");
-    assert_eq!(report.claims().len(), 2 * 6 + 2);
+    assert_eq!(report.claims().count(), 2 * 6 + 2);
     // A panel per underlying pipeline with the paper's six methods, and one for the gated ones.
-    let row = &report.figure().rows[0];
+    let figures = report.figures();
+    let row = &figures[0].1.rows[0];
     assert_eq!(row.len(), 2 + 1);
     assert_eq!((row[0].curves.len(), row[1].curves.len()), (6, 6));
     report.write(folder.path()).unwrap();
@@ -118,7 +121,7 @@ fn threads_and_interruptions_do_not_show() {
     go(&config, two.path(), 2, false).unwrap();
     assert_eq!(bytes(two.path()), whole);
     // Cut in the header, between trajectories, and within one.
-    let file = two.path().join(TRAJECTORIES_FILE);
+    let file = two.path().join(TrajectoryConfig::ROWS_FILE);
     for cut in [5, whole.len() / 2, whole.len() - 7] {
         std::fs::write(&file, &whole[..cut]).unwrap();
         go(&config, two.path(), 2, true).unwrap();
@@ -147,7 +150,7 @@ fn pipelines_of_one_study_share_paths_and_starts() {
     let [both, alone] = folders.map(|f| TrajectoryStudy::read(f.path()).unwrap().rows);
     let expected: Vec<_> = both
         .into_iter()
-        .filter(|row| row.underlying == BOTH[1].name())
+        .filter(|row| row.setting == BOTH[1].name())
         .collect();
     assert_eq!(alone, expected);
 }
@@ -166,13 +169,20 @@ fn by_a_real_clock_every_method_has_images_of_its_own() {
     for row in &study.rows {
         // At least the first image, from the start that both have.
         assert!(
-            row.vsd()
-                .is_some_and(|(_, last)| (0.0..=1.0).contains(&last)),
+            row.measured
+                .as_ref()
+                .is_some_and(|m| (0.0..=1.0).contains(&m.vsd_final)),
             "{row:?}"
         );
     }
-    assert!(study.rows.iter().any(|row| row.n_estimates() > 0));
-    TrajectoryReport::of(study).write(folder.path()).unwrap();
+    assert!(
+        study
+            .rows
+            .iter()
+            .any(|row| row.measured.as_ref().is_some_and(|m| m.steps > 0))
+    );
+    let report = TrajectoryReport::of(vec![("sequential".to_owned(), study)]);
+    report.write(folder.path()).unwrap();
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(html.contains("no run repeats this one"));
 }

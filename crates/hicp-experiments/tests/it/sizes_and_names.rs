@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use hicp_experiments::{Config, Experiment, FusionRule, Subject, TrajectoryConfig, Variant};
+use hicp_experiments::{
+    Config, Design, Experiment, FusionRule, Subject, TrajectoryConfig, Variant,
+};
 use hicp_sim::Household;
-use hybrid_icp::Preset;
+use hybrid_icp::{PipelineLimits, Preset};
 
 fn subjects() -> Vec<Subject> {
     Subject::household(&[Household::Mug, Household::Book]).unwrap()
@@ -21,29 +23,26 @@ fn a_study_has_cases_per_object_and_rows_per_level_and_variant() {
     let variants = [hybrid, other];
     for experiment in Experiment::ALL {
         let config = Config::new(experiment, &subjects(), &variants, 7, 1).unwrap();
-        assert_eq!(config.n_cases(), 14);
-        assert_eq!(config.rows_per_case(), 2 * experiment.levels().len());
+        let layout = config.layout();
+        assert_eq!(layout.n_cases(), 14);
+        assert_eq!(layout.rows_per_case(), 2 * experiment.levels().len());
     }
 }
 
 #[test]
-fn studies_have_titles_of_their_own_and_the_papers_numbers_of_poses() {
+fn studies_have_different_titles() {
     let titles = Experiment::ALL.map(Experiment::title);
     assert_eq!(BTreeSet::from(titles).len(), titles.len());
     let levels = Experiment::ALL.map(Experiment::level_title);
     assert!(levels.iter().all(|title| !title.is_empty()));
-    // §VI-B: 1000 initial poses per object, 100 for the noise of depth and model.
-    assert_eq!(Experiment::InitNoise.paper_poses(), 1000);
-    assert_eq!(Experiment::DepthNoise.paper_poses(), 100);
-    assert_eq!(Experiment::ModelNoise.paper_poses(), 100);
 }
 
 #[test]
 fn trajectories_are_per_object_and_bin_and_images_as_far_apart_as_an_estimate_takes() {
     let presets = [Preset::Hybrid, Preset::ProjectivePointToPlane];
     let mut config = TrajectoryConfig::new(&subjects(), &presets, 3, 1).unwrap();
-    assert_eq!(config.n_trajectories(), 3 * 10 * 2);
-    assert_eq!(config.rows_per_trajectory(), 2 * FusionRule::ALL.len());
+    assert_eq!(config.layout().n_cases(), 3 * 10 * 2);
+    assert_eq!(config.layout().rows_per_case(), 2 * FusionRule::ALL.len());
     config.underlying[1].seconds_per_estimate = 0.25;
     assert!((config.step_m(1) - 0.025).abs() < 1e-15);
     // 0.6 m in steps of 2.5 cm, both ends included.
@@ -64,11 +63,13 @@ fn a_variant_from_a_file_is_called_like_it_and_must_be_a_pipeline() {
     let file = folder.path().join("mine.toml");
     let preset = Variant::preset(Preset::Hybrid);
     std::fs::write(&file, &preset.toml).unwrap();
-    let read = Variant::read(&file).unwrap();
+    let read = Variant::read_within(&PipelineLimits::DEFAULT, &file).unwrap();
     assert_eq!((read.name.as_str(), &read.toml), ("mine", &preset.toml));
     std::fs::write(&file, "type = \"icq\"").unwrap();
-    assert!(Variant::read(&file).is_err());
-    assert!(Variant::read(&folder.path().join("absent.toml")).is_err());
+    assert!(Variant::read_within(&PipelineLimits::DEFAULT, &file).is_err());
+    assert!(
+        Variant::read_within(&PipelineLimits::DEFAULT, &folder.path().join("absent.toml")).is_err()
+    );
 }
 
 #[test]

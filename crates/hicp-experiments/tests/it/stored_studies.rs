@@ -4,10 +4,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use hicp_experiments::{
-    Analysis, CASES_FILE, COLUMNS, CONFIG_FILE, Config, Experiment, ExperimentError, FusionRule,
-    HIGH, LOW, MAX_BINS, MAX_CELLS, MAX_OBJECTS, Metric, Report, RunOptions, Study, Subject,
-    TRAJECTORIES_FILE, TRAJECTORY_COLUMNS, TrajectoryConfig, TrajectoryReport, TrajectoryStudy,
-    Variant, run, run_trajectories,
+    Analysis, CONFIG_FILE, Config, Design, Experiment, ExperimentError, FusionRule, HIGH, LOW,
+    MAX_BINS, MAX_CELLS, MAX_OBJECTS, Metric, Report, RunOptions, Study, Subject, TrajectoryConfig,
+    TrajectoryReport, TrajectoryStudy, Variant, run,
 };
 use hicp_io::{IoError, ReadLimits};
 use hicp_sim::Household;
@@ -25,7 +24,7 @@ impl Stored {
     fn single() -> Self {
         let presets = [Preset::Hybrid, Preset::NnPointToPoint].map(Variant::preset);
         let config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
-        let mut text = COLUMNS.join(",") + "\n";
+        let mut text = header::<Config>() + "\n";
         for object in ["mug", "book"] {
             for case in 0..2 {
                 for variant in ["hybrid", "nn-point-to-point"] {
@@ -37,13 +36,13 @@ impl Stored {
         }
         let stored = Self {
             folder: tempfile::tempdir().unwrap(),
-            rows: CASES_FILE,
+            rows: Config::ROWS_FILE,
         };
         stored.write(
             CONFIG_FILE,
             serde_json::to_string_pretty(&config).unwrap() + "\n",
         );
-        stored.write(CASES_FILE, text);
+        stored.write(Config::ROWS_FILE, text);
         stored
     }
 
@@ -52,7 +51,7 @@ impl Stored {
         let presets = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
         let mut config = TrajectoryConfig::new(&subjects(), &presets, 1, 3).unwrap();
         config.methods.truncate(2);
-        let mut text = TRAJECTORY_COLUMNS.join(",") + "\n";
+        let mut text = header::<TrajectoryConfig>() + "\n";
         for trajectory in 0..3 {
             for object in ["mug", "book"] {
                 for underlying in presets {
@@ -66,13 +65,13 @@ impl Stored {
         }
         let stored = Self {
             folder: tempfile::tempdir().unwrap(),
-            rows: TRAJECTORIES_FILE,
+            rows: TrajectoryConfig::ROWS_FILE,
         };
         stored.write(
             CONFIG_FILE,
             serde_json::to_string_pretty(&config).unwrap() + "\n",
         );
-        stored.write(TRAJECTORIES_FILE, text);
+        stored.write(TrajectoryConfig::ROWS_FILE, text);
         stored
     }
 
@@ -91,18 +90,19 @@ impl Stored {
     /// Reads the study and analyses it, as a report does.
     fn read(&self) -> Result<usize, ExperimentError> {
         let folder = self.folder.path();
-        if self.rows == CASES_FILE {
+        if self.rows == Config::ROWS_FILE {
             let study = Study::read(folder)?;
             let rows = study.rows.len();
             assert_eq!(
-                Report::of(vec![("it".to_owned(), study)]).analyses().len(),
+                Report::of(vec![("it".to_owned(), study)]).entries().len(),
                 1
             );
             return Ok(rows);
         }
         let study = TrajectoryStudy::read(folder)?;
         let rows = study.rows.len();
-        assert!(TrajectoryReport::of(study).analysis().variants().len() > 1);
+        let report = TrajectoryReport::of(vec![("it".to_owned(), study)]);
+        assert!(report.entries()[0].analysis.variants().len() > 1);
         Ok(rows)
     }
 
@@ -146,6 +146,14 @@ impl Stored {
             told => panic!("{told:?}"),
         }
     }
+}
+
+fn header<D: Design>() -> String {
+    D::COLUMNS
+        .iter()
+        .map(|column| column.0)
+        .collect::<Vec<_>>()
+        .join(",")
 }
 
 fn subjects() -> Vec<Subject> {
@@ -406,7 +414,7 @@ fn encodings_and_limits_are_told() {
     for stored in [Stored::single(), Stored::sequential()] {
         let folder = stored.folder.path();
         let within = |limits: &ReadLimits| match stored.rows {
-            CASES_FILE => Study::read_within(limits, folder).map(|_| ()),
+            Config::ROWS_FILE => Study::read_within(limits, folder).map(|_| ()),
             _ => TrajectoryStudy::read_within(limits, folder).map(|_| ()),
         };
         for (limits, field) in [
@@ -473,13 +481,13 @@ fn resume(stored: &Stored) -> Result<(), ExperimentError> {
     };
     let stop = &mut |_| ControlFlow::Break(());
     match stored.rows {
-        CASES_FILE => {
+        Config::ROWS_FILE => {
             let config: Config = serde_json::from_str(&config).unwrap();
             run(&config, &subjects(), folder, options, stop)
         }
         _ => {
             let config: TrajectoryConfig = serde_json::from_str(&config).unwrap();
-            run_trajectories(&config, &subjects(), folder, options, stop)
+            run(&config, &subjects(), folder, options, stop)
         }
     }
 }
@@ -530,12 +538,15 @@ fn a_study_goes_on_only_from_its_own_first_rows() {
             // What is there is not written over.
             assert_eq!(stored.text(stored.rows), rows);
         }
+        // A damaged byte makes a field that no row has.
         let mut foreign = whole.clone().into_bytes();
-        let place = foreign.len() / 2;
+        let place = whole.rfind("0.04").unwrap();
         foreign[place] = 0xff;
         stored.write(stored.rows, &foreign);
         let told = resume(&stored).unwrap_err().to_string();
-        assert!(told.contains("not UTF-8"), "{told}");
+        let (line, field) = (whole.lines().count(), "vsd_final is \"\u{fffd}.04\"");
+        assert!(told.contains(&format!("line {line}")) && told.contains(field), "{told}");
+        assert_eq!(std::fs::read(stored.path(stored.rows)).unwrap(), foreign);
         let utf16: Vec<u8> = whole.encode_utf16().flat_map(u16::to_be_bytes).collect();
         stored.write(stored.rows, &utf16);
         assert!(matches!(
@@ -564,7 +575,7 @@ fn what_could_not_be_read_back_is_not_run() {
     );
     let mut config = TrajectoryConfig::new(&subjects(), &[Preset::Hybrid], 1, 3).unwrap();
     config.bins = 0;
-    let told = run_trajectories(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
+    let told = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
     assert!(
         told.to_string()
             .ends_with("bins: found 0, expected 1 to 1000"),
@@ -588,8 +599,8 @@ fn the_committed_studies_read() {
             |rows: &str, text: String| std::fs::write(folder.path().join(rows), text).unwrap();
         if name == "beyond" {
             put(
-                CASES_FILE,
-                COLUMNS.join(",") + "\nmug,3,local,depth-2,3,0.35,0.04,1.5,9,converged,2.5,\n",
+                Config::ROWS_FILE,
+                header::<Config>() + "\nmug,3,local,depth-2,3,0.35,0.04,1.5,9,converged,2.5,\n",
             );
             let told = Study::read(folder.path());
             assert!(
@@ -598,8 +609,8 @@ fn the_committed_studies_read() {
             );
         } else {
             put(
-                TRAJECTORIES_FILE,
-                TRAJECTORY_COLUMNS.join(",") + "\nmug,3,3,hybrid,average,0.35,0.04,1.5,9,2.5,\n",
+                TrajectoryConfig::ROWS_FILE,
+                header::<TrajectoryConfig>() + "\nmug,3,3,hybrid,average,0.35,0.04,1.5,9,2.5,\n",
             );
             let told = TrajectoryStudy::read(folder.path());
             assert!(told.is_ok_and(|study| study.config.bins == 10), "{name}");
@@ -637,8 +648,8 @@ fn ranges_of_bins_are_of_the_initial_vsd_whatever_their_number() {
         assert!(
             analysis.cell(analysis.groups().len(), 0).is_none() && analysis.cell(0, 2).is_none()
         );
-        let figure = hicp_experiments::Figure::of([&analysis]);
-        let points = &figure.rows[0][0].curves[0].points;
+        let figures = Report::of(vec![("it".to_owned(), study)]).figures();
+        let points = &figures[0].1.rows[0][0].curves[0].points;
         assert!((points[0].0 - 0.5 / bins as f64).abs() < 1e-12);
     }
 }

@@ -1,19 +1,17 @@
-//! Figures like Figure 6 of the paper: a row per study, three columns of curves.
+//! Drawing of figures, as SVG and as pixels.
 
-use std::ops::Range;
 use std::sync::Once;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, RelativeSize, register_font};
 
-use crate::analysis::{Analysis, Interval, Metric};
+use super::curve::Panel;
 use crate::error::ExperimentError;
-use crate::experiment::Experiment;
 
 /// Size of a panel, pixels.
 const PANEL: (u32, u32) = (460, 330);
-/// The palette of Okabe & Ito, whose colours the colour-blind tell apart; each has a marker of its own as well.
+/// The palette of Okabe & Ito, which color-blind readers can distinguish; each color also has its own marker.
 const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -24,34 +22,6 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Curves over the same axes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
-    /// Heading.
-    pub title: String,
-    /// What is along x.
-    pub x_title: String,
-    /// What is along y.
-    pub y_title: String,
-    /// Ends of the x axis.
-    pub x: Range<f64>,
-    /// About how many numbers stand along it.
-    pub x_numbers: usize,
-    /// The curves.
-    pub curves: Vec<Curve>,
-}
-
-/// A variant's curve.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
-    /// Name in the legend.
-    pub label: String,
-    /// Index of the colour and marker.
-    pub style: usize,
-    /// Points (x, mean with interval), from left to right.
-    pub points: Vec<(f64, Interval)>,
-}
-
 /// Panels in rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figure {
@@ -60,20 +30,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Lays out studies as the paper does: a row each; nearest-neighbour variants, projective variants, and the rest with the best
-    /// of either. A study of α has one panel. Studies of time have none.
-    #[must_use]
-    pub fn of<'a>(analyses: impl IntoIterator<Item = &'a Analysis>) -> Self {
-        let rows = analyses
-            .into_iter()
-            .map(row_of)
-            .filter(|row| !row.is_empty());
-        Self {
-            rows: rows.collect(),
-        }
-    }
-
-    /// Whether there is nothing to draw.
+    /// Returns whether there is nothing to draw.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
@@ -85,7 +42,7 @@ impl Figure {
         (PANEL.0 * count(columns), PANEL.1 * count(self.rows.len()))
     }
 
-    /// Draws it as SVG.
+    /// Draws the figure as SVG.
     ///
     /// # Errors
     ///
@@ -96,7 +53,7 @@ impl Figure {
         Ok(text)
     }
 
-    /// Draws it as pixels: width, height, and red, green and blue of every pixel.
+    /// Draws the figure as pixels: width, height, and red, green and blue of every pixel.
     ///
     /// # Errors
     ///
@@ -111,7 +68,7 @@ impl Figure {
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<(), ExperimentError> {
         static FONT: Once = Once::new();
         FONT.call_once(|| {
-            // Fails only for bytes that are no font; then nothing can be drawn, and drawing says so.
+            // Fails only for bytes that are not a font; drawing then reports it.
             let _ = register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular());
         });
         let wrong =
@@ -131,98 +88,12 @@ impl Figure {
     }
 }
 
-/// The end of the y axis of a row: its panels share it.
+/// Returns the end of the y axis, which the panels of a row share.
 fn top(row: &[Panel]) -> f64 {
     let points = row.iter().flat_map(|p| &p.curves).flat_map(|c| &c.points);
     let highest = points.map(|(_, i)| i.high).fold(0.05, f64::max);
     // Room for the legend.
     (highest * 1.3).min(1.3)
-}
-
-fn row_of(analysis: &Analysis) -> Vec<Panel> {
-    let (x_title, x): (&str, Range<f64>) = match analysis.experiment() {
-        Experiment::InitNoise | Experiment::Beyond => ("pre-ICP VSD", 0.0..1.0),
-        Experiment::DepthNoise => ("depth noise, % of the depth", -0.2..5.2),
-        Experiment::ModelNoise => ("model noise level", -0.2..4.2),
-        Experiment::Alpha => ("α", 0.0..1.0),
-        Experiment::Timing => return Vec::new(),
-    };
-    let names = analysis.variants();
-    let family = |prefix: &str| -> Vec<usize> {
-        (0..names.len())
-            .filter(|v| names[*v].starts_with(prefix))
-            .collect()
-    };
-    let (nearest, projective) = (family("nn-"), family("projective-"));
-    let mean = |v: usize| {
-        analysis
-            .mean(Metric::Vsd, analysis.overall(), v)
-            .map_or(f64::INFINITY, |i| i.estimate)
-    };
-    let best = |among: &[usize]| {
-        among
-            .iter()
-            .copied()
-            .min_by(|a, b| mean(*a).total_cmp(&mean(*b)))
-    };
-    let rest = (0..names.len()).filter(|v| !nearest.contains(v) && !projective.contains(v));
-    let last: Vec<usize> = rest
-        .chain(best(&nearest))
-        .chain(best(&projective))
-        .collect();
-    let panel = |title: &str, variants: &[usize]| Panel {
-        title: format!("{}: {title}", analysis.experiment()),
-        x_title: x_title.to_owned(),
-        y_title: "mean post-ICP VSD".to_owned(),
-        x: x.clone(),
-        x_numbers: if x.end > 1.0 { 6 } else { 11 },
-        curves: variants
-            .iter()
-            .enumerate()
-            .map(|(style, v)| curve(analysis, *v, style))
-            .collect(),
-    };
-    let whole = match analysis.experiment() {
-        Experiment::Alpha => Some("mean VSD against the threshold"),
-        Experiment::Beyond => Some("perfect images"),
-        _ => None,
-    };
-    if let Some(title) = whole {
-        let all: Vec<usize> = (0..names.len()).collect();
-        return vec![panel(title, &all)];
-    }
-    [
-        panel("nearest neighbours", &nearest),
-        panel("projective", &projective),
-        panel("hybrid and the best of either", &last),
-    ]
-    .into_iter()
-    .filter(|p| !p.curves.is_empty())
-    .collect()
-}
-
-/// The means of a variant over the single groups.
-pub(crate) fn curve(analysis: &Analysis, variant: usize, style: usize) -> Curve {
-    let singles = analysis
-        .groups()
-        .iter()
-        .enumerate()
-        .filter(|(_, g)| g.single);
-    let points = singles
-        .enumerate()
-        .filter_map(|(step, (group, described))| {
-            let x = match &described.bins {
-                // The middle of the bin.
-                Some(bins) => (bins.start as f64 + 0.5) / analysis.n_bins() as f64,
-                None => described.label.parse().unwrap_or(step as f64),
-            };
-            Some((x, analysis.mean(Metric::Vsd, group, variant)?))
-        });
-    Curve {
-        label: analysis.variants()[variant].clone(),
-        style,
-        points: points.collect(),
-    }
 }
 
 fn draw_panel<B: DrawingBackend>(
@@ -250,7 +121,7 @@ fn draw_panel<B: DrawingBackend>(
     let width = panel.x.end - panel.x.start;
     for (index, curve) in panel.curves.iter().enumerate() {
         let color = PALETTE[curve.style % PALETTE.len()];
-        // Intervals side by side rather than on top of each other.
+        // Intervals are next to each other instead of on top of each other.
         let aside = (index as f64 - (panel.curves.len() as f64 - 1.0) / 2.0) * width * 0.006;
         let at = |x: f64| x + aside;
         let style = curve.style;
@@ -286,7 +157,7 @@ fn draw_panel<B: DrawingBackend>(
         .draw()
 }
 
-/// Corners of a marker about a place, pixels: a square, a diamond, and triangles in four directions.
+/// Returns the corners of a marker at a place, pixels: a square, a diamond, and triangles in four directions.
 fn marker(style: usize, (x, y): (i32, i32)) -> Vec<(i32, i32)> {
     let shape: &[(i32, i32)] = match style % 6 {
         0 => &[(-4, -4), (4, -4), (4, 4), (-4, 4)],
@@ -301,7 +172,9 @@ fn marker(style: usize, (x, y): (i32, i32)) -> Vec<(i32, i32)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::curve::Curve;
     use super::*;
+    use crate::analysis::Interval;
 
     fn figure() -> Figure {
         let at = |estimate| Interval {

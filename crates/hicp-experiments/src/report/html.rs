@@ -1,8 +1,8 @@
-//! Pages and tables that hold everything: nothing is loaded, and whatever a name contains is shown as it is.
+//! Tables, and HTML pages that load nothing. Names are escaped.
 
-use std::fmt::Write as _;
+use crate::study::to_csv;
 
-/// A table: a heading, and rows of as many fields.
+/// A table: a heading, and rows with the same number of fields.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
     /// The headings of the columns.
@@ -12,7 +12,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Makes a table without rows.
+    /// Creates a table without rows.
     #[must_use]
     pub fn new(head: &[&str]) -> Self {
         Self {
@@ -21,53 +21,42 @@ impl Table {
         }
     }
 
-    pub(crate) fn csv(&self) -> Vec<u8> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        for row in std::iter::once(&self.head).chain(&self.rows) {
-            // A vector takes everything, and all rows are of one length.
-            let _ = writer.write_record(row);
-        }
-        writer.into_inner().unwrap_or_default()
+    /// Creates a table without rows; `head` is the headings with `|` between them.
+    pub(crate) fn headed(head: &str) -> Self {
+        Self::new(&head.split('|').collect::<Vec<_>>())
     }
 
-    /// Returns it as HTML, to be put into [`html_page`](crate::html_page).
+    pub(crate) fn csv(&self) -> String {
+        to_csv(std::iter::once(&self.head).chain(&self.rows))
+    }
+
+    /// Returns the table as HTML, for [`html_page`](crate::html_page).
     #[must_use]
     pub fn html(&self) -> String {
-        let mut text = String::from("<table>\n<tr>");
-        for head in &self.head {
-            let _ = write!(text, "<th>{}</th>", escaped(head));
-        }
-        text.push_str("</tr>\n");
-        for row in &self.rows {
-            text.push_str("<tr>");
-            for field in row {
-                let _ = write!(text, "<td>{}</td>", escaped(field));
-            }
-            text.push_str("</tr>\n");
-        }
-        text.push_str("</table>\n");
-        text
+        let line = |fields: &[String], tag: &str| {
+            let cells = fields
+                .iter()
+                .map(|f| format!("<{tag}>{}</{tag}>", escaped(f)));
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        };
+        let rows: String = self.rows.iter().map(|row| line(row, "td")).collect();
+        format!("<table>\n{}{rows}</table>\n", line(&self.head, "th"))
     }
 
-    /// Returns it as Markdown: the first column to the left, the others, which hold numbers, to the right.
+    /// Returns the table as Markdown: the first column left-aligned, the others, numbers, right-aligned.
     #[must_use]
     pub fn markdown(&self) -> String {
         let line = |fields: &[String]| {
             let fields: Vec<String> = fields.iter().map(|f| in_markdown(f)).collect();
             format!("| {} |\n", fields.join(" | "))
         };
-        let mut text = line(&self.head);
-        let _ = writeln!(
-            text,
-            "|---|{}",
-            "---:|".repeat(self.head.len().saturating_sub(1))
-        );
-        self.rows.iter().for_each(|row| text.push_str(&line(row)));
-        text
+        let numbers = "---:|".repeat(self.head.len().saturating_sub(1));
+        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        format!("{}|---|{numbers}\n{rows}", line(&self.head))
     }
 }
 
-/// Text as it is written in HTML, between tags and in quoted attributes.
+/// Escapes text for HTML, between tags and in quoted attributes.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
@@ -76,7 +65,7 @@ pub fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// Text as it is written in a field of a table in Markdown.
+/// Escapes text for a field of a Markdown table.
 fn in_markdown(text: &str) -> String {
     let text = text.replace(['\n', '\r'], " ");
     let mut safe = String::with_capacity(text.len());
@@ -89,7 +78,7 @@ fn in_markdown(text: &str) -> String {
     safe
 }
 
-/// Returns a page under a title, which is escaped here; `body` is HTML.
+/// Returns a page with a title, which is escaped; `body` is HTML.
 #[must_use]
 pub fn page(title: &str, body: &str) -> String {
     let title = escaped(title);
@@ -134,7 +123,7 @@ mod tests {
         let page = page("<script>", "<p>body</p>\n");
         assert!(page.contains("<title>&lt;script&gt;</title>") && !page.contains("<script>"));
         assert!(page.contains("<p>body</p>") && page.ends_with("</html>\n"));
-        assert_eq!(table.csv(), b"a<b,n\n\"x|y & \"\"z\"\"\",1\n");
+        assert_eq!(table.csv(), "a<b,n\n\"x|y & \"\"z\"\"\",1\n");
     }
 
     #[test]

@@ -1,0 +1,316 @@
+//! Means with bootstrap intervals over objects and cases.
+
+use std::collections::{BTreeMap, HashMap};
+
+use hicp_sim::stream;
+use rand::RngExt;
+
+use super::interval::{Interval, never_seen, quantile};
+use super::metric::{ADD_SHARE, Metric};
+use crate::study::{Design, Group, Measured, StudyOf};
+
+/// Number of bootstrap samples.
+pub const REPLICATES: usize = 2000;
+
+/// Figures of a variant in a group, without intervals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Number of rows.
+    pub count: usize,
+    /// Mean VSD of the initial poses.
+    pub vsd_initial: f64,
+    /// Median ADD(-S), millimeters.
+    pub add_median_mm: f64,
+    /// Share of rows whose ADD(-S) is below [`ADD_SHARE`] of the diameter.
+    pub add_success: f64,
+    /// Mean number of iterations, or of estimates along a trajectory.
+    pub steps: f64,
+    /// Standard deviation of the processor time, milliseconds; `None` without times.
+    pub cpu_deviation_ms: Option<f64>,
+}
+
+/// A case of an object, with what was measured at every level by every variant.
+#[derive(Debug)]
+struct Unit {
+    object: usize,
+    bin: usize,
+    /// By level, then by variant.
+    measured: Vec<Option<Measured>>,
+}
+
+/// The means of a study, per bin, level and overall, with bootstrap intervals over objects and cases.
+///
+/// A bootstrap sample draws objects with replacement, and for each the same number of cases in every
+/// bin with replacement. All variants and levels of a drawn case come along, so that differences are
+/// paired. The sample depends on the seed alone.
+///
+/// A case whose rows could not be made is left out. Cost: O([`REPLICATES`] · rows).
+#[derive(Debug)]
+pub struct Analysis {
+    variants: Vec<String>,
+    groups: Vec<Group>,
+    diameters_mm: Vec<f64>,
+    n_levels: usize,
+    n_bins: usize,
+    units: Vec<Unit>,
+    /// Sums and weights, by [`Analysis::slot`]: first of the rows as they are, then of bootstrap samples.
+    replicates: Vec<Vec<f64>>,
+}
+
+impl Analysis {
+    /// Analyzes a study.
+    #[must_use]
+    pub fn of<D: Design>(study: &StudyOf<D>) -> Self {
+        let config = &study.config;
+        let (layout, variants) = (config.layout(), config.compared());
+        let (cells, n_bins) = (layout.rows_per_case(), layout.n_bins());
+        let index = layout.index();
+        let mut places = HashMap::new();
+        let mut units: Vec<Unit> = Vec::new();
+        for row in &study.rows {
+            let [Some(object), Some(setting), Some(variant)] = index.find(row) else {
+                continue;
+            };
+            let Some(measured) = &row.measured else {
+                continue;
+            };
+            let place = *places.entry((object, row.case)).or_insert_with(|| {
+                units.push(Unit {
+                    object,
+                    bin: row.bin.unwrap_or(0).min(n_bins - 1),
+                    measured: vec![None; cells],
+                });
+                units.len() - 1
+            });
+            let cell = setting * layout.variants.len() + variant;
+            units[place].measured[cell] = Some(measured.clone());
+        }
+        let mut analysis = Self {
+            n_levels: cells.checked_div(variants.len()).unwrap_or(0),
+            variants,
+            groups: config.groups(),
+            diameters_mm: config.objects().iter().map(|o| o.diameter_mm).collect(),
+            n_bins,
+            units,
+            replicates: Vec::new(),
+        };
+        analysis.replicates = analysis.bootstrap(config.seed());
+        analysis
+    }
+
+    /// Returns the names of the variants.
+    #[must_use]
+    pub fn variants(&self) -> &[String] {
+        &self.variants
+    }
+
+    /// Returns the groups: single bins or levels first, then ranges of them, all rows last.
+    #[must_use]
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// Returns the index of the group with a label.
+    #[must_use]
+    pub fn group(&self, label: &str) -> Option<usize> {
+        self.groups.iter().position(|g| g.label == label)
+    }
+
+    /// Returns the index of a variant.
+    #[must_use]
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.variants.iter().position(|v| v == name)
+    }
+
+    /// Returns the index of the group of all rows.
+    #[must_use]
+    pub fn overall(&self) -> usize {
+        self.groups.len() - 1
+    }
+
+    /// Returns the number of bins of the initial VSD; 1 if cases are not binned.
+    pub(crate) fn n_bins(&self) -> usize {
+        self.n_bins
+    }
+
+    /// Returns a mean with its interval; `None` if no row has the figure.
+    #[must_use]
+    pub fn mean(&self, metric: Metric, group: usize, variant: usize) -> Option<Interval> {
+        self.contrast(metric, &[(group, variant, 1.0)])
+    }
+
+    /// Returns the paired difference of the means of two variants in a group.
+    #[must_use]
+    pub fn difference(&self, metric: Metric, group: usize, a: usize, b: usize) -> Option<Interval> {
+        self.contrast(metric, &[(group, a, 1.0), (group, b, -1.0)])
+    }
+
+    /// Returns a sum of means times factors, with its interval. A term is a group, a variant and a factor.
+    #[must_use]
+    pub fn contrast(&self, metric: Metric, terms: &[(usize, usize, f64)]) -> Option<Interval> {
+        let value = |sums: &Vec<f64>| -> f64 {
+            let means = terms
+                .iter()
+                .map(|(g, v, factor)| factor * self.mean_of(metric, sums, *g, *v));
+            means.sum()
+        };
+        let (all, samples) = self.replicates.split_first()?;
+        let estimate = Some(value(all)).filter(|x| x.is_finite())?;
+        let mut drawn: Vec<f64> = samples
+            .iter()
+            .map(value)
+            .filter(|x| x.is_finite())
+            .collect();
+        drawn.sort_by(f64::total_cmp);
+        let mut interval = Interval {
+            estimate,
+            low: quantile(&drawn, 0.025).unwrap_or(estimate),
+            high: quantile(&drawn, 0.975).unwrap_or(estimate),
+        };
+        if metric.is_share() && interval.low >= interval.high {
+            let cases = terms.iter().map(|(g, v, _)| self.cases(*g, *v)).min();
+            let unseen = never_seen(cases.unwrap_or(0));
+            // No share is below 0 or above 1.
+            let bound =
+                |sign: f64| -> f64 { terms.iter().map(|t| t.2).filter(|f| f * sign > 0.0).sum() };
+            interval.low = (estimate - unseen).max(bound(-1.0));
+            interval.high = (estimate + unseen).min(bound(1.0));
+        }
+        Some(interval)
+    }
+
+    /// Returns the figures of a variant in a group; `None` if there is no row.
+    #[must_use]
+    pub fn cell(&self, group: usize, variant: usize) -> Option<Cell> {
+        let group = self.groups.get(group)?;
+        let units = self.units.iter();
+        let rows = units.flat_map(|unit| {
+            let figures = self.figures(unit, group, variant);
+            figures.map(|measured| (unit.object, measured))
+        });
+        let rows: Vec<(usize, &Measured)> = rows.collect();
+        let count = rows.len() as f64;
+        let mean = |value: &dyn Fn(usize, &Measured) -> f64| {
+            rows.iter()
+                .map(|(object, m)| value(*object, m))
+                .sum::<f64>()
+                / count
+        };
+        let mut errors: Vec<f64> = rows.iter().map(|(_, m)| m.add_final_mm).collect();
+        errors.sort_by(f64::total_cmp);
+        let times: Option<Vec<f64>> = rows.iter().map(|(_, m)| m.cpu_ms).collect();
+        Some(Cell {
+            count: rows.len(),
+            vsd_initial: mean(&|_, m| m.vsd_initial),
+            add_median_mm: quantile(&errors, 0.5)?,
+            add_success: mean(&|object, m| {
+                let limit = ADD_SHARE * self.diameters_mm[object];
+                f64::from(u8::from(m.add_final_mm < limit))
+            }),
+            steps: mean(&|_, m| m.steps as f64),
+            cpu_deviation_ms: times.map(|times| {
+                let mean = times.iter().sum::<f64>() / count;
+                let squares: f64 = times.iter().map(|t| (t - mean).powi(2)).sum();
+                (squares / (count - 1.0).max(1.0)).sqrt()
+            }),
+        })
+    }
+
+    /// Returns the number of cases of which a variant has rows in a group.
+    ///
+    /// Rows of one case under several conditions are not independent.
+    fn cases(&self, group: usize, variant: usize) -> usize {
+        let Some(group) = self.groups.get(group) else {
+            return 0;
+        };
+        let is_in = |unit: &&Unit| self.figures(unit, group, variant).next().is_some();
+        self.units.iter().filter(is_in).count()
+    }
+
+    /// Returns what a variant measured of a unit in a group, by level.
+    fn figures<'a>(
+        &self,
+        unit: &'a Unit,
+        group: &Group,
+        variant: usize,
+    ) -> impl Iterator<Item = &'a Measured> {
+        let n_variants = self.variants.len();
+        let is_in = variant < n_variants && group.holds(unit.bin);
+        let levels = group.levels.iter().filter(move |_| is_in);
+        levels.filter_map(move |level| unit.measured[level * n_variants + variant].as_ref())
+    }
+
+    /// Returns where the sum of a metric is among the sums of a sample; its weight comes right after.
+    fn slot(&self, metric: Metric, level: usize, variant: usize, bin: usize) -> usize {
+        let cell = (metric as usize * self.n_levels + level) * self.variants.len() + variant;
+        2 * (cell * self.n_bins + bin)
+    }
+
+    fn mean_of(&self, metric: Metric, sums: &[f64], group: usize, variant: usize) -> f64 {
+        let group = self
+            .groups
+            .get(group)
+            .filter(|_| variant < self.variants.len());
+        let Some(group) = group else {
+            return f64::NAN;
+        };
+        let bins = group.bins.clone().unwrap_or(0..self.n_bins);
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for level in &group.levels {
+            for bin in bins.clone() {
+                let slot = self.slot(metric, *level, variant, bin);
+                sum += sums[slot];
+                weight += sums[slot + 1];
+            }
+        }
+        sum / weight
+    }
+
+    /// Returns the sums of a weighting of the units.
+    fn sums(&self, weights: &[f64]) -> Vec<f64> {
+        let n_variants = self.variants.len();
+        let cells = self.n_levels * n_variants * self.n_bins;
+        let mut sums = vec![0.0; 2 * Metric::ALL.len() * cells];
+        for (unit, weight) in self.units.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+            for (index, measured) in unit.measured.iter().enumerate() {
+                let Some(measured) = measured else { continue };
+                for metric in Metric::ALL {
+                    if let Some(value) = metric.of(measured) {
+                        let (level, variant) = (index / n_variants, index % n_variants);
+                        let slot = self.slot(metric, level, variant, unit.bin);
+                        sums[slot] += weight * value;
+                        sums[slot + 1] += weight;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    fn bootstrap(&self, seed: u64) -> Vec<Vec<f64>> {
+        // By object, then by bin, the units.
+        let mut strata: BTreeMap<usize, BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
+        for (index, unit) in self.units.iter().enumerate() {
+            let bins = strata.entry(unit.object).or_default();
+            bins.entry(unit.bin).or_default().push(index);
+        }
+        let strata: Vec<_> = strata.into_values().collect();
+        let mut replicates = vec![self.sums(&vec![1.0; self.units.len()])];
+        if strata.is_empty() {
+            return replicates;
+        }
+        for sample in 0..REPLICATES {
+            let mut rng = stream(seed, &["bootstrap"], sample as u64);
+            let mut weights = vec![0.0; self.units.len()];
+            for _ in 0..strata.len() {
+                for units in strata[rng.random_range(0..strata.len())].values() {
+                    for _ in 0..units.len() {
+                        weights[units[rng.random_range(0..units.len())]] += 1.0;
+                    }
+                }
+            }
+            replicates.push(self.sums(&weights));
+        }
+        replicates
+    }
+}

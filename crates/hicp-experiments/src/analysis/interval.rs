@@ -1,0 +1,80 @@
+//! Estimates with intervals.
+
+use std::fmt;
+
+/// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap.
+///
+/// If no bootstrap sample of a share differs, the interval holds what [`never_seen`] leaves possible.
+///
+/// Displays as `estimate [low, high]` with three digits unless a precision is given; `{:+}` adds signs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The estimate from all rows.
+    pub estimate: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Returns estimate, lower and upper end.
+    pub(crate) fn ends(self) -> [f64; 3] {
+        [self.estimate, self.low, self.high]
+    }
+
+    /// Returns the interval of the difference of the value and a constant.
+    pub(crate) fn minus(self, constant: f64) -> Self {
+        let [estimate, low, high] = self.ends().map(|x| x - constant);
+        Self {
+            estimate,
+            low,
+            high,
+        }
+    }
+
+    /// Returns the interval of the difference of a constant and the value.
+    pub(crate) fn from(self, constant: f64) -> Self {
+        let [estimate, high, low] = self.ends().map(|x| constant - x);
+        Self {
+            estimate,
+            low,
+            high,
+        }
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = f.precision().unwrap_or(3);
+        let [estimate, low, high] = self.ends();
+        match f.sign_plus() {
+            true => write!(
+                f,
+                "{estimate:+.digits$} [{low:+.digits$}, {high:+.digits$}]"
+            ),
+            false => write!(f, "{estimate:.digits$} [{low:.digits$}, {high:.digits$}]"),
+        }
+    }
+}
+
+/// Returns the largest share that `cases` independent cases without it leave plausible (5 %).
+///
+/// This is 1 − 0.05^(1/n), the exact one-sided (Clopper–Pearson) bound, about 3/n. A bootstrap over
+/// cases that are all alike has no interval.
+#[must_use]
+pub fn never_seen(cases: usize) -> f64 {
+    1.0 - 0.05_f64.powf(1.0 / cases as f64)
+}
+
+/// Returns a quantile of sorted values, interpolated between neighbors; `None` without values.
+pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let place = share * last as f64;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // Between 0 and the last index.
+    let below = place.floor() as usize;
+    let above = (below + 1).min(last);
+    let part = place - below as f64;
+    Some(sorted[below] * (1.0 - part) + sorted[above] * part)
+}

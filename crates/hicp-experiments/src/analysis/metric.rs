@@ -1,0 +1,42 @@
+//! The figures that are averaged.
+
+use crate::study::Measured;
+
+/// A mean VSD above this is a failure.
+pub const FAILURE_VSD: f64 = 0.3;
+/// A mean VSD that rose by more than this made the pose worse.
+pub const WORSE_VSD: f64 = 0.02;
+/// An ADD(-S) below this share of the diameter is a success, as in the literature on ADD.
+pub const ADD_SHARE: f64 = 0.1;
+
+/// A figure of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Mean VSD of the returned pose.
+    Vsd,
+    /// Whether it is above [`FAILURE_VSD`].
+    Failure,
+    /// Processor time, milliseconds.
+    CpuMs,
+    /// Whether the mean VSD exceeds that of the initial pose by more than [`WORSE_VSD`].
+    Worse,
+}
+
+impl Metric {
+    pub(super) const ALL: [Self; 4] = [Self::Vsd, Self::Failure, Self::CpuMs, Self::Worse];
+
+    /// Returns whether its mean is a share of the rows.
+    pub(super) fn is_share(self) -> bool {
+        matches!(self, Self::Failure | Self::Worse)
+    }
+
+    pub(super) fn of(self, measured: &Measured) -> Option<f64> {
+        let (before, after) = (measured.vsd_initial, measured.vsd_final);
+        match self {
+            Self::Vsd => Some(after),
+            Self::Failure => Some(f64::from(u8::from(after > FAILURE_VSD))),
+            Self::CpuMs => measured.cpu_ms,
+            Self::Worse => Some(f64::from(u8::from(after > before + WORSE_VSD))),
+        }
+    }
+}

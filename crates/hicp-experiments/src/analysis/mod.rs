@@ -1,0 +1,9 @@
+//! Means of a study with intervals, and differences between its variants.
+
+mod bootstrap;
+mod interval;
+mod metric;
+
+pub use bootstrap::{Analysis, Cell, REPLICATES};
+pub use interval::{Interval, never_seen};
+pub use metric::{ADD_SHARE, FAILURE_VSD, Metric, WORSE_VSD};

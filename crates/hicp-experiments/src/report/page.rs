@@ -1,0 +1,193 @@
+//! The files of a report, and the page that holds them all.
+
+use std::path::Path;
+
+use hicp_io::{write_atomically, write_rgb_png};
+
+use super::figure::Figure;
+use super::html::{Table, page};
+use crate::analysis::Analysis;
+use crate::claims::Claim;
+use crate::error::ExperimentError;
+use crate::study::{Design, StudyOf};
+
+/// A study in a report.
+#[derive(Debug)]
+pub struct Entry<D> {
+    /// Its name, such as that of its folder.
+    pub name: String,
+    /// The study.
+    pub study: StudyOf<D>,
+    /// Its means and intervals.
+    pub analysis: Analysis,
+    /// The claims that were tested on it.
+    pub claims: Vec<Claim>,
+}
+
+/// What a report of a kind of study contains.
+#[derive(Debug)]
+pub struct Document {
+    /// Title of the page.
+    pub title: &'static str,
+    /// What was run, and how to read the page as HTML.
+    pub what_was_run: (Table, String),
+    /// Heading of the claims.
+    pub claims: &'static str,
+    /// Figures: name of the file, heading, figure.
+    pub figures: Vec<(&'static str, &'static str, Figure)>,
+    /// Results, as HTML.
+    pub results: String,
+    /// Heading of the cases that could not be made.
+    pub unmade: &'static str,
+    /// Heading of the differences.
+    pub differences: (&'static str, Table),
+    /// Other tables, with the names of their files.
+    pub tables: Vec<(&'static str, Table)>,
+}
+
+/// A kind of study that has a report.
+pub trait Reported: Design {
+    /// Tests the claims about a study.
+    fn claims(&self, analysis: &Analysis) -> Vec<Claim>;
+
+    /// Describes the report of some studies.
+    fn document(entries: &[Entry<Self>]) -> Document;
+}
+
+/// A report of studies, before it is written.
+#[derive(Debug)]
+pub struct ReportOf<D> {
+    entries: Vec<Entry<D>>,
+}
+
+impl<D: Reported> ReportOf<D> {
+    /// Analyzes studies; each has a name, such as that of its folder.
+    #[must_use]
+    pub fn of(studies: Vec<(String, StudyOf<D>)>) -> Self {
+        let entry = |(name, study): (String, StudyOf<D>)| {
+            let analysis = Analysis::of(&study);
+            Entry {
+                name,
+                claims: study.config.claims(&analysis),
+                study,
+                analysis,
+            }
+        };
+        Self {
+            entries: studies.into_iter().map(entry).collect(),
+        }
+    }
+
+    /// Returns the studies.
+    #[must_use]
+    pub fn entries(&self) -> &[Entry<D>] {
+        &self.entries
+    }
+
+    /// Returns the claims of all studies, with the names of the studies.
+    pub fn claims(&self) -> impl Iterator<Item = (&str, &Claim)> {
+        let entries = self.entries.iter();
+        entries.flat_map(|entry| entry.claims.iter().map(|claim| (&*entry.name, claim)))
+    }
+
+    /// Returns the figures, with the names of their files.
+    #[must_use]
+    pub fn figures(&self) -> Vec<(&'static str, Figure)> {
+        let figures = D::document(&self.entries).figures.into_iter();
+        figures.map(|(name, _, figure)| (name, figure)).collect()
+    }
+
+    /// Writes `report.html`, which holds everything, and next to it the tables as CSV files and the
+    /// figures as SVG and PNG files.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] when a figure cannot be drawn or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), ExperimentError> {
+        std::fs::create_dir_all(folder).map_err(ExperimentError::file(folder))?;
+        let write = |name: &str, text: &str| {
+            write_atomically(folder.join(name), |w| w.write_all(text.as_bytes()))
+        };
+        let mut document = D::document(&self.entries);
+        document.figures.retain(|(_, _, figure)| !figure.is_empty());
+        let mut figures = String::new();
+        for (name, heading, figure) in &document.figures {
+            let svg = figure.svg()?;
+            write(&format!("{name}.svg"), &svg)?;
+            let (width, height, rgb) = figure.pixels()?;
+            write_rgb_png(folder.join(format!("{name}.png")), width, height, &rgb)?;
+            figures += &format!("<h2>{heading}</h2>\n<figure>{svg}</figure>\n");
+        }
+        let claims = self.claims_table();
+        write("claims.csv", &claims.csv())?;
+        write("differences.csv", &document.differences.1.csv())?;
+        for (name, table) in &document.tables {
+            write(name, &table.csv())?;
+        }
+        let section = |heading: &str, html: &str| format!("<h2>{heading}</h2>\n{html}");
+        let unmade = self.unmade();
+        let differences = document.differences.1.html();
+        let body = [
+            section("What was run", &document.what_was_run.0.html()),
+            format!("<p>{}</p>\n", document.what_was_run.1),
+            section(document.claims, &claims.html()),
+            figures,
+            document.results,
+            if unmade.rows.is_empty() {
+                String::new()
+            } else {
+                section(document.unmade, &unmade.html())
+            },
+            section(
+                document.differences.0,
+                &format!(
+                    "<details><summary>All paired differences</summary>\n{differences}</details>\n"
+                ),
+            ),
+        ];
+        write("report.html", &page(document.title, &body.concat()))?;
+        Ok(())
+    }
+
+    fn claims_table(&self) -> Table {
+        let mut table = Table::new(&["study", "where", "claim", "verdict", "figures"]);
+        table.rows.extend(self.claims().map(|(study, claim)| {
+            let (section, verdict) = (claim.section, claim.verdict.name());
+            [study, section, &claim.text, verdict, &claim.figures]
+                .map(str::to_owned)
+                .to_vec()
+        }));
+        table
+    }
+
+    /// Returns why cases could not be made, once per case and reason.
+    fn unmade(&self) -> Table {
+        let mut table = Table::new(&["study", "object", "case", "why"]);
+        for entry in &self.entries {
+            for row in entry.study.rows.iter().filter(|row| row.measured.is_none()) {
+                let case = row.case.to_string();
+                let why = [&entry.name, &row.object, &case, &row.note].map(String::clone);
+                table.rows.push(why.to_vec());
+            }
+        }
+        table.rows.dedup();
+        table
+    }
+}
+
+impl<D: Design> Entry<D> {
+    /// Returns the names of the objects for people.
+    pub(crate) fn objects(&self) -> String {
+        self.study.config.layout().objects.join(", ")
+    }
+
+    /// Returns the number of rows, and how many there will be.
+    pub(crate) fn rows(&self) -> String {
+        let layout = self.study.config.layout();
+        let expected = layout.n_cases().saturating_mul(layout.rows_per_case());
+        match self.study.rows.len() {
+            rows if rows == expected => rows.to_string(),
+            rows => format!("{rows} of {expected}: not finished"),
+        }
+    }
+}

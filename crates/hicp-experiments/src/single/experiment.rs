@@ -1,0 +1,314 @@
+//! The studies, and the conditions under which each presents a case.
+
+use hicp_sim::Household;
+use serde::{Deserialize, Serialize};
+
+use crate::study::{ALL, FAULTY_MASK, Group, NOISY, NOISY_DEPTH, NOISY_MODEL};
+
+/// A study of §VI-B of the paper, or the tuning of α in §IV-A.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Experiment {
+    /// Robustness to the initial pose (§VI-B.1): ten equal bins of the initial VSD, perfect images.
+    InitNoise,
+    /// Robustness to depth noise (§VI-B.2): 0 to 5 % of the depth, 6.2 mm and 9.5° off.
+    DepthNoise,
+    /// Robustness to a wrong model (§VI-B.3): the original and four reconstructions, 6.2 mm and 9.5° off.
+    ModelNoise,
+    /// Time (§VI-B.4, Table I): a third of its rows under the conditions of each of the studies above.
+    Timing,
+    /// The threshold α of Dynamic Switching (§IV-A), on the tuning objects.
+    Alpha,
+    /// The presets beyond the paper: every start under depth noise, model noise and imperfect masks.
+    Beyond,
+}
+
+/// The conditions under which a case is presented.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    /// Whether the initial pose is drawn into bins of the initial VSD (§VI-B.1), or is 6.2 mm and 9.5° off.
+    pub binned: bool,
+    /// Standard deviation of the depth noise, percent of the depth.
+    pub depth_percent: f64,
+    /// 0 for the original model, 1 to 4 for a reconstruction.
+    pub model_level: u32,
+    /// The threshold α, if it is what is studied.
+    pub alpha: Option<f64>,
+    /// The fault of the mask.
+    pub mask: MaskFault,
+}
+
+/// The fault of a condition's mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaskFault {
+    /// None.
+    None,
+    /// Eroded by 3 pixels.
+    Eroded,
+    /// Dilated by 3 pixels, over a wall 10 cm behind the object.
+    Dilated,
+    /// A straight cut removed 20 % of it.
+    Missing,
+    /// A board in front of the object hides 30 % of it.
+    Occluded,
+}
+
+const PERFECT: Condition = Condition {
+    binned: true,
+    depth_percent: 0.0,
+    model_level: 0,
+    alpha: None,
+    mask: MaskFault::None,
+};
+
+/// The mask faults of [`Experiment::Beyond`], with their names.
+const MASKS: [(&str, MaskFault); 4] = [
+    ("eroded", MaskFault::Eroded),
+    ("dilated", MaskFault::Dilated),
+    ("missing", MaskFault::Missing),
+    ("occluded", MaskFault::Occluded),
+];
+/// The groups of imperfect images of [`Experiment::Beyond`], and how the names of their levels start.
+const KINDS: [(&str, &str); 3] = [
+    (NOISY_DEPTH, "depth-"),
+    (NOISY_MODEL, "model-"),
+    (FAULTY_MASK, "mask-"),
+];
+/// Steps of α from 0 to 1.
+const ALPHA_STEPS: u32 = 20;
+/// Largest depth noise, percent.
+const DEPTH_STEPS: u32 = 5;
+/// Number of reconstructions.
+const MODEL_STEPS: u32 = 4;
+
+impl Experiment {
+    /// Every study.
+    pub const ALL: [Self; 6] = [
+        Self::InitNoise,
+        Self::DepthNoise,
+        Self::ModelNoise,
+        Self::Timing,
+        Self::Alpha,
+        Self::Beyond,
+    ];
+
+    /// Returns the name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InitNoise => "init-noise",
+            Self::DepthNoise => "depth-noise",
+            Self::ModelNoise => "model-noise",
+            Self::Timing => "timing",
+            Self::Alpha => "alpha",
+            Self::Beyond => "beyond",
+        }
+    }
+
+    /// Returns the heading in reports.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::InitNoise => "Robustness to the initial pose (§VI-B.1)",
+            Self::DepthNoise => "Robustness to depth noise (§VI-B.2)",
+            Self::ModelNoise => "Robustness to model noise (§VI-B.3)",
+            Self::Timing => "Time (§VI-B.4, Table I)",
+            Self::Alpha => "The threshold α (§IV-A)",
+            Self::Beyond => "Beyond the paper: every start, every imperfection",
+        }
+    }
+
+    /// Returns the heading of the levels.
+    #[must_use]
+    pub fn level_title(self) -> &'static str {
+        match self {
+            Self::InitNoise => "initial VSD",
+            Self::DepthNoise => "depth noise, % of the depth",
+            Self::ModelNoise => "model noise level (0: the original)",
+            Self::Timing => "conditions",
+            Self::Alpha => "α",
+            Self::Beyond => "initial VSD (perfect images), then by condition (all starts)",
+        }
+    }
+
+    /// Returns the objects that it runs on by default (§VI-A.1).
+    #[must_use]
+    pub fn household(self) -> [Household; 10] {
+        match self {
+            Self::Alpha => Household::TUNING,
+            _ => Household::TEST,
+        }
+    }
+
+    /// Returns whether all of its cases are binned by their initial VSD.
+    #[must_use]
+    pub fn is_binned(self) -> bool {
+        self.conditions(0)
+            .iter()
+            .all(|(_, condition)| condition.binned)
+    }
+
+    /// Returns the names of the levels in files.
+    #[must_use]
+    pub fn levels(self) -> Vec<String> {
+        self.conditions(0)
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect()
+    }
+
+    /// Returns the conditions of a level, by its index in [`Experiment::levels`], for a case.
+    ///
+    /// Only those of [`Experiment::Timing`] depend on the case: it cycles through the noise levels of
+    /// the other studies.
+    #[must_use]
+    pub fn condition(self, level: usize, case: u64) -> Condition {
+        let nth = self.conditions(case).into_iter().nth(level);
+        nth.map_or(PERFECT, |(_, condition)| condition)
+    }
+
+    /// Returns the levels with their conditions.
+    fn conditions(self, case: u64) -> Vec<(String, Condition)> {
+        let off = Condition {
+            binned: false,
+            ..PERFECT
+        };
+        let depth = |start| {
+            (0..=DEPTH_STEPS).map(move |step| {
+                let depth_percent = f64::from(step);
+                (
+                    step.to_string(),
+                    Condition {
+                        depth_percent,
+                        ..start
+                    },
+                )
+            })
+        };
+        let model = |start| {
+            (0..=MODEL_STEPS).map(move |model_level| {
+                (
+                    model_level.to_string(),
+                    Condition {
+                        model_level,
+                        ..start
+                    },
+                )
+            })
+        };
+        match self {
+            Self::InitNoise => vec![("0".to_owned(), PERFECT)],
+            Self::DepthNoise => depth(off).collect(),
+            Self::ModelNoise => model(off).collect(),
+            Self::Timing => {
+                let cycle = |study: Self| {
+                    let conditions = study.conditions(0);
+                    #[allow(clippy::cast_possible_truncation)] // Below the number of levels.
+                    let (_, condition) = conditions[(case % conditions.len() as u64) as usize];
+                    (study.name().to_owned(), condition)
+                };
+                [Self::InitNoise, Self::DepthNoise, Self::ModelNoise]
+                    .map(cycle)
+                    .into()
+            }
+            Self::Alpha => {
+                let alphas = (0..=ALPHA_STEPS).map(|step| f64::from(step) / f64::from(ALPHA_STEPS));
+                let conditions = alphas.map(|alpha| {
+                    (
+                        format!("{alpha:.2}"),
+                        Condition {
+                            alpha: Some(alpha),
+                            ..PERFECT
+                        },
+                    )
+                });
+                conditions.collect()
+            }
+            Self::Beyond => {
+                let named = |kind: &'static str| {
+                    move |(name, condition): (String, Condition)| {
+                        (format!("{kind}{name}"), condition)
+                    }
+                };
+                let masks =
+                    MASKS.map(|(name, mask)| (name.to_owned(), Condition { mask, ..PERFECT }));
+                std::iter::once(("perfect".to_owned(), PERFECT))
+                    .chain(depth(PERFECT).skip(1).map(named(KINDS[0].1)))
+                    .chain(model(PERFECT).skip(1).map(named(KINDS[1].1)))
+                    .chain(masks.into_iter().map(named(KINDS[2].1)))
+                    .collect()
+            }
+        }
+    }
+
+    /// Returns the groups of a study with some levels.
+    pub(super) fn groups(self, levels: &[String], n_bins: usize) -> Vec<Group> {
+        let all: Vec<usize> = (0..levels.len()).collect();
+        let mut groups = match self {
+            Self::InitNoise => Group::by_bin(&all, n_bins),
+            // The bins are those of the perfect images.
+            Self::Beyond => Group::by_bin(&all[..all.len().min(1)], n_bins),
+            _ => Vec::new(),
+        };
+        if self != Self::InitNoise {
+            groups.extend(all.iter().map(|level| Group {
+                single: self != Self::Beyond,
+                ..Group::of_levels(&levels[*level], vec![*level])
+            }));
+        }
+        if self == Self::Beyond {
+            groups.extend(KINDS.map(|(label, kind)| {
+                let is_of_kind = |level: &usize| levels[*level].starts_with(kind);
+                Group::of_levels(label, all.iter().copied().filter(is_of_kind).collect())
+            }));
+        }
+        if matches!(self, Self::DepthNoise | Self::ModelNoise) {
+            groups.push(Group::of_levels(
+                NOISY,
+                all.iter().copied().skip(1).collect(),
+            ));
+        }
+        groups.push(Group::of_levels(ALL, all));
+        groups
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_those_of_the_paper() {
+        assert_eq!(
+            Experiment::DepthNoise.levels(),
+            ["0", "1", "2", "3", "4", "5"]
+        );
+        assert_eq!(Experiment::DepthNoise.condition(3, 7).depth_percent, 3.0);
+        assert_eq!(Experiment::ModelNoise.levels().len(), 5);
+        assert_eq!(Experiment::ModelNoise.condition(4, 0).model_level, 4);
+        assert!(!Experiment::ModelNoise.condition(4, 0).binned);
+        let beyond = Experiment::Beyond.levels();
+        assert_eq!((beyond.len(), beyond[3].as_str()), (14, "depth-3"));
+        assert_eq!(Experiment::Beyond.condition(9, 0).model_level, 4);
+        let occluded = Experiment::Beyond.condition(13, 0);
+        assert_eq!(
+            (occluded.mask, occluded.binned),
+            (MaskFault::Occluded, true)
+        );
+        let alphas = Experiment::Alpha.levels();
+        assert_eq!((alphas.len(), alphas[8].as_str()), (21, "0.40"));
+        assert_eq!(Experiment::Alpha.condition(8, 0).alpha, Some(0.4));
+    }
+
+    #[test]
+    fn timing_goes_through_every_level_of_the_others() {
+        let percents: Vec<f64> = (0..6)
+            .map(|c| Experiment::Timing.condition(1, c).depth_percent)
+            .collect();
+        assert_eq!(percents, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        let models: Vec<u32> = (0..5)
+            .map(|c| Experiment::Timing.condition(2, c).model_level)
+            .collect();
+        assert_eq!(models, [0, 1, 2, 3, 4]);
+    }
+}

@@ -1,0 +1,287 @@
+//! The report of studies of single images, with figures like the paper's Figure 6.
+
+use super::claims::{TABLE_I, claims};
+use super::config::Config;
+use super::experiment::Experiment;
+use crate::analysis::{Analysis, Interval, Metric, REPLICATES};
+use crate::claims::Claim;
+use crate::report::{
+    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, html_escaped, means,
+};
+
+const YARDSTICK: &str = "nn-point-to-point";
+
+impl Reported for Config {
+    fn claims(&self, analysis: &Analysis) -> Vec<Claim> {
+        claims(self.experiment, analysis)
+    }
+
+    fn document(entries: &[Entry<Self>]) -> Document {
+        let figure = |alpha: bool| {
+            let is_in = |e: &&Entry<Self>| (e.experiment() == Experiment::Alpha) == alpha;
+            let rows = entries.iter().filter(is_in);
+            Figure {
+                rows: rows
+                    .map(Entry::panels)
+                    .filter(|row| !row.is_empty())
+                    .collect(),
+            }
+        };
+        let note = format!(
+            "Every variant refines the same images from the same initial poses. VSD is the mean over tolerances of 5 % to 50 % \
+             of the diameter, against the true pose of the original model. Brackets hold 95 % intervals: percentiles of {REPLICATES} \
+             bootstrap samples over objects and, within each, over cases; differences are paired. ADD(-S) is ADI where an object \
+             declares symmetries. CPU time is the processor time of one thread from depth image and mask to pose, with normals and \
+             search trees; compare its ratios."
+        );
+        Document {
+            title: "The single-image studies of Hybrid ICP, rerun",
+            what_was_run: (what_was_run(entries), note),
+            claims: "The paper's claims",
+            figures: vec![
+                (
+                    "figure",
+                    "Mean VSD after ICP, as in Figure 6 of the paper",
+                    figure(false),
+                ),
+                ("alpha", "The threshold α", figure(true)),
+            ],
+            results: entries.iter().map(Entry::results).collect(),
+            unmade: "Cases that could not be made",
+            differences: (
+                "Differences of the mean VSD, by group",
+                differences(entries),
+            ),
+            tables: vec![("summary.csv", summary(entries))],
+        }
+    }
+}
+
+impl Entry<Config> {
+    fn experiment(&self) -> Experiment {
+        self.study.config.experiment
+    }
+
+    /// Returns the index of the variant that is compared with the others: hybrid, or the first.
+    fn reference(&self) -> usize {
+        self.analysis.variant("hybrid").unwrap_or(0)
+    }
+
+    /// Returns the mean time of a variant, milliseconds, and its ratio to that of the yardstick.
+    fn time(&self, group: usize, variant: usize) -> [Option<f64>; 2] {
+        let mean = |v| Some(self.analysis.mean(Metric::CpuMs, group, v)?.estimate);
+        let yardstick = self.analysis.variant(YARDSTICK).and_then(mean);
+        let time = mean(variant);
+        [time, time.zip(yardstick).map(|(time, unit)| time / unit)]
+    }
+
+    fn results(&self) -> String {
+        let experiment = self.experiment();
+        format!(
+            "<h2>{}</h2>\n<h3>All rows</h3>\n{}<h3>Mean VSD by {}</h3>\n{}",
+            html_escaped(&format!("{}: {}", self.name, experiment.title())),
+            self.overall().html(),
+            experiment.level_title(),
+            means(&self.analysis).html()
+        )
+    }
+
+    /// Returns the overall figures per variant, with the paper's times.
+    fn overall(&self) -> Table {
+        let mut table = Table::headed(
+            "variant|rows|mean VSD|VSD > 0.3|worse by > 0.02|median ADD(-S), mm|ADD(-S) < 0.1 d|iterations|\
+             CPU time, ms (± deviation)|time / nn-point-to-point|the paper's ratio|hybrid − this, mean VSD",
+        );
+        let (analysis, group) = (&self.analysis, self.analysis.overall());
+        let text = |interval: Option<Interval>| interval.map(|i| i.to_string()).unwrap_or_default();
+        let paper = |name: &str| Some(TABLE_I.iter().find(|(n, ..)| *n == name)?.1);
+        for (variant, name) in analysis.variants().iter().enumerate() {
+            let Some(cell) = analysis.cell(group, variant) else {
+                continue;
+            };
+            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+            let share = |metric| {
+                let ends = analysis
+                    .mean(metric, group, variant)
+                    .map(|i| i.ends().map(percent));
+                ends.map(|[share, low, high]| format!("{share} [{low}, {high}]"))
+                    .unwrap_or_default()
+            };
+            let [time, ratio] = self.time(group, variant);
+            let deviation = cell.cpu_deviation_ms.unwrap_or(0.0);
+            let paper_ratio = paper(name)
+                .zip(paper(YARDSTICK))
+                .map(|(time, unit)| time / unit);
+            let others = Some(self.reference()).filter(|ours| *ours != variant);
+            let difference =
+                others.and_then(|ours| analysis.difference(Metric::Vsd, group, ours, variant));
+            table.rows.push(vec![
+                name.clone(),
+                cell.count.to_string(),
+                text(analysis.mean(Metric::Vsd, group, variant)),
+                share(Metric::Failure),
+                share(Metric::Worse),
+                fixed(Some(cell.add_median_mm), 2),
+                percent(cell.add_success),
+                fixed(Some(cell.steps), 1),
+                time.map(|mean| format!("{mean:.2} ± {deviation:.2}"))
+                    .unwrap_or_default(),
+                fixed(ratio, 2),
+                fixed(paper_ratio, 2),
+                text(difference),
+            ]);
+        }
+        table
+    }
+
+    /// Lays out a study as the paper does: nearest-neighbor variants, projective variants, and the
+    /// rest with the best of either. Studies of time have no panels.
+    fn panels(&self) -> Vec<Panel> {
+        let (analysis, experiment) = (&self.analysis, self.experiment());
+        let (x_title, x) = match experiment {
+            Experiment::InitNoise | Experiment::Beyond => ("pre-ICP VSD", 0.0..1.0),
+            Experiment::DepthNoise => ("depth noise, % of the depth", -0.2..5.2),
+            Experiment::ModelNoise => ("model noise level", -0.2..4.2),
+            Experiment::Alpha => ("α", 0.0..1.0),
+            Experiment::Timing => return Vec::new(),
+        };
+        let all: Vec<usize> = (0..analysis.variants().len()).collect();
+        let is_of = |v: usize, family: &str| analysis.variants()[v].starts_with(family);
+        let (nearest, others): (Vec<usize>, Vec<usize>) =
+            all.iter().partition(|v| is_of(**v, "nn-"));
+        let (projective, rest): (Vec<usize>, Vec<usize>) =
+            others.iter().partition(|v| is_of(**v, "projective-"));
+        let mean = |v: &usize| {
+            let mean = analysis.mean(Metric::Vsd, analysis.overall(), *v);
+            mean.map_or(f64::INFINITY, |i| i.estimate)
+        };
+        let best = |family: &[usize]| {
+            family
+                .iter()
+                .copied()
+                .min_by(|a, b| mean(a).total_cmp(&mean(b)))
+        };
+        let last: Vec<usize> = rest
+            .into_iter()
+            .chain(best(&nearest))
+            .chain(best(&projective))
+            .collect();
+        let panels = match experiment {
+            Experiment::Alpha => vec![("mean VSD against the threshold", all)],
+            Experiment::Beyond => vec![("perfect images", all)],
+            _ => vec![
+                ("nearest neighbours", nearest),
+                ("projective", projective),
+                ("hybrid and the best of either", last),
+            ],
+        };
+        let panel = |(title, variants): (&str, Vec<usize>)| Panel {
+            title: format!("{}: {title}", experiment.name()),
+            x_title: x_title.to_owned(),
+            y_title: "mean post-ICP VSD".to_owned(),
+            x: x.clone(),
+            x_numbers: if x.end > 1.0 { 6 } else { 11 },
+            curves: variants
+                .iter()
+                .zip(0..)
+                .map(|(v, style)| Curve::of(analysis, *v, style))
+                .collect(),
+        };
+        let panels = panels.into_iter().map(panel);
+        panels.filter(|panel| !panel.curves.is_empty()).collect()
+    }
+}
+
+fn what_was_run(entries: &[Entry<Config>]) -> Table {
+    let mut table =
+        Table::headed("study|experiment|version|seed|objects|cases per object|rows|camera");
+    table.rows.extend(entries.iter().map(|entry| {
+        let c = &entry.study.config;
+        let camera = &c.camera;
+        vec![
+            entry.name.clone(),
+            c.experiment.name().to_owned(),
+            c.version.clone(),
+            c.seed.to_string(),
+            entry.objects(),
+            c.poses.to_string(),
+            entry.rows(),
+            format!("{}×{}, f = {:.1}", camera.width, camera.height, camera.fx),
+        ]
+    }));
+    table
+}
+
+/// Returns everything per group and variant, for programs.
+fn summary(entries: &[Entry<Config>]) -> Table {
+    let mut table = Table::headed(
+        "study|experiment|group|variant|rows|vsd_initial|vsd_final|vsd_final_low|vsd_final_high|\
+         failure_share|failure_low|failure_high|worse_share|worse_low|worse_high|add_median_mm|\
+         add_below_tenth_diameter|iterations|cpu_ms|cpu_ms_deviation|cpu_ratio_to_nn_point_to_point",
+    );
+    for entry in entries {
+        let analysis = &entry.analysis;
+        for (group, described) in analysis.groups().iter().enumerate() {
+            for (variant, name) in analysis.variants().iter().enumerate() {
+                let Some(cell) = analysis.cell(group, variant) else {
+                    continue;
+                };
+                let names = [
+                    &entry.name,
+                    entry.experiment().name(),
+                    &described.label,
+                    name,
+                ];
+                let mut row = names.map(str::to_owned).to_vec();
+                row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
+                for metric in [Metric::Vsd, Metric::Failure, Metric::Worse] {
+                    row.extend(ends(analysis.mean(metric, group, variant)));
+                }
+                let [time, ratio] = entry.time(group, variant);
+                row.extend([
+                    fixed(Some(cell.add_median_mm), 3),
+                    fixed(Some(cell.add_success), 4),
+                    fixed(Some(cell.steps), 2),
+                    fixed(time, 3),
+                    fixed(cell.cpu_deviation_ms, 3),
+                    fixed(ratio, 3),
+                ]);
+                table.rows.push(row);
+            }
+        }
+    }
+    table
+}
+
+/// Returns the paired differences of hybrid from each other variant, per group.
+fn differences(entries: &[Entry<Config>]) -> Table {
+    let mut table = Table::headed(
+        "study|group|variant|against|vsd_difference|low|high|failure_difference|failure_low|failure_high",
+    );
+    for entry in entries {
+        let (analysis, ours) = (&entry.analysis, entry.reference());
+        for (group, described) in analysis.groups().iter().enumerate() {
+            let others = analysis
+                .variants()
+                .iter()
+                .enumerate()
+                .filter(|(v, _)| *v != ours);
+            for (other, name) in others {
+                let of = |metric| analysis.difference(metric, group, ours, other);
+                let (Some(vsd), Some(failure)) = (of(Metric::Vsd), of(Metric::Failure)) else {
+                    continue;
+                };
+                let names = [
+                    &entry.name,
+                    &described.label,
+                    &analysis.variants()[ours],
+                    name,
+                ];
+                let mut row = names.map(String::clone).to_vec();
+                row.extend([vsd, failure].into_iter().flat_map(|i| ends(Some(i))));
+                table.rows.push(row);
+            }
+        }
+    }
+    table
+}

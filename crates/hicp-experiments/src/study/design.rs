@@ -1,0 +1,65 @@
+//! What distinguishes one kind of study from another.
+
+use std::fmt::Debug;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::fields::Fields;
+use super::group::Group;
+use super::layout::Layout;
+use super::models::Models;
+use super::records::ObjectRecord;
+use super::row::{Columns, Row};
+use crate::error::ExperimentError;
+use crate::subject::Subject;
+
+/// Makes the rows of a case, given the index of the object and that of the case; one per thread.
+pub type Worker<'a> = Box<dyn FnMut(usize, u64) -> Vec<Row> + 'a>;
+
+/// A kind of study: the configuration that is stored next to the rows, and what follows from it.
+pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwned {
+    /// Name of the file of rows.
+    const ROWS_FILE: &'static str;
+    /// The columns of that file.
+    const COLUMNS: &'static Columns;
+
+    /// Checks every field that was read, or that a caller has changed.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError::Field`] that names the first wrong field.
+    fn check(&self, fields: Fields<'_>) -> Result<(), ExperimentError>;
+
+    /// Returns the rows that the study has, and their order.
+    fn layout(&self) -> Layout<'_>;
+
+    /// Creates the worker of a thread; reconstructions go into `models`.
+    ///
+    /// # Errors
+    ///
+    /// [`ExperimentError`] when a pipeline cannot be built.
+    fn worker<'a>(
+        &'a self,
+        subjects: &'a [Subject],
+        models: &'a Models,
+    ) -> Result<Worker<'a>, ExperimentError>;
+
+    /// Returns the seed of everything random.
+    fn seed(&self) -> u64;
+
+    /// Returns the objects.
+    fn objects(&self) -> &[ObjectRecord];
+
+    /// Returns the names of what the analysis compares, one or more per case: by default the variants.
+    fn compared(&self) -> Vec<String> {
+        self.layout()
+            .variants
+            .into_iter()
+            .map(str::to_owned)
+            .collect()
+    }
+
+    /// Returns the rows that are averaged together: single bins or levels first, all rows last.
+    fn groups(&self) -> Vec<Group>;
+}

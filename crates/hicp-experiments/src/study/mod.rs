@@ -1,0 +1,22 @@
+//! A study of any kind: its configuration, its rows, and how they are run, stored and read.
+
+mod design;
+mod fields;
+mod group;
+mod layout;
+mod models;
+mod records;
+mod row;
+mod run;
+mod stored;
+
+pub use design::{Design, Worker};
+pub use fields::{Fields, MAX_BINS, MAX_CELLS, MAX_OBJECTS};
+pub use group::{ALL, FAULTY_MASK, Group, HIGH, LOW, NOISY, NOISY_DEPTH, NOISY_MODEL};
+pub use layout::Layout;
+pub use models::Models;
+pub use records::{CameraRecord, ObjectRecord};
+pub use row::{Column, Columns, Measured, Row};
+pub(crate) use row::{quoted, to_csv};
+pub use run::{RunOptions, run};
+pub use stored::{CONFIG_FILE, StudyOf};

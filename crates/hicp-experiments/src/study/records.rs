@@ -1,0 +1,87 @@
+//! Cameras and objects as a configuration stores them.
+
+use hicp_core::{CameraError, PinholeCamera};
+use hicp_sim::SimError;
+use serde::{Deserialize, Serialize};
+
+use crate::error::ExperimentError;
+use crate::subject::Subject;
+
+/// A camera in a configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the names of every camera file")]
+pub struct CameraRecord {
+    pub fx: f64,
+    pub fy: f64,
+    pub cx: f64,
+    pub cy: f64,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// An object in a configuration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectRecord {
+    /// Its name.
+    pub name: String,
+    /// `household`, or the name of the mesh file.
+    pub source: String,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Diameter, millimeters.
+    pub diameter_mm: f64,
+    /// Whether symmetries are declared, so that ADI replaces ADD.
+    pub symmetric: bool,
+    /// A hash of the mesh.
+    pub fingerprint: String,
+}
+
+impl Default for CameraRecord {
+    /// The camera of the studies: 640 × 480 pixels with a focal length of 573 pixels.
+    fn default() -> Self {
+        Self {
+            fx: 572.4,
+            fy: 573.6,
+            cx: 325.3,
+            cy: 242.0,
+            width: 640,
+            height: 480,
+        }
+    }
+}
+
+impl CameraRecord {
+    pub(crate) fn pinhole(&self) -> Result<PinholeCamera, CameraError> {
+        PinholeCamera::new(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+    }
+}
+
+impl From<&Subject> for ObjectRecord {
+    fn from(subject: &Subject) -> Self {
+        Self {
+            name: subject.name.clone(),
+            source: subject.source.clone(),
+            triangles: subject.model.mesh().triangles().len(),
+            diameter_mm: subject.model.diameter() * 1e3,
+            symmetric: subject.is_symmetric(),
+            fingerprint: format!("{:016x}", subject.fingerprint()),
+        }
+    }
+}
+
+impl ObjectRecord {
+    /// Refuses objects that are not smaller than a distance to the camera, meters.
+    pub(crate) fn fit(objects: &[Self], max_distance: f64) -> Result<(), ExperimentError> {
+        let is_too_large = |object: &&Self| object.diameter_mm / 1e3 >= max_distance;
+        match objects.iter().find(is_too_large) {
+            None => Ok(()),
+            Some(object) => Err(ExperimentError::Sim(SimError::TooLarge {
+                object: object.name.clone(),
+                diameter: object.diameter_mm / 1e3,
+                max_distance,
+            })),
+        }
+    }
+}
