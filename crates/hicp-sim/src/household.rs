@@ -5,7 +5,7 @@ use hicp_core::{
 };
 use rand::RngExt;
 
-use crate::shapes;
+use crate::shapes::{boxes, tools, vessels};
 use crate::solid::Solid;
 use crate::stream::stream;
 
@@ -167,13 +167,34 @@ impl Household {
         ))
     }
 
-    /// Makes the object's solid in its nominal proportions, metres, z up.
+    /// Returns the object's solid in its nominal proportions, meters, z up.
     #[must_use]
     pub fn solid(self) -> Solid {
-        shapes::solid(self)
+        match self {
+            Self::Mug => vessels::mug(),
+            Self::Bottle => vessels::bottle(),
+            Self::Bowl => vessels::bowl(),
+            Self::Carton => boxes::carton(),
+            Self::Bracket => tools::bracket(),
+            Self::Hammer => tools::hammer(),
+            Self::Plate => vessels::plate(),
+            Self::Iron => tools::iron(),
+            Self::Car => boxes::car(),
+            Self::Pan => vessels::pan(),
+            Self::Can => vessels::can(),
+            Self::Laptop => boxes::laptop(),
+            Self::Teapot => vessels::teapot(),
+            Self::Knife => tools::knife(),
+            Self::Book => boxes::book(),
+            Self::Pot => vessels::pot(),
+            Self::Tape => tools::tape(),
+            Self::Headphones => boxes::headphones(),
+            Self::Camera => boxes::camera(),
+            Self::Ladle => vessels::ladle(),
+        }
     }
 
-    /// Makes the object's solid in other proportions, metres, z up.
+    /// Returns the object's solid in other proportions, meters, z up.
     #[must_use]
     pub fn solid_with(self, proportions: Proportions) -> Solid {
         let Proportions { width, height } = proportions;

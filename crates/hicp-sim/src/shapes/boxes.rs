@@ -6,12 +6,12 @@ use crate::profile::{refine, subdivide, to_u32};
 use crate::solid::Solid;
 
 /// A flat carton.
-pub(super) fn carton() -> Solid {
+pub(crate) fn carton() -> Solid {
     Solid::cuboid(Vector3::new(0.06, 0.16, 0.21), 14)
 }
 
 /// A toy car: a body, a cabin and four wheels.
-pub(super) fn car() -> Solid {
+pub(crate) fn car() -> Solid {
     let body = [
         (-0.09, 0.0),
         (0.09, 0.0),
@@ -42,7 +42,7 @@ pub(super) fn car() -> Solid {
 }
 
 /// A closed book: pages between two covers, and a spine.
-pub(super) fn book() -> Solid {
+pub(crate) fn book() -> Solid {
     let cover = Solid::cuboid(Vector3::new(0.15, 0.21, 0.003), 10);
     let pages = Solid::cuboid(Vector3::new(0.144, 0.2, 0.025), 10);
     let spine = Solid::cuboid(Vector3::new(0.004, 0.21, 0.03), 6);
@@ -56,7 +56,7 @@ pub(super) fn book() -> Solid {
 }
 
 /// An open laptop: two thin plates, the screen leaning back by 20 degrees.
-pub(super) fn laptop() -> Solid {
+pub(crate) fn laptop() -> Solid {
     let (width, depth) = (0.2, 0.13);
     let lean = Isometry3::rotation(Vector3::x() * -20.0_f64.to_radians());
     let hinge = Isometry3::translation(0.0, depth / 2.0, 0.004);
@@ -68,7 +68,7 @@ pub(super) fn laptop() -> Solid {
 }
 
 /// A camera: a body, a lens off its middle, and a viewfinder.
-pub(super) fn camera() -> Solid {
+pub(crate) fn camera() -> Solid {
     let lens = [
         (0.0, -0.02),
         (0.03, -0.02),
@@ -91,7 +91,7 @@ pub(super) fn camera() -> Solid {
 }
 
 /// Headphones: two cups and a band over the top, the same after half a turn.
-pub(super) fn headphones() -> Solid {
+pub(crate) fn headphones() -> Solid {
     let cup = [
         (0.0, -0.014),
         (0.028, -0.014),

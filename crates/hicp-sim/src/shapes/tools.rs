@@ -6,7 +6,7 @@ use crate::profile::{refine, subdivide, to_u32};
 use crate::solid::Solid;
 
 /// An angle bracket of two thin plates.
-pub(super) fn bracket() -> Solid {
+pub(crate) fn bracket() -> Solid {
     let corner = [
         (0.0, 0.0),
         (0.09, 0.0),
@@ -19,7 +19,7 @@ pub(super) fn bracket() -> Solid {
 }
 
 /// A hammer with an asymmetric head.
-pub(super) fn hammer() -> Solid {
+pub(crate) fn hammer() -> Solid {
     let head = [
         (-0.055, -0.004),
         (-0.02, -0.014),
@@ -47,7 +47,7 @@ pub(super) fn hammer() -> Solid {
 }
 
 /// A clothes iron: a wedge with a handle.
-pub(super) fn iron() -> Solid {
+pub(crate) fn iron() -> Solid {
     let sole = [
         (-0.10, -0.055),
         (0.02, -0.055),
@@ -75,7 +75,7 @@ pub(super) fn iron() -> Solid {
 }
 
 /// A kitchen knife: a thin blade and a thicker handle.
-pub(super) fn knife() -> Solid {
+pub(crate) fn knife() -> Solid {
     let blade = [
         (0.0, -0.014),
         (0.105, -0.014),
@@ -91,7 +91,7 @@ pub(super) fn knife() -> Solid {
 }
 
 /// A roll of tape: a ring, the same from both sides.
-pub(super) fn tape() -> Solid {
+pub(crate) fn tape() -> Solid {
     let section = [
         (0.036, -0.012),
         (0.055, -0.012),

@@ -6,7 +6,7 @@ use crate::profile::{bowl_point, refine, to_u32};
 use crate::solid::Solid;
 
 /// A cup with a thin wall and a handle.
-pub(super) fn mug() -> Solid {
+pub(crate) fn mug() -> Solid {
     let arc = |i: usize| {
         let t = std::f64::consts::PI * (f64::from(to_u32(i)) / 16.0 - 0.5);
         Point3::new(0.038 + 0.030 * t.cos(), 0.0, 0.032 * t.sin())
@@ -27,7 +27,7 @@ pub(super) fn mug() -> Solid {
 }
 
 /// A bottle with a neck.
-pub(super) fn bottle() -> Solid {
+pub(crate) fn bottle() -> Solid {
     let outline = [
         (0.0, -0.11),
         (0.034, -0.11),
@@ -44,7 +44,7 @@ pub(super) fn bottle() -> Solid {
 }
 
 /// A thin-walled bowl.
-pub(super) fn bowl() -> Solid {
+pub(crate) fn bowl() -> Solid {
     let outside = (0..=14).map(|i| bowl_point(i, 0.085));
     let inside = (0..=14).rev().map(|i| bowl_point(i, 0.081));
     let profile: Vec<_> = outside.chain(inside).collect();
@@ -52,7 +52,7 @@ pub(super) fn bowl() -> Solid {
 }
 
 /// A dinner plate.
-pub(super) fn plate() -> Solid {
+pub(crate) fn plate() -> Solid {
     let profile = [
         (0.0, -0.012),
         (0.07, -0.012),
@@ -67,7 +67,7 @@ pub(super) fn plate() -> Solid {
 }
 
 /// A pan with a long handle.
-pub(super) fn pan() -> Solid {
+pub(crate) fn pan() -> Solid {
     let profile = [
         (0.0, -0.02),
         (0.085, -0.02),
@@ -87,7 +87,7 @@ pub(super) fn pan() -> Solid {
 }
 
 /// A can with recessed ends, the same at both.
-pub(super) fn can() -> Solid {
+pub(crate) fn can() -> Solid {
     let outline = [
         (0.0, -0.053),
         (0.029, -0.053),
@@ -102,7 +102,7 @@ pub(super) fn can() -> Solid {
 }
 
 /// A hexagonal planter with a thin wall.
-pub(super) fn pot() -> Solid {
+pub(crate) fn pot() -> Solid {
     let wall = [
         (0.0, -0.05),
         (0.045, -0.05),
@@ -121,7 +121,7 @@ pub(super) fn pot() -> Solid {
 }
 
 /// A teapot: a round body, a spout and a handle.
-pub(super) fn teapot() -> Solid {
+pub(crate) fn teapot() -> Solid {
     let body = (1..=14).map(|i| {
         // From the flat bottom to the lid, along an ellipse.
         let t = std::f64::consts::PI * (0.18 + 0.75 * f64::from(to_u32(i)) / 14.0);
@@ -150,7 +150,7 @@ pub(super) fn teapot() -> Solid {
 }
 
 /// A ladle: a small thin-walled bowl with a long handle.
-pub(super) fn ladle() -> Solid {
+pub(crate) fn ladle() -> Solid {
     let outside = (0..=14).map(|i| bowl_point(i, 0.042));
     let inside = (0..=14).rev().map(|i| bowl_point(i, 0.0395));
     let profile: Vec<_> = outside.chain(inside).collect();
