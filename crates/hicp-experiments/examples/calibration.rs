@@ -1,9 +1,11 @@
-//! Are covariances what the errors say? Fits `Calibration` on the tuning objects and prints the share of single-image errors inside
+//! Fits `Calibration` on the tuning objects and prints the share of single-image errors inside
 //! the 50, 90 and 99 % ellipsoids, before and after, on the tuning and on the test objects.
 //!
-//! Run with `cargo run --release -p hicp-experiments --example calibration [TRAJECTORIES]`: per object, 10 unless told otherwise.
-//! Trajectories are those of the sequential study (starts in ten bins, a D435's axial noise, reconstructions with 5 mm and 1.1°), with
-//! another seed. Objects that turn freely about an axis are left out, and so are estimates that the calibrated gate leaves out.
+//! Run with `cargo run --release -p hicp-experiments --example calibration [TRAJECTORIES]`: per
+//! object, 10 unless told otherwise. Trajectories are those of the sequential study (starts in ten
+//! bins, a D435's axial noise, reconstructions with 5 mm and 1.1°), with another seed. Objects that
+//! turn freely about an axis are left out, and so are estimates that the calibrated gate leaves
+//! out.
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
 use hicp_core::{Isometry3, Matrix6, Vector6, se3};
@@ -38,18 +40,15 @@ fn main() -> Result<(), Failed> {
         let tuning = samples(&Household::TUNING, preset, trajectories)?;
         let test = samples(&Household::TEST, preset, trajectories)?;
         println!("{preset}: {} and {} estimates", tuning.len(), test.len());
-        let scatter = fit(shipped, [Factor::Scale, Factor::Floor], |model| {
+        let scatter = fit(shipped, &[|m| &mut m.scale, |m| &mut m.floor], |model| {
             scatter_loss(&tuning, model)
         });
         println!(
             "  scatter along a trajectory: scale {:.2}, floor {:.4}",
             scatter.scale, scatter.floor
         );
-        let fitted = fit(
-            shipped,
-            [Factor::Shared, Factor::Gain, Factor::Power],
-            |model| total_loss(&tuning, model),
-        );
+        let shared: [Factor; 3] = [|m| &mut m.shared, |m| &mut m.mve_gain, |m| &mut m.mve_power];
+        let fitted = fit(shipped, &shared, |model| total_loss(&tuning, model));
         println!(
             "  errors, with scale {} and floor {}: shared {:.4}, gain {:.1}, power {:.2}",
             fitted.scale, fitted.floor, fitted.shared, fitted.mve_gain, fitted.mve_power
@@ -87,15 +86,11 @@ fn samples(
     config.methods = vec!["gated-weighted-average".to_owned()];
     config.underlying[0].seconds_per_estimate = SECONDS;
     let (mut kept, mut failed) = (Vec::new(), None);
-    watch_trajectories(
-        &config,
-        &subjects,
-        0..trajectories,
-        &mut |seen| match sample(seen) {
-            Ok(found) => kept.extend(found.filter(|s| s.mve <= max_mve)),
-            Err(error) => failed = Some(error),
-        },
-    )?;
+    let mut watch = |seen: &TrajectoryStep<'_>| match sample(seen) {
+        Ok(found) => kept.extend(found.filter(|s| s.mve <= max_mve)),
+        Err(error) => failed = Some(error),
+    };
+    watch_trajectories(&config, &subjects, 0..trajectories, &mut watch)?;
     failed.map_or(Ok(kept), Err)
 }
 
@@ -143,12 +138,12 @@ fn total_loss(samples: &[Sample], model: &Calibration) -> f64 {
     each.map(|s| surprise(&s.error, &total(model, s), nu)).sum()
 }
 
-/// The same of the differences between neighbours on a trajectory, in which what they share is not.
+/// The same of the differences between neighbors on a trajectory, in which what they share is not.
 fn scatter_loss(samples: &[Sample], model: &Calibration) -> f64 {
-    let neighbours = samples
+    let neighbors = samples
         .windows(2)
         .filter(|two| two[0].trajectory == two[1].trajectory);
-    let each = neighbours.map(|two| {
+    let each = neighbors.map(|two| {
         let difference = two[1].error - two[0].error;
         let covariance = own(model, &two[0]) + own(model, &two[1]);
         surprise(&difference, &covariance, model.degrees_of_freedom)
@@ -156,31 +151,11 @@ fn scatter_loss(samples: &[Sample], model: &Calibration) -> f64 {
     each.sum()
 }
 
-#[derive(Clone, Copy)]
-enum Factor {
-    Scale,
-    Floor,
-    Shared,
-    Gain,
-    Power,
-}
+/// A factor of a calibration.
+type Factor = fn(&mut Calibration) -> &mut f64;
 
-fn factor(model: &mut Calibration, which: Factor) -> &mut f64 {
-    match which {
-        Factor::Scale => &mut model.scale,
-        Factor::Floor => &mut model.floor,
-        Factor::Shared => &mut model.shared,
-        Factor::Gain => &mut model.mve_gain,
-        Factor::Power => &mut model.mve_power,
-    }
-}
-
-/// Changes some factors by turns, in ever smaller steps, as long as the loss falls.
-fn fit<const N: usize>(
-    start: Calibration,
-    factors: [Factor; N],
-    loss: impl Fn(&Calibration) -> f64,
-) -> Calibration {
+/// Changes one factor after another, in ever smaller steps, as long as the loss falls.
+fn fit(start: Calibration, factors: &[Factor], loss: impl Fn(&Calibration) -> f64) -> Calibration {
     let (mut best, mut least) = (start, loss(&start));
     let mut step: f64 = 2.0;
     while step > 1.01 {
@@ -188,7 +163,7 @@ fn fit<const N: usize>(
         for which in factors {
             for change in [step, 1.0 / step] {
                 let mut tried = best;
-                *factor(&mut tried, which) *= change;
+                *which(&mut tried) *= change;
                 let found = loss(&tried);
                 if found < least {
                     (best, least, better) = (tried, found, true);
