@@ -1,6 +1,6 @@
 //! Claims, and how intervals decide them.
 
-use crate::analysis::Interval;
+use crate::analysis::{Analysis, Interval, Metric};
 
 /// Whether a claim holds in a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,51 +13,38 @@ pub enum ClaimVerdict {
     NotSignificant,
 }
 
+use ClaimVerdict::{DoesNotHold, Holds, NotSignificant};
+
 impl ClaimVerdict {
     /// Returns the verdict in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Holds => "holds",
-            Self::DoesNotHold => "does not hold",
-            Self::NotSignificant => "not significant",
+            Holds => "holds",
+            DoesNotHold => "does not hold",
+            NotSignificant => "not significant",
         }
     }
 
-    /// Returns "holds" or "does not hold".
-    pub(crate) fn of(holds: bool) -> Self {
-        if holds {
-            Self::Holds
-        } else {
-            Self::DoesNotHold
+    /// Returns "does not hold" if `fails`, and "holds" if `holds`.
+    pub(crate) fn of(holds: bool, fails: bool) -> Self {
+        match (fails, holds) {
+            (true, _) => DoesNotHold,
+            (false, true) => Holds,
+            (false, false) => NotSignificant,
         }
     }
 
-    /// Decides that all contrasts are negative.
-    pub(crate) fn negative<'a>(contrasts: impl IntoIterator<Item = &'a Interval>) -> Self {
-        Self::decide(contrasts, |contrast| contrast.high < 0.0)
+    /// Decides whether all contrasts are negative.
+    pub(crate) fn negative(contrasts: &[Interval]) -> Self {
+        let holds = contrasts.iter().all(|i| i.high < 0.0);
+        Self::of(holds, contrasts.iter().any(|i| i.low > 0.0))
     }
 
-    /// Decides that no contrast is positive.
-    pub(crate) fn not_positive<'a>(contrasts: impl IntoIterator<Item = &'a Interval>) -> Self {
-        Self::decide(contrasts, |contrast| contrast.high <= 0.0)
-    }
-
-    /// Returns that it holds if `holds` for all contrasts, and that it does not if one is positive.
-    fn decide<'a>(
-        contrasts: impl IntoIterator<Item = &'a Interval>,
-        holds: fn(&Interval) -> bool,
-    ) -> Self {
-        let mut verdict = Self::Holds;
-        for contrast in contrasts {
-            if contrast.low > 0.0 {
-                return Self::DoesNotHold;
-            }
-            if !holds(contrast) {
-                verdict = Self::NotSignificant;
-            }
-        }
-        verdict
+    /// Decides whether no contrast is positive.
+    pub(crate) fn not_positive(contrasts: &[Interval]) -> Self {
+        let holds = contrasts.iter().all(|i| i.high <= 0.0);
+        Self::of(holds, contrasts.iter().any(|i| i.low > 0.0))
     }
 }
 
@@ -74,19 +61,63 @@ pub struct Claim {
     pub figures: String,
 }
 
-impl Claim {
-    pub(crate) fn new(
-        section: &'static str,
+/// Contrasts with the texts that stand before them.
+pub(crate) type Evidence = Vec<(String, Interval)>;
+
+/// Tests the claims of a section on an analysis.
+#[derive(Clone, Copy)]
+pub(crate) struct Judge<'a> {
+    pub(crate) analysis: &'a Analysis,
+    pub(crate) section: &'static str,
+    /// Number of digits of the figures.
+    pub(crate) digits: usize,
+}
+
+impl<'a> Judge<'a> {
+    /// Returns the mean VSD of a variant in a group.
+    pub(crate) fn vsd(self, group: usize, variant: usize) -> Option<Interval> {
+        self.analysis.mean(Metric::Vsd, group, variant)
+    }
+
+    /// Returns the paired difference of the mean VSD of two variants in a group.
+    pub(crate) fn difference(self, group: usize, a: usize, b: usize) -> Option<Interval> {
+        self.analysis.difference(Metric::Vsd, group, a, b)
+    }
+
+    /// Returns the name of a variant.
+    pub(crate) fn name(self, variant: usize) -> &'a str {
+        &self.analysis.variants()[variant]
+    }
+
+    /// Returns a claim with its verdict.
+    #[allow(clippy::unnecessary_wraps, reason = "the last line of every test")]
+    pub(crate) fn claim(
+        self,
         text: impl Into<String>,
         verdict: ClaimVerdict,
         figures: impl Into<String>,
-    ) -> Self {
-        Self {
+    ) -> Option<Claim> {
+        let (section, text, figures) = (self.section, text.into(), figures.into());
+        Some(Claim {
             section,
-            text: text.into(),
+            text,
             verdict,
-            figures: figures.into(),
-        }
+            figures,
+        })
+    }
+
+    /// Decides a claim by a rule; `None` without evidence.
+    pub(crate) fn decide(
+        self,
+        text: impl Into<String>,
+        rule: fn(&[Interval]) -> ClaimVerdict,
+        evidence: Evidence,
+    ) -> Option<Claim> {
+        let (labels, contrasts): (Vec<String>, Vec<Interval>) = evidence.into_iter().unzip();
+        contrasts.first()?;
+        let (digits, labeled) = (self.digits, labels.iter().zip(&contrasts));
+        let figures = labeled.map(|(label, i)| format!("{label}{i:+.digits$}"));
+        self.claim(text, rule(&contrasts), listed(figures))
     }
 }
 
@@ -101,31 +132,26 @@ mod tests {
 
     #[test]
     fn verdicts_follow_the_intervals() {
-        let at = |estimate: f64| Interval {
-            estimate,
-            low: estimate - 0.1,
-            high: estimate + 0.1,
+        let around = |half: f64| {
+            move |estimate: &f64| Interval {
+                estimate: *estimate,
+                low: estimate - half,
+                high: estimate + half,
+            }
         };
-        let negative =
-            |all: &[f64]| ClaimVerdict::negative(&all.iter().copied().map(at).collect::<Vec<_>>());
-        assert_eq!(negative(&[-0.2, -0.3]), ClaimVerdict::Holds);
-        assert_eq!(negative(&[-0.2, 0.05]), ClaimVerdict::NotSignificant);
-        assert_eq!(negative(&[-0.2, 0.2]), ClaimVerdict::DoesNotHold);
-        let not_positive = |all: &[f64]| {
-            ClaimVerdict::not_positive(&all.iter().copied().map(at).collect::<Vec<_>>())
-        };
-        assert_eq!(not_positive(&[-0.2]), ClaimVerdict::Holds);
-        assert_eq!(not_positive(&[-0.2, 0.0]), ClaimVerdict::NotSignificant);
-        assert_eq!(not_positive(&[0.2, -0.2]), ClaimVerdict::DoesNotHold);
-        let zero = Interval {
-            estimate: 0.0,
-            low: 0.0,
-            high: 0.0,
-        };
-        assert_eq!(ClaimVerdict::not_positive([&zero]), ClaimVerdict::Holds);
+        let all =
+            |estimates: &[f64]| -> Vec<Interval> { estimates.iter().map(around(0.1)).collect() };
+        assert_eq!(ClaimVerdict::negative(&all(&[-0.2, -0.3])), Holds);
+        assert_eq!(ClaimVerdict::negative(&all(&[-0.2, 0.05])), NotSignificant);
+        assert_eq!(ClaimVerdict::negative(&all(&[-0.2, 0.2])), DoesNotHold);
+        assert_eq!(ClaimVerdict::not_positive(&all(&[-0.2])), Holds);
         assert_eq!(
-            ClaimVerdict::negative([&zero]),
-            ClaimVerdict::NotSignificant
+            ClaimVerdict::not_positive(&all(&[-0.2, 0.0])),
+            NotSignificant
         );
+        assert_eq!(ClaimVerdict::not_positive(&all(&[0.2, -0.2])), DoesNotHold);
+        let zero = [around(0.0)(&0.0)];
+        assert_eq!(ClaimVerdict::not_positive(&zero), Holds);
+        assert_eq!(ClaimVerdict::negative(&zero), NotSignificant);
     }
 }

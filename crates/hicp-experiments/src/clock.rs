@@ -1,8 +1,8 @@
-//! The time that a thread has computed.
+//! The processor time of a thread.
 
 use std::time::Duration;
 
-/// Returns the processor time of the calling thread: other programs on the machine do not count, waiting does not either.
+/// Returns the processor time of the calling thread, without other programs and without waiting.
 #[cfg(unix)]
 pub(crate) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -13,7 +13,7 @@ pub(crate) fn thread_time() -> Duration {
     )
 }
 
-/// Returns the time since the first call; systems other than Unix have no portable clock of a thread.
+/// Returns the time since the first call: there is no portable clock of a thread except on Unix.
 #[cfg(not(unix))]
 pub(crate) fn thread_time() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();

@@ -8,7 +8,7 @@ use hicp_sim::SimError;
 use hybrid_icp::PipelineError;
 use thiserror::Error;
 
-/// Why a study could not be run, read or reported.
+/// The reason why a study could not be run, read or reported.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
@@ -24,7 +24,7 @@ pub enum ExperimentError {
         /// The file.
         path: PathBuf,
     },
-    /// A study that cannot go on because it was begun otherwise.
+    /// A study that cannot continue because it was started with another configuration.
     #[error("{} was begun otherwise: {difference}; expected the same command as before, or another folder", path.display())]
     OtherConfiguration {
         /// The stored configuration.
@@ -50,25 +50,25 @@ pub enum ExperimentError {
         /// Why.
         source: serde_json::Error,
     },
-    /// A stored configuration that no study has.
+    /// A field of a configuration that no study can have.
     #[error("{}, {field}: found {found}, expected {expected}", path.display())]
     Field {
         /// The file.
         path: PathBuf,
         /// The field, by its name in the file.
         field: String,
-        /// What is there.
+        /// The value found.
         found: String,
-        /// What should be there.
+        /// The expected value.
         expected: String,
     },
-    /// A study lacks what a report needs.
+    /// A study without a finished row, of which there is no report.
     #[error("{} holds no finished row, expected at least one", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// Someone asked to stop.
+    /// The caller stopped the study.
     #[error("stopped after {cases} cases; --resume goes on from there")]
     Stopped {
         /// Number of cases whose rows are written.
@@ -77,7 +77,7 @@ pub enum ExperimentError {
     /// A figure could not be drawn.
     #[error("cannot draw the figure: {0}")]
     Figure(String),
-    /// The file system refused.
+    /// The file system refused an operation.
     #[error("cannot use {}", path.display())]
     File {
         /// The file or folder.

@@ -1,13 +1,15 @@
-//! The studies of the Hybrid ICP paper, as code: single images (§VI-A, §VI-B, Table I and the tuning of α) and trajectories (§VI-C).
+//! The studies of the Hybrid ICP paper, as code: single images (§VI-A, §VI-B, Table I and the
+//! tuning of α) and trajectories (§VI-C).
 //!
 //! **Should you use this crate?** Use it to check the paper's claims, or to compare a custom pipeline
 //! with the paper's nine variants on many objects; `hybrid-icp experiment` is its command line. To
 //! refine poses, use `hybrid-icp`.
 //!
-//! A study presents cases (an object, an image, an initial pose) under one or more levels of noise to
-//! every variant, so that differences between variants are paired. It writes the rows of each case as
-//! it goes, can be killed and resumed, and gives the same rows on any number of threads, except for
-//! times. [`Design`] is what distinguishes kinds of studies: [`Config`] and [`TrajectoryConfig`].
+//! A study presents cases (an object, an image, an initial pose) under one or more levels of noise
+//! to every variant, so that differences between variants are paired. It writes the rows of each
+//! case as it goes, can be killed and resumed, and gives the same rows on any number of threads,
+//! except for times. [`Design`] is what distinguishes kinds of studies: [`Config`] and
+//! [`TrajectoryConfig`].
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -60,7 +62,7 @@ pub use single::{Condition, Config, Experiment, MaskFault, TABLE_I, claims};
 pub use study::{
     ALL, CONFIG_FILE, CameraRecord, Column, Columns, Design, FAULTY_MASK, Fields, Group, HIGH, LOW,
     Layout, MAX_BINS, MAX_CELLS, MAX_OBJECTS, Measured, Models, NOISY, NOISY_DEPTH, NOISY_MODEL,
-    ObjectRecord, Row, RunOptions, StudyOf, Worker, run,
+    ObjectRecord, Outcome, Row, RunOptions, StudyOf, Worker, run,
 };
 pub use subject::Subject;
 pub use variant::Variant;

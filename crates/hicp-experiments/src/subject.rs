@@ -37,7 +37,8 @@ impl Subject {
         made.collect()
     }
 
-    /// Reads every mesh file of a folder, in meters, in the order of their names, without symmetries.
+    /// Reads every mesh file of a folder, in meters, in the order of their names, without
+    /// symmetries.
     ///
     /// # Errors
     ///

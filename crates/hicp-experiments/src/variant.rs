@@ -75,8 +75,8 @@ impl Variant {
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Pipeline`] when the text is not a pipeline, or α is given and the pipeline
-    /// does not switch.
+    /// [`ExperimentError::Pipeline`] when the text is not a pipeline, or α is given and the
+    /// pipeline does not switch.
     pub fn build(&self, alpha: Option<f64>) -> Result<BoxedStage, ExperimentError> {
         Ok(self.parse(alpha)?.build_within(&PipelineLimits::NONE)?)
     }

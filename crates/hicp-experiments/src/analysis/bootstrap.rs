@@ -38,11 +38,12 @@ struct Unit {
     measured: Vec<Option<Measured>>,
 }
 
-/// The means of a study, per bin, level and overall, with bootstrap intervals over objects and cases.
+/// The means of a study, per bin, level and overall, with bootstrap intervals over objects and
+/// cases.
 ///
-/// A bootstrap sample draws objects with replacement, and for each the same number of cases in every
-/// bin with replacement. All variants and levels of a drawn case come along, so that differences are
-/// paired. The sample depends on the seed alone.
+/// A bootstrap sample draws objects with replacement, and for each the same number of cases in
+/// every bin with replacement. All variants and levels of a drawn case come along, so that
+/// differences are paired. The sample depends on the seed alone.
 ///
 /// A case whose rows could not be made is left out. Cost: O([`REPLICATES`] · rows).
 #[derive(Debug)]
@@ -53,7 +54,8 @@ pub struct Analysis {
     n_levels: usize,
     n_bins: usize,
     units: Vec<Unit>,
-    /// Sums and weights, by [`Analysis::slot`]: first of the rows as they are, then of bootstrap samples.
+    /// Sums and weights, by [`Analysis::slot`]: first of the rows as they are, then of bootstrap
+    /// samples.
     replicates: Vec<Vec<f64>>,
 }
 
@@ -128,6 +130,15 @@ impl Analysis {
         self.groups.len() - 1
     }
 
+    /// Returns every group with its label, and in each every variant with its name.
+    pub(crate) fn grid(&self) -> impl Iterator<Item = (usize, &str, usize, &str)> {
+        let groups = self.groups.iter().enumerate();
+        groups.flat_map(|(group, described)| {
+            let variants = self.variants.iter().enumerate();
+            variants.map(move |(v, name)| (group, &*described.label, v, &**name))
+        })
+    }
+
     /// Returns the number of bins of the initial VSD; 1 if cases are not binned.
     pub(crate) fn n_bins(&self) -> usize {
         self.n_bins
@@ -145,22 +156,18 @@ impl Analysis {
         self.contrast(metric, &[(group, a, 1.0), (group, b, -1.0)])
     }
 
-    /// Returns a sum of means times factors, with its interval. A term is a group, a variant and a factor.
+    /// Returns a sum of means times factors, with its interval. A term is a group, a variant and a
+    /// factor.
     #[must_use]
     pub fn contrast(&self, metric: Metric, terms: &[(usize, usize, f64)]) -> Option<Interval> {
         let value = |sums: &Vec<f64>| -> f64 {
-            let means = terms
-                .iter()
-                .map(|(g, v, factor)| factor * self.mean_of(metric, sums, *g, *v));
-            means.sum()
+            let mean = |(g, v, factor)| factor * self.mean_of(metric, sums, g, v);
+            terms.iter().copied().map(mean).sum()
         };
         let (all, samples) = self.replicates.split_first()?;
         let estimate = Some(value(all)).filter(|x| x.is_finite())?;
-        let mut drawn: Vec<f64> = samples
-            .iter()
-            .map(value)
-            .filter(|x| x.is_finite())
-            .collect();
+        let mut drawn: Vec<f64> = samples.iter().map(value).collect();
+        drawn.retain(|x| x.is_finite());
         drawn.sort_by(f64::total_cmp);
         let mut interval = Interval {
             estimate,
@@ -191,10 +198,8 @@ impl Analysis {
         let rows: Vec<(usize, &Measured)> = rows.collect();
         let count = rows.len() as f64;
         let mean = |value: &dyn Fn(usize, &Measured) -> f64| {
-            rows.iter()
-                .map(|(object, m)| value(*object, m))
-                .sum::<f64>()
-                / count
+            let sum: f64 = rows.iter().map(|(object, m)| value(*object, m)).sum();
+            sum / count
         };
         let mut errors: Vec<f64> = rows.iter().map(|(_, m)| m.add_final_mm).collect();
         errors.sort_by(f64::total_cmp);
@@ -240,20 +245,20 @@ impl Analysis {
         levels.filter_map(move |level| unit.measured[level * n_variants + variant].as_ref())
     }
 
-    /// Returns where the sum of a metric is among the sums of a sample; its weight comes right after.
+    /// Returns where the sum of a metric is among the sums of a sample; its weight comes right
+    /// after.
     fn slot(&self, metric: Metric, level: usize, variant: usize, bin: usize) -> usize {
         let cell = (metric as usize * self.n_levels + level) * self.variants.len() + variant;
         2 * (cell * self.n_bins + bin)
     }
 
     fn mean_of(&self, metric: Metric, sums: &[f64], group: usize, variant: usize) -> f64 {
-        let group = self
-            .groups
-            .get(group)
-            .filter(|_| variant < self.variants.len());
-        let Some(group) = group else {
+        let Some(group) = self.groups.get(group) else {
             return f64::NAN;
         };
+        if variant >= self.variants.len() {
+            return f64::NAN;
+        }
         let bins = group.bins.clone().unwrap_or(0..self.n_bins);
         let (mut sum, mut weight) = (0.0, 0.0);
         for level in &group.levels {

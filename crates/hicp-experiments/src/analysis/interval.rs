@@ -4,9 +4,11 @@ use std::fmt;
 
 /// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap.
 ///
-/// If no bootstrap sample of a share differs, the interval holds what [`never_seen`] leaves possible.
+/// If no bootstrap sample of a share differs, the interval holds what [`never_seen`] leaves
+/// possible.
 ///
-/// Displays as `estimate [low, high]` with three digits unless a precision is given; `{:+}` adds signs.
+/// Displays as `estimate [low, high]` with three digits unless a precision is given; `{:+}` adds
+/// signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The estimate from all rows.

@@ -11,7 +11,8 @@ use crate::error::ExperimentError;
 
 /// Size of a panel, pixels.
 const PANEL: (u32, u32) = (460, 330);
-/// The palette of Okabe & Ito, which color-blind readers can distinguish; each color also has its own marker.
+/// The palette of Okabe & Ito, which color-blind readers can distinguish; each color also has its
+/// own marker.
 const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -157,7 +158,8 @@ fn draw_panel<B: DrawingBackend>(
         .draw()
 }
 
-/// Returns the corners of a marker at a place, pixels: a square, a diamond, and triangles in four directions.
+/// Returns the corners of a marker at a place, pixels: a square, a diamond, and triangles in four
+/// directions.
 fn marker(style: usize, (x, y): (i32, i32)) -> Vec<(i32, i32)> {
     let shape: &[(i32, i32)] = match style % 6 {
         0 => &[(-4, -4), (4, -4), (4, 4), (-4, 4)],

@@ -43,7 +43,8 @@ impl Table {
         format!("<table>\n{}{rows}</table>\n", line(&self.head, "th"))
     }
 
-    /// Returns the table as Markdown: the first column left-aligned, the others, numbers, right-aligned.
+    /// Returns the table as Markdown: the first column left-aligned, the others, numbers,
+    /// right-aligned.
     #[must_use]
     pub fn markdown(&self) -> String {
         let line = |fields: &[String]| {

@@ -6,6 +6,7 @@ use hicp_io::{write_atomically, write_rgb_png};
 
 use super::figure::Figure;
 use super::html::{Table, page};
+use super::tables::texts;
 use crate::analysis::Analysis;
 use crate::claims::Claim;
 use crate::error::ExperimentError;
@@ -125,25 +126,20 @@ impl<D: Reported> ReportOf<D> {
             write(name, &table.csv())?;
         }
         let section = |heading: &str, html: &str| format!("<h2>{heading}</h2>\n{html}");
-        let unmade = self.unmade();
-        let differences = document.differences.1.html();
+        let unmade = Some(self.unmade()).filter(|table| !table.rows.is_empty());
+        let unmade = unmade.map(|table| section(document.unmade, &table.html()));
+        let (heading, differences) = (document.differences.0, document.differences.1.html());
+        let differences = format!(
+            "<details><summary>All paired differences</summary>\n{differences}</details>\n"
+        );
         let body = [
             section("What was run", &document.what_was_run.0.html()),
             format!("<p>{}</p>\n", document.what_was_run.1),
             section(document.claims, &claims.html()),
             figures,
             document.results,
-            if unmade.rows.is_empty() {
-                String::new()
-            } else {
-                section(document.unmade, &unmade.html())
-            },
-            section(
-                document.differences.0,
-                &format!(
-                    "<details><summary>All paired differences</summary>\n{differences}</details>\n"
-                ),
-            ),
+            unmade.unwrap_or_default(),
+            section(heading, &differences),
         ];
         write("report.html", &page(document.title, &body.concat()))?;
         Ok(())
@@ -153,9 +149,7 @@ impl<D: Reported> ReportOf<D> {
         let mut table = Table::new(&["study", "where", "claim", "verdict", "figures"]);
         table.rows.extend(self.claims().map(|(study, claim)| {
             let (section, verdict) = (claim.section, claim.verdict.name());
-            [study, section, &claim.text, verdict, &claim.figures]
-                .map(str::to_owned)
-                .to_vec()
+            texts(&[study, section, &claim.text, verdict, &claim.figures])
         }));
         table
     }
@@ -166,8 +160,8 @@ impl<D: Reported> ReportOf<D> {
         for entry in &self.entries {
             for row in entry.study.rows.iter().filter(|row| row.measured.is_none()) {
                 let case = row.case.to_string();
-                let why = [&entry.name, &row.object, &case, &row.note].map(String::clone);
-                table.rows.push(why.to_vec());
+                let why = texts(&[&entry.name, &row.object, &case, &row.note]);
+                table.rows.push(why);
             }
         }
         table.rows.dedup();

@@ -17,26 +17,26 @@ pub(crate) fn ends(interval: Option<Interval>) -> [String; 3] {
     }
 }
 
+/// Returns fields as text.
+pub(crate) fn texts(fields: &[&str]) -> Vec<String> {
+    fields.iter().map(|field| (*field).to_owned()).collect()
+}
+
 /// Returns the mean VSD per variant and group.
 pub(crate) fn means(analysis: &Analysis) -> Table {
-    let groups = 0..analysis.groups().len();
+    let groups = || 0..analysis.groups().len();
     let mut table = Table::new(&["variant"]);
-    table
-        .head
-        .extend(analysis.groups().iter().map(|group| group.label.clone()));
-    let line = |name: &str, fields: Vec<String>| [vec![name.to_owned()], fields].concat();
-    let initial = groups
-        .clone()
-        .map(|g| Some(fixed(Some(analysis.cell(g, 0)?.vsd_initial), 3)));
-    if let Some(initial) = initial.collect() {
-        table.rows.push(line("(initial)", initial));
+    let labels = analysis.groups().iter().map(|group| group.label.clone());
+    table.head.extend(labels);
+    let initial = |group| Some(fixed(Some(analysis.cell(group, 0)?.vsd_initial), 3));
+    if let Some(initial) = groups().map(initial).collect::<Option<Vec<_>>>() {
+        table.rows.push([texts(&["(initial)"]), initial].concat());
     }
     for (variant, name) in analysis.variants().iter().enumerate() {
-        let means = groups
-            .clone()
-            .map(|g| analysis.mean(Metric::Vsd, g, variant));
-        let means = means.map(|i| i.map_or_else(String::new, |i| i.to_string()));
-        table.rows.push(line(name, means.collect()));
+        let mut row = vec![name.clone()];
+        let means = groups().map(|group| analysis.mean(Metric::Vsd, group, variant));
+        row.extend(means.map(|i| i.map_or_else(String::new, |i| i.to_string())));
+        table.rows.push(row);
     }
     table
 }

@@ -2,7 +2,7 @@
 
 use super::config::TrajectoryConfig;
 use crate::analysis::{Analysis, Interval, Metric};
-use crate::claims::{Claim, ClaimVerdict, listed};
+use crate::claims::{Claim, ClaimVerdict, Evidence, Judge, listed};
 use crate::study::{HIGH, LOW};
 
 /// The methods of the paper that use uncertainty, each with its counterpart that does not.
@@ -18,165 +18,139 @@ const BEYOND: [&str; 3] = [
 ];
 const HYBRID: &str = "hybrid";
 const CASCADE: &str = "projective-cascade-point-plane";
-const SECTION: &str = "§VI-C";
 
-/// Tests the findings, and what goes beyond them; those whose pipelines or methods the study lacks are left out.
+/// Tests the findings, and what goes beyond them; those whose pipelines or methods the study lacks
+/// are left out.
 pub(super) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Claim> {
-    let methods = config.paper_methods();
+    let (section, digits, methods) = ("§VI-C", 4, config.paper_methods());
+    let judge = Judge {
+        analysis,
+        section,
+        digits,
+    };
     let mut found = Vec::new();
     for underlying in &config.underlying {
-        let judge = Judge {
-            analysis,
+        let pipeline = Pipeline {
+            judge,
             underlying: &underlying.name,
             methods: &methods,
         };
-        found.extend(judge.no_clear_best());
-        found.extend(judge.average_as_good());
-        found.extend(judge.weighting_no_better());
-        found.extend(
-            BEYOND
-                .iter()
-                .filter_map(|method| judge.better_than_average(method)),
-        );
+        found.extend([
+            pipeline.no_clear_best(),
+            pipeline.average_as_good(),
+            pipeline.weighting_no_better(),
+        ]);
+        found.extend(BEYOND.map(|method| pipeline.better_than_average(method)));
     }
-    found.extend(is_better(analysis, &methods, LOW, [CASCADE, HYBRID]));
-    found.extend(is_better(analysis, &methods, HIGH, [HYBRID, CASCADE]));
-    found
+    found.push(is_better(judge, &methods, LOW, [CASCADE, HYBRID]));
+    found.push(is_better(judge, &methods, HIGH, [HYBRID, CASCADE]));
+    found.into_iter().flatten().collect()
 }
 
 /// Tests claims about the methods with one underlying pipeline.
-struct Judge<'a> {
-    analysis: &'a Analysis,
+struct Pipeline<'a> {
+    judge: Judge<'a>,
     underlying: &'a str,
     /// Those of the paper.
     methods: &'a [&'a str],
 }
 
-impl Judge<'_> {
+impl Pipeline<'_> {
     fn variant(&self, method: &str) -> Option<usize> {
-        self.analysis
-            .variant(&TrajectoryConfig::variant(self.underlying, method))
+        let name = TrajectoryConfig::variant(self.underlying, method);
+        self.judge.analysis.variant(&name)
+    }
+
+    fn text(&self, text: &str) -> String {
+        format!("{}: {text}", self.underlying)
     }
 
     /// Returns the paired difference of the mean VSD of two methods over all bins.
     fn difference(&self, a: &str, b: &str) -> Option<Interval> {
-        let (a, b) = (self.variant(a)?, self.variant(b)?);
-        self.analysis
-            .difference(Metric::Vsd, self.analysis.overall(), a, b)
-    }
-
-    fn claim(
-        &self,
-        section: &'static str,
-        text: &str,
-        verdict: ClaimVerdict,
-        figures: String,
-    ) -> Claim {
-        Claim::new(
-            section,
-            format!("{}: {text}", self.underlying),
-            verdict,
-            figures,
-        )
+        let all = self.judge.analysis.overall();
+        self.judge
+            .difference(all, self.variant(a)?, self.variant(b)?)
     }
 
     fn no_clear_best(&self) -> Option<Claim> {
-        let mean = |method: &str| {
-            let (all, variant) = (self.analysis.overall(), self.variant(method)?);
-            Some(self.analysis.mean(Metric::Vsd, all, variant)?.estimate)
-        };
-        let means = self.methods.iter().filter_map(|m| Some((*m, mean(m)?)));
-        let mut ranked: Vec<(&str, f64)> = means.collect();
-        ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let ((best, mean), others) = ranked.split_first()?;
+        let all = self.judge.analysis.overall();
+        let mean = |method| Some(self.judge.vsd(all, self.variant(method)?)?.estimate);
+        let means = self.methods.iter().filter_map(|m| Some((mean(m)?, *m)));
+        let mut ranked: Vec<(f64, &str)> = means.collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ((mean, best), others) = ranked.split_first()?;
         let against = others
             .iter()
-            .filter_map(|(m, _)| Some((*m, self.difference(best, m)?)));
-        let against: Vec<(&str, Interval)> = against.collect();
+            .filter_map(|(_, m)| Some((m, self.difference(best, m)?)));
+        let against: Vec<_> = against.collect();
         against.first()?;
         let is_clear = against.iter().all(|(_, i)| i.high < 0.0);
-        let figures = against.iter().map(|(m, i)| format!("− {m}: {i:+.4}"));
-        let lowest = format!("lowest: {best}, {mean:.4}");
-        Some(self.claim(
-            SECTION,
-            "no method is clearly best (better than each other one, its interval excluding zero)",
-            ClaimVerdict::of(!is_clear),
-            listed(std::iter::once(lowest).chain(figures)),
-        ))
-    }
-
-    /// Tests that no named difference is above zero.
-    fn not_above(&self, text: &str, differences: Vec<(String, Interval)>) -> Option<Claim> {
-        differences.first()?;
-        let verdict = ClaimVerdict::not_positive(differences.iter().map(|d| &d.1));
-        let figures = differences
-            .iter()
-            .map(|(name, i)| format!("{name}: {i:+.4}"));
-        Some(self.claim(SECTION, text, verdict, listed(figures)))
+        let mut figures = vec![format!("lowest: {best}, {mean:.4}")];
+        figures.extend(against.iter().map(|(m, i)| format!("− {m}: {i:+.4}")));
+        let text =
+            "no method is clearly best (better than each other one, its interval excluding zero)";
+        let verdict = ClaimVerdict::of(!is_clear, is_clear);
+        self.judge.claim(self.text(text), verdict, listed(figures))
     }
 
     fn average_as_good(&self) -> Option<Claim> {
         let others = self.methods.iter().filter(|m| **m != AVERAGE);
-        let differences =
-            others.filter_map(|m| Some((format!("− {m}"), self.difference(AVERAGE, m)?)));
-        self.not_above(
-            "average is at least as good as each other method",
-            differences.collect(),
-        )
+        let difference = |m| Some((format!("− {m}: "), self.difference(AVERAGE, m)?));
+        let evidence = others.filter_map(|m| difference(m)).collect();
+        let text = self.text("average is at least as good as each other method");
+        self.judge
+            .decide(text, ClaimVerdict::not_positive, evidence)
     }
 
     fn weighting_no_better(&self) -> Option<Claim> {
-        let differences = WEIGHTED.iter().filter_map(|(with, without)| {
-            Some((
-                format!("{without} − {with}"),
-                self.difference(without, with)?,
-            ))
+        let label = |with, without| format!("{without} − {with}: ");
+        let evidence = WEIGHTED.iter().filter_map(|(with, without)| {
+            Some((label(with, without), self.difference(without, with)?))
         });
-        let text = "weighting by the MVE is no better than weighing all alike";
-        self.not_above(text, differences.collect())
+        let text = self.text("weighting by the MVE is no better than weighing all alike");
+        self.judge
+            .decide(text, ClaimVerdict::not_positive, evidence.collect())
     }
 
     fn better_than_average(&self, method: &str) -> Option<Claim> {
-        let difference = self.difference(method, AVERAGE)?;
-        let verdict = ClaimVerdict::negative([&difference]);
-        let (text, figures) = (
-            format!("{method} is better than average"),
-            format!("{difference:+.4}"),
-        );
-        Some(self.claim("beyond §V", &text, verdict, figures))
+        let section = "beyond §V";
+        let judge = Judge {
+            section,
+            ..self.judge
+        };
+        let evidence = vec![(String::new(), self.difference(method, AVERAGE)?)];
+        let text = self.text(&format!("{method} is better than average"));
+        judge.decide(text, ClaimVerdict::negative, evidence)
     }
 }
 
 /// Tests whether one pipeline is better than another in a range of bins, over the paper's methods.
 fn is_better(
-    analysis: &Analysis,
+    judge: Judge<'_>,
     methods: &[&str],
     label: &str,
     [better, worse]: [&str; 2],
 ) -> Option<Claim> {
-    let group = analysis.group(label)?;
-    let variant =
-        |underlying, method| analysis.variant(&TrajectoryConfig::variant(underlying, method));
+    let group = judge.analysis.group(label)?;
+    let of = |underlying, m| {
+        let name = TrajectoryConfig::variant(underlying, m);
+        judge.analysis.variant(&name)
+    };
     let pairs = methods
         .iter()
-        .filter_map(|m| Some((*m, variant(better, m)?, variant(worse, m)?)));
-    let pairs: Vec<(&str, usize, usize)> = pairs.collect();
+        .filter_map(|m| Some((m, of(better, m)?, of(worse, m)?)));
+    let pairs: Vec<_> = pairs.collect();
     pairs.first()?;
     let share = 1.0 / pairs.len() as f64;
-    let terms = pairs
-        .iter()
-        .flat_map(|(_, a, b)| [(group, *a, share), (group, *b, -share)]);
-    let together = analysis.contrast(Metric::Vsd, &terms.collect::<Vec<_>>())?;
-    let mut figures = vec![format!("mean over the methods: {together:+.4}")];
+    let terms = |(_, a, b): &(_, usize, usize)| [(group, *a, share), (group, *b, -share)];
+    let terms: Vec<_> = pairs.iter().flat_map(terms).collect();
+    let together = judge.analysis.contrast(Metric::Vsd, &terms)?;
+    let mut evidence: Evidence = vec![("mean over the methods: ".to_owned(), together)];
     for (method, a, b) in &pairs {
-        let difference = analysis.difference(Metric::Vsd, group, *a, *b)?;
-        figures.push(format!("{method}: {difference:+.4}"));
+        let difference = judge.difference(group, *a, *b)?;
+        evidence.push((format!("{method}: "), difference));
     }
     let text = format!("{better} is better than {worse} at {label} initial VSD");
-    Some(Claim::new(
-        SECTION,
-        text,
-        ClaimVerdict::negative([&together]),
-        listed(figures),
-    ))
+    // The mean decides.
+    judge.decide(text, |all| ClaimVerdict::negative(&all[..1]), evidence)
 }

@@ -98,8 +98,8 @@ pub struct UnderlyingRecord {
 impl TrajectoryConfig {
     /// Describes the paper's setting (§VI-C.1) for some underlying pipelines and all methods.
     ///
-    /// The camera moves from 1 m to 0.4 m at 0.1 m/s. The depth has a D435's axial noise, the models
-    /// are reconstructions with errors of 5 mm and 1.1°, and starts fall into ten bins.
+    /// The camera moves from 1 m to 0.4 m at 0.1 m/s. The depth has a D435's axial noise, the
+    /// models are reconstructions with errors of 5 mm and 1.1°, and starts fall into ten bins.
     ///
     /// # Errors
     ///
@@ -132,10 +132,7 @@ impl TrajectoryConfig {
             reconstruction_voxel_m: 0.0025,
             reconstruction_max_distance_m: 0.6,
             camera: CameraRecord::default(),
-            underlying: underlying
-                .iter()
-                .map(|u| UnderlyingRecord::of(*u))
-                .collect(),
+            underlying: underlying.iter().map(UnderlyingRecord::from).collect(),
             methods: FusionRule::ALL.map(FusionRule::name).to_vec(),
             objects: subjects.iter().map(ObjectRecord::from).collect(),
         };
@@ -197,9 +194,10 @@ impl TrajectoryConfig {
     }
 }
 
-impl UnderlyingRecord {
-    /// Describes a preset with its cost in the paper's Table I, which has every preset of the paper.
-    fn of(preset: Preset) -> Self {
+impl From<&Preset> for UnderlyingRecord {
+    /// Describes a preset with its cost in the paper's Table I, which has every preset of the
+    /// paper.
+    fn from(preset: &Preset) -> Self {
         let cost = TABLE_I.iter().find(|(name, ..)| *name == preset.name());
         Self {
             name: preset.name().to_owned(),
@@ -207,7 +205,9 @@ impl UnderlyingRecord {
             seconds_per_estimate: cost.map_or(0.5, |(_, mean, _)| *mean),
         }
     }
+}
 
+impl UnderlyingRecord {
     /// Returns the pipeline, to build from.
     pub(super) fn variant(&self) -> Variant {
         Variant {

@@ -101,7 +101,7 @@ impl Design for TrajectoryConfig {
     ) -> Result<Worker<'a>, ExperimentError> {
         let mut runner = TrajectoryRunner::new(self, subjects, models)?;
         Ok(Box::new(move |object, case| {
-            runner.rows(object, case, &mut |_| ())
+            runner.outcomes(object, case, &mut |_| ())
         }))
     }
 

@@ -2,12 +2,15 @@
 
 use super::calibration;
 use super::claims::claims;
-use super::config::{TrajectoryClock, TrajectoryConfig};
+use super::config::{TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
 use crate::analysis::{Analysis, FAILURE_VSD, Metric, REPLICATES};
 use crate::claims::{Claim, listed};
-use crate::report::{Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, means};
+use crate::report::{
+    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, means, texts,
+};
 
 const AVERAGE: &str = "average";
+const PER_BIN: &str = "trajectories per object and bin";
 
 impl Reported for TrajectoryConfig {
     fn claims(&self, analysis: &Analysis) -> Vec<Claim> {
@@ -20,10 +23,8 @@ impl Reported for TrajectoryConfig {
             ..Table::headed(head)
         };
         let calibration = table(calibration::HEAD, |entry| calibration::rows(&entry.study));
-        let means: String = entries
-            .iter()
-            .map(|entry| means(&entry.analysis).html())
-            .collect();
+        let tables = entries.iter().map(|entry| means(&entry.analysis).html());
+        let means: String = tables.collect();
         let results = format!(
             "<h2>Mean VSD by initial VSD</h2>\n{means}\
              <h2>Are the covariances what the errors say?</h2>\n<p>Share of the final errors inside the ellipsoids that should hold \
@@ -36,25 +37,17 @@ impl Reported for TrajectoryConfig {
              failure_share|failure_low|failure_high|add_median_mm|n_estimates",
             Entry::summary,
         );
-        let differences = table(
-            "underlying|group|method|against|vsd_difference|low|high",
-            Entry::differences,
-        );
+        let head = "underlying|group|method|against|vsd_difference|low|high";
+        let differences = table(head, Entry::differences);
+        let rows = entries.iter().map(Entry::panels).collect();
+        let as_in_paper = "Mean VSD after the trajectory, as in Figure 7 of the paper";
+        let run = table("what|value", Entry::what_was_run);
         let is_real = |e: &Entry<Self>| e.study.config.clock == TrajectoryClock::Real;
         Document {
             title: "Sequential ICP, the study of §VI-C rerun",
-            what_was_run: (
-                table("what|value", Entry::what_was_run),
-                note(entries.iter().any(is_real)),
-            ),
+            what_was_run: (run, note(entries.iter().any(is_real))),
             claims: "The paper's findings",
-            figures: vec![(
-                "figure",
-                "Mean VSD after the trajectory, as in Figure 7 of the paper",
-                Figure {
-                    rows: entries.iter().map(Entry::panels).collect(),
-                },
-            )],
+            figures: vec![("figure", as_in_paper, Figure { rows })],
             results,
             unmade: "Trajectories that could not be made",
             differences: ("Differences from average, by group", differences),
@@ -84,37 +77,30 @@ fn note(is_real: bool) -> String {
 }
 
 impl Entry<TrajectoryConfig> {
-    /// Returns the pairs of pipeline and method with their indices in the analysis.
+    /// Returns every pipeline with every method, and their index in the analysis.
     fn pairs(&self) -> impl Iterator<Item = (&str, &str, usize)> {
         let config = &self.study.config;
-        let pairs = config
-            .underlying
-            .iter()
-            .flat_map(|u| config.methods.iter().map(move |m| (u, m)));
-        pairs
-            .zip(0..)
-            .map(|((u, m), index)| (&*u.name, &**m, index))
+        let methods = || config.methods.iter().map(String::as_str);
+        let pipelines = config.underlying.iter().map(|u| &*u.name);
+        let pairs = pipelines.flat_map(move |u| methods().map(move |m| (u, m)));
+        pairs.zip(0..).map(|((u, m), index)| (u, m, index))
     }
 
     /// Returns everything per bin, pipeline and method.
     fn summary(&self) -> Vec<Vec<String>> {
-        let mut rows = Vec::new();
+        let (analysis, mut rows) = (&self.analysis, Vec::new());
         for (underlying, method, index) in self.pairs() {
-            for (group, described) in self.analysis.groups().iter().enumerate() {
-                let Some(cell) = self.analysis.cell(group, index) else {
+            for (group, described) in analysis.groups().iter().enumerate() {
+                let Some(cell) = analysis.cell(group, index) else {
                     continue;
                 };
-                let mut row = [underlying, method, &described.label]
-                    .map(str::to_owned)
-                    .to_vec();
+                let mut row = texts(&[underlying, method, &described.label]);
                 row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
                 for metric in [Metric::Vsd, Metric::Failure] {
-                    row.extend(ends(self.analysis.mean(metric, group, index)));
+                    row.extend(ends(analysis.mean(metric, group, index)));
                 }
-                row.extend([
-                    fixed(Some(cell.add_median_mm), 3),
-                    fixed(Some(cell.steps), 2),
-                ]);
+                row.push(fixed(Some(cell.add_median_mm), 3));
+                row.push(fixed(Some(cell.steps), 2));
                 rows.push(row);
             }
         }
@@ -123,20 +109,17 @@ impl Entry<TrajectoryConfig> {
 
     /// Returns the paired differences of every method from `average`, per pipeline and group.
     fn differences(&self) -> Vec<Vec<String>> {
-        let mut rows = Vec::new();
+        let (analysis, mut rows) = (&self.analysis, Vec::new());
         for (underlying, method, index) in self.pairs().filter(|pair| pair.1 != AVERAGE) {
             let average = TrajectoryConfig::variant(underlying, AVERAGE);
-            let Some(average) = self.analysis.variant(&average) else {
+            let Some(average) = analysis.variant(&average) else {
                 continue;
             };
-            for (group, described) in self.analysis.groups().iter().enumerate() {
-                let difference = self.analysis.difference(Metric::Vsd, group, index, average);
-                if difference.is_some() {
-                    let names = [underlying, &described.label, method, AVERAGE];
-                    rows.push(
-                        [names.map(str::to_owned).to_vec(), ends(difference).to_vec()].concat(),
-                    );
-                }
+            for (group, described) in analysis.groups().iter().enumerate() {
+                let difference = analysis.difference(Metric::Vsd, group, index, average);
+                let mut row = texts(&[underlying, &described.label, method, AVERAGE]);
+                row.extend(ends(difference));
+                rows.extend(difference.map(|_| row));
             }
         }
         rows
@@ -155,30 +138,25 @@ impl Entry<TrajectoryConfig> {
             curves,
         };
         let paper = config.paper_methods();
-        let beyond = config
-            .methods
-            .iter()
-            .map(String::as_str)
-            .filter(|m| !paper.contains(m));
-        let beyond: Vec<&str> = std::iter::once(AVERAGE).chain(beyond).collect();
+        let mut beyond: Vec<&str> = config.methods.iter().map(String::as_str).collect();
+        beyond.retain(|m| !paper.contains(m));
+        beyond.insert(0, AVERAGE);
+        let curve = |(variant, style)| Curve::of(&self.analysis, variant, style);
         let curves = |underlying: &str, methods: &[&str], style: usize| -> Vec<Curve> {
-            let variant = |m| {
-                self.analysis
-                    .variant(&TrajectoryConfig::variant(underlying, m))
-            };
-            let found = methods.iter().filter_map(|m| variant(m)).zip(style..);
-            found
-                .map(|(v, style)| Curve::of(&self.analysis, v, style))
-                .collect()
+            let names = methods
+                .iter()
+                .map(|m| TrajectoryConfig::variant(underlying, m));
+            let found = names.filter_map(|name| self.analysis.variant(&name));
+            found.zip(style..).map(curve).collect()
         };
         let mut panels: Vec<Panel> = Vec::new();
         let mut together = Vec::new();
         for (index, u) in config.underlying.iter().enumerate() {
             let mut alone = curves(&u.name, &paper, 0);
             // The title of the panel names the pipeline.
-            alone
-                .iter_mut()
-                .for_each(|curve| drop(curve.label.drain(..=u.name.len())));
+            for curve in &mut alone {
+                curve.label.drain(..=u.name.len());
+            }
             panels.push(panel(&u.name, alone));
             together.extend(curves(&u.name, &beyond, index * beyond.len()));
         }
@@ -188,53 +166,41 @@ impl Entry<TrajectoryConfig> {
 
     fn what_was_run(&self) -> Vec<Vec<String>> {
         let c = &self.study.config;
-        let costs = c
-            .underlying
-            .iter()
-            .enumerate()
-            .map(|(index, u)| match c.clock {
-                TrajectoryClock::Cost => format!(
-                    "{}: {} s per estimate, {:.4} m, {} images",
-                    u.name,
-                    u.seconds_per_estimate,
-                    c.step_m(index),
-                    c.n_images(index)
-                ),
-                TrajectoryClock::Real => format!("{}: as long as it took", u.name),
-            });
+        let cost = |(index, u): (usize, &UnderlyingRecord)| {
+            let (name, seconds) = (&u.name, u.seconds_per_estimate);
+            let (step, images) = (c.step_m(index), c.n_images(index));
+            match c.clock {
+                TrajectoryClock::Cost => {
+                    format!("{name}: {seconds} s per estimate, {step:.4} m, {images} images")
+                }
+                TrajectoryClock::Real => format!("{name}: as long as it took"),
+            }
+        };
+        let costs = c.underlying.iter().enumerate().map(cost);
+        let (from, over, speed) = (c.start_distance_m, c.path_m, c.speed_m_s);
+        let (images, voxel) = (c.reconstruction_images, c.reconstruction_voxel_m);
+        let (meters, degrees) = (
+            c.reconstruction_translation_m,
+            c.reconstruction_rotation_deg,
+        );
+        let reconstruction =
+            format!("{images} images, {meters} m, {degrees}°, voxels of {voxel} m");
         let [c0, c1, c2] = c.depth_noise_m;
         let fields = [
             ("version", c.version.clone()),
             ("seed", c.seed.to_string()),
             ("objects", self.objects()),
-            (
-                "trajectories per object and bin",
-                c.trajectories.to_string(),
-            ),
+            (PER_BIN, c.trajectories.to_string()),
             ("rows", self.rows()),
             ("pipelines", listed(costs)),
             (
                 "path",
-                format!(
-                    "from {} m over {} m at {} m/s",
-                    c.start_distance_m, c.path_m, c.speed_m_s
-                ),
+                format!("from {from} m over {over} m at {speed} m/s"),
             ),
-            (
-                "reconstruction",
-                format!(
-                    "{} images, {} m, {}°, voxels of {} m",
-                    c.reconstruction_images,
-                    c.reconstruction_translation_m,
-                    c.reconstruction_rotation_deg,
-                    c.reconstruction_voxel_m
-                ),
-            ),
+            ("reconstruction", reconstruction),
             ("depth noise", format!("σ = {c0} + {c1} z + {c2} z² m")),
         ];
-        fields
-            .into_iter()
-            .map(|(name, value)| vec![name.to_owned(), value])
-            .collect()
+        let line = |(name, value): (&str, String)| vec![name.to_owned(), value];
+        fields.into_iter().map(line).collect()
     }
 }

@@ -1,4 +1,4 @@
-//! How the estimates along a trajectory are fused.
+//! The methods that fuse the estimates along a trajectory.
 
 use hicp_core::{Isometry3, Model};
 use hybrid_icp::fusion::{
@@ -7,22 +7,23 @@ use hybrid_icp::fusion::{
 };
 use hybrid_icp::{BoxedStage, Calibration, MeanVsd, Preset, SequentialConfig, SequentialEstimator};
 
-/// A method of §V-A as the study runs it, or one behind this project's gate.
+/// A method of §V-A as the study runs it, or one behind a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FusionRule {
-    /// The paper's method: covariances e_MVE·U with U the unit about the object (rotations count by its radius), carried by the
-    /// adjoint; no gate, no symmetries.
+    /// The paper's method: covariances e_MVE·U with U the unit about the object (rotations count by
+    /// its radius), carried by the adjoint; no gate, no symmetries.
     Plain(FusionMethod),
-    /// The same, but estimates with an MVE above 0.4 are left out and symmetric poses are brought together:
-    /// [`SequentialEstimator::for_object`].
+    /// The same, but estimates with an MVE above 0.4 are left out and symmetric poses are brought
+    /// together: [`SequentialEstimator::for_object`].
     Gated(FusionMethod),
-    /// As `Gated`, with the covariance of the registration, calibrated to the pipeline: [`SequentialEstimator::calibrated`].
+    /// As `Gated`, with the covariance of the registration, calibrated to the pipeline:
+    /// [`SequentialEstimator::calibrated`].
     Calibrated(FusionMethod),
 }
 
 impl FusionRule {
-    /// The paper's six methods in its order, then what goes beyond it.
+    /// The paper's six methods in its order, then those beyond the paper.
     pub const ALL: [Self; 10] = [
         Self::Plain(FusionMethod::LastEstimate),
         Self::Plain(FusionMethod::Average),
@@ -36,7 +37,7 @@ impl FusionRule {
         Self::Calibrated(FusionMethod::MostConfident),
     ];
 
-    /// What a message says that a name should have been.
+    /// The expected names, for messages.
     pub(crate) const EXPECTED: &str =
         "a method of the paper, or one of those that gated- and calibrated- are put before";
 
@@ -50,7 +51,8 @@ impl FusionRule {
         }
     }
 
-    /// Returns the rule of a name; any method may be gated or calibrated, not only those of [`FusionRule::ALL`].
+    /// Returns the rule of a name; any method may be gated or calibrated, not only those of
+    /// [`FusionRule::ALL`].
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let of = |rule: fn(FusionMethod) -> Self, method: &str| method.parse().ok().map(rule);
@@ -67,8 +69,10 @@ impl FusionRule {
         matches!(self, Self::Plain(_))
     }
 
-    /// Returns the probability that the squared Mahalanobis distance of the final pose from the truth is at most so much, by the
-    /// distribution that the rule assumes with an underlying pipeline.
+    /// Returns the probability that the squared Mahalanobis distance of the final pose from the
+    /// truth is at most this large.
+    ///
+    /// By the distribution that the rule assumes with an underlying pipeline.
     pub(crate) fn probability_within(self, pipeline: &str, mahalanobis_squared: f64) -> f64 {
         match self {
             Self::Calibrated(_) => calibration(pipeline).probability_within(mahalanobis_squared),
@@ -76,7 +80,8 @@ impl FusionRule {
         }
     }
 
-    /// Makes an estimator that starts from `init` in the first camera frame; `pipeline` is the name of the underlying one.
+    /// Creates an estimator that starts from `init` in the first camera frame; `pipeline` is the
+    /// name of the underlying pipeline.
     pub(crate) fn estimator(
         self,
         stage: BoxedStage,
@@ -110,7 +115,7 @@ impl FusionRule {
     }
 }
 
-/// The calibration for a pipeline by its name; that of `hybrid` for one that is no preset.
+/// Returns the calibration for a pipeline by its name; that of `hybrid` if it is not a preset.
 fn calibration(pipeline: &str) -> Calibration {
     Calibration::of(pipeline.parse().unwrap_or(Preset::Hybrid))
 }

@@ -13,14 +13,14 @@ use super::rule::FusionRule;
 use super::trajectory::Trajectory;
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
-use crate::study::{Design, Fields, Measured, Models, Row};
+use crate::study::{Design, Fields, Measured, Models, Outcome};
 use crate::subject::Subject;
 use crate::variant::Variant;
 
 type Failed = Box<dyn Error>;
 type Watch<'w> = &'w mut dyn FnMut(&TrajectoryStep<'_>);
 
-/// Makes the rows of trajectories; one per thread.
+/// Evaluates trajectories; one per thread.
 pub(super) struct TrajectoryRunner<'a> {
     config: &'a TrajectoryConfig,
     subjects: &'a [Subject],
@@ -80,14 +80,15 @@ impl TrajectoryStep<'_> {
     }
 }
 
-/// Travels trajectories of every object and calls `watch` with each step of every pipeline and method.
+/// Travels trajectories of every object and calls `watch` with each step of every pipeline and
+/// method.
 ///
 /// For figures that the rows do not hold.
 ///
 /// # Errors
 ///
-/// [`ExperimentError`] when the configuration is invalid or a pipeline cannot be built. A trajectory
-/// that cannot be made has no steps.
+/// [`ExperimentError`] when the configuration is invalid or a pipeline cannot be built. A
+/// trajectory that cannot be made has no steps.
 pub fn watch_trajectories(
     config: &TrajectoryConfig,
     subjects: &[Subject],
@@ -99,7 +100,7 @@ pub fn watch_trajectories(
     let mut runner = TrajectoryRunner::new(config, subjects, &models)?;
     for index in trajectories {
         for object in 0..subjects.len() {
-            runner.rows(object, index, watch);
+            runner.outcomes(object, index, watch);
         }
     }
     Ok(())
@@ -113,14 +114,12 @@ impl<'a> TrajectoryRunner<'a> {
     ) -> Result<Self, ExperimentError> {
         let camera = config.camera.pinhole()?;
         let underlying: Vec<Variant> = config.underlying.iter().map(|u| u.variant()).collect();
-        underlying
-            .iter()
-            .try_for_each(|u| u.build(None).map(drop))?;
+        for variant in &underlying {
+            variant.build(None)?;
+        }
         // Unknown methods were refused with the configuration.
-        let rules = config
-            .methods
-            .iter()
-            .filter_map(|name| FusionRule::from_name(name));
+        let rules = config.methods.iter().map(String::as_str);
+        let rules = rules.filter_map(FusionRule::from_name);
         Ok(Self {
             config,
             subjects,
@@ -132,40 +131,31 @@ impl<'a> TrajectoryRunner<'a> {
         })
     }
 
-    /// Makes the rows of a trajectory: underlying pipelines in order, and in each the methods in order.
+    /// Evaluates a trajectory: underlying pipelines in order, and in each the methods in order.
     ///
-    /// All get the same path, the same start and the same model. By the clock of costs, all methods of
-    /// a pipeline get the same images. `watch` is called with every step.
-    pub(super) fn rows(&mut self, object: usize, index: u64, watch: Watch<'_>) -> Vec<Row> {
-        let (config, subject) = (self.config, &self.subjects[object]);
+    /// All get the same path, the same start and the same model. By the clock of costs, all methods
+    /// of a pipeline get the same images. `watch` is called with every step.
+    pub(super) fn outcomes(&mut self, object: usize, index: u64, watch: Watch<'_>) -> Vec<Outcome> {
         let drawn = self.draw(object, index);
-        let mut rows = Vec::new();
-        for (underlying, record) in config.underlying.iter().enumerate() {
-            let traveled =
-                drawn
-                    .as_ref()
-                    .map_err(Clone::clone)
-                    .and_then(|(trajectory, believed)| {
-                        let journey = Journey {
-                            object,
-                            index,
-                            underlying,
-                            trajectory,
-                            believed,
-                        };
-                        self.travel(&journey, watch).map_err(|e| e.to_string())
-                    });
-            rows.extend(config.methods.iter().enumerate().map(|(method, name)| Row {
-                object: subject.name.clone(),
-                case: index,
-                bin: drawn.as_ref().ok().map(|(trajectory, _)| trajectory.bin),
-                setting: record.name.clone(),
-                variant: name.clone(),
-                measured: traveled.as_ref().ok().map(|all| all[method].clone()),
-                note: traveled.as_ref().err().cloned().unwrap_or_default(),
-            }));
+        let mut outcomes = Vec::new();
+        for underlying in 0..self.underlying.len() {
+            let drawn = drawn.as_ref().map_err(Clone::clone);
+            let traveled = drawn.and_then(|(trajectory, believed)| {
+                let journey = Journey {
+                    object,
+                    index,
+                    underlying,
+                    trajectory,
+                    believed,
+                };
+                self.travel(&journey, watch).map_err(|e| e.to_string())
+            });
+            match traveled {
+                Ok(all) => outcomes.extend(all.into_iter().map(Ok)),
+                Err(error) => outcomes.extend(vec![Err(error); self.rules.len()]),
+            }
         }
-        rows
+        outcomes
     }
 
     /// Draws a trajectory, and reconstructs the model.
@@ -173,9 +163,8 @@ impl<'a> TrajectoryRunner<'a> {
         let (config, subject) = (self.config, &self.subjects[object]);
         let (model, name) = (&subject.model, &subject.name);
         let believed = self.models.get(object, 0, || {
-            Ok(config
-                .reconstruction()?
-                .reconstruct(model, name, config.seed)?)
+            let settings = config.reconstruction()?;
+            Ok(settings.reconstruct(model, name, config.seed)?)
         })?;
         let trajectory = Trajectory::draw(config, &mut self.scorer, model, name, index)?;
         Ok((trajectory, believed))
@@ -208,7 +197,8 @@ impl<'a> TrajectoryRunner<'a> {
         Ok(all)
     }
 
-    /// Takes some estimators along the path on the same images; returns the true pose where it ends.
+    /// Takes some estimators along the path on the same images; returns the true pose where it
+    /// ends.
     fn go(
         &self,
         journey: &Journey<'_>,

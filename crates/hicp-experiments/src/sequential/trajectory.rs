@@ -1,4 +1,4 @@
-//! The camera's path, and the pose to start from (§VI-C.1).
+//! The camera's path, and the initial pose (§VI-C.1).
 
 use hicp_core::{Isometry3, Model, Translation3, Vector3};
 use hicp_sim::{CaseMaker, VsdBins, object_pose, perturb, rotation_of, stream, unit_vector};
@@ -6,14 +6,15 @@ use rand::RngExt;
 
 use super::config::TrajectoryConfig;
 
-/// A straight path toward a point near the object, without turning, and a start in a bin of the initial VSD.
+/// A straight path toward a point near the object, without rotation, and a start in a bin of the
+/// initial VSD.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Trajectory {
     /// The true pose in the first camera frame.
     pub(crate) camera_from_object: Isometry3<f64>,
-    /// Where the camera moves, a unit vector in its frame.
+    /// Direction of the camera's motion, a unit vector in its frame.
     pub(crate) direction: Vector3<f64>,
-    /// The pose to start from, in the first camera frame.
+    /// The initial pose, in the first camera frame.
     pub(crate) init: Isometry3<f64>,
     /// Mean VSD of `init` against the truth in the first camera frame, with the original model.
     pub(crate) vsd_initial: f64,
@@ -24,7 +25,8 @@ pub(crate) struct Trajectory {
 impl Trajectory {
     /// Draws the trajectory of an index; its bin is the index modulo their number.
     ///
-    /// A start is looked for around one path for a number of tries before another path is drawn, as in the single-image studies.
+    /// Tries a number of starts around one path before it draws another path, as the single-image
+    /// studies do.
     pub(crate) fn draw(
         config: &TrajectoryConfig,
         scorer: &mut CaseMaker,
@@ -72,7 +74,7 @@ impl Trajectory {
         ))
     }
 
-    /// The motion of the camera when it travels so far: the next camera frame from the one before.
+    /// Returns the motion of the camera over a distance: the next camera frame from the one before.
     pub(crate) fn motion(&self, meters: f64) -> Isometry3<f64> {
         let moved = Translation3::from(-self.direction * meters);
         Isometry3::from_parts(moved, hicp_core::UnitQuaternion::identity())

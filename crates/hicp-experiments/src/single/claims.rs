@@ -3,7 +3,7 @@
 use super::aims::aims;
 use super::experiment::Experiment;
 use crate::analysis::{Analysis, FAILURE_VSD, Interval, Metric};
-use crate::claims::{Claim, ClaimVerdict, listed};
+use crate::claims::{Claim, ClaimVerdict, Evidence, Judge, listed};
 use crate::study::{HIGH, LOW, NOISY};
 
 /// The order of Table I, fastest first: means and standard deviations of the times, seconds.
@@ -26,353 +26,301 @@ const CASCADE: &str = "projective-cascade-point-plane";
 /// Tests the claims about a study; those whose variants it lacks are left out.
 #[must_use]
 pub fn claims(experiment: Experiment, analysis: &Analysis) -> Vec<Claim> {
-    let judge = |section| Judge { analysis, section };
+    let digits = 3;
+    let judge = |section| Judge {
+        analysis,
+        section,
+        digits,
+    };
     let found = match experiment {
-        Experiment::InitNoise => {
-            let judge = judge("§VI-B.1");
-            vec![
-                judge.lowest_everywhere("initial VSD"),
-                judge.hybrid_lowest(Some(analysis.overall()), "over all bins"),
-                judge.hybrid_beats_cascade(),
-                judge.projective_best_low(),
-                judge.nn_best_high(),
-                judge.fails_high("projective-", "projective"),
-                judge.fails_high("nn-", "nearest-neighbour"),
-                judge.nn_cascades(),
-            ]
-        }
+        Experiment::InitNoise => of_initial_poses(judge("§VI-B.1")),
         Experiment::DepthNoise => {
             let judge = judge("§VI-B.2");
-            let mut found = judge.noise("depth noise", "over 1 to 5 % depth noise");
-            let all = judge.family("").into_iter();
-            found.extend(all.map(|variant| judge.improves_with_little_noise(variant)));
+            let mut found = of_noise(judge, "depth noise", "1 to 5 % depth noise");
+            found.extend(
+                family(judge, "")
+                    .iter()
+                    .map(|v| improves_with_little_noise(judge, *v)),
+            );
             found
         }
         Experiment::ModelNoise => {
-            judge("§VI-B.3").noise("model noise", "over reconstructions 1 to 4")
+            of_noise(judge("§VI-B.3"), "model noise", "reconstructions 1 to 4")
         }
-        Experiment::Timing => {
-            vec![
-                judge("§VI-B.4").projective_fastest(),
-                judge("Table I").table_order(),
-            ]
-        }
-        Experiment::Alpha => vec![judge("§IV-A").alpha()],
-        Experiment::Beyond => return aims(analysis),
+        Experiment::Timing => vec![
+            projective_fastest(judge("§VI-B.4")),
+            table_order(judge("Table I")),
+        ],
+        Experiment::Alpha => vec![alpha(judge("§IV-A"))],
+        Experiment::Beyond => aims(judge("aim")),
     };
     found.into_iter().flatten().collect()
 }
 
-struct Judge<'a> {
-    analysis: &'a Analysis,
-    /// The section of the claims.
-    section: &'static str,
+fn of_initial_poses(judge: Judge<'_>) -> Vec<Option<Claim>> {
+    vec![
+        lowest_everywhere(judge, "initial VSD"),
+        hybrid_lowest(judge, Some(judge.analysis.overall()), "all bins"),
+        hybrid_beats_cascade(judge),
+        projective_best_low(judge),
+        nn_best_high(judge),
+        fails_high(judge, "projective-", "projective"),
+        fails_high(judge, "nn-", "nearest-neighbour"),
+        nn_cascades(judge),
+    ]
 }
 
-impl Judge<'_> {
-    #[allow(clippy::unnecessary_wraps, reason = "how every test of a claim ends")]
-    fn claim(
-        &self,
-        text: impl Into<String>,
-        verdict: ClaimVerdict,
-        figures: impl Into<String>,
-    ) -> Option<Claim> {
-        Some(Claim::new(self.section, text, verdict, figures))
-    }
+fn of_noise(judge: Judge<'_>, noise: &str, over: &str) -> Vec<Option<Claim>> {
+    vec![
+        lowest_everywhere(judge, noise),
+        hybrid_lowest(judge, judge.analysis.group(NOISY), over),
+        less_susceptible(judge, noise),
+    ]
+}
 
-    fn name(&self, variant: usize) -> &str {
-        &self.analysis.variants()[variant]
-    }
+/// Returns the variants whose names start with a prefix.
+fn family(judge: Judge<'_>, prefix: &str) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..judge.analysis.variants().len()).collect();
+    all.retain(|v| judge.name(*v).starts_with(prefix));
+    all
+}
 
-    fn vsd(&self, group: usize, variant: usize) -> Option<Interval> {
-        self.analysis.mean(Metric::Vsd, group, variant)
-    }
+/// Returns the variant with the lowest mean in a group, with that mean.
+fn lowest(judge: Judge<'_>, group: usize, among: &[usize]) -> Option<(usize, Interval)> {
+    let means = among
+        .iter()
+        .filter_map(|v| Some((*v, judge.vsd(group, *v)?)));
+    means.min_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))
+}
 
-    /// Returns the variants whose names start with a prefix.
-    fn family(&self, prefix: &str) -> Vec<usize> {
-        let all = 0..self.analysis.variants().len();
-        all.filter(|v| self.name(*v).starts_with(prefix)).collect()
-    }
+/// Decides that a variant is lower than each of the others; lists the differences, worst first.
+fn lower_than_each(
+    judge: Judge<'_>,
+    text: String,
+    group: usize,
+    (a, others): (usize, &[usize]),
+) -> Option<Claim> {
+    let label = |b: usize| format!("against {}: ", judge.name(b));
+    let difference = |b: &usize| Some((label(*b), judge.difference(group, a, *b)?));
+    let mut evidence: Evidence = others.iter().filter_map(difference).collect();
+    evidence.sort_by(|x, y| y.1.estimate.total_cmp(&x.1.estimate));
+    judge.decide(text, ClaimVerdict::negative, evidence)
+}
 
-    /// Returns the variant with the lowest mean in a group, with that mean.
-    fn lowest(&self, group: usize, among: &[usize]) -> Option<(usize, Interval)> {
-        let means = among
-            .iter()
-            .filter_map(|v| Some((*v, self.vsd(group, *v)?)));
-        means.min_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))
-    }
+fn hybrid_lowest(judge: Judge<'_>, group: Option<usize>, over: &str) -> Option<Claim> {
+    let hybrid = judge.analysis.variant(HYBRID)?;
+    let mut others = family(judge, "");
+    others.retain(|v| *v != hybrid);
+    let text = format!("hybrid has a lower mean VSD than each other variant over {over}");
+    lower_than_each(judge, text, group?, (hybrid, &others))
+}
 
-    /// Returns the differences of a variant from others that are there, with their names.
-    fn against(&self, group: usize, a: usize, others: &[usize]) -> Vec<(&str, Interval)> {
-        let difference = |b: &usize| self.analysis.difference(Metric::Vsd, group, a, *b);
-        let others = others.iter();
-        others
-            .filter_map(|b| Some((self.name(*b), difference(b)?)))
-            .collect()
-    }
-
-    /// Decides "a is lower than each of the others"; the figures list the differences, worst first.
-    fn lower_than_each(
-        &self,
-        group: usize,
-        a: usize,
-        others: &[usize],
-    ) -> Option<(ClaimVerdict, String)> {
-        let mut differences = self.against(group, a, others);
-        differences.sort_by(|x, y| y.1.estimate.total_cmp(&x.1.estimate));
-        differences.first()?;
-        let verdict = ClaimVerdict::negative(differences.iter().map(|d| &d.1));
-        let figures = differences
-            .iter()
-            .map(|(name, i)| format!("against {name}: {i:+}"));
-        Some((verdict, listed(figures)))
-    }
-
-    fn hybrid_lowest(&self, group: Option<usize>, over: &str) -> Option<Claim> {
-        let hybrid = self.analysis.variant(HYBRID)?;
-        let others: Vec<usize> = self
-            .family("")
-            .into_iter()
-            .filter(|v| *v != hybrid)
-            .collect();
-        let (verdict, figures) = self.lower_than_each(group?, hybrid, &others)?;
-        let text = format!("hybrid has a lower mean VSD than each other variant {over}");
-        self.claim(text, verdict, figures)
-    }
-
-    fn lowest_everywhere(&self, along: &str) -> Option<Claim> {
-        let hybrid = self.analysis.variant(HYBRID)?;
-        let (mut first, mut tied, mut behind) = (0, Vec::new(), Vec::new());
-        for (group, described) in self.analysis.groups().iter().enumerate() {
-            let best = self
-                .lowest(group, &self.family(""))
-                .filter(|_| described.single);
-            let Some((best, lowest)) = best else {
-                continue;
-            };
-            let (label, ours) = (&described.label, self.vsd(group, hybrid)?.estimate);
-            let text = format!("{label}: {ours:.3}, {} {lowest}", self.name(best));
-            if best == hybrid {
-                first += 1;
-            } else if ours <= lowest.high {
-                tied.push(text);
-            } else {
-                behind.push(text);
-            }
-        }
-        let steps = first + tied.len() + behind.len();
-        let verdict = ClaimVerdict::of(behind.is_empty());
-        let mut figures = vec![format!("lowest at {first} of {steps}")];
-        for (what, items) in [("within the interval", tied), ("behind", behind)] {
-            if !items.is_empty() {
-                figures.push(format!("{what} ({})", listed(items)));
-            }
-        }
-        let text = format!(
-            "hybrid is the lowest, or within the interval of the lowest, at every step of {along}"
-        );
-        self.claim(text, verdict, listed(figures))
-    }
-
-    fn hybrid_beats_cascade(&self) -> Option<Claim> {
-        let (low, hybrid) = (self.analysis.group(LOW)?, self.analysis.variant(HYBRID)?);
-        let cascade = self.analysis.variant(CASCADE)?;
-        let difference = self
-            .analysis
-            .difference(Metric::Vsd, low, hybrid, cascade)?;
-        let text = format!("hybrid outperforms {CASCADE} even at low initial VSD (below 0.3)");
-        self.claim(
-            text,
-            ClaimVerdict::negative([&difference]),
-            format!("{difference:+}"),
-        )
-    }
-
-    fn projective_best_low(&self) -> Option<Claim> {
-        let low = self.analysis.group(LOW)?;
-        let (projective, mean) = self.lowest(low, &self.family("projective-"))?;
-        let (verdict, figures) = self.lower_than_each(low, projective, &self.family("nn-"))?;
-        let text = format!(
-            "at low initial VSD (below 0.3) a projective variant is best among those with a fixed association (here {}, {mean})",
-            self.name(projective)
-        );
-        self.claim(text, verdict, figures)
-    }
-
-    fn nn_best_high(&self) -> Option<Claim> {
-        let (high, nn) = (self.analysis.group(HIGH)?, self.analysis.variant(NN)?);
-        let mut fixed = self.family("");
-        fixed.retain(|v| *v != nn && self.name(*v) != HYBRID);
-        let (verdict, figures) = self.lower_than_each(high, nn, &fixed)?;
-        let text = format!(
-            "at high initial VSD (0.7 and above) {NN} ({}) is best among those with a fixed association",
-            self.vsd(high, nn)?
-        );
-        self.claim(text, verdict, figures)
-    }
-
-    fn fails_high(&self, prefix: &str, kind: &str) -> Option<Claim> {
-        let high = self.analysis.group(HIGH)?;
-        let family = self.family(prefix).into_iter();
-        let means: Vec<(usize, Interval)> = family
-            .filter_map(|v| Some((v, self.vsd(high, v)?)))
-            .collect();
-        means.first()?;
-        let missing: Vec<Interval> = means.iter().map(|m| m.1.from(FAILURE_VSD)).collect();
-        let figures = means.iter().map(|(v, mean)| {
-            let failed = self.analysis.mean(Metric::Failure, high, *v);
-            let percent = 100.0 * failed.map_or(0.0, |f| f.estimate);
-            format!("{}: {mean}, {percent:.0} % above 0.3", self.name(*v))
-        });
-        let text = format!("every {kind} variant fails (mean VSD above 0.3) at high initial VSD");
-        self.claim(text, ClaimVerdict::negative(&missing), listed(figures))
-    }
-
-    /// Decides "no better": a significantly lower mean refutes it, means that are not lower confirm it.
-    fn nn_cascades(&self) -> Option<Claim> {
-        let (all, nn) = (self.analysis.overall(), self.analysis.variant(NN)?);
-        let family = self.family("nn-cascade-").into_iter();
-        let difference = |v| self.analysis.difference(Metric::Vsd, all, v, nn);
-        let differences: Vec<(usize, Interval)> =
-            family.filter_map(|v| Some((v, difference(v)?))).collect();
-        differences.first()?;
-        let verdict = if differences.iter().any(|(_, i)| i.high < 0.0) {
-            ClaimVerdict::DoesNotHold
-        } else if differences.iter().all(|(_, i)| i.estimate >= 0.0) {
-            ClaimVerdict::Holds
-        } else {
-            ClaimVerdict::NotSignificant
+fn lowest_everywhere(judge: Judge<'_>, along: &str) -> Option<Claim> {
+    let hybrid = judge.analysis.variant(HYBRID)?;
+    let (mut first, mut tied, mut behind) = (0, Vec::new(), Vec::new());
+    let groups = judge.analysis.groups().iter().enumerate();
+    for (group, described) in groups.filter(|(_, group)| group.single) {
+        let Some((best, mean)) = lowest(judge, group, &family(judge, "")) else {
+            continue;
         };
-        let figures = differences.iter();
-        let figures = figures.map(|(v, i)| format!("{} − {NN}: {i:+}", self.name(*v)));
-        let text = "cascading is no better than point-to-point with nearest neighbours";
-        self.claim(text, verdict, listed(figures))
-    }
-
-    /// Tests the claims about a kind of noise.
-    fn noise(&self, noise: &str, over: &str) -> Vec<Option<Claim>> {
-        vec![
-            self.lowest_everywhere(noise),
-            self.hybrid_lowest(self.analysis.group(NOISY), over),
-            self.less_susceptible(noise),
-        ]
-    }
-
-    /// Compares the rise of the mean from no noise to noise, projective against nearest neighbors.
-    fn less_susceptible(&self, noise: &str) -> Option<Claim> {
-        let (none, noisy) = (0, self.analysis.group(NOISY)?);
-        let rise = |prefix: &str, factor: f64| -> Option<Vec<(usize, usize, f64)>> {
-            let family = self.family(prefix);
-            family.first()?;
-            let share = factor / family.len() as f64;
-            let terms = family
-                .iter()
-                .flat_map(|v| [(noisy, *v, share), (none, *v, -share)]);
-            Some(terms.collect())
-        };
-        let of = |terms: &[(usize, usize, f64)]| self.analysis.contrast(Metric::Vsd, terms);
-        let (projective, nearest) = (rise("projective-", 1.0)?, rise("nn-", 1.0)?);
-        let difference = of(&[&projective[..], &rise("nn-", -1.0)?].concat())?;
-        let (projective, nearest) = (of(&projective)?, of(&nearest)?);
-        self.claim(
-            format!("projective variants are less susceptible to {noise} than those with nearest neighbours (rise of the mean VSD from none)"),
-            ClaimVerdict::negative([&difference]),
-            format!("projective {projective:+}, nearest neighbours {nearest:+}, difference {difference:+}"),
-        )
-    }
-
-    fn improves_with_little_noise(&self, variant: usize) -> Option<Claim> {
-        let name = self.name(variant);
-        if !(name.ends_with("point-to-plane") || name.contains("-cascade-")) {
-            return None;
+        let ours = judge.vsd(group, hybrid)?.estimate;
+        let text = format!(
+            "{}: {ours:.3}, {} {mean}",
+            described.label,
+            judge.name(best)
+        );
+        match best == hybrid {
+            true => first += 1,
+            false if ours <= mean.high => tied.push(text),
+            false => behind.push(text),
         }
-        let (none, little) = (self.analysis.group("0")?, self.analysis.group("1")?);
-        let terms = [(little, variant, 1.0), (none, variant, -1.0)];
-        let change = self.analysis.contrast(Metric::Vsd, &terms)?;
-        let text = format!("{name} improves from 0 % to 1 % depth noise");
-        self.claim(
-            text,
-            ClaimVerdict::negative([&change]),
-            format!("{change:+}"),
-        )
     }
+    let verdict = ClaimVerdict::of(behind.is_empty(), !behind.is_empty());
+    let steps = first + tied.len() + behind.len();
+    let mut figures = vec![format!("lowest at {first} of {steps}")];
+    let others = [("within the interval", tied), ("behind", behind)];
+    let others = others.into_iter().filter(|(_, items)| !items.is_empty());
+    figures.extend(others.map(|(what, items)| format!("{what} ({})", listed(items))));
+    let text = "hybrid is the lowest, or within the interval of the lowest, at every step of";
+    judge.claim(format!("{text} {along}"), verdict, listed(figures))
+}
 
-    /// Returns the difference of the mean times of two variants.
-    fn time(&self, a: usize, b: usize) -> Option<Interval> {
-        let all = self.analysis.overall();
-        self.analysis.difference(Metric::CpuMs, all, a, b)
-    }
+fn hybrid_beats_cascade(judge: Judge<'_>) -> Option<Claim> {
+    let (low, cascade) = (judge.analysis.group(LOW)?, judge.analysis.variant(CASCADE)?);
+    let difference = judge.difference(low, judge.analysis.variant(HYBRID)?, cascade)?;
+    let text = format!("hybrid outperforms {CASCADE} even at low initial VSD (below 0.3)");
+    judge.decide(
+        text,
+        ClaimVerdict::negative,
+        vec![(String::new(), difference)],
+    )
+}
 
-    fn projective_fastest(&self) -> Option<Claim> {
-        let projective = self.family("projective-");
-        let mut slow = self.family("");
-        slow.retain(|v| !projective.contains(v));
-        let pairs = projective
-            .iter()
-            .flat_map(|p| slow.iter().map(|s| (*p, *s)));
-        let contrasts: Vec<Interval> = pairs.filter_map(|(p, s)| self.time(p, s)).collect();
-        let nearest = contrasts
-            .iter()
-            .max_by(|a, b| a.estimate.total_cmp(&b.estimate))?;
-        self.claim(
-            "every projective variant is faster than hybrid and than every variant with nearest neighbours",
-            ClaimVerdict::negative(&contrasts),
-            format!("the nearest pair differs by {nearest:+} ms"),
-        )
-    }
+fn projective_best_low(judge: Judge<'_>) -> Option<Claim> {
+    let low = judge.analysis.group(LOW)?;
+    let (best, mean) = lowest(judge, low, &family(judge, "projective-"))?;
+    let text = format!(
+        "at low initial VSD (below 0.3) a projective variant is best among those with a fixed association (here {}, {mean})",
+        judge.name(best)
+    );
+    lower_than_each(judge, text, low, (best, &family(judge, "nn-")))
+}
 
-    fn table_order(&self) -> Option<Claim> {
-        let all = self.analysis.overall();
-        let order = TABLE_I.iter().map(|(name, ..)| self.analysis.variant(name));
-        let order: Vec<usize> = order.collect::<Option<_>>()?;
-        let pairs = order.windows(2).map(|pair| self.time(pair[0], pair[1]));
-        let pairs: Vec<Interval> = pairs.collect::<Option<_>>()?;
-        let mean = |v| Some(self.analysis.mean(Metric::CpuMs, all, v)?.estimate);
-        let unit = mean(self.analysis.variant(NN)?)?;
-        let ratios = order.iter().map(|v| Some((*v, mean(*v)? / unit)));
-        // The places in Table I, fastest here first.
-        let mut ranked: Vec<(usize, (usize, f64))> = ratios.flatten().enumerate().collect();
-        ranked.sort_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let agreeing = (0..ranked.len()).map(|i| {
-            ranked[i..]
-                .iter()
-                .filter(|later| later.0 > ranked[i].0)
-                .count()
-        });
-        let agreeing: usize = agreeing.sum();
-        let ranked = ranked
-            .iter()
-            .map(|(_, (v, ratio))| format!("{} {ratio:.2}", self.name(*v)));
-        let ranked = ranked.collect::<Vec<_>>().join(", ");
-        self.claim(
-            "the order of Table I, every neighbouring pair of it",
-            ClaimVerdict::negative(&pairs),
-            format!("{agreeing} of 36 pairs are in the paper's order; fastest first, time in units of {NN}: {ranked}"),
-        )
-    }
+fn nn_best_high(judge: Judge<'_>) -> Option<Claim> {
+    let (high, nn) = (judge.analysis.group(HIGH)?, judge.analysis.variant(NN)?);
+    let mut fixed = family(judge, "");
+    fixed.retain(|v| *v != nn && judge.name(*v) != HYBRID);
+    let text = format!(
+        "at high initial VSD (0.7 and above) {NN} ({}) is best among those with a fixed association",
+        judge.vsd(high, nn)?
+    );
+    lower_than_each(judge, text, high, (nn, &fixed))
+}
 
-    fn alpha(&self) -> Option<Claim> {
-        let (variant, paper) = (0, self.analysis.group("0.40")?);
-        let groups = self.analysis.groups();
-        let steps = || (0..groups.len()).filter(|g| groups[*g].single);
-        let means = steps().filter_map(|g| Some((g, self.vsd(g, variant)?)));
-        let (best, lowest) = means.min_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))?;
-        let loss = |group| {
-            let terms = [(group, variant, 1.0), (best, variant, -1.0)];
-            self.analysis.contrast(Metric::Vsd, &terms)
+fn fails_high(judge: Judge<'_>, prefix: &str, kind: &str) -> Option<Claim> {
+    let high = judge.analysis.group(HIGH)?;
+    let (mut missing, mut figures) = (Vec::new(), Vec::new());
+    for variant in family(judge, prefix) {
+        let Some(mean) = judge.vsd(high, variant) else {
+            continue;
         };
-        let is_near = |group: &usize| loss(*group).is_some_and(|loss| loss.low <= 0.0);
-        let near: Vec<&str> = steps().filter(is_near).map(|g| &*groups[g].label).collect();
-        let loss = loss(paper)?;
-        self.claim(
-            "α = 0.4 is not significantly worse than the best threshold",
-            ClaimVerdict::of(loss.low <= 0.0),
-            format!(
-                "the minimum, {lowest}, is at α = {}; at 0.4 {}, that is {loss:+} more; not distinguishable from the minimum: {}",
-                groups[best].label,
-                self.vsd(paper, variant)?,
-                near.join(", ")
-            ),
-        )
+        let failed = judge.analysis.mean(Metric::Failure, high, variant)?;
+        let (name, percent) = (judge.name(variant), 100.0 * failed.estimate);
+        missing.push(mean.from(FAILURE_VSD));
+        figures.push(format!("{name}: {mean}, {percent:.0} % above 0.3"));
     }
+    missing.first()?;
+    let text = format!("every {kind} variant fails (mean VSD above 0.3) at high initial VSD");
+    judge.claim(text, ClaimVerdict::negative(&missing), listed(figures))
+}
+
+/// Tests "no better": a significantly lower mean refutes it, means that are not lower confirm it.
+fn nn_cascades(judge: Judge<'_>) -> Option<Claim> {
+    let (all, nn) = (judge.analysis.overall(), judge.analysis.variant(NN)?);
+    let label = |v: usize| format!("{} − {NN}: ", judge.name(v));
+    let difference = |v: &usize| Some((label(*v), judge.difference(all, *v, nn)?));
+    let cascades = family(judge, "nn-cascade-");
+    let no_better = |differences: &[Interval]| {
+        let holds = differences.iter().all(|i| i.estimate >= 0.0);
+        ClaimVerdict::of(holds, differences.iter().any(|i| i.high < 0.0))
+    };
+    let text = "cascading is no better than point-to-point with nearest neighbours";
+    judge.decide(
+        text,
+        no_better,
+        cascades.iter().filter_map(difference).collect(),
+    )
+}
+
+/// Compares the rise of the mean from no noise to noise, projective against nearest neighbors.
+fn less_susceptible(judge: Judge<'_>, noise: &str) -> Option<Claim> {
+    let (none, noisy) = (0, judge.analysis.group(NOISY)?);
+    let rise = |prefix: &str, factor: f64| {
+        let family = family(judge, prefix);
+        let share = factor / family.len() as f64;
+        let terms = |v: &usize| [(noisy, *v, share), (none, *v, -share)];
+        let terms: Vec<(usize, usize, f64)> = family.iter().flat_map(terms).collect();
+        Some(terms).filter(|terms| !terms.is_empty())
+    };
+    let of = |terms: &[(usize, usize, f64)]| judge.analysis.contrast(Metric::Vsd, terms);
+    let (projective, nearest) = (rise("projective-", 1.0)?, rise("nn-", 1.0)?);
+    let difference = of(&[projective.clone(), rise("nn-", -1.0)?].concat())?;
+    let (projective, nearest) = (of(&projective)?, of(&nearest)?);
+    judge.claim(
+        format!("projective variants are less susceptible to {noise} than those with nearest neighbours (rise of the mean VSD from none)"),
+        ClaimVerdict::negative(&[difference]),
+        format!("projective {projective:+}, nearest neighbours {nearest:+}, difference {difference:+}"),
+    )
+}
+
+fn improves_with_little_noise(judge: Judge<'_>, variant: usize) -> Option<Claim> {
+    let name = judge.name(variant);
+    let has_planes = name.ends_with("point-to-plane") || name.contains("-cascade-");
+    let none = judge.analysis.group("0").filter(|_| has_planes)?;
+    let terms = [
+        (judge.analysis.group("1")?, variant, 1.0),
+        (none, variant, -1.0),
+    ];
+    let change = judge.analysis.contrast(Metric::Vsd, &terms)?;
+    let text = format!("{name} improves from 0 % to 1 % depth noise");
+    judge.decide(text, ClaimVerdict::negative, vec![(String::new(), change)])
+}
+
+/// Returns the difference of the mean times of two variants.
+fn time(judge: Judge<'_>, a: usize, b: usize) -> Option<Interval> {
+    let all = judge.analysis.overall();
+    judge.analysis.difference(Metric::CpuMs, all, a, b)
+}
+
+fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
+    let projective = family(judge, "projective-");
+    let mut slow = family(judge, "");
+    slow.retain(|v| !projective.contains(v));
+    let pairs = projective
+        .iter()
+        .flat_map(|p| slow.iter().map(|s| (*p, *s)));
+    let contrasts: Vec<Interval> = pairs.filter_map(|(p, s)| time(judge, p, s)).collect();
+    let nearest = contrasts
+        .iter()
+        .max_by(|a, b| a.estimate.total_cmp(&b.estimate))?;
+    judge.claim(
+        "every projective variant is faster than hybrid and than every variant with nearest neighbours",
+        ClaimVerdict::negative(&contrasts),
+        format!("the nearest pair differs by {nearest:+} ms"),
+    )
+}
+
+fn table_order(judge: Judge<'_>) -> Option<Claim> {
+    let all = judge.analysis.overall();
+    let order = TABLE_I.iter().map(|row| judge.analysis.variant(row.0));
+    let order: Vec<usize> = order.collect::<Option<_>>()?;
+    let pairs = order.windows(2).map(|pair| time(judge, pair[0], pair[1]));
+    let pairs: Vec<Interval> = pairs.collect::<Option<_>>()?;
+    let mean = |v| Some(judge.analysis.mean(Metric::CpuMs, all, v)?.estimate);
+    let unit = mean(judge.analysis.variant(NN)?)?;
+    // The places in Table I and the ratios, fastest here first.
+    let ratios = order.iter().filter_map(|v| Some((mean(*v)? / unit, *v)));
+    let mut ranked: Vec<(usize, (f64, usize))> = ratios.enumerate().collect();
+    ranked.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
+    let later = |(i, one): (usize, &(usize, _))| {
+        let others = ranked[i..].iter();
+        others.filter(|later| later.0 > one.0).count()
+    };
+    let agreeing: usize = ranked.iter().enumerate().map(later).sum();
+    let ranked = ranked
+        .iter()
+        .map(|(_, (ratio, v))| format!("{} {ratio:.2}", judge.name(*v)));
+    let ranked = ranked.collect::<Vec<_>>().join(", ");
+    judge.claim(
+        "the order of Table I, every neighbouring pair of it",
+        ClaimVerdict::negative(&pairs),
+        format!("{agreeing} of 36 pairs are in the paper's order; fastest first, time in units of {NN}: {ranked}"),
+    )
+}
+
+fn alpha(judge: Judge<'_>) -> Option<Claim> {
+    let (variant, groups) = (0, judge.analysis.groups());
+    let steps = || (0..groups.len()).filter(|g| groups[*g].single);
+    let means = steps().filter_map(|g| Some((g, judge.vsd(g, variant)?)));
+    let (best, lowest) = means.min_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))?;
+    let loss = |group: usize| {
+        let terms = [(group, variant, 1.0), (best, variant, -1.0)];
+        judge.analysis.contrast(Metric::Vsd, &terms)
+    };
+    let near = steps().filter(|g| loss(*g).is_some_and(|loss| loss.low <= 0.0));
+    let near = near
+        .map(|g| &*groups[g].label)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let paper = judge.analysis.group("0.40")?;
+    let (best, mean, loss) = (
+        &groups[best].label,
+        judge.vsd(paper, variant)?,
+        loss(paper)?,
+    );
+    judge.claim(
+        "α = 0.4 is not significantly worse than the best threshold",
+        ClaimVerdict::of(loss.low <= 0.0, loss.low > 0.0),
+        format!("the minimum, {lowest}, is at α = {best}; at 0.4 {mean}, that is {loss:+} more; not distinguishable from the minimum: {near}"),
+    )
 }

@@ -48,12 +48,13 @@ pub struct Config {
 }
 
 impl Config {
-    /// Describes a study in the paper's setting, seen by a 640 × 480 camera with a focal length of 573 pixels.
+    /// Describes a study in the paper's setting, seen by a 640 × 480 camera with a focal length of
+    /// 573 pixels.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError`] when there are no cases, objects or variants, two have the same name, an object is too large for the
-    /// distances, or a variant cannot be built.
+    /// [`ExperimentError`] when there are no cases, objects or variants, two have the same name, an
+    /// object is too large for the distances, or a variant cannot be built.
     pub fn new(
         experiment: Experiment,
         subjects: &[Subject],

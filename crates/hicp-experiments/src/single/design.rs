@@ -72,7 +72,7 @@ impl Design for Config {
         models: &'a Models,
     ) -> Result<Worker<'a>, ExperimentError> {
         let mut runner = Runner::new(self, subjects, models)?;
-        Ok(Box::new(move |object, case| runner.rows(object, case)))
+        Ok(Box::new(move |object, case| runner.outcomes(object, case)))
     }
 
     fn seed(&self) -> u64 {

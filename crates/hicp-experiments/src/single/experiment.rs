@@ -13,20 +13,24 @@ pub enum Experiment {
     InitNoise,
     /// Robustness to depth noise (§VI-B.2): 0 to 5 % of the depth, 6.2 mm and 9.5° off.
     DepthNoise,
-    /// Robustness to a wrong model (§VI-B.3): the original and four reconstructions, 6.2 mm and 9.5° off.
+    /// Robustness to a wrong model (§VI-B.3): the original and four reconstructions, 6.2 mm and
+    /// 9.5° off.
     ModelNoise,
-    /// Time (§VI-B.4, Table I): a third of its rows under the conditions of each of the studies above.
+    /// Time (§VI-B.4, Table I): a third of its rows under the conditions of each of the studies
+    /// above.
     Timing,
     /// The threshold α of Dynamic Switching (§IV-A), on the tuning objects.
     Alpha,
-    /// The presets beyond the paper: every start under depth noise, model noise and imperfect masks.
+    /// The presets beyond the paper: every start under depth noise, model noise and imperfect
+    /// masks.
     Beyond,
 }
 
 /// The conditions under which a case is presented.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// Whether the initial pose is drawn into bins of the initial VSD (§VI-B.1), or is 6.2 mm and 9.5° off.
+    /// Whether the initial pose is drawn into bins of the initial VSD (§VI-B.1), or is 6.2 mm and
+    /// 9.5° off.
     pub binned: bool,
     /// Standard deviation of the depth noise, percent of the depth.
     pub depth_percent: f64,
@@ -61,6 +65,33 @@ const PERFECT: Condition = Condition {
     mask: MaskFault::None,
 };
 
+const OFF: Condition = Condition {
+    binned: false,
+    ..PERFECT
+};
+
+impl Condition {
+    fn depth(mut self, percent: u32) -> Self {
+        self.depth_percent = f64::from(percent);
+        self
+    }
+
+    fn model(mut self, level: u32) -> Self {
+        self.model_level = level;
+        self
+    }
+
+    fn alpha(mut self, alpha: f64) -> Self {
+        self.alpha = Some(alpha);
+        self
+    }
+
+    fn mask(mut self, fault: MaskFault) -> Self {
+        self.mask = fault;
+        self
+    }
+}
+
 /// The mask faults of [`Experiment::Beyond`], with their names.
 const MASKS: [(&str, MaskFault); 4] = [
     ("eroded", MaskFault::Eroded),
@@ -68,7 +99,8 @@ const MASKS: [(&str, MaskFault); 4] = [
     ("missing", MaskFault::Missing),
     ("occluded", MaskFault::Occluded),
 ];
-/// The groups of imperfect images of [`Experiment::Beyond`], and how the names of their levels start.
+/// The groups of imperfect images of [`Experiment::Beyond`], and how the names of their levels
+/// start.
 const KINDS: [(&str, &str); 3] = [
     (NOISY_DEPTH, "depth-"),
     (NOISY_MODEL, "model-"),
@@ -143,9 +175,7 @@ impl Experiment {
     /// Returns whether all of its cases are binned by their initial VSD.
     #[must_use]
     pub fn is_binned(self) -> bool {
-        self.conditions(0)
-            .iter()
-            .all(|(_, condition)| condition.binned)
+        self.conditions(0).iter().all(|level| level.1.binned)
     }
 
     /// Returns the names of the levels in files.
@@ -153,14 +183,14 @@ impl Experiment {
     pub fn levels(self) -> Vec<String> {
         self.conditions(0)
             .into_iter()
-            .map(|(name, _)| name)
+            .map(|level| level.0)
             .collect()
     }
 
     /// Returns the conditions of a level, by its index in [`Experiment::levels`], for a case.
     ///
-    /// Only those of [`Experiment::Timing`] depend on the case: it cycles through the noise levels of
-    /// the other studies.
+    /// Only those of [`Experiment::Timing`] depend on the case: it cycles through the noise levels
+    /// of the other studies.
     #[must_use]
     pub fn condition(self, level: usize, case: u64) -> Condition {
         let nth = self.conditions(case).into_iter().nth(level);
@@ -169,76 +199,35 @@ impl Experiment {
 
     /// Returns the levels with their conditions.
     fn conditions(self, case: u64) -> Vec<(String, Condition)> {
-        let off = Condition {
-            binned: false,
-            ..PERFECT
-        };
-        let depth = |start| {
-            (0..=DEPTH_STEPS).map(move |step| {
-                let depth_percent = f64::from(step);
-                (
-                    step.to_string(),
-                    Condition {
-                        depth_percent,
-                        ..start
-                    },
-                )
-            })
-        };
-        let model = |start| {
-            (0..=MODEL_STEPS).map(move |model_level| {
-                (
-                    model_level.to_string(),
-                    Condition {
-                        model_level,
-                        ..start
-                    },
-                )
-            })
-        };
+        let mut all = Vec::new();
         match self {
-            Self::InitNoise => vec![("0".to_owned(), PERFECT)],
-            Self::DepthNoise => depth(off).collect(),
-            Self::ModelNoise => model(off).collect(),
+            Self::InitNoise => all.push(("0".to_owned(), PERFECT)),
+            Self::DepthNoise => {
+                all.extend((0..=DEPTH_STEPS).map(|p| (p.to_string(), OFF.depth(p))));
+            }
+            Self::ModelNoise => {
+                all.extend((0..=MODEL_STEPS).map(|l| (l.to_string(), OFF.model(l))));
+            }
             Self::Timing => {
-                let cycle = |study: Self| {
-                    let conditions = study.conditions(0);
+                for study in [Self::InitNoise, Self::DepthNoise, Self::ModelNoise] {
+                    let mut levels = study.conditions(0);
                     #[allow(clippy::cast_possible_truncation)] // Below the number of levels.
-                    let (_, condition) = conditions[(case % conditions.len() as u64) as usize];
-                    (study.name().to_owned(), condition)
-                };
-                [Self::InitNoise, Self::DepthNoise, Self::ModelNoise]
-                    .map(cycle)
-                    .into()
+                    let turn = (case % levels.len() as u64) as usize;
+                    all.push((study.name().to_owned(), levels.swap_remove(turn).1));
+                }
             }
-            Self::Alpha => {
-                let alphas = (0..=ALPHA_STEPS).map(|step| f64::from(step) / f64::from(ALPHA_STEPS));
-                let conditions = alphas.map(|alpha| {
-                    (
-                        format!("{alpha:.2}"),
-                        Condition {
-                            alpha: Some(alpha),
-                            ..PERFECT
-                        },
-                    )
-                });
-                conditions.collect()
-            }
+            Self::Alpha => all.extend((0..=ALPHA_STEPS).map(|step| {
+                let alpha = f64::from(step) / f64::from(ALPHA_STEPS);
+                (format!("{alpha:.2}"), PERFECT.alpha(alpha))
+            })),
             Self::Beyond => {
-                let named = |kind: &'static str| {
-                    move |(name, condition): (String, Condition)| {
-                        (format!("{kind}{name}"), condition)
-                    }
-                };
-                let masks =
-                    MASKS.map(|(name, mask)| (name.to_owned(), Condition { mask, ..PERFECT }));
-                std::iter::once(("perfect".to_owned(), PERFECT))
-                    .chain(depth(PERFECT).skip(1).map(named(KINDS[0].1)))
-                    .chain(model(PERFECT).skip(1).map(named(KINDS[1].1)))
-                    .chain(masks.into_iter().map(named(KINDS[2].1)))
-                    .collect()
+                all.push(("perfect".to_owned(), PERFECT));
+                all.extend((1..=DEPTH_STEPS).map(|p| (format!("depth-{p}"), PERFECT.depth(p))));
+                all.extend((1..=MODEL_STEPS).map(|l| (format!("model-{l}"), PERFECT.model(l))));
+                all.extend(MASKS.map(|(name, m)| (format!("mask-{name}"), PERFECT.mask(m))));
             }
         }
+        all
     }
 
     /// Returns the groups of a study with some levels.
@@ -263,10 +252,8 @@ impl Experiment {
             }));
         }
         if matches!(self, Self::DepthNoise | Self::ModelNoise) {
-            groups.push(Group::of_levels(
-                NOISY,
-                all.iter().copied().skip(1).collect(),
-            ));
+            let noisy = all.iter().copied().skip(1).collect();
+            groups.push(Group::of_levels(NOISY, noisy));
         }
         groups.push(Group::of_levels(ALL, all));
         groups

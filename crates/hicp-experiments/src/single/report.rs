@@ -6,7 +6,7 @@ use super::experiment::Experiment;
 use crate::analysis::{Analysis, Interval, Metric, REPLICATES};
 use crate::claims::Claim;
 use crate::report::{
-    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, html_escaped, means,
+    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, html_escaped, means, texts,
 };
 
 const YARDSTICK: &str = "nn-point-to-point";
@@ -19,14 +19,12 @@ impl Reported for Config {
     fn document(entries: &[Entry<Self>]) -> Document {
         let figure = |alpha: bool| {
             let is_in = |e: &&Entry<Self>| (e.experiment() == Experiment::Alpha) == alpha;
-            let rows = entries.iter().filter(is_in);
-            Figure {
-                rows: rows
-                    .map(Entry::panels)
-                    .filter(|row| !row.is_empty())
-                    .collect(),
-            }
+            let rows = entries.iter().filter(is_in).map(Entry::panels);
+            let rows = rows.filter(|row| !row.is_empty()).collect();
+            Figure { rows }
         };
+        let paper_figure = "Mean VSD after ICP, as in Figure 6 of the paper";
+        let by_group = "Differences of the mean VSD, by group";
         let note = format!(
             "Every variant refines the same images from the same initial poses. VSD is the mean over tolerances of 5 % to 50 % \
              of the diameter, against the true pose of the original model. Brackets hold 95 % intervals: percentiles of {REPLICATES} \
@@ -39,19 +37,12 @@ impl Reported for Config {
             what_was_run: (what_was_run(entries), note),
             claims: "The paper's claims",
             figures: vec![
-                (
-                    "figure",
-                    "Mean VSD after ICP, as in Figure 6 of the paper",
-                    figure(false),
-                ),
+                ("figure", paper_figure, figure(false)),
                 ("alpha", "The threshold α", figure(true)),
             ],
             results: entries.iter().map(Entry::results).collect(),
             unmade: "Cases that could not be made",
-            differences: (
-                "Differences of the mean VSD, by group",
-                differences(entries),
-            ),
+            differences: (by_group, differences(entries)),
             tables: vec![("summary.csv", summary(entries))],
         }
     }
@@ -101,20 +92,18 @@ impl Entry<Config> {
             };
             let percent = |share: f64| format!("{:.1} %", 100.0 * share);
             let share = |metric| {
-                let ends = analysis
-                    .mean(metric, group, variant)
-                    .map(|i| i.ends().map(percent));
-                ends.map(|[share, low, high]| format!("{share} [{low}, {high}]"))
-                    .unwrap_or_default()
+                let Some(mean) = analysis.mean(metric, group, variant) else {
+                    return String::new();
+                };
+                let [share, low, high] = mean.ends().map(percent);
+                format!("{share} [{low}, {high}]")
             };
             let [time, ratio] = self.time(group, variant);
             let deviation = cell.cpu_deviation_ms.unwrap_or(0.0);
-            let paper_ratio = paper(name)
-                .zip(paper(YARDSTICK))
-                .map(|(time, unit)| time / unit);
-            let others = Some(self.reference()).filter(|ours| *ours != variant);
-            let difference =
-                others.and_then(|ours| analysis.difference(Metric::Vsd, group, ours, variant));
+            let spent = time.map(|mean| format!("{mean:.2} ± {deviation:.2}"));
+            let papers = paper(name).zip(paper(YARDSTICK));
+            let ours = self.reference();
+            let difference = analysis.difference(Metric::Vsd, group, ours, variant);
             table.rows.push(vec![
                 name.clone(),
                 cell.count.to_string(),
@@ -124,11 +113,10 @@ impl Entry<Config> {
                 fixed(Some(cell.add_median_mm), 2),
                 percent(cell.add_success),
                 fixed(Some(cell.steps), 1),
-                time.map(|mean| format!("{mean:.2} ± {deviation:.2}"))
-                    .unwrap_or_default(),
+                spent.unwrap_or_default(),
                 fixed(ratio, 2),
-                fixed(paper_ratio, 2),
-                text(difference),
+                fixed(papers.map(|(time, unit)| time / unit), 2),
+                text(difference.filter(|_| ours != variant)),
             ]);
         }
         table
@@ -147,25 +135,17 @@ impl Entry<Config> {
         };
         let all: Vec<usize> = (0..analysis.variants().len()).collect();
         let is_of = |v: usize, family: &str| analysis.variants()[v].starts_with(family);
-        let (nearest, others): (Vec<usize>, Vec<usize>) =
-            all.iter().partition(|v| is_of(**v, "nn-"));
-        let (projective, rest): (Vec<usize>, Vec<usize>) =
+        type Indices = Vec<usize>;
+        let (nearest, others): (Indices, Indices) = all.iter().partition(|v| is_of(**v, "nn-"));
+        let (projective, mut last): (Indices, Indices) =
             others.iter().partition(|v| is_of(**v, "projective-"));
-        let mean = |v: &usize| {
-            let mean = analysis.mean(Metric::Vsd, analysis.overall(), *v);
+        let mean = |v: usize| {
+            let mean = analysis.mean(Metric::Vsd, analysis.overall(), v);
             mean.map_or(f64::INFINITY, |i| i.estimate)
         };
-        let best = |family: &[usize]| {
-            family
-                .iter()
-                .copied()
-                .min_by(|a, b| mean(a).total_cmp(&mean(b)))
-        };
-        let last: Vec<usize> = rest
-            .into_iter()
-            .chain(best(&nearest))
-            .chain(best(&projective))
-            .collect();
+        for family in [&nearest, &projective] {
+            last.extend(family.iter().min_by(|a, b| mean(**a).total_cmp(&mean(**b))));
+        }
         let panels = match experiment {
             Experiment::Alpha => vec![("mean VSD against the threshold", all)],
             Experiment::Beyond => vec![("perfect images", all)],
@@ -175,17 +155,18 @@ impl Entry<Config> {
                 ("hybrid and the best of either", last),
             ],
         };
-        let panel = |(title, variants): (&str, Vec<usize>)| Panel {
+        let curves = |variants: Indices| {
+            let curves = variants.into_iter().zip(0..);
+            let curves = curves.map(|(v, style)| Curve::of(analysis, v, style));
+            curves.collect()
+        };
+        let panel = |(title, variants): (&str, Indices)| Panel {
             title: format!("{}: {title}", experiment.name()),
             x_title: x_title.to_owned(),
             y_title: "mean post-ICP VSD".to_owned(),
             x: x.clone(),
             x_numbers: if x.end > 1.0 { 6 } else { 11 },
-            curves: variants
-                .iter()
-                .zip(0..)
-                .map(|(v, style)| Curve::of(analysis, *v, style))
-                .collect(),
+            curves: curves(variants),
         };
         let panels = panels.into_iter().map(panel);
         panels.filter(|panel| !panel.curves.is_empty()).collect()
@@ -220,34 +201,22 @@ fn summary(entries: &[Entry<Config>]) -> Table {
          add_below_tenth_diameter|iterations|cpu_ms|cpu_ms_deviation|cpu_ratio_to_nn_point_to_point",
     );
     for entry in entries {
-        let analysis = &entry.analysis;
-        for (group, described) in analysis.groups().iter().enumerate() {
-            for (variant, name) in analysis.variants().iter().enumerate() {
-                let Some(cell) = analysis.cell(group, variant) else {
-                    continue;
-                };
-                let names = [
-                    &entry.name,
-                    entry.experiment().name(),
-                    &described.label,
-                    name,
-                ];
-                let mut row = names.map(str::to_owned).to_vec();
-                row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
-                for metric in [Metric::Vsd, Metric::Failure, Metric::Worse] {
-                    row.extend(ends(analysis.mean(metric, group, variant)));
-                }
-                let [time, ratio] = entry.time(group, variant);
-                row.extend([
-                    fixed(Some(cell.add_median_mm), 3),
-                    fixed(Some(cell.add_success), 4),
-                    fixed(Some(cell.steps), 2),
-                    fixed(time, 3),
-                    fixed(cell.cpu_deviation_ms, 3),
-                    fixed(ratio, 3),
-                ]);
-                table.rows.push(row);
+        let (analysis, experiment) = (&entry.analysis, entry.experiment().name());
+        for (group, label, variant, name) in analysis.grid() {
+            let Some(cell) = analysis.cell(group, variant) else {
+                continue;
+            };
+            let mut row = texts(&[&entry.name, experiment, label, name]);
+            row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
+            for metric in [Metric::Vsd, Metric::Failure, Metric::Worse] {
+                row.extend(ends(analysis.mean(metric, group, variant)));
             }
+            let [time, ratio] = entry.time(group, variant);
+            row.push(fixed(Some(cell.add_median_mm), 3));
+            row.push(fixed(Some(cell.add_success), 4));
+            row.push(fixed(Some(cell.steps), 2));
+            row.extend([time, cell.cpu_deviation_ms, ratio].map(|x| fixed(x, 3)));
+            table.rows.push(row);
         }
     }
     table
@@ -260,27 +229,14 @@ fn differences(entries: &[Entry<Config>]) -> Table {
     );
     for entry in entries {
         let (analysis, ours) = (&entry.analysis, entry.reference());
-        for (group, described) in analysis.groups().iter().enumerate() {
-            let others = analysis
-                .variants()
-                .iter()
-                .enumerate()
-                .filter(|(v, _)| *v != ours);
-            for (other, name) in others {
-                let of = |metric| analysis.difference(metric, group, ours, other);
-                let (Some(vsd), Some(failure)) = (of(Metric::Vsd), of(Metric::Failure)) else {
-                    continue;
-                };
-                let names = [
-                    &entry.name,
-                    &described.label,
-                    &analysis.variants()[ours],
-                    name,
-                ];
-                let mut row = names.map(String::clone).to_vec();
-                row.extend([vsd, failure].into_iter().flat_map(|i| ends(Some(i))));
-                table.rows.push(row);
-            }
+        for (group, label, other, name) in analysis.grid().filter(|cell| cell.2 != ours) {
+            let of = |metric| analysis.difference(metric, group, ours, other);
+            let (Some(vsd), Some(failure)) = (of(Metric::Vsd), of(Metric::Failure)) else {
+                continue;
+            };
+            let mut row = texts(&[&entry.name, label, &analysis.variants()[ours], name]);
+            row.extend([vsd, failure].into_iter().flat_map(|i| ends(Some(i))));
+            table.rows.push(row);
         }
     }
     table

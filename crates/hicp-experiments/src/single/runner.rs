@@ -1,8 +1,8 @@
-//! The rows of a case: every condition, every variant.
+//! The evaluation of a case: every condition, every variant.
 
 use std::sync::Arc;
 
-use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Model, Observation, Problem};
+use hicp_core::{DepthImage, Isometry3, Mask, Model, Observation, Problem};
 use hicp_sim::{
     Case, CaseMaker, Corruption, DepthNoise, DepthSensor, MaskDefects, Reconstruction,
     ReconstructionNoise, RelativeGaussian,
@@ -13,15 +13,16 @@ use super::config::Config;
 use super::experiment::{Condition, MaskFault};
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
-use crate::study::{Measured, Models, Row};
+use crate::study::{Measured, Models, Outcome};
 use crate::subject::Subject;
 
-/// Distance of the wall behind an object whose mask is dilated, meters: the added pixels need a depth.
+/// Distance of the wall behind an object whose mask is dilated, meters: the added pixels need a
+/// depth.
 const WALL_METERS: f64 = 0.1;
 /// More renders than a workspace remembers.
 const FORGET: u32 = 8;
 
-/// Makes the rows of cases; one per thread.
+/// Evaluates cases; one per thread.
 pub(super) struct Runner<'a> {
     config: &'a Config,
     subjects: &'a [Subject],
@@ -71,41 +72,28 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Makes the rows of a case: levels in order, and in each the variants in order.
+    /// Evaluates a case: levels in order, and in each the variants in order.
     ///
     /// All variants get the same image and the same initial pose.
-    pub(super) fn rows(&mut self, object: usize, index: u64) -> Vec<Row> {
-        let (config, subjects) = (self.config, self.subjects);
-        let mut rows = Vec::new();
+    pub(super) fn outcomes(&mut self, object: usize, index: u64) -> Vec<Outcome> {
+        let config = self.config;
+        let mut outcomes = Vec::new();
         let mut cases: [Option<Result<Case, String>>; 2] = [None, None];
-        for (level, level_name) in config.levels.iter().enumerate() {
+        for level in 0..config.levels.len() {
             let condition = config.experiment.condition(level, index);
             let case = cases[usize::from(condition.binned)]
                 .get_or_insert_with(|| self.case(object, index, condition.binned));
-            let presented = match case {
-                Ok(case) => self.present(object, case, &condition),
-                Err(error) => Err(error.clone()),
-            };
-            for (variant, record) in config.variants.iter().enumerate() {
-                let measured = presented
-                    .as_ref()
-                    .map_err(Clone::clone)
-                    .and_then(|presented| {
-                        let measured = self.measure(object, level, variant, presented);
-                        measured.map_err(|e| e.to_string())
-                    });
-                rows.push(Row {
-                    object: subjects[object].name.clone(),
-                    case: index,
-                    variant: record.name.clone(),
-                    setting: level_name.clone(),
-                    bin: presented.as_ref().ok().and_then(|p| p.case.bin),
-                    note: measured.as_ref().err().cloned().unwrap_or_default(),
-                    measured: measured.ok(),
-                });
+            let case = case.as_ref().map_err(Clone::clone);
+            let presented = case.and_then(|case| self.present(object, case, &condition));
+            for variant in 0..config.variants.len() {
+                let measured = match &presented {
+                    Ok(presented) => self.measure(object, level, variant, presented),
+                    Err(error) => Err(error.clone()),
+                };
+                outcomes.push(measured);
             }
         }
-        rows
+        outcomes
     }
 
     fn case(&mut self, object: usize, index: u64, binned: bool) -> Result<Case, String> {
@@ -160,7 +148,7 @@ impl<'a> Runner<'a> {
         level: usize,
         variant: usize,
         presented: &Presented<'_>,
-    ) -> Result<Measured, ImageError> {
+    ) -> Outcome {
         let level = level.min(self.stages.len() - 1);
         let stage = &mut self.stages[level][variant];
         let workspace = &mut self.workspaces[variant];
@@ -168,7 +156,8 @@ impl<'a> Runner<'a> {
 
         // Every variant creates an observation: normals and search trees are part of its time.
         let (mask, start) = (presented.mask.clone(), thread_time());
-        let observation = Observation::new(depth, mask, case.camera)?;
+        let observation = Observation::new(depth, mask, case.camera);
+        let observation = observation.map_err(|e| e.to_string())?;
         let problem = Problem::new(presented.model, &observation);
         let outcome = stage.run(&problem, &case.init, &mut Session::new(workspace, &mut ()));
         let time = thread_time().saturating_sub(start);

@@ -10,12 +10,14 @@ use super::group::Group;
 use super::layout::Layout;
 use super::models::Models;
 use super::records::ObjectRecord;
-use super::row::{Columns, Row};
+use super::row::{Columns, Outcome};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
 
-/// Makes the rows of a case, given the index of the object and that of the case; one per thread.
-pub type Worker<'a> = Box<dyn FnMut(usize, u64) -> Vec<Row> + 'a>;
+/// Evaluates a case, given the index of the object and that of the case; one per thread.
+///
+/// Returns the outcomes by setting, and in each by variant.
+pub type Worker<'a> = Box<dyn FnMut(usize, u64) -> Vec<Outcome> + 'a>;
 
 /// A kind of study: the configuration that is stored next to the rows, and what follows from it.
 pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwned {
@@ -51,7 +53,8 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
     /// Returns the objects.
     fn objects(&self) -> &[ObjectRecord];
 
-    /// Returns the names of what the analysis compares, one or more per case: by default the variants.
+    /// Returns the names of what the analysis compares, one or more per case: by default the
+    /// variants.
     fn compared(&self) -> Vec<String> {
         self.layout()
             .variants

@@ -41,7 +41,8 @@ impl Group {
         }
     }
 
-    /// The groups of single bins of some levels, then the one of low and the one of high initial VSD.
+    /// The groups of single bins of some levels, then the one of low and the one of high initial
+    /// VSD.
     pub(crate) fn by_bin(levels: &[usize], n_bins: usize) -> Vec<Self> {
         // Enough digits that no two bins have the same name.
         let digits = match n_bins {

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::row::{Column, Columns, Row, quoted};
+use super::row::{Column, Columns, Outcome, Row, quoted};
 
 /// Most names that a message lists.
 const LISTED: usize = 12;
@@ -65,6 +65,24 @@ impl<'a> Layout<'a> {
         }
     }
 
+    /// Returns the rows of a case; `outcomes` are by setting, and in each by variant.
+    pub(crate) fn rows(&self, object: usize, case: u64, outcomes: Vec<Outcome>) -> Vec<Row> {
+        let mut rows = Vec::new();
+        for (place, outcome) in outcomes.into_iter().enumerate() {
+            let setting = place / self.variants.len();
+            rows.push(Row {
+                object: self.objects[object].to_owned(),
+                case,
+                setting: self.settings[setting].to_owned(),
+                variant: self.variants[place % self.variants.len()].to_owned(),
+                bin: self.bin(setting, case).filter(|_| outcome.is_ok()),
+                note: outcome.as_ref().err().cloned().unwrap_or_default(),
+                measured: outcome.ok(),
+            });
+        }
+        rows
+    }
+
     /// Returns the place in the order of a run of a row with these indices.
     fn place(&self, [object, setting, variant]: [usize; 3], case: u64) -> u64 {
         let number = |names: &[&str]| names.len() as u64;
@@ -107,7 +125,6 @@ pub(crate) struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// `bin` returns the bin of a case in a setting.
     pub(crate) fn new(layout: Layout<'a>, columns: &'static Columns) -> Self {
         Self {
             index: layout.index(),
@@ -131,15 +148,9 @@ impl<'a> Places<'a> {
                 .find(|c| c.1 == column)
                 .map_or("", |c| c.0)
         };
-        let mut indices = [0; 3];
-        for ((found, index), (column, text, listed)) in self
-            .index
-            .find(row)
-            .into_iter()
-            .zip(&mut indices)
-            .zip(named)
-        {
-            *index = found.ok_or_else(|| {
+        let (found, mut indices) = (self.index.find(row), [0; 3]);
+        for (place, (column, text, listed)) in named.into_iter().enumerate() {
+            indices[place] = found[place].ok_or_else(|| {
                 let more = if listed.len() > LISTED { ", ..." } else { "" };
                 let listed: Vec<String> = listed.iter().take(LISTED).map(|n| quoted(n)).collect();
                 let (column, text) = (name(column), quoted(text));
@@ -156,20 +167,18 @@ impl<'a> Places<'a> {
         let place = layout.place(indices, case);
         if !self.seen.insert(place) {
             let named = named.map(|(column, text, _)| format!("{} {}", name(column), quoted(text)));
+            let named = named.join(", ");
             return Err(format!(
-                "found {}, {column} {case} again, expected every row once",
-                named.join(", ")
+                "found {named}, {column} {case} again, expected every row once"
             ));
         }
         // A row without figures need not state its bin.
         let expected = layout.bin(indices[1], case);
         if row.bin != expected && (row.bin.is_some() || row.measured.is_some()) {
             let text = |bin: Option<usize>| bin.map_or("empty".to_owned(), |bin| bin.to_string());
-            return Err(format!(
-                "bin is {}, expected {}: cases go through the bins of config.json in turn",
-                text(row.bin),
-                text(expected)
-            ));
+            let (found, expected) = (text(row.bin), text(expected));
+            let rule = "cases go through the bins of config.json in turn";
+            return Err(format!("bin is {found}, expected {expected}: {rule}"));
         }
         Ok(place)
     }

@@ -41,6 +41,9 @@ pub struct Measured {
     pub mahalanobis_squared: Option<f64>,
 }
 
+/// The figures of a row, or why there are none.
+pub type Outcome = Result<Measured, String>;
+
 /// The part of a row that a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields of `Row` and `Measured`")]
@@ -71,10 +74,9 @@ const SHOWN: usize = 60;
 impl Row {
     /// Returns rows as CSV, one per line, without a header. Numbers have a fixed number of digits.
     pub(crate) fn to_csv(columns: &Columns, rows: &[Self]) -> String {
-        to_csv(
-            rows.iter()
-                .map(|row| columns.iter().map(|c| row.field(c.1))),
-        )
+        let fields =
+            |row: &Self| -> Vec<String> { columns.iter().map(|c| row.field(c.1)).collect() };
+        to_csv(rows.iter().map(fields))
     }
 
     fn field(&self, column: Column) -> String {
@@ -184,10 +186,9 @@ struct Record<'a> {
 impl<'a> Record<'a> {
     /// Returns the name and the text of a column; two empty texts if the file has no such column.
     fn get(self, column: Column) -> (&'static str, &'a str) {
-        let index = self.columns.iter().position(|c| c.1 == column);
-        index.map_or(("", ""), |index| {
-            (self.columns[index].0, &self.record[index])
-        })
+        let mut fields = self.columns.iter().zip(self.record);
+        let field = fields.find(|(c, _)| c.1 == column);
+        field.map_or(("", ""), |(column, text)| (column.0, text))
     }
 
     /// Parses a number; `range` continues the message "expected a number".

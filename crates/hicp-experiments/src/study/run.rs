@@ -78,8 +78,9 @@ pub fn run<D: Design>(
                         return;
                     }
                     let (object, case) = layout.case(n);
+                    let rows = layout.rows(object, case, worker(object, case));
                     // The receiver is gone when the study stops.
-                    if sender.send(Ok((n, worker(object, case)))).is_err() {
+                    if sender.send(Ok((n, rows))).is_err() {
                         return;
                     }
                 }
@@ -138,13 +139,8 @@ fn open<D: Design>(
         Err(encoding @ IoError::Encoding { .. }) => encoding,
         _ => error,
     })?;
-    check_order(
-        config,
-        &options.limits,
-        &path,
-        &(header + &cases.join("\n")),
-        cases.len(),
-    )?;
+    let text = header + &cases.join("\n");
+    check_order(config, &options.limits, &path, &text, cases.len())?;
     Ok((log, cases.len()))
 }
 

@@ -69,7 +69,8 @@ pub(crate) fn read_config<D: Design>(
     Ok(config)
 }
 
-/// Calls `each` with every row in the text of a file, and with the number of rows that a run writes before it.
+/// Calls `each` with every row in the text of a file, and with the number of rows that a run writes
+/// before it.
 ///
 /// Refuses rows that the study cannot have, with the line.
 pub(crate) fn each_row<D: Design>(
