@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix3, Point2, Point3};
 
-use crate::error::CameraError;
+use thiserror::Error;
+
+use crate::number::Number;
 use crate::region::PixelRegion;
 
 /// Where the centre of the first pixel lies in the coordinates that a calibration uses.
@@ -225,5 +227,76 @@ impl PinholeCamera {
     pub fn distance_per_depth(&self, u: f64, v: f64) -> f64 {
         let (x, y) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         (x * x + y * y + 1.0).sqrt()
+    }
+}
+
+/// A camera that cannot be.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// A focal length that is not positive or that no lens has.
+    #[error(
+        "focal length {name} is {}, expected a number of pixels above 0, {} to {}",
+        Number(*value),
+        MIN_FOCAL_LENGTH,
+        MAX_FOCAL_LENGTH
+    )]
+    FocalLength {
+        /// `fx` or `fy`.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+    },
+    /// A principal point that is nowhere near the image.
+    #[error(
+        "principal point {name} is {}, expected a number of pixels between -{1} and {1}",
+        Number(*value),
+        MAX_FOCAL_LENGTH
+    )]
+    PrincipalPoint {
+        /// `cx` or `cy`.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+    },
+    /// An image side of zero or of absurd size.
+    #[error("image {name} is {value} pixels, expected 1 to {}", MAX_IMAGE_SIDE)]
+    ImageSide {
+        /// `width` or `height`.
+        name: &'static str,
+        /// The value given.
+        value: u32,
+    },
+    /// A calibration matrix that is not of the form [fx 0 cx; 0 fy cy; 0 0 1].
+    #[error(
+        "camera matrix entry [{row}][{column}] is {}, expected {expected}: K must be [fx 0 cx; 0 fy cy; 0 0 1]",
+        Number(*found)
+    )]
+    MatrixEntry {
+        /// Row of the entry, from 0.
+        row: usize,
+        /// Column of the entry, from 0.
+        column: usize,
+        /// The value given.
+        found: f64,
+        /// The value required.
+        expected: f64,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_shorten_numbers_that_would_fill_lines() {
+        let error = CameraError::PrincipalPoint {
+            name: "cx",
+            value: 2e300,
+        };
+        assert_eq!(
+            error.to_string(),
+            "principal point cx is 2e300, expected a number of pixels between -1000000000 and 1000000000"
+        );
     }
 }

@@ -40,8 +40,10 @@ impl Derived {
             }
         };
         let value = Arc::clone(slot.get_or_init(|| Arc::new(build())));
-        // The slot was found by the type's id, so the fallback is never taken; it keeps this function free of panics.
-        value.downcast::<T>().unwrap_or_else(|_| Arc::new(build()))
+        let Ok(value) = value.downcast::<T>() else {
+            unreachable!("the slot was found by the id of its type");
+        };
+        value
     }
 }
 

@@ -2,8 +2,9 @@
 //!
 //! All are row-major, index `v * width + u`, in metres where they hold lengths; 0 means "nothing was measured here".
 
+use thiserror::Error;
+
 use crate::camera::PinholeCamera;
-use crate::error::ImageError;
 use crate::region::PixelRegion;
 
 /// Smallest depth that counts as measured, metres: the inverse of a smaller one, down to the denormals, loses its meaning in `f32`.
@@ -257,4 +258,40 @@ pub(crate) fn check_size(
             second_height: second_size.1,
         })
     }
+}
+
+/// An image whose size does not fit.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The number of values is not width × height.
+    #[error("image of {width}x{height} needs {expected} values, found {found}")]
+    PixelCount {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// width × height.
+        expected: usize,
+        /// The number of values given.
+        found: usize,
+    },
+    /// Two things that must be of one size are not.
+    #[error(
+        "{first} is {first_width}x{first_height} but {second} is {second_width}x{second_height}: expected the same size"
+    )]
+    SizeMismatch {
+        /// What the first size belongs to.
+        first: &'static str,
+        /// Width of the first.
+        first_width: u32,
+        /// Height of the first.
+        first_height: u32,
+        /// What the second size belongs to.
+        second: &'static str,
+        /// Width of the second.
+        second_width: u32,
+        /// Height of the second.
+        second_height: u32,
+    },
 }

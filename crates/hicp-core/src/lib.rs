@@ -28,14 +28,15 @@ mod camera;
 mod correspondences;
 mod derived;
 mod diameter;
-mod error;
 mod id;
 mod image;
+mod index;
 mod label;
 mod mesh;
 mod mesh_survey;
 mod model;
 mod normals;
+mod number;
 mod observation;
 mod problem;
 mod region;
@@ -55,19 +56,21 @@ mod work;
 /// What the crates of this workspace share and users do not need. No stability is promised.
 #[doc(hidden)]
 pub mod internal {
+    pub use crate::index::index;
     pub use crate::label::type_label;
     pub use crate::vectorized::{VectorLoop, vectorized};
     pub use crate::work::Work;
 }
 
-pub use camera::{MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters};
+pub use camera::{
+    CameraError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters,
+};
 pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
 pub use diameter::diameter;
-pub use error::{CameraError, ImageError, MeshError, RotationError, SymmetryError};
 pub use id::Id;
-pub use image::{DepthImage, DistanceImage, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask};
-pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, TriMesh};
+pub use image::{DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask};
+pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshError, TriMesh};
 pub use mesh_survey::MeshSurvey;
 pub use model::{Model, ModelConfig};
 pub use nalgebra::{
@@ -78,8 +81,10 @@ pub use observation::Observation;
 pub use problem::{Context, Iteration, Problem};
 pub use region::PixelRegion;
 pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
-pub use rotation::{ROTATION_TOLERANCE, rotation_from_matrix};
+pub use rotation::{ROTATION_TOLERANCE, RotationError, rotation_from_matrix};
 pub use rotation_grid::rotation_grid;
 pub use sampling::{MAX_SAMPLES, sample_surface};
 pub use surfel::Surfel;
-pub use symmetry::{CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis};
+pub use symmetry::{
+    CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError,
+};

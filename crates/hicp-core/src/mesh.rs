@@ -1,11 +1,11 @@
 //! Triangle meshes.
 
+use thiserror::Error;
+
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-
-use crate::error::MeshError;
 
 /// Largest absolute vertex coordinate accepted, metres: what a map grid reaches (a UTM northing ends at 10 000 km).
 ///
@@ -290,4 +290,58 @@ impl DisjointSets {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
+}
+
+/// A mesh that cannot be registered.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// No triangle.
+    #[error("mesh has {vertices} vertices but no triangle")]
+    NoTriangles {
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// More vertices or triangles than indices can address.
+    #[error("mesh has {count} {what}, expected at most {limit}")]
+    TooLarge {
+        /// `vertices` or `triangles`.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// A triangle that names a vertex that is not there.
+    #[error(
+        "triangle {triangle} uses vertex {index}, but there are {vertices} vertices (counted from 0)"
+    )]
+    IndexOutOfRange {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The vertex index it holds.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A vertex, used or not, with a coordinate that is not finite, or so large that its square overflows.
+    #[error("vertex {vertex} is ({x}, {y}, {z}) m, expected finite coordinates within ±{limit} m")]
+    Coordinate {
+        /// Index of the vertex.
+        vertex: usize,
+        /// x.
+        x: f32,
+        /// y.
+        y: f32,
+        /// z.
+        z: f32,
+        /// Largest absolute coordinate accepted.
+        limit: f32,
+    },
+    /// Every triangle has zero area.
+    #[error("all {triangles} triangles have zero area")]
+    NoArea {
+        /// Number of triangles.
+        triangles: usize,
+    },
 }

@@ -6,9 +6,9 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::camera::PinholeCamera;
 use crate::derived::Derived;
-use crate::error::ImageError;
 use crate::id::Id;
-use crate::image::{DepthImage, Mask, check_size};
+use crate::image::{DepthImage, ImageError, Mask, check_size};
+use crate::index;
 use crate::normals::{DepthPatch, estimate_normals};
 use crate::region::PixelRegion;
 use crate::surfel::Surfel;
@@ -250,8 +250,8 @@ impl Observation {
     /// Returns the pixel (u, v) of a surfel's index, see [`Observation::surfel`].
     #[must_use]
     pub fn pixel(&self, index: u32) -> (u32, u32) {
-        // The side of an accepted image fits; an empty region has no indices.
-        let width = u32::try_from(self.region.width()).unwrap_or(1).max(1);
+        // An empty region has no indices.
+        let width = index::index(self.region.width()).max(1);
         (
             self.region.u_min + index % width,
             self.region.v_min + index / width,
@@ -273,13 +273,7 @@ impl Observation {
                     .step_by(step)
                     .map(move |u| row + (u - region.u_min) as usize)
             })
-            // At most 2³⁰ pixels in any accepted image.
-            .map(|index| {
-                (
-                    u32::try_from(index).unwrap_or(u32::MAX),
-                    &self.surfels[index],
-                )
-            })
+            .map(|index| (index::index(index), &self.surfels[index]))
             .filter(|(_, s)| s.point.z > 0.0)
     }
 
@@ -327,23 +321,22 @@ impl Observation {
         let measured = |i: &usize| self.mask.pixels()[*i] && self.depth.pixels()[*i] > 0.0;
         let n_measured = pixels().filter(measured).count();
         let camera = self.camera.scaled_down(factor);
-        match (
+        let (Ok(depth), Ok(mask)) = (
             DepthImage::from_meters(width, height, depth),
             Mask::new(width, height, mask),
-        ) {
-            (Ok(depth), Ok(mask)) => Self {
-                id: Id::next(),
-                camera,
-                depth: Arc::new(depth),
-                mask,
-                region,
-                n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),
-                surfels,
-                n_measured,
-                derived: Derived::default(),
-            },
-            // The vectors were filled for these sizes, so this is never taken; it keeps the function free of panics.
-            _ => self.clone(),
+        ) else {
+            unreachable!("the pixels were collected for an image of {width}x{height}");
+        };
+        Self {
+            id: Id::next(),
+            camera,
+            depth: Arc::new(depth),
+            mask,
+            region,
+            n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),
+            surfels,
+            n_measured,
+            derived: Derived::default(),
         }
     }
 

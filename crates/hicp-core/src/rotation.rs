@@ -1,8 +1,10 @@
 //! Rotations from matrices that somebody wrote down.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use thiserror::Error;
 
-use crate::error::RotationError;
+use crate::number::Number;
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 /// Largest deviation from orthogonality and from determinant 1 that is taken for rounding.
 pub const ROTATION_TOLERANCE: f64 = 1e-3;
@@ -55,4 +57,42 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     Ok(UnitQuaternion::from_rotation_matrix(
         &Rotation3::from_matrix_unchecked(rotation),
     ))
+}
+
+/// A 3×3 matrix that is not a rotation.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum RotationError {
+    /// A component is not finite.
+    #[error("rotation entry [{row}][{column}] is {value}, expected a finite number")]
+    NotFinite {
+        /// Row from 0.
+        row: usize,
+        /// Column from 0.
+        column: usize,
+        /// The value given.
+        value: f64,
+    },
+    /// R Rᵀ is not the identity.
+    #[error(
+        "rotation is not orthogonal: the largest entry of |R Rᵀ - I| is {}, expected at most {tolerance}",
+        Number(*deviation)
+    )]
+    NotOrthogonal {
+        /// max |R Rᵀ − I|.
+        deviation: f64,
+        /// The largest deviation accepted.
+        tolerance: f64,
+    },
+    /// The determinant is not +1: a reflection when it is −1.
+    #[error(
+        "rotation has determinant {}, expected 1 within {tolerance} (-1 is a reflection)",
+        Number(*determinant)
+    )]
+    Determinant {
+        /// det R.
+        determinant: f64,
+        /// The largest deviation accepted.
+        tolerance: f64,
+    },
 }

@@ -1,8 +1,8 @@
 //! Symmetries of an object: the motions that leave it looking the same.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use thiserror::Error;
 
-use crate::error::SymmetryError;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
 /// Rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
 pub const CONTINUOUS_STEPS: usize = 315;
@@ -112,4 +112,30 @@ impl Symmetries {
         }
         motions
     }
+}
+
+/// Symmetries that are not rigid motions.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SymmetryError {
+    /// An axis without direction.
+    #[error("symmetry axis ({x}, {y}, {z}) has no direction, expected a finite non-zero vector")]
+    Axis {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+    },
+    /// A point on the axis that is not finite.
+    #[error("symmetry offset ({x}, {y}, {z}) is not finite")]
+    Offset {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+    },
 }

@@ -21,5 +21,8 @@ pub(crate) fn keep_positions<T: Copy>(
 pub(crate) fn spread(i: usize, count: usize, length: usize) -> usize {
     // In u128, since the product may exceed 64 bits; the quotient is below `length`.
     let position = (2 * i as u128 + 1) * length as u128 / (2 * count.max(1) as u128);
-    usize::try_from(position).unwrap_or(usize::MAX)
+    let Ok(position) = usize::try_from(position) else {
+        unreachable!("the quotient is below `length`, a usize");
+    };
+    position
 }
