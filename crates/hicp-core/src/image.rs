@@ -108,6 +108,33 @@ impl DepthImage {
         Raster::new(width, height, pixels).map(Self)
     }
 
+    /// Creates a depth image from the 16-bit units of a sensor, row by row; 0 is missing.
+    ///
+    /// `meters_per_unit` is the value of one unit: 0.001 for millimeters, BOP's `depth_scale` divided by 1000.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when `units` does not hold `width * height` values.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), hicp_core::ImageError> {
+    /// let depth = hicp_core::DepthImage::from_u16(2, 1, &[0, 1500], 0.001)?;
+    /// assert_eq!(depth.pixels(), [0.0, 1.5]);
+    /// # Ok(()) }
+    /// ```
+    pub fn from_u16(
+        width: u32,
+        height: u32,
+        units: &[u16],
+        meters_per_unit: f64,
+    ) -> Result<Self, ImageError> {
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let meters = units
+            .iter()
+            .map(|z| (f64::from(*z) * meters_per_unit) as f32);
+        Self::collect(width, height, meters)
+    }
+
     image_accessors!(f32);
 
     /// Returns the distance image: range along each pixel's ray instead of depth.
@@ -178,6 +205,15 @@ impl Mask {
         let raster = Raster::new(width, height, pixels)?;
         let region = bounding_region(&raster);
         Ok(Self(raster, region))
+    }
+
+    /// Creates a mask from bytes, row by row: every pixel that is not 0 belongs to the object.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
+    pub fn from_u8(width: u32, height: u32, pixels: &[u8]) -> Result<Self, ImageError> {
+        Self::new(width, height, pixels.iter().map(|p| *p != 0).collect())
     }
 
     /// Makes a mask in which every pixel belongs to the object.

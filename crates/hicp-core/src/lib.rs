@@ -73,15 +73,18 @@ pub use image::{DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEP
 pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshError, TriMesh};
 pub use mesh_survey::MeshSurvey;
 pub use model::{Model, ModelConfig};
+pub use nalgebra;
 pub use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,
+    Isometry3, Matrix3, Matrix4, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,
     UnitVector3, Vector3, Vector6,
 };
 pub use observation::Observation;
 pub use problem::{Context, Iteration, Problem};
 pub use region::PixelRegion;
 pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
-pub use rotation::{ROTATION_TOLERANCE, RotationError, rotation_from_matrix};
+pub use rotation::{
+    PoseMatrixError, ROTATION_TOLERANCE, RotationError, pose_from_matrix, rotation_from_matrix,
+};
 pub use rotation_grid::rotation_grid;
 pub use sampling::{MAX_SAMPLES, sample_surface};
 pub use surfel::Surfel;

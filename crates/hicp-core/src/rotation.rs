@@ -1,10 +1,10 @@
-//! Rotations from matrices that somebody wrote down.
+//! Rotations and poses from matrices that are rounded.
 
 use thiserror::Error;
 
 use crate::number::Number;
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 
 /// Largest deviation from orthogonality and from determinant 1 that is taken for rounding.
 pub const ROTATION_TOLERANCE: f64 = 1e-3;
@@ -57,6 +57,70 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     Ok(UnitQuaternion::from_rotation_matrix(
         &Rotation3::from_matrix_unchecked(rotation),
     ))
+}
+
+/// Returns the pose of a 4×4 matrix [R t; 0 0 0 1] with t in meters, R being a rotation up to rounding.
+///
+/// # Errors
+///
+/// [`PoseMatrixError`] if R is not a rotation (see [`rotation_from_matrix`]), t is not finite, or the last row is not
+/// [0 0 0 1].
+///
+/// ```
+/// use hicp_core::{Matrix4, pose_from_matrix};
+/// let matrix = Matrix4::new_translation(&hicp_core::Vector3::new(0.0, 0.1, 0.8));
+/// assert_eq!(pose_from_matrix(&matrix).unwrap().translation.z, 0.8);
+/// assert!(pose_from_matrix(&(matrix * 2.0)).is_err());
+/// ```
+pub fn pose_from_matrix(matrix: &Matrix4<f64>) -> Result<Isometry3<f64>, PoseMatrixError> {
+    for (column, expected) in [0.0, 0.0, 0.0, 1.0].into_iter().enumerate() {
+        let found = matrix[(3, column)];
+        if found != expected {
+            return Err(PoseMatrixError::LastRow {
+                column,
+                found,
+                expected,
+            });
+        }
+    }
+    let rotation = rotation_from_matrix(&matrix.fixed_view::<3, 3>(0, 0).into_owned())?;
+    for row in 0..3 {
+        let found = matrix[(row, 3)];
+        if !found.is_finite() {
+            return Err(PoseMatrixError::Translation { row, found });
+        }
+    }
+    let translation = Translation3::new(matrix[(0, 3)], matrix[(1, 3)], matrix[(2, 3)]);
+    Ok(Isometry3::from_parts(translation, rotation))
+}
+
+/// A 4×4 matrix that is not a pose.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum PoseMatrixError {
+    /// The upper left 3×3 block is not a rotation.
+    #[error(transparent)]
+    Rotation(#[from] RotationError),
+    /// A component of the translation is not finite.
+    #[error("translation entry [{row}][3] is {found}, expected a finite number of meters")]
+    Translation {
+        /// Row from 0.
+        row: usize,
+        /// The value given.
+        found: f64,
+    },
+    /// The last row is not [0 0 0 1]: the matrix may be transposed.
+    #[error(
+        "pose matrix entry [3][{column}] is {found}, expected {expected}: the last row must be [0 0 0 1], is the matrix transposed?"
+    )]
+    LastRow {
+        /// Column from 0.
+        column: usize,
+        /// The value given.
+        found: f64,
+        /// The value required.
+        expected: f64,
+    },
 }
 
 /// A 3×3 matrix that is not a rotation.

@@ -99,18 +99,11 @@ pub(crate) struct PyStageEvent(StageRecord);
 
 impl PyStageEvent {
     pub(crate) fn of_record(record: &StageRecord) -> Self {
-        Self(*record)
+        Self(record.clone())
     }
 
     pub(crate) fn new(event: &StageEvent<'_>) -> Self {
-        Self(StageRecord {
-            switched: None,
-            selection: event.selection,
-            association: event.association,
-            metric: event.metric,
-            n_source: event.n_source,
-            outcome: *event.outcome,
-        })
+        Self(StageRecord::from(event))
     }
 }
 
@@ -139,6 +132,18 @@ impl PyStageEvent {
     #[getter]
     fn association(&self) -> &'static str {
         self.0.association
+    }
+
+    /// Names of the outlier filters and weights, in order.
+    #[getter]
+    fn filters(&self) -> Vec<&'static str> {
+        self.0.filters.clone()
+    }
+
+    /// Names of the stop rules, in order.
+    #[getter]
+    fn stop_rules(&self) -> Vec<&'static str> {
+        self.0.stop_rules.clone()
     }
 
     /// Name of the error metric.
@@ -200,7 +205,9 @@ impl PyStageEvent {
         dict.set_item("regime_mve", self.regime_mve())?;
         dict.set_item("selection", self.selection())?;
         dict.set_item("association", self.association())?;
+        dict.set_item("filters", self.filters())?;
         dict.set_item("metric", self.metric())?;
+        dict.set_item("stop_rules", self.stop_rules())?;
         dict.set_item("n_source", self.n_source())?;
         dict.set_item("iterations", self.iterations())?;
         dict.set_item("n_pairs", self.n_pairs())?;

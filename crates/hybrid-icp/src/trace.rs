@@ -3,7 +3,8 @@
 use hicp_icp::{Observer, Outcome, RegimeEvent, StageEvent};
 
 /// One ICP stage that ran.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StageRecord {
     /// Decision of the switch, if this is the first stage after one.
     pub switched: Option<RegimeEvent>,
@@ -11,12 +12,31 @@ pub struct StageRecord {
     pub selection: &'static str,
     /// Name of the data association.
     pub association: &'static str,
+    /// Names of the outlier filters and weights, in order.
+    pub filters: Vec<&'static str>,
     /// Name of the error metric.
     pub metric: &'static str,
+    /// Names of the stop rules, in order.
+    pub stop_rules: Vec<&'static str>,
     /// Number of points selected.
     pub n_source: usize,
     /// Its outcome.
     pub outcome: Outcome,
+}
+
+impl From<&StageEvent<'_>> for StageRecord {
+    fn from(event: &StageEvent<'_>) -> Self {
+        Self {
+            switched: None,
+            selection: event.selection,
+            association: event.association,
+            filters: event.filters.to_vec(),
+            metric: event.metric,
+            stop_rules: event.stop_rules.to_vec(),
+            n_source: event.n_source,
+            outcome: *event.outcome,
+        }
+    }
 }
 
 /// An observer that stores one record per ICP stage.
@@ -47,13 +67,8 @@ impl Observer for Trace {
     }
 
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {
-        self.stages.push(StageRecord {
-            switched: self.pending.take(),
-            selection: event.selection,
-            association: event.association,
-            metric: event.metric,
-            n_source: event.n_source,
-            outcome: *event.outcome,
-        });
+        let mut record = StageRecord::from(event);
+        record.switched = self.pending.take();
+        self.stages.push(record);
     }
 }

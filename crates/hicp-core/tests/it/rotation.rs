@@ -3,7 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::support::Numbers;
-use hicp_core::{Matrix3, ROTATION_TOLERANCE, RotationError, Vector3, rotation_from_matrix, so3};
+use hicp_core::{
+    Isometry3, Matrix3, PoseMatrixError, ROTATION_TOLERANCE, RotationError, Vector3,
+    pose_from_matrix, rotation_from_matrix, so3,
+};
 
 fn rounded(matrix: &Matrix3<f64>, digits: i32) -> Matrix3<f64> {
     let scale = 10_f64.powi(digits);
@@ -148,4 +151,32 @@ fn what_is_not_finite_is_named() {
             }
         }
     }
+}
+
+#[test]
+fn poses_come_from_matrices_and_transposed_ones_are_refused() {
+    let mut numbers = Numbers(77);
+    let pose = Isometry3::new(
+        Vector3::new(numbers.unit(), numbers.unit(), 0.9),
+        Vector3::new(0.3, -1.1, 0.4),
+    );
+    let matrix = pose.to_homogeneous();
+    let found = pose_from_matrix(&matrix).unwrap();
+    assert!((found.to_homogeneous() - matrix).amax() < 1e-12);
+    assert!(matches!(
+        pose_from_matrix(&matrix.transpose()),
+        Err(PoseMatrixError::LastRow { column: 0, .. })
+    ));
+    let mut nowhere = matrix;
+    nowhere[(1, 3)] = f64::NAN;
+    assert!(matches!(
+        pose_from_matrix(&nowhere),
+        Err(PoseMatrixError::Translation { row: 1, .. })
+    ));
+    let mut sheared = matrix;
+    sheared[(0, 1)] += 0.1;
+    assert!(matches!(
+        pose_from_matrix(&sheared),
+        Err(PoseMatrixError::Rotation(_))
+    ));
 }

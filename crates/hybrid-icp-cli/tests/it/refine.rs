@@ -56,6 +56,9 @@ fn the_result_has_every_key_in_its_type() {
         ] {
             assert!(stage[key].is_string(), "{key}");
         }
+        for key in ["filters", "stop_rules"] {
+            assert!(stage[key].is_array(), "{key}");
+        }
         for key in ["iterations", "n_pairs", "n_source"] {
             assert!(stage[key].is_u64(), "{key}");
         }
