@@ -32,6 +32,7 @@ const CONFINED: &[(&str, &str)] = &[
     ("glam", "hicp-raster"),
     ("kiddo", "hicp-association"),
     ("tobj", "hicp-io"),
+    ("toml", "hicp-pipeline"),
 ];
 
 /// Marks of unfinished work, split so that this file does not contain them.

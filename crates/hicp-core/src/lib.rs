@@ -46,8 +46,7 @@ mod rotation_grid;
 mod sampling;
 pub mod se3;
 pub mod so3;
-#[doc(hidden)]
-pub mod suggest;
+mod suggest;
 mod surfel;
 mod symmetry;
 mod vectorized;
@@ -58,6 +57,7 @@ mod work;
 pub mod internal {
     pub use crate::index::index;
     pub use crate::label::type_label;
+    pub use crate::suggest::nearest_name;
     pub use crate::vectorized::{VectorLoop, vectorized};
     pub use crate::work::Work;
 }

@@ -1,7 +1,10 @@
-//! The known name that somebody may have meant.
+//! Suggestions for misspelled names.
 
-/// Returns the candidate with the fewest edits from a name, if it takes no more than half of it to be retyped.
-pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+/// Returns the candidate with the fewest edits from a name, if these are at most half of its letters.
+pub fn nearest_name<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(candidate, name), candidate))

@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use hicp_core::suggest::nearest;
+use hicp_core::internal::nearest_name;
 use hicp_icp::MAX_ITERATIONS;
 use toml::de::DeValue;
 
@@ -154,7 +154,7 @@ impl<'a> Context<'a> {
         PipelineError::Unknown {
             place: spot.place(self.origin, self.text),
             problem,
-            suggestion: nearest(name, known.iter().copied()).map(str::to_owned),
+            suggestion: nearest_name(name, known.iter().copied()).map(str::to_owned),
             known: known.into_iter().map(str::to_owned).collect(),
         }
     }

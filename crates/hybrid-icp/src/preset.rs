@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use hicp_core::suggest::nearest;
+use hicp_core::internal::nearest_name;
 use hicp_icp::Stage;
 use thiserror::Error;
 
@@ -125,7 +125,7 @@ impl FromStr for Preset {
         let named = Self::ALL.into_iter().find(|preset| preset.name() == name);
         named.ok_or_else(|| UnknownPreset {
             name: name.to_owned(),
-            suggestion: nearest(name, Self::ALL.map(Self::name)),
+            suggestion: nearest_name(name, Self::ALL.map(Self::name)),
         })
     }
 }
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_name_is_answered_with_the_nearest() {
+    fn a_misspelt_name_is_answered_with_the_nearest_name() {
         let error = "nn-point-to-plan".parse::<Preset>().unwrap_err();
         assert_eq!(error.suggestion, Some("nn-point-to-plane"));
         assert!(error.to_string().contains("projective-cascade-plane-point"));

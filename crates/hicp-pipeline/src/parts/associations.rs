@@ -6,7 +6,7 @@ use hicp_association::{
     ProjectiveSearch, Reciprocal, Stride, WarmNearestNeighbor,
 };
 
-use super::{length, stride};
+use super::common::{length, stride};
 use crate::build::Parameters;
 use crate::catalog::{BoxedAssociation, Catalog};
 use crate::error::PipelineError;

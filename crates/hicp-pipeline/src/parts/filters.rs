@@ -6,7 +6,7 @@ use hicp_association::{
     Trimmed, VarTrimmed,
 };
 
-use super::{EDGE, TILT, length};
+use super::common::{EDGE, TILT, length};
 use crate::catalog::{BoxedFilter, Catalog};
 use crate::range::{FACTOR, METERS, Range, SHARE};
 

@@ -2,6 +2,7 @@
 //! does, its parameters with their ranges and defaults, and its constructor.
 
 mod associations;
+mod common;
 mod filters;
 mod metrics;
 mod scores;
@@ -11,19 +12,7 @@ mod stop_rules;
 
 use std::sync::LazyLock;
 
-use hicp_association::{Length, Stride};
-
-use crate::build::Parameters;
 use crate::catalog::Catalog;
-use crate::error::PipelineError;
-use crate::range::Range;
-
-/// The tilt of a surface.
-const TILT: Range = Range::new(0.0, 90.0, "degrees");
-/// What a largest tilt means.
-const EDGE: &str = "a steeper surface is a depth edge";
-/// A length whose unit another parameter states.
-const OF_UNIT: Range = Range::positive("of `unit`");
 
 impl Catalog {
     /// Returns the parts that ship with the library.
@@ -42,34 +31,4 @@ impl Catalog {
         });
         &BUILT_IN
     }
-}
-
-/// Reads a length and the word that says what it is counted in.
-fn length(
-    p: &mut Parameters<'_>,
-    name: &'static str,
-    default: f64,
-    meaning: &'static str,
-) -> Result<Length, PipelineError> {
-    let length = p.number(name, OF_UNIT, default, meaning)?;
-    let units = [
-        ("diameters", Length::Diameters as fn(f32) -> Length),
-        ("meters", Length::Meters),
-    ];
-    Ok(p.word("unit", &units, "unit of the length")?(length))
-}
-
-/// Reads the spacing of a pixel grid: about so many points, or every so many pixels.
-fn stride(
-    p: &mut Parameters<'_>,
-    points: u32,
-    pixels: u32,
-    meaning: &'static str,
-) -> Result<Stride, PipelineError> {
-    let points = p.count("points", 1, points, meaning)?;
-    let pixels = p.count("pixels", 0, pixels, "spacing of the grid instead, if not 0")?;
-    Ok(match pixels {
-        0 => Stride::AboutPoints(points),
-        _ => Stride::Pixels(pixels),
-    })
 }

@@ -5,7 +5,7 @@ use hicp_association::{
     VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 
-use super::{EDGE, TILT, length, stride};
+use super::common::{EDGE, TILT, length, stride};
 use crate::build::Parameters;
 use crate::catalog::{BoxedSelection, Catalog};
 use crate::error::PipelineError;
