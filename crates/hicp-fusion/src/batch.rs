@@ -1,29 +1,32 @@
 //! Fusing all estimates at once: `average` and `weighted-average`.
 
-use hicp_core::{Isometry3, Matrix6, se3};
+use hicp_core::Matrix6;
 
 use crate::config::FuserConfig;
-use crate::estimate::{PoseEstimate, symmetrized};
+use crate::estimate::PoseEstimate;
 use crate::fuser::{Fuser, Update};
-use crate::fusion::{Fused, Fusion, Solution};
-use crate::motion::{CameraMotion, Carrier, Transport};
+use crate::fusion::Fusion;
+use crate::motion::{CameraMotion, Transport};
+use crate::solution::Solution;
 
-/// By what estimates are weighed.
+/// The weights of estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Weights {
-    /// All alike, by the unit covariance.
+    /// Equal weights, from the unit covariance.
     Constant,
-    /// By their own covariances.
+    /// The inverses of the estimates' own covariances.
     Own,
 }
 
-/// Keeps every estimate and fuses all of them anew with every update (§V-A): `average` with equal covariances,
-/// `weighted-average` with those of the estimates.
+/// Keeps every estimate and fuses all of them again with every update (§V-A).
 ///
-/// The pose weighs by the method; the covariance that it reports follows from the estimates' own, in both methods. Those of a
-/// camera motion are added to every estimate held; that they are the same errors is not accounted for ([`crate::RecursiveFuser`] does).
+/// `average` gives the estimates equal covariances; `weighted-average` uses their own. In both methods
+/// the covariance of the result follows from the estimates' own. The covariance of a camera motion is
+/// added to every estimate held. Its errors are the same in all of them, which [`crate::RecursiveFuser`]
+/// accounts for and this fuser does not.
 ///
-/// Cost of an update: about 1 µs per estimate held, see [`Fusion`]. Memory grows by some 700 bytes per estimate, up to the window.
+/// Cost of an update: about 1 µs per estimate held, see [`Fusion`]. Memory: about 700 bytes per estimate,
+/// up to the window.
 #[derive(Clone, Debug)]
 pub struct BatchFuser {
     config: FuserConfig,
@@ -34,8 +37,9 @@ pub struct BatchFuser {
     fused: Option<PoseEstimate>,
     /// Invariant: its terms are those of `held`.
     fusion: Fusion,
-    /// From the camera frame in which the estimates are held: fusing is equivariant, so they need not move with the camera.
-    camera_from_anchor: Isometry3<f64>,
+    /// From the camera frame in which the estimates are held. Fusing is equivariant, so they need not move
+    /// with the camera.
+    camera_from_anchor: CameraMotion,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -45,13 +49,13 @@ struct Held {
 }
 
 impl BatchFuser {
-    /// Makes `average`: estimates weigh alike, whatever their covariances.
+    /// Creates `average`: all estimates have equal weights, whatever their covariances.
     #[must_use]
     pub fn average(config: FuserConfig) -> Self {
         Self::new(config, Weights::Constant)
     }
 
-    /// Makes `weighted-average`: estimates weigh by their covariances.
+    /// Creates `weighted-average`: the covariances of the estimates weigh them.
     #[must_use]
     pub fn weighted_average(config: FuserConfig) -> Self {
         Self::new(config, Weights::Own)
@@ -64,11 +68,11 @@ impl BatchFuser {
             held: Vec::new(),
             fused: None,
             fusion: Fusion::new(config.limits),
-            camera_from_anchor: Isometry3::identity(),
+            camera_from_anchor: CameraMotion::none(),
         }
     }
 
-    /// Number of estimates held.
+    /// Returns the number of estimates held.
     #[must_use]
     pub fn len(&self) -> usize {
         self.held.len()
@@ -80,111 +84,100 @@ impl BatchFuser {
         self.held.is_empty()
     }
 
-    /// Fuses what is held, from what was fused before.
-    fn fuse(&mut self) -> Solution {
-        let anchor_from_camera = self.camera_from_anchor.inverse();
-        let Some(start) = self.fused.map(|fused| fused.camera_from_object) else {
-            return Solution::NONE;
+    /// Returns the motion from the current camera frame to the anchor's.
+    fn anchor_from_camera(&self) -> CameraMotion {
+        CameraMotion::exact(self.camera_from_anchor.next_camera_from_camera().inverse())
+    }
+
+    /// Fuses the estimates held, starting from the last fused estimate.
+    fn fuse(&mut self, start: &PoseEstimate) -> Solution {
+        let to_anchor = self.anchor_from_camera();
+        let start = to_anchor.next_camera_from_camera() * start.camera_from_object;
+        let Some(mut fused) = self.fusion.solve(&start) else {
+            unreachable!("estimates are held, and the start is one of them or was fused from them")
         };
-        let Some(fused) = self.fusion.solve(&(anchor_from_camera * start)) else {
-            return Solution::NONE;
-        };
-        let mut estimate = PoseEstimate {
-            camera_from_object: fused.camera_from_object,
-            covariance: self.covariance(&fused),
-            mve: None,
-        };
-        carry(&mut estimate, &self.camera_from_anchor);
-        self.fused = Some(estimate);
+        if self.weights == Weights::Constant {
+            let own = self.held.iter().map(|held| &held.estimate.covariance);
+            fused.estimate.covariance = self.fusion.covariance_from(&fused.estimate, own);
+        }
+        let carried = self
+            .camera_from_anchor
+            .carry(&fused.estimate, Transport::Adjoint);
+        self.fused = Some(carried);
         fused.solution
     }
 
-    fn push(&mut self, held: Held) {
-        self.fusion
-            .push_weighted(&held.estimate.camera_from_object, &held.weight);
-        self.held.push(held);
-    }
-
-    /// Takes all that is held to the current camera frame.
+    /// Moves everything held to the current camera frame.
     fn rebase(&mut self) {
-        let motion = std::mem::replace(&mut self.camera_from_anchor, Isometry3::identity());
-        let adjoint = se3::adjoint(&motion);
+        let motion = std::mem::replace(&mut self.camera_from_anchor, CameraMotion::none());
         for held in &mut self.held {
-            carry(&mut held.estimate, &motion);
-            held.weight = symmetrized(&(adjoint * held.weight * adjoint.transpose()));
-        }
-    }
-
-    fn covariance(&self, fused: &Fused) -> Matrix6<f64> {
-        match self.weights {
-            Weights::Own => fused.covariance,
-            Weights::Constant => {
-                let own = self.held.iter().map(|held| &held.estimate.covariance);
-                self.fusion.covariance_from(fused, own)
-            }
+            held.estimate = motion.carry(&held.estimate, Transport::Adjoint);
+            held.weight = motion.carry_weight(&held.weight, Transport::Adjoint);
         }
     }
 }
 
 impl Fuser for BatchFuser {
     fn propagate(&mut self, motion: &CameraMotion) {
-        let carrier = Carrier::new(motion, self.config.transport);
-        if let Some(fused) = &mut self.fused {
-            carrier.estimate(fused);
-        }
-        if self.config.transport == Transport::Adjoint && motion.covariance().is_none() {
-            self.camera_from_anchor = motion.apply(&self.camera_from_anchor);
+        let transport = self.config.transport;
+        self.fused = self.fused.map(|fused| motion.carry(&fused, transport));
+        if transport == Transport::Adjoint && motion.covariance().is_none() {
+            let camera_from_anchor = self.camera_from_anchor.next_camera_from_camera();
+            self.camera_from_anchor = CameraMotion::exact(motion.apply(camera_from_anchor));
             return;
         }
         self.rebase();
         self.fusion.clear();
         for held in &mut self.held {
-            carrier.estimate(&mut held.estimate);
+            held.estimate = motion.carry(&held.estimate, transport);
             held.weight = match self.weights {
                 Weights::Own => held.estimate.covariance,
-                Weights::Constant => carrier.carried(&held.weight),
+                Weights::Constant => motion.carry_weight(&held.weight, transport),
             };
             self.fusion
                 .push_weighted(&held.estimate.camera_from_object, &held.weight);
         }
-        // Carried by the adjoint, what was fused is what would be; kept as they are, the covariances weigh otherwise here.
-        if self.config.transport == Transport::Kept && self.held.len() > 1 {
-            self.fuse();
+        // With the adjoint, the carried result is the result of the carried estimates. Kept covariances
+        // weigh differently in the new frame.
+        if let (Transport::Kept, Some(start), 2..) = (transport, self.fused, self.held.len()) {
+            self.fuse(&start);
         }
     }
 
     fn update(&mut self, estimate: &PoseEstimate) -> Update {
-        if self
-            .config
-            .window
-            .is_some_and(|n| self.held.len() >= n.max(1))
-        {
+        let window = self.config.window;
+        if window.is_some_and(|n| self.held.len() >= n.max(1)) {
             self.held.remove(0);
             self.fusion.remove_first();
         }
         let mut anchored = *estimate;
         if self.held.is_empty() {
-            self.camera_from_anchor = Isometry3::identity();
+            self.camera_from_anchor = CameraMotion::none();
         } else {
-            carry(&mut anchored, &self.camera_from_anchor.inverse());
+            anchored = self
+                .anchor_from_camera()
+                .carry(estimate, Transport::Adjoint);
         }
         let weight = match self.weights {
             Weights::Own => anchored.covariance,
-            Weights::Constant => {
-                let weight = self.config.unit.at(&estimate.camera_from_object);
-                let adjoint = se3::adjoint(&self.camera_from_anchor.inverse());
-                symmetrized(&(adjoint * weight * adjoint.transpose()))
-            }
+            Weights::Constant => self.anchor_from_camera().carry_weight(
+                &self.config.unit.at(&estimate.camera_from_object),
+                Transport::Adjoint,
+            ),
         };
-        self.push(Held {
+        self.fusion
+            .push_weighted(&anchored.camera_from_object, &weight);
+        self.held.push(Held {
             estimate: anchored,
             weight,
         });
-        if self.held.len() == 1 {
-            self.fused = Some(*estimate);
-            return Update::Accepted(Solution::NONE);
+        match self.fused {
+            Some(start) if self.held.len() > 1 => Update::Accepted(self.fuse(&start)),
+            _ => {
+                self.fused = Some(*estimate);
+                Update::Accepted(Solution::NONE)
+            }
         }
-        Update::Accepted(self.fuse())
     }
 
     fn estimate(&self) -> Option<PoseEstimate> {
@@ -195,7 +188,7 @@ impl Fuser for BatchFuser {
         self.held.clear();
         self.fusion.clear();
         self.fused = None;
-        self.camera_from_anchor = Isometry3::identity();
+        self.camera_from_anchor = CameraMotion::none();
     }
 
     fn name(&self) -> &'static str {
@@ -204,12 +197,4 @@ impl Fuser for BatchFuser {
             Weights::Own => "weighted-average",
         }
     }
-}
-
-/// Writes an estimate in the next frame.
-fn carry(estimate: &mut PoseEstimate, next_from_this: &Isometry3<f64>) {
-    let adjoint = se3::adjoint(next_from_this);
-    estimate.camera_from_object = next_from_this * estimate.camera_from_object;
-    estimate.camera_from_object.rotation.renormalize();
-    estimate.covariance = symmetrized(&(adjoint * estimate.covariance * adjoint.transpose()));
 }

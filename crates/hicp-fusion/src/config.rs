@@ -1,7 +1,7 @@
 //! What the methods of §V-A are made with.
 
-use crate::fusion::FusionLimits;
 use crate::motion::Transport;
+use crate::solution::FusionLimits;
 use crate::unit::UnitCovariance;
 
 /// Options of the six methods. Any value is valid; the default is the paper's reading, but for covariances carried by the adjoint.

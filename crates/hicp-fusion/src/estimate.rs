@@ -1,23 +1,104 @@
-//! A pose with its covariance.
+//! A pose with its covariance, and the errors of invalid inputs.
 
-use hicp_core::{Isometry3, Matrix6, Vector6, se3};
-use nalgebra::{Cholesky, SymmetricEigen, U6};
+use hicp_core::{Isometry3, Matrix6, se3};
+use thiserror::Error;
 
-use crate::error::FusionError;
+use crate::information::{information, symmetrized};
 
-/// Largest coordinate of a translation that is accepted, metres.
+/// Largest accepted coordinate of a translation, meters.
 pub const MAX_TRANSLATION_METERS: f64 = 1e6;
 
-/// Largest entry of a covariance that is accepted, m² or rad².
+/// Largest accepted entry of a covariance, m² or rad².
 pub const MAX_VARIANCE: f64 = 1e60;
 
 /// Share of the largest entry that rounding may take from symmetry and from the smallest eigenvalue.
 const ROUNDING: f64 = 1e-9;
 
-/// An estimate of an object's pose in the current camera frame, with its 6×6 covariance and, where known, its MVE.
+/// An invalid estimate, motion or parameter.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum FusionError {
+    /// A translation is not finite or beyond [`MAX_TRANSLATION_METERS`].
+    #[error(
+        "translation of {what} is ({x}, {y}, {z}) m, expected finite numbers within ±{} m",
+        MAX_TRANSLATION_METERS
+    )]
+    Translation {
+        /// The transform that has the translation.
+        what: &'static str,
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+    },
+    /// The quaternion of a rotation is not finite or not of unit length.
+    #[error("rotation of {what} has a quaternion of length {norm}, expected 1")]
+    Rotation {
+        /// The transform that has the rotation.
+        what: &'static str,
+        /// Length of the quaternion.
+        norm: f64,
+    },
+    /// An entry of a covariance is not finite or beyond [`MAX_VARIANCE`].
+    #[error(
+        "covariance entry [{row}][{column}] is {value}, expected a finite number within ±{:e}",
+        MAX_VARIANCE
+    )]
+    CovarianceEntry {
+        /// Row from 0.
+        row: usize,
+        /// Column from 0.
+        column: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// A covariance is not symmetric.
+    #[error(
+        "covariance is not symmetric: entry [{row}][{column}] is {value} and its mirror image {mirrored}"
+    )]
+    CovarianceAsymmetric {
+        /// Row from 0.
+        row: usize,
+        /// Column from 0.
+        column: usize,
+        /// The value found there.
+        value: f64,
+        /// The value at the mirrored place.
+        mirrored: f64,
+    },
+    /// A covariance has a negative eigenvalue.
+    #[error("covariance has the eigenvalue {eigenvalue}, expected 0 or more")]
+    CovarianceNegative {
+        /// The smallest eigenvalue.
+        eigenvalue: f64,
+    },
+    /// A mean VSD estimate is out of range.
+    #[error("mean VSD estimate is {value}, expected 0 to 1")]
+    Mve {
+        /// The value found.
+        value: f64,
+    },
+    /// A parameter is out of range.
+    #[error("{name} is {value}, expected {expected}")]
+    Parameter {
+        /// Name of the parameter.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// The valid values.
+        expected: &'static str,
+    },
+    /// There is no estimate to fuse.
+    #[error("no estimate to fuse, expected one or more")]
+    Empty,
+}
+
+/// An object's estimated pose in the current camera frame, with its 6×6 covariance and optional MVE.
 ///
-/// The covariance is that of a *left* perturbation, T = exp(ξ^) T̄ with ξ = [ρ; φ] (metres, then radians), and lives in the
-/// camera frame: Barfoot & Furgale 2014; see [`hicp_core::se3`]. It may be singular, zero included.
+/// The covariance describes a *left* perturbation T = exp(ξ^) T̄ with ξ = [ρ; φ] (meters, then radians)
+/// in the camera frame (Barfoot & Furgale 2014; see [`hicp_core::se3`]). It may be singular, or zero.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -40,12 +121,12 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
-    /// Makes an estimate. Asymmetry within rounding is averaged away.
+    /// Creates an estimate. Asymmetry within rounding is averaged away.
     ///
     /// # Errors
     ///
-    /// [`FusionError`] when the pose is not a rigid motion within ±[`MAX_TRANSLATION_METERS`], or the covariance is not
-    /// symmetric, positive semidefinite and within [`MAX_VARIANCE`].
+    /// [`FusionError`] if the pose is not a rigid motion within ±[`MAX_TRANSLATION_METERS`], or if the
+    /// covariance is not symmetric, positive semidefinite and within [`MAX_VARIANCE`].
     pub fn new(
         camera_from_object: Isometry3<f64>,
         covariance: Matrix6<f64>,
@@ -58,11 +139,13 @@ impl PoseEstimate {
         })
     }
 
-    /// Returns the estimate with its mean VSD estimate e_MVE, 0 (agrees with the image everywhere) to 1 (nowhere).
+    /// Returns the estimate with its mean VSD estimate e_MVE.
+    ///
+    /// e_MVE is 0 if the pose agrees with the image everywhere, and 1 if it agrees nowhere.
     ///
     /// # Errors
     ///
-    /// [`FusionError::Mve`] when it is not between 0 and 1.
+    /// [`FusionError::Mve`] if it is not between 0 and 1.
     pub fn with_mve(self, mve: f64) -> Result<Self, FusionError> {
         if !(0.0..=1.0).contains(&mve) {
             return Err(FusionError::Mve { value: mve });
@@ -91,8 +174,10 @@ impl PoseEstimate {
         self.mve
     }
 
-    /// Returns ξᵀ(Σ + Σ′)⁻¹ξ with ξ = ln(T T′⁻¹)^∨, the squared Mahalanobis distance of two independent estimates of one pose:
-    /// χ² with 6 degrees of freedom if both covariances are right and small (mean 6; 99 % below 16.8, 99.9 % below 22.5).
+    /// Returns the squared Mahalanobis distance of two independent estimates of one pose.
+    ///
+    /// The distance is ξᵀ(Σ + Σ′)⁻¹ξ with ξ = ln(T T′⁻¹)^∨. If both covariances are right and small, it
+    /// follows χ² with 6 degrees of freedom: mean 6, 99 % below 16.8, 99.9 % below 22.5.
     #[must_use]
     pub fn mahalanobis_squared(&self, other: &Self) -> f64 {
         let xi = se3::log(&(self.camera_from_object * other.camera_from_object.inverse()));
@@ -100,7 +185,7 @@ impl PoseEstimate {
     }
 }
 
-/// Refuses what is not a rigid motion of sensible size.
+/// Refuses a transform that is not a rigid motion within ±[`MAX_TRANSLATION_METERS`].
 pub(crate) fn check_motion(what: &'static str, motion: &Isometry3<f64>) -> Result<(), FusionError> {
     let t = &motion.translation.vector;
     // Written so that NaN fails.
@@ -116,7 +201,7 @@ pub(crate) fn check_motion(what: &'static str, motion: &Isometry3<f64>) -> Resul
     }
 }
 
-/// Refuses what is not a covariance; returns it symmetric to the bit.
+/// Refuses an invalid covariance. Returns a valid one, symmetric to the bit.
 pub(crate) fn checked_covariance(covariance: &Matrix6<f64>) -> Result<Matrix6<f64>, FusionError> {
     for row in 0..6 {
         for column in 0..6 {
@@ -147,62 +232,4 @@ pub(crate) fn checked_covariance(covariance: &Matrix6<f64>) -> Result<Matrix6<f6
         return Err(FusionError::CovarianceNegative { eigenvalue });
     }
     Ok(symmetric)
-}
-
-/// Returns (Σ + Σᵀ)/2.
-pub(crate) fn symmetrized(matrix: &Matrix6<f64>) -> Matrix6<f64> {
-    (matrix + matrix.transpose()) * 0.5
-}
-
-/// Standard deviation, metres and radians, given to directions in which a singular covariance has none.
-pub const MIN_STANDARD_DEVIATION: f64 = 1e-6;
-
-/// Share of its diagonal entry below which a pivot of the Cholesky decomposition is rounding.
-const RELATIVE_PIVOT: f64 = 1e-13;
-
-/// Returns Σ⁻¹. A Σ that is singular to working precision has its eigenvalues raised to [`MIN_STANDARD_DEVIATION`]² first.
-pub(crate) fn information(covariance: &Matrix6<f64>) -> Matrix6<f64> {
-    if let Some(factor) = regular_factor(covariance) {
-        return symmetrized(&factor.inverse());
-    }
-    let (eigenvalues, vectors) = floored_eigen(covariance);
-    let inverse = Matrix6::from_diagonal(&eigenvalues.map(|value| 1.0 / value));
-    symmetrized(&(vectors * inverse * vectors.transpose()))
-}
-
-/// Returns ln det Σ, with the eigenvalues of a singular Σ raised as in [`information`]. Motions do not change it: det Ad = 1.
-pub(crate) fn log_determinant(covariance: &Matrix6<f64>) -> f64 {
-    if let Some(factor) = regular_factor(covariance) {
-        let l = factor.l_dirty();
-        return (0..6).map(|i| 2.0 * l[(i, i)].ln()).sum();
-    }
-    floored_eigen(covariance).0.iter().map(|v| v.ln()).sum()
-}
-
-/// The Cholesky decomposition of a covariance that is regular to working precision.
-fn regular_factor(covariance: &Matrix6<f64>) -> Option<Factor> {
-    let factor = covariance.cholesky()?;
-    let l = factor.l_dirty();
-    let regular = (0..6).all(|i| {
-        let pivot = l[(i, i)] * l[(i, i)];
-        pivot > RELATIVE_PIVOT * covariance[(i, i)] && pivot > 1e-20
-    });
-    regular.then_some(factor)
-}
-
-type Factor = Cholesky<f64, U6>;
-
-/// More than any 6×6 matrix needs.
-const EIGEN_ITERATIONS: usize = 1000;
-
-/// Eigenvalues, raised to [`MIN_STANDARD_DEVIATION`]², and eigenvectors.
-fn floored_eigen(covariance: &Matrix6<f64>) -> (Vector6<f64>, Matrix6<f64>) {
-    let least = MIN_STANDARD_DEVIATION * MIN_STANDARD_DEVIATION;
-    match SymmetricEigen::try_new(*covariance, f64::EPSILON, EIGEN_ITERATIONS) {
-        Some(eigen) => (eigen.eigenvalues.map(|v| v.max(least)), eigen.eigenvectors),
-        None => (
-            covariance.diagonal().map(|v| v.max(least)),
-            Matrix6::identity(),
-        ),
-    }
 }

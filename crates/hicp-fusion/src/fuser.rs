@@ -1,78 +1,135 @@
 //! The trait of fusers.
 
 use hicp_core::internal::type_label;
+use thiserror::Error;
 
 use crate::estimate::PoseEstimate;
-use crate::fusion::Solution;
 use crate::motion::CameraMotion;
+use crate::solution::Solution;
 
-/// Turns the estimates that come in while the camera moves into one, in the current camera frame (§V).
+/// Fuses the estimates that arrive while the camera moves into one, in the current camera frame (§V).
+///
+/// A custom fuser moves what it holds with [`CameraMotion::carry`] and fuses with
+/// [`Fusion`](crate::Fusion) or in its own way. It reports [`Solution::NONE`] if it solves nothing, and
+/// [`Failure::Custom`] if it rejects an estimate. `hicp-testkit` checks the contract.
 ///
 /// # Contract
 ///
-/// - [`Fuser::propagate`] takes everything held to the next camera frame; [`Fuser::update`] takes an estimate in the current
-///   frame; [`Fuser::estimate`] returns what is believed there, `None` before the first update.
-/// - After one update the estimate is that update's, covariance included, unless it was gated.
-/// - Never panics and never returns what is not finite: estimates and motions are checked when they are made.
+/// - [`Fuser::propagate`] takes everything held to the next camera frame. [`Fuser::update`] takes an
+///   estimate in the current frame. [`Fuser::estimate`] returns the fused one there, and `None` before the
+///   first update.
+/// - After one update the fused estimate is that update's, covariance included, unless it was rejected.
+/// - A fuser never panics and never returns numbers that are not finite. Estimates and motions are checked
+///   when they are created.
 /// - Pure: equal calls since the last [`Fuser::reset`] give equal bits.
 /// - A warm update (as many estimates held before, then reset) makes no heap allocation.
+///
+/// ```
+/// use hicp_fusion::{CameraMotion, Failure, Fuser, PoseEstimate, Solution, Transport, Update};
+///
+/// /// Keeps the estimate with the lowest MVE.
+/// #[derive(Default)]
+/// struct LowestMve(Option<PoseEstimate>);
+///
+/// impl Fuser for LowestMve {
+///     fn propagate(&mut self, motion: &CameraMotion) {
+///         self.0 = self.0.map(|held| motion.carry(&held, Transport::Adjoint));
+///     }
+///
+///     fn update(&mut self, estimate: &PoseEstimate) -> Update {
+///         let mve = |estimate: &PoseEstimate| estimate.mve().unwrap_or(1.0);
+///         if self.0.is_some_and(|held| mve(&held) < mve(estimate)) {
+///             return Update::Rejected(Failure::Custom("the held estimate has a lower MVE"));
+///         }
+///         self.0 = Some(*estimate);
+///         Update::Accepted(Solution::NONE)
+///     }
+///
+///     fn estimate(&self) -> Option<PoseEstimate> {
+///         self.0
+///     }
+///
+///     fn reset(&mut self) {
+///         self.0 = None;
+///     }
+/// }
+/// # let pose = hicp_core::Isometry3::translation(0.0, 0.0, 0.5);
+/// # let seen = |mve| PoseEstimate::new(pose, hicp_core::Matrix6::identity())?.with_mve(mve);
+/// # let mut fuser = LowestMve::default();
+/// # assert!(fuser.update(&seen(0.1)?).is_taken());
+/// # assert_eq!(fuser.update(&seen(0.2)?).failure().unwrap().to_string(), "the held estimate has a lower MVE");
+/// # Ok::<(), hicp_fusion::FusionError>(())
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a fuser",
+    label = "expected a type that implements `Fuser`",
+    note = "`Fuser` is implemented by `BatchFuser`, `RecursiveFuser`, `LastEstimate`, `MostConfident`, by `Gated`, \
+            `SymmetryAware` and `SharedError` around a fuser, and by the boxes that `FusionMethod::build` returns"
+)]
 pub trait Fuser {
-    /// Takes what is held to the next camera frame.
+    /// Moves everything held to the next camera frame.
     fn propagate(&mut self, motion: &CameraMotion);
 
-    /// Takes in an estimate in the current camera frame.
+    /// Fuses or rejects an estimate in the current camera frame.
     fn update(&mut self, estimate: &PoseEstimate) -> Update;
 
     /// Returns the fused estimate in the current camera frame.
     fn estimate(&self) -> Option<PoseEstimate>;
 
-    /// Forgets everything, keeps the memory.
+    /// Removes everything held and keeps the memory.
     fn reset(&mut self);
 
-    /// Name in traces and on the command line.
+    /// Returns the name in traces and on the command line.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
 }
 
-impl<T: Fuser + ?Sized> Fuser for Box<T> {
-    fn propagate(&mut self, motion: &CameraMotion) {
-        (**self).propagate(motion);
-    }
+macro_rules! forward_fuser {
+    ($($pointer:ty),*) => {$(
+        impl<T: Fuser + ?Sized> Fuser for $pointer {
+            fn propagate(&mut self, motion: &CameraMotion) {
+                (**self).propagate(motion);
+            }
 
-    fn update(&mut self, estimate: &PoseEstimate) -> Update {
-        (**self).update(estimate)
-    }
+            fn update(&mut self, estimate: &PoseEstimate) -> Update {
+                (**self).update(estimate)
+            }
 
-    fn estimate(&self) -> Option<PoseEstimate> {
-        (**self).estimate()
-    }
+            fn estimate(&self) -> Option<PoseEstimate> {
+                (**self).estimate()
+            }
 
-    fn reset(&mut self) {
-        (**self).reset();
-    }
+            fn reset(&mut self) {
+                (**self).reset();
+            }
 
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )*};
 }
 
-/// What became of an estimate.
+forward_fuser!(Box<T>, &mut T);
+
+/// The decision of a [`Fuser`] about an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Update {
-    /// It was taken in.
+    /// The estimate was fused.
     Accepted(Solution),
-    /// It failed the gate but stands until a better one comes, for there is nothing else.
+    /// The estimate failed a gate, but stands until a better one arrives, because nothing else is held.
     Provisional(Failure, Solution),
-    /// It was left out.
+    /// The estimate was left out.
     Rejected(Failure),
-    /// It contradicted what was held, as those before it did: everything held was forgotten, and it starts anew.
+    /// The estimate contradicts what was held, as those before it did. Everything held was removed, and
+    /// the estimate is the new start.
     Restarted(Failure, Solution),
 }
 
 impl Update {
-    /// How the fusion ended, where something was fused.
+    /// Returns how the fusion ended; `None` if the estimate was rejected.
     #[must_use]
     pub fn solution(&self) -> Option<&Solution> {
         match self {
@@ -83,28 +140,56 @@ impl Update {
         }
     }
 
+    /// Returns why the estimate failed; `None` if it was accepted.
+    #[must_use]
+    pub fn failure(&self) -> Option<&Failure> {
+        match self {
+            Self::Provisional(failure, _)
+            | Self::Rejected(failure)
+            | Self::Restarted(failure, _) => Some(failure),
+            Self::Accepted(_) => None,
+        }
+    }
+
     /// Returns whether the estimate is part of what is held now.
     #[must_use]
     pub fn is_taken(&self) -> bool {
         self.solution().is_some()
     }
+
+    /// Returns one word for reports: "accepted", "provisional", "rejected" or "restarted".
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Accepted(_) => "accepted",
+            Self::Provisional(..) => "provisional",
+            Self::Rejected(_) => "rejected",
+            Self::Restarted(..) => "restarted",
+        }
+    }
 }
 
-/// Why an estimate failed a gate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The reason why an estimate failed.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum Failure {
-    /// Its MVE says that it does not explain the image.
+    /// The pose does not explain its image: the MVE is too large.
+    #[error("MVE {found:.3} above {limit}")]
     Mve {
         /// The MVE.
         found: f64,
-        /// The largest that passes.
+        /// The largest MVE that passes.
         limit: f64,
     },
-    /// It is too far from what is held, by both covariances.
+    /// The pose is too far from what is held, by both covariances.
+    #[error("squared Mahalanobis distance {found:.1} above {limit:.1}")]
     Mahalanobis {
         /// The squared distance.
         found: f64,
-        /// The largest that passes.
+        /// The largest squared distance that passes.
         limit: f64,
     },
+    /// The reason of a custom fuser, in a few words for reports.
+    #[error("{0}")]
+    Custom(&'static str),
 }

@@ -2,58 +2,9 @@
 
 use hicp_core::{Isometry3, Matrix3, Matrix6, Vector3, Vector6, se3};
 
-use crate::error::FusionError;
-use crate::estimate::{PoseEstimate, information, symmetrized};
-
-/// When the iteration of [`Fusion`] ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FusionLimits {
-    /// The most evaluations of the cost.
-    pub max_iterations: usize,
-    /// Length |ε| of a step, metres and radians in one, below which it is the last.
-    pub tolerance: f64,
-}
-
-impl Default for FusionLimits {
-    /// 50 evaluations, 10⁻¹⁰. Estimates that spread over 0.1 rad take about 6 evaluations, over 0.4 rad about 9.
-    fn default() -> Self {
-        Self {
-            max_iterations: 50,
-            tolerance: 1e-10,
-        }
-    }
-}
-
-/// How an iteration ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solution {
-    /// Evaluations of the cost; 0 where nothing was solved.
-    pub iterations: usize,
-    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the pose evaluated last; about 3(K − 1) for K estimates whose covariances are right.
-    pub cost: f64,
-    /// Whether the last step was shorter than the tolerance. If not, the pose is the best that was evaluated.
-    pub converged: bool,
-}
-
-impl Solution {
-    /// What a method reports that solves nothing.
-    pub(crate) const NONE: Self = Self {
-        iterations: 0,
-        cost: 0.0,
-        converged: true,
-    };
-}
-
-/// Several estimates as one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fused {
-    /// The pose.
-    pub camera_from_object: Isometry3<f64>,
-    /// Its covariance if those of the estimates are right and their errors independent: A⁻¹ at the minimum (Laplace).
-    pub covariance: Matrix6<f64>,
-    /// How the iteration ended.
-    pub solution: Solution,
-}
+use crate::estimate::{FusionError, PoseEstimate};
+use crate::information::{information, symmetrized};
+use crate::solution::{Fused, FusionLimits, Solution};
 
 /// The fusion of Barfoot & Furgale (T-RO 2014, §V): the pose that minimises V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ with
 /// ξₖ = ln(T Tₖ⁻¹)^∨, by Gauss–Newton on SE(3).
@@ -87,7 +38,7 @@ struct Linearization {
 }
 
 impl Fusion {
-    /// Makes a workspace.
+    /// Creates an empty workspace.
     #[must_use]
     pub fn new(limits: FusionLimits) -> Self {
         Self {
@@ -96,7 +47,7 @@ impl Fusion {
         }
     }
 
-    /// Forgets the estimates, keeps the memory.
+    /// Removes the estimates and keeps the memory.
     pub fn clear(&mut self) {
         self.terms.clear();
     }
@@ -150,10 +101,10 @@ impl Fusion {
         self.terms.iter().map(half_square).sum()
     }
 
-    /// Minimises V from a start; `None` without estimates.
+    /// Minimizes V from a start. Returns `None` without estimates, or if the start is not finite.
     #[must_use]
     pub fn solve(&self, start: &Isometry3<f64>) -> Option<Fused> {
-        if self.terms.is_empty() {
+        if !se3::is_finite(start) {
             return None;
         }
         let mut pose = *start;
@@ -197,13 +148,12 @@ impl Fusion {
             (pose, at) = (candidate, linearization);
         }
         Some(Fused {
-            camera_from_object: pose,
-            covariance: self.covariance(&at)?,
-            solution: Solution {
-                iterations,
-                cost: at.cost,
-                converged,
+            estimate: PoseEstimate {
+                camera_from_object: pose,
+                covariance: self.covariance(&at)?,
+                mve: None,
             },
+            solution: Solution::new(iterations, at.cost, converged),
         })
     }
 
@@ -211,7 +161,7 @@ impl Fusion {
     /// A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. One matrix per estimate, in the order of pushing.
     pub(crate) fn covariance_from<'a>(
         &self,
-        fused: &Fused,
+        fused: &PoseEstimate,
         own: impl Iterator<Item = &'a Matrix6<f64>>,
     ) -> Matrix6<f64> {
         let mut middle = Matrix6::zeros();
@@ -282,13 +232,14 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     moved
 }
 
-/// Fuses estimates, from the one with the smallest tr Σ: see [`Fusion`].
+/// Fuses estimates with [`Fusion`], starting from the one with the smallest tr Σ.
 ///
-/// Allocates; keep a [`Fusion`] where that matters.
+/// Allocates; a caller that fuses often keeps a [`Fusion`].
 ///
 /// # Errors
 ///
-/// [`FusionError::Empty`] without estimates. Not converging is no error: `solution` says so.
+/// [`FusionError::Empty`] without estimates. An iteration that does not converge is not an error; see
+/// [`Fused::solution`].
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -298,8 +249,8 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
 /// let a = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.500), Matrix6::identity() * 1e-6)?;
 /// let b = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.502), Matrix6::identity() * 4e-6)?;
 /// let fused = fuse(&[a, b], FusionLimits::default())?;
-/// assert!((fused.camera_from_object.translation.z - 0.5004).abs() < 1e-12);
-/// assert!((fused.covariance[(0, 0)] - 0.8e-6).abs() < 1e-12);
+/// assert!((fused.estimate.camera_from_object().translation.z - 0.5004).abs() < 1e-12);
+/// assert!((fused.estimate.covariance()[(0, 0)] - 0.8e-6).abs() < 1e-12);
 /// assert!(fused.solution.converged);
 /// # Ok(()) }
 /// ```

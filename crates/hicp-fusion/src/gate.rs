@@ -1,10 +1,9 @@
 //! Estimates that failed do not drag the fused pose.
 
-use crate::error::FusionError;
-use crate::estimate::PoseEstimate;
+use crate::estimate::{FusionError, PoseEstimate};
 use crate::fuser::{Failure, Fuser, Update};
-use crate::fusion::Solution;
 use crate::motion::CameraMotion;
+use crate::solution::Solution;
 
 /// 99.9 % of a χ² variable with 6 degrees of freedom are below this.
 pub const CHI_SQUARED_6_999: f64 = 22.458;
@@ -114,6 +113,7 @@ impl<F: Fuser> Gated<F> {
     fn replace(&mut self, estimate: &PoseEstimate) -> Solution {
         self.inner.reset();
         self.contradictions = 0;
+        // The inner fuser may have a gate of its own, and reject the estimate.
         let update = self.inner.update(estimate);
         update.solution().copied().unwrap_or(Solution::NONE)
     }

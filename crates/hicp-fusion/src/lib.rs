@@ -1,11 +1,16 @@
-//! Fusing pose estimates on SE(3) while the camera moves: the trait [`Fuser`], Barfoot & Furgale's fusion ([`Fusion`], [`fuse`]), the
-//! paper's six methods ([`FusionMethod`], §V-A), and fusers that look at what they are given ([`Gated`], [`SymmetryAware`], [`SharedError`]).
+//! Fuses pose estimates on SE(3) while the camera moves.
 //!
-//! **Should you use this crate?** To fuse poses with covariances, whoever made them, yes: it depends on `hicp-core` alone. To
-//! estimate a pose from images along a trajectory, use `hybrid_icp::SequentialEstimator`, which drives a fuser.
+//! - [`Fuser`]: the trait. A custom fuser implements it.
+//! - [`Fusion`], [`fuse`]: the fusion of Barfoot & Furgale.
+//! - [`FusionMethod`]: the paper's six methods (§V-A).
+//! - [`Gated`], [`SymmetryAware`], [`SharedError`]: fusers around a fuser.
+//!
+//! **Should you use this crate?** Yes, to fuse poses with covariances from any source: it depends on
+//! `hicp-core` only, and re-exports it. To estimate a pose from images along a trajectory, use
+//! `hybrid_icp::SequentialEstimator`, which drives a fuser.
 //!
 //! ```
-//! use hicp_core::{Isometry3, Matrix6, Point3, Vector3};
+//! use hicp_fusion::hicp_core::{Isometry3, Point3, Vector3};
 //! use hicp_fusion::{CameraMotion, Fuser, FuserConfig, FusionMethod, PoseEstimate, UnitCovariance};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // An object of 6 cm radius about its origin.
@@ -26,22 +31,23 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Conventions: `camera_from_object`; twists ξ = [ρ; φ], translation first, metres and radians; covariances are those of left
-//! perturbations T = exp(ξ^) T̄, in the camera frame.
+//! Conventions: poses are `camera_from_object`. Twists are ξ = [ρ; φ], translation first, in meters and
+//! radians. Covariances describe left perturbations T = exp(ξ^) T̄ in the camera frame.
 
 mod batch;
 mod config;
 mod covariance;
-mod error;
 mod estimate;
 mod fuser;
 mod fusion;
 mod gate;
+mod information;
 mod method;
 mod motion;
 mod recursive;
 mod shared_error;
 mod single;
+mod solution;
 mod symmetry_aware;
 mod tails;
 mod unit;
@@ -49,16 +55,18 @@ mod unit;
 pub use batch::BatchFuser;
 pub use config::FuserConfig;
 pub use covariance::{CovarianceModel, InflatedCovariance, MVE_FLOOR, MveCovariance};
-pub use error::FusionError;
-pub use estimate::{MAX_TRANSLATION_METERS, MAX_VARIANCE, MIN_STANDARD_DEVIATION, PoseEstimate};
+pub use estimate::{FusionError, MAX_TRANSLATION_METERS, MAX_VARIANCE, PoseEstimate};
 pub use fuser::{Failure, Fuser, Update};
-pub use fusion::{Fused, Fusion, FusionLimits, Solution, fuse};
+pub use fusion::{Fusion, fuse};
 pub use gate::{CHI_SQUARED_6_999, Gate, Gated};
+pub use hicp_core;
+pub use information::MIN_STANDARD_DEVIATION;
 pub use method::{BoxedFuser, FusionMethod, UnknownMethod};
 pub use motion::{CameraMotion, Transport};
 pub use recursive::RecursiveFuser;
 pub use shared_error::SharedError;
 pub use single::{LastEstimate, MostConfident};
+pub use solution::{Fused, FusionLimits, Solution};
 pub use symmetry_aware::SymmetryAware;
 pub use tails::probability_within;
 pub use unit::UnitCovariance;

@@ -1,14 +1,14 @@
-//! How estimates follow the moving camera.
+//! Motions of the camera, and the transport of estimates along them.
 
 use hicp_core::{Isometry3, Matrix6, se3};
 
-use crate::error::FusionError;
-use crate::estimate::{PoseEstimate, check_motion, checked_covariance, symmetrized};
+use crate::estimate::{FusionError, PoseEstimate, check_motion, checked_covariance};
+use crate::information::transported;
 
-/// A known motion of the camera, T_C′C of §V: what takes coordinates in the previous camera frame to the next one.
+/// A known motion of the camera, T_C′C of §V: takes coordinates in the previous camera frame to the next.
 ///
-/// It may have a covariance of its own, a left perturbation in the *next* camera frame: what the kinematics or the odometry
-/// leave uncertain.
+/// It may have a covariance, of a left perturbation in the *next* camera frame, for the uncertainty of
+/// the kinematics or the odometry.
 ///
 /// ```
 /// use hicp_core::Isometry3;
@@ -26,24 +26,28 @@ pub struct CameraMotion {
 }
 
 impl CameraMotion {
-    /// Makes a motion that is known exactly.
+    /// Creates a motion that is known exactly.
     ///
     /// # Errors
     ///
-    /// [`FusionError`] when it is not a rigid motion of sensible size.
+    /// [`FusionError`] if it is not a rigid motion within ±[`MAX_TRANSLATION_METERS`].
+    ///
+    /// [`MAX_TRANSLATION_METERS`]: crate::MAX_TRANSLATION_METERS
     pub fn new(next_camera_from_camera: Isometry3<f64>) -> Result<Self, FusionError> {
         check_motion("next_camera_from_camera", &next_camera_from_camera)?;
-        Ok(Self {
-            next_camera_from_camera,
-            covariance: None,
-        })
+        Ok(Self::exact(next_camera_from_camera))
     }
 
-    /// Makes the motion of a camera that stands still.
+    /// Creates the motion of a camera that stands still.
     #[must_use]
     pub fn none() -> Self {
+        Self::exact(Isometry3::identity())
+    }
+
+    /// Creates a motion from a valid transform.
+    pub(crate) fn exact(next_camera_from_camera: Isometry3<f64>) -> Self {
         Self {
-            next_camera_from_camera: Isometry3::identity(),
+            next_camera_from_camera,
             covariance: None,
         }
     }
@@ -52,7 +56,7 @@ impl CameraMotion {
     ///
     /// # Errors
     ///
-    /// [`FusionError`] when it is not symmetric and positive semidefinite.
+    /// [`FusionError`] if it is not symmetric and positive semidefinite.
     pub fn with_covariance(self, covariance: &Matrix6<f64>) -> Result<Self, FusionError> {
         Ok(Self {
             covariance: Some(checked_covariance(covariance)?),
@@ -76,56 +80,67 @@ impl CameraMotion {
     #[must_use]
     pub fn apply(&self, camera_from_object: &Isometry3<f64>) -> Isometry3<f64> {
         let mut moved = self.next_camera_from_camera * camera_from_object;
-        // Thousands of frames must not let the quaternion drift.
+        // Without this, the quaternion drifts over thousands of frames.
         moved.rotation.renormalize();
         moved
     }
+
+    /// Returns an estimate in the next camera frame.
+    ///
+    /// To first order the covariance becomes Σ_A + Ad(A) Σ Ad(A)ᵀ with Σ_A the motion's own covariance, or
+    /// Σ_A + Σ with [`Transport::Kept`]. The MVE stays. A custom [`Fuser`](crate::Fuser) calls this in
+    /// [`propagate`](crate::Fuser::propagate).
+    ///
+    /// ```
+    /// use hicp_core::{Isometry3, Matrix6};
+    /// use hicp_fusion::{CameraMotion, PoseEstimate, Transport};
+    /// # fn main() -> Result<(), hicp_fusion::FusionError> {
+    /// let advance = CameraMotion::new(Isometry3::translation(0.0, 0.0, -0.1))?;
+    /// let seen = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.5), Matrix6::identity())?;
+    /// let next = advance.carry(&seen, Transport::Adjoint);
+    /// assert_eq!(next.camera_from_object().translation.z, 0.4);
+    /// // A rotation about the old camera's center also moves what the new camera sees.
+    /// assert!(next.covariance()[(0, 0)] > 1.0);
+    /// # Ok(()) }
+    /// ```
+    #[must_use]
+    pub fn carry(&self, estimate: &PoseEstimate, transport: Transport) -> PoseEstimate {
+        let mut covariance = self.carry_weight(&estimate.covariance, transport);
+        if let Some(own) = &self.covariance {
+            covariance += own;
+        }
+        PoseEstimate {
+            camera_from_object: self.apply(&estimate.camera_from_object),
+            covariance,
+            mve: estimate.mve,
+        }
+    }
+
+    /// Returns a covariance in the next camera frame, without adding the motion's own.
+    pub(crate) fn carry_weight(
+        &self,
+        covariance: &Matrix6<f64>,
+        transport: Transport,
+    ) -> Matrix6<f64> {
+        match transport {
+            Transport::Adjoint => {
+                transported(covariance, &se3::adjoint(&self.next_camera_from_camera))
+            }
+            Transport::Kept => *covariance,
+        }
+    }
 }
 
-/// What happens to the covariance of an estimate when the camera moves by A.
+/// The effect of a camera motion A on the covariance of an estimate.
 // Deviation: §V moves poses and is silent on covariances; by default they move along. `Transport::Kept` is the plain reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Transport {
-    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty, written in the next camera frame. What is fused then does not depend on the
-    /// frame that it is fused in.
+    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty, written in the next camera frame. The fused estimate
+    /// then does not depend on the frame in which it is fused.
     #[default]
     Adjoint,
-    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention the covariances. What is fused depends on
-    /// the frame.
+    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention the covariances.
+    /// The fused estimate depends on the frame.
     Kept,
-}
-
-/// A motion as it acts on covariances; the adjoint is made once for all estimates.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Carrier<'a> {
-    motion: &'a CameraMotion,
-    adjoint: Option<Matrix6<f64>>,
-}
-
-impl<'a> Carrier<'a> {
-    pub(crate) fn new(motion: &'a CameraMotion, transport: Transport) -> Self {
-        Self {
-            motion,
-            adjoint: match transport {
-                Transport::Adjoint => Some(se3::adjoint(&motion.next_camera_from_camera)),
-                Transport::Kept => None,
-            },
-        }
-    }
-
-    /// The covariance in the next frame, the motion's own not added.
-    pub(crate) fn carried(&self, covariance: &Matrix6<f64>) -> Matrix6<f64> {
-        self.adjoint.map_or(*covariance, |adjoint| {
-            symmetrized(&(adjoint * covariance * adjoint.transpose()))
-        })
-    }
-
-    /// The estimate in the next frame: to first order Σ′ = Σ_A + Ad(A) Σ Ad(A)ᵀ.
-    pub(crate) fn estimate(&self, estimate: &mut PoseEstimate) {
-        estimate.camera_from_object = self.motion.apply(&estimate.camera_from_object);
-        estimate.covariance = self.carried(&estimate.covariance);
-        if let Some(own) = &self.motion.covariance {
-            estimate.covariance += own;
-        }
-    }
 }

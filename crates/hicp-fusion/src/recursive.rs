@@ -6,16 +6,18 @@ use crate::batch::Weights;
 use crate::config::FuserConfig;
 use crate::estimate::PoseEstimate;
 use crate::fuser::{Fuser, Update};
-use crate::fusion::{Fusion, Solution};
-use crate::motion::{CameraMotion, Carrier};
+use crate::fusion::Fusion;
+use crate::motion::CameraMotion;
+use crate::solution::Solution;
 
-/// Keeps one estimate, and fuses each new one with it (§V-A): `filtering-constant` gives every new one the unit covariance,
-/// `filtering` its own. Starts from the first estimate.
+/// Keeps one estimate, and fuses each new one with it (§V-A).
 ///
-/// The pose differs from that of all estimates fused at once by terms of second order in their spread. A camera motion's
-/// covariance adds to what is held as a whole, as it should: older estimates lose weight against newer ones in `filtering`.
+/// `filtering-constant` gives every new estimate the unit covariance; `filtering` uses its own. The pose
+/// differs from that of all estimates fused at once by terms of second order in their spread. The
+/// covariance of a camera motion is added to the estimate held, so older estimates lose weight against
+/// newer ones in `filtering`.
 ///
-/// Cost of an update: that of fusing two; memory does not grow.
+/// Cost of an update: that of fusing two estimates. Memory does not grow.
 #[derive(Clone, Debug)]
 pub struct RecursiveFuser {
     config: FuserConfig,
@@ -31,13 +33,13 @@ struct State {
 }
 
 impl RecursiveFuser {
-    /// Makes `filtering-constant`: every new estimate has the unit covariance.
+    /// Creates `filtering-constant`: every new estimate has the unit covariance.
     #[must_use]
     pub fn filtering_constant(config: FuserConfig) -> Self {
         Self::new(config, Weights::Constant)
     }
 
-    /// Makes `filtering`: every new estimate has its own covariance.
+    /// Creates `filtering`: every new estimate has its own covariance.
     #[must_use]
     pub fn filtering(config: FuserConfig) -> Self {
         Self::new(config, Weights::Own)
@@ -55,12 +57,12 @@ impl RecursiveFuser {
 
 impl Fuser for RecursiveFuser {
     fn propagate(&mut self, motion: &CameraMotion) {
-        let carrier = Carrier::new(motion, self.config.transport);
+        let transport = self.config.transport;
         if let Some(state) = &mut self.state {
-            carrier.estimate(&mut state.estimate);
+            state.estimate = motion.carry(&state.estimate, transport);
             state.weight = match self.weights {
                 Weights::Own => state.estimate.covariance,
-                Weights::Constant => carrier.carried(&state.weight),
+                Weights::Constant => motion.carry_weight(&state.weight, transport),
             };
         }
     }
@@ -83,20 +85,19 @@ impl Fuser for RecursiveFuser {
             self.fusion
                 .push_weighted(&part.estimate.camera_from_object, &part.weight);
         }
-        let Some(fused) = self.fusion.solve(&held.estimate.camera_from_object) else {
-            return Update::Accepted(Solution::NONE);
+        let Some(mut fused) = self.fusion.solve(&held.estimate.camera_from_object) else {
+            unreachable!("there are two estimates, and the held pose is finite")
         };
-        let own = [&held.estimate.covariance, &new.estimate.covariance];
+        let weight = fused.estimate.covariance;
+        if self.weights == Weights::Constant {
+            let own = [&held.estimate.covariance, &new.estimate.covariance];
+            fused.estimate.covariance = self
+                .fusion
+                .covariance_from(&fused.estimate, own.into_iter());
+        }
         self.state = Some(State {
-            estimate: PoseEstimate {
-                camera_from_object: fused.camera_from_object,
-                covariance: match self.weights {
-                    Weights::Own => fused.covariance,
-                    Weights::Constant => self.fusion.covariance_from(&fused, own.into_iter()),
-                },
-                mve: None,
-            },
-            weight: fused.covariance,
+            estimate: fused.estimate,
+            weight,
         });
         Update::Accepted(fused.solution)
     }

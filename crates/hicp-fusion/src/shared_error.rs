@@ -1,7 +1,6 @@
 //! An error that all estimates have in common.
 
-use crate::error::FusionError;
-use crate::estimate::PoseEstimate;
+use crate::estimate::{FusionError, PoseEstimate};
 use crate::fuser::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;

@@ -1,11 +1,12 @@
-//! Methods that fuse nothing but choose: `last-estimate` and `most-confident`.
+//! Methods that select one estimate and fuse nothing: `last-estimate` and `most-confident`.
 
-use crate::estimate::{PoseEstimate, log_determinant};
+use crate::estimate::PoseEstimate;
 use crate::fuser::{Fuser, Update};
-use crate::fusion::Solution;
-use crate::motion::{CameraMotion, Carrier, Transport};
+use crate::information::log_determinant;
+use crate::motion::{CameraMotion, Transport};
+use crate::solution::Solution;
 
-/// Believes the latest estimate (§V-A): `last-estimate`.
+/// Returns the latest estimate (§V-A): `last-estimate`.
 #[derive(Clone, Debug, Default)]
 pub struct LastEstimate {
     transport: Transport,
@@ -13,7 +14,7 @@ pub struct LastEstimate {
 }
 
 impl LastEstimate {
-    /// Makes the method.
+    /// Creates the method.
     #[must_use]
     pub fn new(transport: Transport) -> Self {
         Self {
@@ -25,9 +26,7 @@ impl LastEstimate {
 
 impl Fuser for LastEstimate {
     fn propagate(&mut self, motion: &CameraMotion) {
-        if let Some(held) = &mut self.held {
-            Carrier::new(motion, self.transport).estimate(held);
-        }
+        self.held = self.held.map(|held| motion.carry(&held, self.transport));
     }
 
     fn update(&mut self, estimate: &PoseEstimate) -> Update {
@@ -51,10 +50,11 @@ impl Fuser for LastEstimate {
 /// Difference of ln det Σ that is rounding.
 const TIE: f64 = 1e-9;
 
-/// Believes the estimate with the lowest uncertainty so far (§V-A): `most-confident`. The newest among equals.
+/// Returns the estimate with the lowest uncertainty so far (§V-A): `most-confident`.
 ///
-/// Uncertainty is det Σ, the size of the ellipsoid: a camera motion does not change it, unlike the trace, and for multiples of one
-/// matrix it orders as the factor does. Estimates that a motion of uncertain size has aged lose to fresher ones.
+/// Uncertainty is det Σ, the size of the ellipsoid. Unlike the trace, a camera motion does not change it,
+/// and for multiples of one matrix it orders as the factor does. The covariance of a motion makes older
+/// estimates less certain than newer ones. Among equals the newest is selected.
 #[derive(Clone, Debug, Default)]
 pub struct MostConfident {
     transport: Transport,
@@ -62,7 +62,7 @@ pub struct MostConfident {
 }
 
 impl MostConfident {
-    /// Makes the method.
+    /// Creates the method.
     #[must_use]
     pub fn new(transport: Transport) -> Self {
         Self {
@@ -74,9 +74,7 @@ impl MostConfident {
 
 impl Fuser for MostConfident {
     fn propagate(&mut self, motion: &CameraMotion) {
-        if let Some(held) = &mut self.held {
-            Carrier::new(motion, self.transport).estimate(held);
-        }
+        self.held = self.held.map(|held| motion.carry(&held, self.transport));
     }
 
     fn update(&mut self, estimate: &PoseEstimate) -> Update {

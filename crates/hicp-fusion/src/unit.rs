@@ -2,8 +2,8 @@
 
 use hicp_core::{Isometry3, Matrix6, Point3, Translation3, Vector6, se3};
 
-use crate::error::FusionError;
-use crate::estimate::symmetrized;
+use crate::estimate::FusionError;
+use crate::information::transported;
 
 /// The shape of a covariance whose size is a single number, as the paper's e_MVE·I₆ and I₆ are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,7 +61,7 @@ impl UnitCovariance {
                 let diagonal = Vector6::new(square, square, square, 1.0, 1.0, 1.0);
                 let center = Translation3::from((camera_from_object * center).coords);
                 let adjoint = se3::adjoint(&Isometry3::from(center));
-                symmetrized(&(adjoint * Matrix6::from_diagonal(&diagonal) * adjoint.transpose()))
+                transported(&Matrix6::from_diagonal(&diagonal), &adjoint)
             }
         }
     }

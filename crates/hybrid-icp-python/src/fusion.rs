@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use hybrid_icp::fusion::{
     BoxedFuser, CameraMotion, Fuser as _, FuserConfig, FusionLimits, FusionMethod, Gate, Gated,
-    PoseEstimate, SymmetryAware, Transport, UnitCovariance, Update,
+    PoseEstimate, SymmetryAware, Transport, UnitCovariance,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -117,10 +117,8 @@ impl PyPoseEstimate {
 #[pyfunction]
 pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
     let estimates: Vec<PoseEstimate> = estimates.iter().map(|estimate| estimate.0).collect();
-    let fused = hybrid_icp::fusion::fuse(&estimates, FusionLimits::default());
-    let fused = fused.map_err(errors::input)?;
-    PoseEstimate::new(fused.camera_from_object, fused.covariance)
-        .map(PyPoseEstimate)
+    hybrid_icp::fusion::fuse(&estimates, FusionLimits::default())
+        .map(|fused| PyPoseEstimate(fused.estimate))
         .map_err(errors::input)
 }
 
@@ -252,7 +250,7 @@ impl PyFuser {
     /// str
     ///     "accepted"; "provisional" when it failed the gate but there is nothing else; "rejected"; or "restarted".
     fn update(&self, estimate: &PyPoseEstimate) -> &'static str {
-        name(&self.locked().update(&estimate.0))
+        self.locked().update(&estimate.0).name()
     }
 
     /// The fused estimate in the current camera frame; None before the first.
@@ -293,16 +291,5 @@ pub(crate) fn motion(
             .with_covariance(&array::matrix6(value, "covariance")?)
             .map_err(errors::input),
         None => Ok(motion),
-    }
-}
-
-/// Name of what became of an estimate.
-pub(crate) fn name(update: &Update) -> &'static str {
-    match update {
-        Update::Accepted(_) => "accepted",
-        Update::Provisional(..) => "provisional",
-        Update::Rejected(_) => "rejected",
-        Update::Restarted(..) => "restarted",
-        _ => "other",
     }
 }

@@ -195,7 +195,7 @@ impl PySequentialStep {
     #[getter]
     fn event(&self) -> &'static str {
         match &self.0.event {
-            SequentialEvent::Estimated(update) => fusion::name(update),
+            SequentialEvent::Estimated(update) => update.name(),
             SequentialEvent::NoEstimate(_) => "no_estimate",
             SequentialEvent::Refused(_) => "refused",
             _ => "other",

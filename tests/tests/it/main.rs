@@ -14,6 +14,7 @@ mod concurrency;
 mod cross;
 mod custom_association;
 mod custom_filter;
+mod custom_fuser;
 mod custom_metric;
 mod custom_observer;
 mod custom_part;

@@ -39,7 +39,7 @@ fn the_golden_case() {
     let fusion = fusion(&golden(), FusionLimits::default());
     let fused = fusion.solve(&Isometry3::identity()).unwrap();
     assert!(fused.solution.converged);
-    let xi = se3::log(&fused.camera_from_object);
+    let xi = se3::log(fused.estimate.camera_from_object());
     let expected = Vector6::new(
         0.681_843_539_433,
         0.094_852_340_287,
@@ -50,7 +50,7 @@ fn the_golden_case() {
     );
     assert!((xi - expected).amax() < 1e-11, "{xi}");
     assert!((fused.solution.cost - 0.840_676_263_287).abs() < 1e-12);
-    let matrix = fused.camera_from_object.to_homogeneous();
+    let matrix = fused.estimate.camera_from_object().to_homogeneous();
     let expected = nalgebra::Matrix4::new(
         0.831_422_014_464,
         -0.533_027_607_175,
@@ -78,7 +78,7 @@ fn the_golden_case() {
         0.189_854_178_401,
         0.193_414_758_079,
     );
-    let covariance = fused.covariance;
+    let covariance = fused.estimate.covariance();
     assert!((covariance.diagonal() - diagonal).amax() < 1e-9);
     for (found, expected) in [
         (covariance[(0, 1)], -0.054_374_795_264),
@@ -121,13 +121,14 @@ fn the_gradient_is_zero_at_the_result() {
         let estimates = random.estimates(6, spread);
         let fusion = fusion(&estimates, EXACT);
         let fused = fused(&estimates);
-        let hessian = fused.covariance.try_inverse().unwrap();
+        let hessian = fused.estimate.covariance().try_inverse().unwrap();
         for axis in 0..6 {
             let h = 1e-4 * spread;
             let mut step = Vector6::zeros();
             step[axis] = h;
-            let at =
-                |step: Vector6<f64>| fusion.cost(&(se3::exp(&step) * fused.camera_from_object));
+            let at = |step: Vector6<f64>| {
+                fusion.cost(&(se3::exp(&step) * fused.estimate.camera_from_object()))
+            };
             let (ahead, behind) = (at(step), at(-step));
             let gradient = (ahead - behind) / (2.0 * h);
             // What the step of the wrong sign leaves is of the order of the spread.
@@ -147,9 +148,9 @@ fn identical_poses_have_a_kth_of_the_covariance() {
     for count in [1_u32, 2, 7] {
         let estimates = vec![estimate(pose, covariance); count as usize];
         let fused = fused(&estimates);
-        assert!(apart(&fused.camera_from_object, &pose) < 1e-15);
+        assert!(apart(fused.estimate.camera_from_object(), &pose) < 1e-15);
         let expected = covariance / f64::from(count);
-        assert!(relative(&fused.covariance, &expected) < 1e-13);
+        assert!(relative(fused.estimate.covariance(), &expected) < 1e-13);
         assert!(fused.solution.cost < 1e-28);
     }
 }
@@ -163,10 +164,15 @@ fn neither_the_order_nor_the_start_matters() {
         let mut shuffled = estimates.clone();
         shuffled.sort_by_cached_key(|_| random.uniform().to_bits());
         let fusion = fusion(&shuffled, EXACT);
-        let start = random.pose(0.7) * expected.camera_from_object;
+        let start = random.pose(0.7) * expected.estimate.camera_from_object();
         let found = fusion.solve(&start).unwrap();
-        assert!(apart(&found.camera_from_object, &expected.camera_from_object) < 1e-14);
-        assert!(relative(&found.covariance, &expected.covariance) < 1e-13);
+        assert!(
+            apart(
+                found.estimate.camera_from_object(),
+                expected.estimate.camera_from_object()
+            ) < 1e-14
+        );
+        assert!(relative(found.estimate.covariance(), expected.estimate.covariance()) < 1e-13);
     }
 }
 
@@ -183,16 +189,21 @@ fn fusing_is_equivariant_under_the_adjoint() {
             .map(|e| estimate(motion * e.camera_from_object(), carried(e.covariance())))
             .collect();
         let (here, there) = (fused(&estimates), fused(&moved));
-        let expected = motion * here.camera_from_object;
-        assert!(apart(&there.camera_from_object, &expected) < 1e-13);
-        assert!(relative(&there.covariance, &carried(&here.covariance)) < 1e-12);
+        let expected = motion * here.estimate.camera_from_object();
+        assert!(apart(there.estimate.camera_from_object(), &expected) < 1e-13);
+        assert!(
+            relative(
+                there.estimate.covariance(),
+                &carried(here.estimate.covariance())
+            ) < 1e-12
+        );
 
         // And it is the covariances that make it so: kept as they are, the result is another.
         let kept: Vec<PoseEstimate> = estimates
             .iter()
             .map(|e| estimate(motion * e.camera_from_object(), *e.covariance()))
             .collect();
-        assert!(apart(&fused(&kept).camera_from_object, &expected) > 1e-4);
+        assert!(apart(fused(&kept).estimate.camera_from_object(), &expected) > 1e-4);
     }
 }
 
@@ -202,8 +213,13 @@ fn a_single_estimate_is_itself() {
     let only = random.estimates(1, 0.3);
     let fusion = fusion(&only, EXACT);
     let fused = fusion.solve(&random.pose(0.7)).unwrap();
-    assert!(apart(&fused.camera_from_object, only[0].camera_from_object()) < 1e-14);
-    assert!(relative(&fused.covariance, only[0].covariance()) < 1e-12);
+    assert!(
+        apart(
+            fused.estimate.camera_from_object(),
+            only[0].camera_from_object()
+        ) < 1e-14
+    );
+    assert!(relative(fused.estimate.covariance(), only[0].covariance()) < 1e-12);
     assert_eq!(fuse(&[], EXACT), Err(FusionError::Empty));
 }
 
@@ -216,11 +232,11 @@ fn one_wild_outlier_is_averaged_in_by_its_covariance() {
     // As sure as the others: it drags the pose by about a tenth of the way.
     estimates.push(estimate(wild, Matrix6::identity() * 1e-4));
     let dragged = fused(&estimates);
-    let share = apart(&dragged.camera_from_object, &pose) / apart(&wild, &pose);
+    let share = apart(dragged.estimate.camera_from_object(), &pose) / apart(&wild, &pose);
     assert!((0.05..0.2).contains(&share), "{share}");
     // A hundred times as unsure it hardly counts, and its weight is a 90,000th.
     estimates[9] = estimate(wild, Matrix6::identity());
-    let share = apart(&fused(&estimates).camera_from_object, &pose) / apart(&wild, &pose);
+    let share = apart(fused(&estimates).estimate.camera_from_object(), &pose) / apart(&wild, &pose);
     assert!(share < 1e-4, "{share}");
 }
 
@@ -242,8 +258,8 @@ fn estimates_spread_over_half_a_turn() {
             .collect();
         let fusion = fusion(&estimates, FusionLimits::default());
         let fused = fusion.solve(&about(start)).unwrap();
-        assert!(se3::is_finite(&fused.camera_from_object));
-        assert!(fused.covariance.iter().all(|x| x.is_finite()));
+        assert!(se3::is_finite(fused.estimate.camera_from_object()));
+        assert!(fused.estimate.covariance().iter().all(|x| x.is_finite()));
         assert!(
             fused.solution.cost <= fusion.cost(&about(start)),
             "{fused:?}"
@@ -251,7 +267,10 @@ fn estimates_spread_over_half_a_turn() {
         if fused.solution.converged {
             let h = 1e-5;
             let at = |step: f64| {
-                fusion.cost(&(Isometry3::rotation(Vector3::z() * step) * fused.camera_from_object))
+                fusion.cost(
+                    &(Isometry3::rotation(Vector3::z() * step)
+                        * fused.estimate.camera_from_object()),
+                )
             };
             let gradient = (at(h) - at(-h)) / (2.0 * h);
             assert!(gradient.abs() < 1e-3, "{angles:?}: {gradient} {fused:?}");
@@ -262,7 +281,7 @@ fn estimates_spread_over_half_a_turn() {
         estimate(about(179.0), Matrix6::identity() * 0.01),
     ];
     let fused = fused(&pair);
-    let angle = fused.camera_from_object.rotation.angle();
+    let angle = fused.estimate.camera_from_object().rotation.angle();
     assert!((angle - 89.5_f64.to_radians()).abs() < 1e-12, "{angle}");
     // At half a turn and on either side of the cut the mean is between, not at zero.
     let pair = [
@@ -270,7 +289,8 @@ fn estimates_spread_over_half_a_turn() {
         estimate(about(-170.0), Matrix6::identity() * 0.01),
     ];
     let angle = crate::common::fused(&pair)
-        .camera_from_object
+        .estimate
+        .camera_from_object()
         .rotation
         .angle();
     assert!((angle - PI).abs() < 1e-12, "{angle}");
@@ -292,28 +312,43 @@ fn zero_and_huge_covariances() {
     };
     // An exact estimate decides.
     let exact = with([Matrix6::zeros(), unit, unit]);
-    assert!(apart(&exact.camera_from_object, &poses[0]) < 1e-9);
+    assert!(apart(exact.estimate.camera_from_object(), &poses[0]) < 1e-9);
     assert!(exact.solution.converged);
     // Two exact ones are averaged.
     let two = with([Matrix6::zeros(), Matrix6::zeros(), unit]);
     let mean = fused(&[estimate(poses[0], unit), estimate(poses[1], unit)]);
-    assert!(apart(&two.camera_from_object, &mean.camera_from_object) < 1e-9);
+    assert!(
+        apart(
+            two.estimate.camera_from_object(),
+            mean.estimate.camera_from_object()
+        ) < 1e-9
+    );
     // An estimate that knows nothing changes nothing.
     let huge = with([unit, unit, Matrix6::identity() * 1e30]);
-    assert!(apart(&huge.camera_from_object, &mean.camera_from_object) < 1e-12);
+    assert!(
+        apart(
+            huge.estimate.camera_from_object(),
+            mean.estimate.camera_from_object()
+        ) < 1e-12
+    );
     // If none knows anything, it is their average all the same.
     for factor in [1e30, 1e60] {
         let all = with([Matrix6::identity() * factor; 3]);
         let alike = with([unit; 3]);
-        assert!(apart(&all.camera_from_object, &alike.camera_from_object) < 1e-9);
-        let ratio = all.covariance[(0, 0)] / factor;
+        assert!(
+            apart(
+                all.estimate.camera_from_object(),
+                alike.estimate.camera_from_object()
+            ) < 1e-9
+        );
+        let ratio = all.estimate.covariance()[(0, 0)] / factor;
         assert!((0.2..0.5).contains(&ratio), "{ratio}");
     }
     // Known in some directions only: the others come from elsewhere.
     let mut partly = Matrix6::zeros();
     partly[(2, 2)] = 1e30;
     let split = with([partly, unit, unit]);
-    let difference = se3::log(&(split.camera_from_object * poses[0].inverse()));
+    let difference = se3::log(&(split.estimate.camera_from_object() * poses[0].inverse()));
     assert!(difference.fixed_rows::<2>(0).norm() < 1e-6, "{difference}");
     assert!(difference.fixed_rows::<3>(3).norm() < 1e-6, "{difference}");
     assert!(difference[2].abs() > 1e-3, "{difference}");
@@ -337,8 +372,8 @@ fn the_mean_cost_is_that_of_its_degrees_of_freedom() {
             .collect();
         let fused = fuse(&estimates, FusionLimits::default()).unwrap();
         total += fused.solution.cost;
-        let error = se3::log(&(fused.camera_from_object * truth.inverse()));
-        covered += error.dot(&(fused.covariance.try_inverse().unwrap() * error));
+        let error = se3::log(&(fused.estimate.camera_from_object() * truth.inverse()));
+        covered += error.dot(&(fused.estimate.covariance().try_inverse().unwrap() * error));
     }
     // Standard errors: √(6/2000) = 0.055 and √(12/2000) = 0.077.
     let (cost, nees) = (total / f64::from(runs), covered / f64::from(runs));
@@ -413,8 +448,8 @@ fn small_regular_covariances_weigh_by_what_they_say() {
         .solve(&Isometry3::identity())
         .unwrap();
     // A fifth of the way: the weights are as four to one.
-    let x = both.camera_from_object.translation.x;
+    let x = both.estimate.camera_from_object().translation.x;
     assert!((x - 0.2e-9).abs() < 1e-14, "{x}");
     let expected = covariance(1e-8) * 0.8;
-    assert!(relative(&both.covariance, &expected) < 1e-6);
+    assert!(relative(both.estimate.covariance(), &expected) < 1e-6);
 }

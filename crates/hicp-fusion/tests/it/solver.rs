@@ -57,9 +57,7 @@ fn no_evaluation_makes_the_pose_worse() {
         let mut before = f64::INFINITY;
         for max_iterations in 1..=30 {
             let Fused {
-                camera_from_object,
-                solution,
-                ..
+                estimate, solution, ..
             } = solved(&estimates, max_iterations);
             assert!(solution.iterations <= max_iterations);
             // It ends before only where it has converged.
@@ -70,7 +68,7 @@ fn no_evaluation_makes_the_pose_worse() {
                 "{seed} {max_iterations}"
             );
             if !solution.converged {
-                let cost = fusion(&estimates, limits(1)).cost(&camera_from_object);
+                let cost = fusion(&estimates, limits(1)).cost(estimate.camera_from_object());
                 assert!((solution.cost / cost - 1.0).abs() < 1e-9);
                 // Out of evaluations before a step was short enough.
                 halved += usize::from(solution.cost >= before);
@@ -100,7 +98,7 @@ fn where_it_converges_the_slope_is_zero() {
             let at = |h: f64| {
                 let mut step = Vector6::zeros();
                 step[axis] = h;
-                workspace.cost(&(se3::exp(&step) * found.camera_from_object))
+                workspace.cost(&(se3::exp(&step) * found.estimate.camera_from_object()))
             };
             // V and its curvature are of the order of 1.
             let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
@@ -119,7 +117,7 @@ fn a_tolerance_of_zero_uses_every_evaluation() {
         tolerance: 0.0,
     };
     let fused = fusion(&here, limits).solve(&Isometry3::identity()).unwrap();
-    assert_eq!(fused.camera_from_object, Isometry3::identity());
+    assert_eq!(*fused.estimate.camera_from_object(), Isometry3::identity());
     assert_eq!(fused.solution.iterations, 7);
     assert!(!fused.solution.converged && fused.solution.cost == 0.0);
 }
@@ -145,8 +143,8 @@ fn it_ends_where_rounding_hides_the_minimum() {
         );
         assert!(far.solution.converged, "{:?}", far.solution);
         assert!(far.solution.iterations < 500, "{:?}", far.solution);
-        let found = away.inverse() * far.camera_from_object;
+        let found = away.inverse() * far.estimate.camera_from_object();
         // V is flat at its minimum: what it loses to rounding, some 1e-10 of it, is the square of what the pose does.
-        assert!(apart(&found, &near.camera_from_object) < 1e-5);
+        assert!(apart(&found, near.estimate.camera_from_object()) < 1e-5);
     }
 }

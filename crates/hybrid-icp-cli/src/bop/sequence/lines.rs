@@ -1,6 +1,6 @@
 //! What is told of each image, as a line of JSON.
 
-use hybrid_icp::fusion::{Failure, Update};
+use hybrid_icp::fusion::Update;
 use hybrid_icp::{Isometry3, Matrix6, Outcome, SequentialEvent, SequentialStep};
 use serde_json::{Value, json};
 
@@ -39,13 +39,7 @@ impl What {
     fn name(&self) -> &'static str {
         match self {
             Self::Moved(_) => "moved",
-            Self::Registered(SequentialEvent::Estimated(update)) => match update {
-                Update::Accepted(_) => "accepted",
-                Update::Provisional(..) => "provisional",
-                Update::Rejected(_) => "rejected",
-                Update::Restarted(..) => "restarted",
-                _ => "estimated",
-            },
+            Self::Registered(SequentialEvent::Estimated(update)) => update.name(),
             Self::Registered(SequentialEvent::Refused(_)) => "refused",
             Self::Registered(_) => "no-estimate",
         }
@@ -79,16 +73,7 @@ impl What {
         match self {
             Self::Moved(why) => Some((*why).to_owned()),
             Self::Registered(event) => match event {
-                SequentialEvent::Estimated(
-                    Update::Provisional(failure, _)
-                    | Update::Rejected(failure)
-                    | Update::Restarted(failure, _),
-                ) => Some(match failure {
-                    Failure::Mve { found, limit } => format!("MVE {found:.3} above {limit}"),
-                    Failure::Mahalanobis { found, limit } => {
-                        format!("squared Mahalanobis distance {found:.1} above {limit:.1}")
-                    }
-                }),
+                SequentialEvent::Estimated(update) => update.failure().map(ToString::to_string),
                 SequentialEvent::NoEstimate(termination) => Some(termination.explain().to_owned()),
                 SequentialEvent::Refused(error) => Some(error.to_string()),
                 _ => None,
