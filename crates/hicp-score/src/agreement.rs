@@ -7,7 +7,7 @@ use crate::tolerances::{N_TOLERANCES, tolerances};
 /// Pixels counted at a time.
 const LANES: usize = 8;
 
-/// A row of pixels: what was rendered, what was measured, and the mask, from the same column on.
+/// A row of pixels: rendered depth, measured depth and mask, from the same column on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<'a> {
     pub(crate) rendered: &'a [f32],
@@ -19,18 +19,18 @@ pub(crate) struct Row<'a> {
     pub(crate) y: f64,
 }
 
-/// Sums a region up, row by row.
+/// Counts the pixels of a region, row by row.
 #[derive(Debug)]
 pub(crate) struct Agreement<R> {
     pub(crate) rows: R,
     pub(crate) cx: f64,
     pub(crate) inverse_fx: f64,
     pub(crate) diameter: f64,
-    /// See [`crate::MeanVsd::occlusion_tolerance`], below 0 too; infinite for none.
-    pub(crate) occlusion_tolerance: f64,
+    /// Rendered pixels outside the mask do not count if they are this far behind the measured surface, meters.
+    pub(crate) hidden_beyond: f64,
 }
 
-/// What was found.
+/// The counts of a region.
 #[derive(Debug)]
 pub(crate) struct Found {
     /// Pixels of the intersection that differ by less than each tolerance.
@@ -53,7 +53,7 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
             let width = row.rendered.len();
             let mut first = 0;
             while first < width {
-                // The last pixels of a row are filled up with ones that do not count.
+                // The last pixels of a row are padded with pixels that do not count.
                 let n = (width - first).min(LANES);
                 let (mut rendered, mut observed) = ([0.0_f32; LANES], [0.0_f32; LANES]);
                 let mut masked = [false; LANES];
@@ -70,7 +70,7 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
                     first += LANES;
                     continue;
                 }
-                // What is true of a pixel is all bits, and not a truth value that it would take a branch to look at.
+                // Masks are all-ones or zero instead of `bool`, which avoids a branch per pixel.
                 let mut relative = [0.0; LANES];
                 for lane in 0..LANES {
                     let (z, measured) = (f64::from(rendered[lane]), f64::from(observed[lane]));
@@ -80,9 +80,9 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
                     let behind = (z - measured) * distance_per_depth;
                     let (seen, known) = (all_bits(z > 0.0), all_bits(measured > 0.0));
                     let masked = all_bits(masked[lane]);
-                    let hidden = known & all_bits(behind > self.occlusion_tolerance);
+                    let hidden = known & all_bits(behind > self.hidden_beyond);
                     outside[lane] += 1 & seen & !masked & !hidden;
-                    // No number, where it does not count, and less than no limit.
+                    // NaN where the pixel does not count: NaN is below no limit.
                     let nothing = !(seen & known & masked);
                     relative[lane] =
                         f64::from_bits((behind.abs() * inverse_diameter).to_bits() | nothing);

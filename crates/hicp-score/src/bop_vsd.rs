@@ -2,9 +2,8 @@
 
 use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, PixelRegion, RenderedView};
 
-use crate::error::ScoreError;
 use crate::tolerances::N_TOLERANCES;
-use crate::vsd::{visibility_masks, vsd};
+use crate::vsd::{ScoreError, visibility_masks, vsd};
 
 /// Returns e_VSD(τ) for τ = 5 %, …, 50 % of the diameter with the visibility masks of BOP'19.
 ///

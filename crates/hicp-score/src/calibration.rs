@@ -1,31 +1,31 @@
-//! Whether a score tells right poses from wrong ones: ROC area and reliability.
+//! Measures of how well a score separates correct poses from wrong ones: ROC area and reliability.
 
-/// The score of an estimate, and whether the estimate is correct.
+/// The score of an estimate, labeled with whether the estimate is correct.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judgement {
+pub struct LabeledScore {
     /// Confidence; higher is better.
     pub score: f64,
-    /// Whether the estimate is correct, by whatever rule.
+    /// Whether the estimate is correct, by any rule.
     pub correct: bool,
 }
 
-/// Returns the area under the ROC curve: the probability that a correct estimate has a higher score than a wrong one, where
-/// equal scores count half.
+/// Returns the area under the ROC curve; `None` unless there are correct and wrong estimates.
 ///
-/// ½ says that the score knows nothing, 1 that some threshold on it parts right from wrong. `None` unless there are
-/// estimates of both kinds. The Mann-Whitney statistic, exact with ties. Cost: O(n log n).
+/// The area is the probability that a correct estimate has a higher score than a wrong one, where equal
+/// scores count half (the Mann-Whitney statistic, exact with ties). ½ means that the score has no
+/// information, 1 that some threshold separates correct from wrong. Cost: O(n log n).
 ///
 /// ```
-/// use hicp_score::{Judgement, roc_area};
-/// let judged = [(0.9, true), (0.8, true), (0.8, false), (0.3, false)];
-/// let judged = judged.map(|(score, correct)| Judgement { score, correct });
+/// use hicp_score::{LabeledScore, roc_area};
+/// let labeled = [(0.9, true), (0.8, true), (0.8, false), (0.3, false)];
+/// let labeled = labeled.map(|(score, correct)| LabeledScore { score, correct });
 /// // Of the four pairs of a right and a wrong one, three are in order and one is a tie.
-/// assert_eq!(roc_area(&judged), Some(0.875));
-/// assert_eq!(roc_area(&judged[..2]), None);
+/// assert_eq!(roc_area(&labeled), Some(0.875));
+/// assert_eq!(roc_area(&labeled[..2]), None);
 /// ```
 #[must_use]
-pub fn roc_area(judged: &[Judgement]) -> Option<f64> {
-    let mut sorted: Vec<&Judgement> = judged.iter().collect();
+pub fn roc_area(labeled: &[LabeledScore]) -> Option<f64> {
+    let mut sorted: Vec<&LabeledScore> = labeled.iter().collect();
     sorted.sort_by(|a, b| a.score.total_cmp(&b.score));
     // In halves of pairs, so that every number is whole.
     let (mut wrong_below, mut right, mut won) = (0_u128, 0_u128, 0_u128);
@@ -41,7 +41,7 @@ pub fn roc_area(judged: &[Judgement]) -> Option<f64> {
     (pairs > 0).then(|| won as f64 / pairs as f64)
 }
 
-/// Estimates whose scores lie in a range: a line of a reliability table.
+/// The estimates with scores in one range: a line of a reliability table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReliabilityBin {
     /// Lower bound of the scores, included.
@@ -74,7 +74,7 @@ impl ReliabilityBin {
 ///
 /// Scores outside are counted in the nearest range, as are those that are no number in the lowest. Cost: O(n + bins).
 #[must_use]
-pub fn reliability(judged: &[Judgement], bins: usize) -> Vec<ReliabilityBin> {
+pub fn reliability(labeled: &[LabeledScore], bins: usize) -> Vec<ReliabilityBin> {
     let bound = |index: usize| index as f64 / bins as f64;
     let mut table: Vec<ReliabilityBin> = (0..bins)
         .map(|index| ReliabilityBin {
@@ -83,7 +83,7 @@ pub fn reliability(judged: &[Judgement], bins: usize) -> Vec<ReliabilityBin> {
             ..ReliabilityBin::default()
         })
         .collect();
-    for Judgement { score, correct } in judged {
+    for LabeledScore { score, correct } in labeled {
         // By the bounds themselves, so that a score at one is in the bin that begins there.
         let above = table.partition_point(|bin| bin.lower <= *score);
         let Some(bin) = table.get_mut(above.saturating_sub(1)) else {

@@ -1,49 +1,66 @@
-//! Whether what was measured is flatter than what was rendered.
+//! Compares how flat the measured and the rendered surface are.
 
 use hicp_core::{Context, Isometry3, Matrix3, Observation, PixelRegion, RenderedView, Vector3};
 
-/// How many pixels are looked at, at most.
+/// Largest number of pixels that are compared.
 const MAX_PIXELS: usize = 512;
-/// Pixels below which nothing is said.
+/// Smallest number of pixels for a result.
 const MIN_PIXELS: usize = 64;
-/// Of how many pixels a distance is told: seven tenths are nearer. The rest may be another surface, flying pixels, edges.
+/// Share of the pixels that are nearer than a reported distance. The rest may be another surface, flying
+/// pixels or edges.
 const SHARE: f64 = 0.7;
-/// Share of the pixels, the nearest ones, that a plane is fitted to again, and how often.
+/// Share of the pixels, the nearest ones, that the next plane is fitted to.
 const FITTED: f64 = 0.8;
+/// Number of fits.
 const ROUNDS: usize = 4;
-/// How many times better than the pose a plane has to explain what was measured for [`Flatness::is_flat`] …
+/// Least ratio of the distances from the pose's surface and from the plane for [`Flatness::is_flat`].
 const RATIO: f64 = 1.5;
-/// … and the share of the diameter up to which no flatness counts: what a sensor and an ICP leave.
+/// Share of the diameter below which a distance is the error of a sensor and an ICP.
 const SHARE_OF_DIAMETER: f64 = 0.01;
-/// Share of the diameter within which a surface is flat: what a sensor makes of a wall.
+/// Share of the diameter within which a surface is flat, as a sensor measures a wall.
 const FLAT: f64 = 0.03;
 
-/// How flat the measured and the rendered surface are where both are, and how far one is from the other.
+/// How flat the measured and the rendered surface are where both are seen, and how far apart they are.
 ///
-/// A wall, a table or a box in the place of an object may leave it an MVE that looks good, for the finest of its tolerances is 5 % of
-/// the diameter: a face or a side of the object lies flat against it. Then a plane explains the depth better than the pose does.
+/// A wall, a table or a box in the place of the object may still have a good MVE: its finest tolerance is
+/// 5 % of the diameter, so a face or a side of the object lies flat against it. A plane then explains the
+/// depth better than the pose does.
 ///
-/// Every distance is the one, in metres along the optical axis, that seven tenths of the pixels stay below. Pixels are those of the mask with
-/// depth where the model is rendered, on a grid that takes 512 of them at the most. A plane is the one of least squares of inverse depths,
-/// fitted again to the nearest eight tenths of the pixels.
+/// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer. The
+/// pixels are those of the mask with depth where the model is rendered, on a grid of at most 512. The
+/// plane has the least squares of inverse depths, fitted again to the nearest eight tenths of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Flatness {
-    /// From the measured to the rendered surface.
+    /// Distance from the measured to the rendered surface.
     pub residual: f64,
-    /// From the measured surface to the plane that fits it best.
+    /// Distance from the measured surface to the plane that fits it best.
     pub measured: f64,
-    /// From the rendered surface to the plane that fits it best.
+    /// Distance from the rendered surface to the plane that fits it best.
     pub rendered: f64,
     /// Diameter of the model.
     pub diameter: f64,
 }
 
 impl Flatness {
-    /// Measures the flatness at a pose; `None` where fewer than 64 pixels show both surfaces, or they are seen so flat that no plane in front of
-    /// the camera fits.
+    /// Creates a value from stored numbers, meters; see the fields.
+    #[must_use]
+    pub fn new(residual: f64, measured: f64, rendered: f64, diameter: f64) -> Self {
+        Self {
+            residual,
+            measured,
+            rendered,
+            diameter,
+        }
+    }
+
+    /// Measures the flatness at a pose.
     ///
-    /// Cost: one render (shared with whoever else looks at this pose) and a look at some five hundred pixels, more where what both show is
-    /// a small part of their boxes. Allocates nothing.
+    /// Returns `None` if fewer than 64 pixels show both surfaces, or if no plane in front of the camera
+    /// fits.
+    ///
+    /// Cost: one render (shared with other components that use this pose) and about 500 pixels, more if
+    /// the common pixels are a small part of their boxes. Allocates nothing.
     #[must_use]
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
         let (model, observation) = context.problem.sides()?;
@@ -58,7 +75,7 @@ impl Flatness {
             }
         };
         if n < MAX_PIXELS / 4 {
-            // They are few of the box: as fine a grid as they need.
+            // The common pixels are a small part of the box: use a finer grid.
             let finer = step as f64 * (n.max(1) as f64 / MAX_PIXELS as f64).sqrt();
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // Below the step before, not negative.

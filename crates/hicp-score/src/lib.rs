@@ -1,12 +1,16 @@
-//! Scores of a pose: Visible Surface Discrepancy ([`vsd`], [`Vsd`]), the mean VSD estimate against the live image
-//! ([`MeanVsd`], the paper's MVE), and the pose errors and recalls of the BOP benchmark ([`bop_vsd`], [`mssd`], [`mspd`], [`add`],
-//! [`adi`], [`Recalls`]).
+//! Scores and pose errors.
 //!
-//! **Should you use this crate?** To judge poses, with or without ground truth, whoever made them: yes. To refine them, use
-//! `hybrid-icp`, which reports the MVE of what it returns.
+//! - [`Score`]: the trait. [`MeanVsd`] (the paper's MVE) scores a pose against the live image,
+//!   [`SampledMve`] ranks many poses, [`Vsd`] compares with a known true pose.
+//! - [`Flatness`]: recognizes a wall in the mask.
+//! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP benchmark.
+//! - [`roc_area`], [`reliability`]: how well a score separates correct poses from wrong ones.
+//!
+//! **Should you use this crate?** Yes, to judge poses from any source, with or without ground truth. To
+//! refine poses, use `hybrid-icp`, which reports the MVE of the refined pose. `hicp-core` is re-exported.
 //!
 //! ```
-//! use hicp_core::{DistanceImage, Mask};
+//! use hicp_score::hicp_core::{DistanceImage, Mask};
 //! # fn main() -> Result<(), hicp_score::ScoreError> {
 //! let truth = DistanceImage::new(2, 1, vec![0.500, 0.500])?;
 //! let estimate = DistanceImage::new(2, 1, vec![0.500, 0.512])?;
@@ -23,11 +27,11 @@
 mod agreement;
 mod bop_vsd;
 mod calibration;
-mod error;
 mod flatness;
 mod mean_vsd;
 mod model_points;
 mod nearest;
+mod occlusion;
 mod pose_error;
 mod recall;
 mod sampled_mve;
@@ -36,11 +40,12 @@ mod tolerances;
 mod vsd;
 
 pub use bop_vsd::{bop_vsd, spheres_overlap};
-pub use calibration::{Judgement, ReliabilityBin, reliability, roc_area};
-pub use error::ScoreError;
+pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
 pub use flatness::Flatness;
-pub use mean_vsd::{MeanVsd, VISIBILITY_TOLERANCE_METERS};
+pub use hicp_core;
+pub use mean_vsd::MeanVsd;
 pub use model_points::ModelPoints;
+pub use occlusion::{Occlusion, VISIBILITY_TOLERANCE_METERS};
 pub use pose_error::{add, adi, mspd, mssd};
 pub use recall::{
     N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates,
@@ -48,4 +53,4 @@ pub use recall::{
 pub use sampled_mve::SampledMve;
 pub use score::Score;
 pub use tolerances::{N_TOLERANCES, tolerances};
-pub use vsd::{Vsd, visibility_masks, vsd};
+pub use vsd::{ScoreError, Vsd, visibility_masks, vsd};

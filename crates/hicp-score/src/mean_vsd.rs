@@ -4,47 +4,42 @@ use hicp_core::internal::vectorized;
 use hicp_core::{Context, Isometry3};
 
 use crate::agreement::{Agreement, Row};
+use crate::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 
-/// The mean VSD estimate (MVE) of §IV-A: VSD with the measured distances and the segmentation mask in the place of the true ones.
+/// The mean VSD estimate (MVE) of §IV-A: VSD against the measured distances and the segmentation mask.
 ///
-/// The mean over τ = 5 %…50 % of the diameter; 0 for a pose whose render is the image, 1 when nothing agrees or nothing is
-/// seen. It needs no ground truth: it is the score of a pose against the live image, and an uncertainty proxy.
+/// The mean over τ = 5 %…50 % of the diameter: 0 if the render of the pose equals the image, 1 if nothing
+/// agrees or nothing is seen. It needs no ground truth, so it scores a pose against the live image and
+/// serves as a measure of uncertainty.
 ///
-/// Masked pixels without depth count in neither mask; they say nothing about the pose, and would put a floor under the
-/// score of every image with holes. An empty union is 1.
+/// Masked pixels without depth count in neither mask. They hold no evidence about the pose, and would
+/// raise the score of every image with holes. An empty union is 1.
 ///
-/// Cost: one render (shared with whoever else looks at this pose) and O(rendered pixels).
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Cost: one render (shared with other components that use this pose) and O(rendered pixels).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeanVsd {
-    /// When set, rendered pixels outside the mask that something observed hides by more than this many metres are not
-    /// counted against the pose (BOP's δ is 0.015). `None` is the paper's definition: everything rendered counts.
-    ///
-    /// Below 0 it is lenient with the mask: what was observed may also lie that far *behind* the rendered surface, as it does where
-    /// the mask has missed a part of the object. Outside the mask only what the camera sees through by more than that, or did
-    /// not measure, counts against the pose then.
-    pub occlusion_tolerance: Option<f64>,
+    /// Which rendered pixels outside the mask count against the pose.
+    pub occlusion: Occlusion,
 }
-
-/// BOP's visibility tolerance δ, metres, for every dataset but ITODD.
-pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
 
 // Deviation: masked pixels without depth count in neither mask; the paper's images have none.
 impl MeanVsd {
-    /// The definition of §IV-A: everything rendered counts.
+    /// Creates the definition of §IV-A: every rendered pixel counts.
     #[must_use]
     pub fn paper() -> Self {
         Self {
-            occlusion_tolerance: None,
+            occlusion: Occlusion::Counted,
         }
     }
 
-    /// Lenient with masks that miss a part of the object: BOP's tolerance, below 0.
+    /// Creates the score for masks that miss a part of the object: [`Occlusion::Lenient`] with BOP's
+    /// tolerance.
     #[must_use]
     pub fn lenient() -> Self {
         Self {
-            occlusion_tolerance: Some(-VISIBILITY_TOLERANCE_METERS),
+            occlusion: Occlusion::LENIENT,
         }
     }
 
@@ -87,21 +82,12 @@ impl MeanVsd {
             cx: camera.cx(),
             inverse_fx: 1.0 / camera.fx(),
             diameter: model.diameter(),
-            occlusion_tolerance: self.occlusion_tolerance.unwrap_or(f64::INFINITY),
+            hidden_beyond: self.occlusion.least_distance_behind(),
         });
         errors(
             found.correct,
             observation.n_measured() as u64 + found.outside,
         )
-    }
-}
-
-impl Default for MeanVsd {
-    /// Occlusion is recognised with BOP's tolerance.
-    fn default() -> Self {
-        Self {
-            occlusion_tolerance: Some(VISIBILITY_TOLERANCE_METERS),
-        }
     }
 }
 

@@ -4,51 +4,52 @@ use std::sync::Arc;
 
 use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
 
-use crate::mean_vsd::VISIBILITY_TOLERANCE_METERS;
+use crate::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, mean};
 
-/// An estimate of the MVE at low resolution, for ranking many poses: points of the model's surface are splatted into a coarse
-/// depth buffer, which is compared with the observation as [`crate::MeanVsd`] compares a render.
+/// An estimate of the MVE at low resolution, for ranking many poses.
 ///
-/// It costs some ten microseconds whatever the mesh, and is no substitute for the MVE where a pose is accepted or reported:
-/// pixels that no sample hits count as not rendered, and thin parts come and go. Samples of a closed mesh that face away from
-/// the camera are passed over. Occlusion is recognised with BOP's tolerance, as [`crate::MeanVsd::default`] does, unless told
-/// otherwise.
+/// Splats points of the model's surface into a coarse depth buffer and compares the buffer with the
+/// observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs whatever the mesh, and does
+/// not replace the MVE where a pose is accepted or reported: pixels without a sample count as not
+/// rendered, and thin parts may be missed. Samples of a closed mesh that face away from the camera are
+/// skipped.
 ///
-/// Cost: O(samples) per pose; the sampling is made once per model and shared, and so is the coarse observation.
+/// Cost: O(samples) per pose. The sampling is computed once per model and shared, and so is the coarse
+/// observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledMve {
     /// Number of points on the model; 0 scores every pose 1.
     pub samples: usize,
-    /// About how many pixels of the mask are looked at.
+    /// Approximate number of pixels of the mask that are compared.
     pub pixels: usize,
-    /// As [`crate::MeanVsd::occlusion_tolerance`], metres; infinite for none.
-    pub occlusion_tolerance: f64,
+    /// Which splatted pixels outside the mask count against the pose.
+    pub occlusion: Occlusion,
     /// The depth buffer of the coarse image, empty (0) between two poses.
     buffer: Vec<f32>,
     /// The pixels of the buffer that were written.
-    touched: Vec<u32>,
+    touched: Vec<usize>,
 }
 
 impl SampledMve {
-    /// Makes the score.
+    /// Creates the score with the default occlusion.
     #[must_use]
     pub fn new(samples: usize, pixels: usize) -> Self {
         Self {
             samples,
             pixels,
-            occlusion_tolerance: VISIBILITY_TOLERANCE_METERS,
+            occlusion: Occlusion::default(),
             buffer: Vec::new(),
             touched: Vec::new(),
         }
     }
 
-    /// The default, lenient with masks that miss a part of the object, as [`crate::MeanVsd::lenient`] is.
+    /// Creates the default for masks that miss a part of the object, as [`crate::MeanVsd::lenient`].
     #[must_use]
     pub fn lenient() -> Self {
         Self {
-            occlusion_tolerance: -VISIBILITY_TOLERANCE_METERS,
+            occlusion: Occlusion::LENIENT,
             ..Self::default()
         }
     }
@@ -98,8 +99,7 @@ impl SampledMve {
             let index = v as usize * width + u as usize;
             let nearest = &mut self.buffer[index];
             if *nearest <= 0.0 {
-                // At most 2³⁰ pixels in any accepted image.
-                self.touched.push(u32::try_from(index).unwrap_or(0));
+                self.touched.push(index);
                 *nearest = p.z;
             } else if p.z < *nearest {
                 *nearest = p.z;
@@ -110,23 +110,23 @@ impl SampledMve {
     /// Compares the depth buffer with the observation, and empties it.
     fn compare(&mut self, coarse: &Observation, diameter: f64) -> f64 {
         let camera = coarse.camera();
-        let width = camera.width();
+        let width = camera.width() as usize;
         let (depth, mask) = (coarse.depth().pixels(), coarse.mask().pixels());
+        let hidden_beyond = self.occlusion.least_distance_behind();
         let mut correct = AgreementCounts::new(diameter);
         let mut outside = 0;
         for index in self.touched.drain(..) {
-            let place = index as usize;
-            let z = f64::from(std::mem::take(&mut self.buffer[place]));
-            let measured = f64::from(depth[place]);
-            let x = (f64::from(index % width) - camera.cx()) / camera.fx();
-            let y = (f64::from(index / width) - camera.cy()) / camera.fy();
+            let z = f64::from(std::mem::take(&mut self.buffer[index]));
+            let measured = f64::from(depth[index]);
+            let x = ((index % width) as f64 - camera.cx()) / camera.fx();
+            let y = ((index / width) as f64 - camera.cy()) / camera.fy();
             let behind = (z - measured) * (x * x + y * y + 1.0).sqrt();
             let known = measured > 0.0;
-            if mask[place] {
+            if mask[index] {
                 if known {
                     correct.add(behind.abs());
                 }
-            } else if !(known && behind > self.occlusion_tolerance) {
+            } else if !(known && behind > hidden_beyond) {
                 outside += 1;
             }
         }

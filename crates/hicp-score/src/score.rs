@@ -3,26 +3,37 @@
 use hicp_core::internal::type_label;
 use hicp_core::{Context, Isometry3};
 
-/// Says how bad a pose is: 0 is perfect, higher is worse.
+/// Scores a pose: 0 is perfect, higher is worse.
 ///
-/// Pure: equal inputs give equal bits. Ask `context.view(pose)` for the render at the pose; the selection that starts from
-/// that pose then gets it for free.
+/// Pure: equal inputs give equal bits. Use `context.view(pose)` for the render at the pose; a selection
+/// that starts from the same pose then shares it.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a score",
+    label = "expected a type that implements `Score`",
+    note = "`Score` is implemented by `MeanVsd`, `SampledMve`, `Vsd` and boxes of scores"
+)]
 pub trait Score {
     /// Returns the score of a pose; never NaN.
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64;
 
-    /// Name in traces.
+    /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
 }
 
-impl<T: Score + ?Sized> Score for Box<T> {
-    fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
-        (**self).score(context, camera_from_object)
-    }
+macro_rules! forward_score {
+    ($($pointer:ty),*) => {$(
+        impl<T: Score + ?Sized> Score for $pointer {
+            fn score(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> f64 {
+                (**self).score(context, pose)
+            }
 
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
+            fn name(&self) -> &'static str {
+                (**self).name()
+            }
+        }
+    )*};
 }
+
+forward_score!(Box<T>, &mut T);

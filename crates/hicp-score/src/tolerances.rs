@@ -50,17 +50,11 @@ impl AgreementCounts {
     /// An empty union is an error of 1: nothing was seen where something should be.
     pub(crate) fn errors(&self, union: u64) -> [f64; N_TOLERANCES] {
         let mut sum = 0;
-        errors(
-            self.histogram
-                .first_chunk()
-                .copied()
-                .unwrap_or_default()
-                .map(|count: u64| {
-                    sum += count;
-                    sum
-                }),
-            union,
-        )
+        let correct = std::array::from_fn(|k| {
+            sum += self.histogram[k];
+            sum
+        });
+        errors(correct, union)
     }
 }
 

@@ -1,10 +1,35 @@
-//! Visible Surface Discrepancy.
+//! Visible Surface Discrepancy, and the errors of invalid inputs.
 
 use hicp_core::{Context, DistanceImage, Isometry3, Mask, RenderedView};
+use thiserror::Error;
 
-use crate::error::ScoreError;
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, N_TOLERANCES, mean};
+
+/// Inputs that have no score.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ScoreError {
+    /// The sizes of images differ.
+    #[error("{what} is {}x{}, expected {}x{}", found.0, found.1, expected.0, expected.1)]
+    Size {
+        /// Name of the image.
+        what: &'static str,
+        /// Its width and height.
+        found: (u32, u32),
+        /// The width and height of the others.
+        expected: (u32, u32),
+    },
+    /// A diameter is not finite and positive.
+    #[error("diameter is {value}, expected a finite number above 0")]
+    Diameter {
+        /// The value found.
+        value: f64,
+    },
+    /// An image is invalid.
+    #[error(transparent)]
+    Image(#[from] hicp_core::ImageError),
+}
 
 /// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter, from distance maps and visibility masks.
 ///
@@ -157,10 +182,9 @@ impl Vsd {
         let mut union = truth.depth().iter().filter(|z| **z > 0.0).count() as u64;
         let mut counts = AgreementCounts::new(model.diameter());
         let region = estimate.region();
-        let mut depths = estimate.depth().iter();
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let z = depths.next().copied().unwrap_or(0.0);
+        let rows = estimate.depth().chunks_exact(region.width().max(1));
+        for (v, row) in (region.v_min..region.v_max).zip(rows) {
+            for (u, &z) in (region.u_min..region.u_max).zip(row) {
                 if z <= 0.0 {
                     continue;
                 }

@@ -1,8 +1,8 @@
 //! Renders, scores and pose errors.
 
 use hybrid_icp::{
-    MeanVsd, Problem, Rasterizer, RenderedView, Renderer, Score, VISIBILITY_TOLERANCE_METERS,
-    Workspace,
+    MeanVsd, Occlusion, Problem, Rasterizer, RenderedView, Renderer, Score,
+    VISIBILITY_TOLERANCE_METERS, Workspace,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -50,8 +50,9 @@ pub(crate) fn render_depth<'py>(
 /// T_co : array_like, shape (4, 4)
 ///     Camera from object, metres.
 /// occlusion_tolerance : float or None, optional
-///     Rendered pixels outside the mask that something hides by more than this many metres do not count; `None` is the paper's
-///     definition, in which everything rendered counts.
+///     Rendered pixels outside the mask that something hides by more than this many metres do not count.
+///     Below 0, the measured surface may also lie that far behind, for masks that miss a part of the
+///     object. `None` is the paper's definition: every rendered pixel counts.
 ///
 /// Returns
 /// -------
@@ -70,7 +71,7 @@ pub(crate) fn mve(
     let pose = array::motion(T_co, "T_co")?.isometry;
     let (model, observation) = (&model.get().model, &observation.get().observation);
     let mut score = MeanVsd {
-        occlusion_tolerance,
+        occlusion: occlusion_tolerance.map_or(Occlusion::Counted, Occlusion::from_tolerance),
     };
     Ok(py.detach(|| {
         let mut workspace = Workspace::new(Rasterizer::default());

@@ -163,7 +163,7 @@ pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
 /// ```
 /// use hybrid_icp::*;
 /// // A rough pose that became a good one.
-/// let at = |residual| Some(Flatness { residual, measured: 0.0025, rendered: 0.009, diameter: 0.2 });
+/// let at = |residual| Some(Flatness::new(residual, 0.0025, 0.009, 0.2));
 /// assert_eq!(warnings_of_result(0.6, 0.1, at(0.002)), []);
 /// // Something was found in the mask, but nothing that the detector had seen there.
 /// assert!(matches!(warnings_of_result(0.95, 0.2, None)[..], [Warning::FoundElsewhere { .. }]));

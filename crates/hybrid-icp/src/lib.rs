@@ -90,10 +90,10 @@ pub use hicp_metric::{
 pub use hicp_pipeline::{self as pipeline, PipelineError, PipelineFile, PipelineLimits};
 pub use hicp_raster::{Rasterizer, render_depth_image};
 pub use hicp_score::{
-    Flatness, Judgement, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, PoseErrors, Recalls,
-    ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors, VISIBILITY_TOLERANCE_METERS, Vsd,
-    add, adi, bop_vsd, match_instances, most_visible, mspd, mssd, reliability, roc_area,
-    spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
+    Flatness, LabeledScore, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, Occlusion,
+    PoseErrors, Recalls, ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors,
+    VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances, most_visible, mspd, mssd,
+    reliability, roc_area, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
 };
 pub use hicp_switch::{
     PAPER_ALPHA, Switch, SwitchAmong, SwitchUntilStall, Switcher, Threshold, Thresholds,

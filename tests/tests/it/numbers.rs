@@ -299,18 +299,10 @@ fn results_are_doubted_by_their_scores() {
         [Warning::Unexplained { mve: 0.4 }]
     );
     assert_eq!(warnings_of_result(0.2, 0.2, None), []);
-    let flatness = Flatness {
-        residual: 0.01,
-        measured: 0.002,
-        rendered: 0.0123,
-        diameter: 0.2,
-    };
+    let flatness = Flatness::new(0.01, 0.002, 0.0123, 0.2);
     assert_eq!(warnings_of_result(half, 0.4, Some(flatness)).len(), 1);
     // No depth image is as flat as numbers are.
-    let exact = Flatness {
-        measured: 1e-16,
-        ..flatness
-    };
+    let exact = Flatness::new(0.01, 1e-16, 0.0123, 0.2);
     let found = warnings_of_result(half, nearly, Some(exact));
     assert!(found[0].to_string().contains("flat to within 0.0010 m"));
     let found = warnings_of_result(half, nearly, Some(flatness));

@@ -1,6 +1,6 @@
 //! Scores.
 
-use hicp_score::{MeanVsd, SampledMve};
+use hicp_score::{MeanVsd, Occlusion, SampledMve};
 
 use crate::catalog::Catalog;
 use crate::range::Range;
@@ -18,7 +18,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             Cost: a render, shared with the selection, and O(pixels).";
         let tolerance: f64 = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
         Ok(MeanVsd {
-            occlusion_tolerance: tolerance.is_finite().then_some(tolerance),
+            occlusion: Occlusion::from_tolerance(tolerance),
         })
     });
     catalog.add_score("sampled-mve", |p| {
@@ -27,7 +27,8 @@ pub(super) fn add(catalog: &mut Catalog) {
         let samples = p.limited(Samples, "samples", 0, 1500, "points on the model")?;
         let pixels = p.count("pixels", 1, 200, "pixels of the mask, about")?;
         let mut score = SampledMve::new(samples, pixels);
-        score.occlusion_tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
+        let tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
+        score.occlusion = Occlusion::from_tolerance(tolerance);
         Ok(score)
     });
 }

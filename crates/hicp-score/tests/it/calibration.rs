@@ -1,9 +1,9 @@
 //! ROC areas and reliability tables that can be counted by hand.
 
-use hicp_score::{Judgement, reliability, roc_area};
+use hicp_score::{LabeledScore, reliability, roc_area};
 
-fn judged(list: &[(f64, bool)]) -> Vec<Judgement> {
-    let of = |(score, correct): &(f64, bool)| Judgement {
+fn labeled(list: &[(f64, bool)]) -> Vec<LabeledScore> {
+    let of = |(score, correct): &(f64, bool)| LabeledScore {
         score: *score,
         correct: *correct,
     };
@@ -11,7 +11,7 @@ fn judged(list: &[(f64, bool)]) -> Vec<Judgement> {
 }
 
 fn area(list: &[(f64, bool)]) -> Option<f64> {
-    roc_area(&judged(list))
+    roc_area(&labeled(list))
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn bins_hold_their_lower_bounds() {
         (-3.0, false),
         (7.0, true),
     ];
-    let table = reliability(&judged(&list), 4);
+    let table = reliability(&labeled(&list), 4);
     let bounds: Vec<_> = table.iter().map(|b| (b.lower, b.upper)).collect();
     assert_eq!(bounds, [(0.0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1.0)]);
     let counts: Vec<_> = table.iter().map(|b| (b.count, b.correct)).collect();
@@ -91,5 +91,5 @@ fn bins_hold_their_lower_bounds() {
         (empty[0].share_correct(), empty[1].mean_score()),
         (None, None)
     );
-    assert!(reliability(&judged(&list), 0).is_empty());
+    assert!(reliability(&labeled(&list), 0).is_empty());
 }

@@ -233,13 +233,7 @@ fn flatness_of_cube(scale: u32) -> Flatness {
 #[test]
 fn flat_is_what_a_plane_explains_and_the_model_is_not() {
     let at = |residual: f64, measured: f64, rendered: f64| {
-        let flatness = Flatness {
-            residual,
-            measured,
-            rendered,
-            diameter: 0.2,
-        };
-        flatness.is_flat()
+        Flatness::new(residual, measured, rendered, 0.2).is_flat()
     };
     assert!(at(0.006, 0.003, 0.006));
     // The pose explains it as well, or nearly.

@@ -5,7 +5,7 @@ use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, PixelRegion, Point3,
     Problem, RenderCache, RenderedView, Renderer, TriMesh,
 };
-use hicp_score::{MeanVsd, Score, tolerances};
+use hicp_score::{MeanVsd, Occlusion, Score, tolerances};
 
 /// Draws the same whatever it is asked for.
 #[derive(Clone, Debug)]
@@ -64,8 +64,12 @@ fn by_definition(mean_vsd: MeanVsd, drawn: &Drawn, observation: &Observation) ->
                     differences.push(behind.abs());
                 }
             } else {
-                let hides = |tolerance: f64| known && behind > tolerance;
-                union += usize::from(seen && !mean_vsd.occlusion_tolerance.is_some_and(hides));
+                let hidden = match mean_vsd.occlusion {
+                    Occlusion::Tolerated { meters } => behind > meters,
+                    Occlusion::Lenient { meters } => behind > -meters,
+                    _ => false,
+                };
+                union += usize::from(seen && !(known && hidden));
             }
         }
     }
@@ -161,7 +165,7 @@ fn what_is_exactly_the_tolerance_in_front_does_not_hide() {
     let observation = two_pixels([0.25, 0.5], [false, true]);
     let found = |tolerance: f64| {
         let mean_vsd = MeanVsd {
-            occlusion_tolerance: Some(tolerance),
+            occlusion: Occlusion::Tolerated { meters: tolerance },
         };
         mve(mean_vsd, &drawn([0.5, 0.5]), &observation)
     };

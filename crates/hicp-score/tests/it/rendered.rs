@@ -5,7 +5,8 @@ use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
 };
 use hicp_score::{
-    MeanVsd, N_TOLERANCES, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, Vsd, tolerances, vsd,
+    MeanVsd, N_TOLERANCES, Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, Vsd,
+    tolerances, vsd,
 };
 
 fn camera() -> PinholeCamera {
@@ -40,10 +41,12 @@ fn mve(
 
 const BOTH: [MeanVsd; 2] = [
     MeanVsd {
-        occlusion_tolerance: None,
+        occlusion: Occlusion::Counted,
     },
     MeanVsd {
-        occlusion_tolerance: Some(VISIBILITY_TOLERANCE_METERS),
+        occlusion: Occlusion::Tolerated {
+            meters: VISIBILITY_TOLERANCE_METERS,
+        },
     },
 ];
 
@@ -133,13 +136,17 @@ fn by_definition(
             .zip(measured.pixels())
             .zip(observation.mask().pixels())
         {
-            let hidden = |tolerance: f64| *m > 0.0 && r - m > tolerance;
+            let hidden = match mean_vsd.occlusion {
+                Occlusion::Tolerated { meters } => r - m > meters,
+                Occlusion::Lenient { meters } => r - m > -meters,
+                _ => false,
+            };
             let in_measured = *masked && *m > 0.0;
             let in_rendered = *r > 0.0
                 && if *masked {
                     *m > 0.0
                 } else {
-                    !mean_vsd.occlusion_tolerance.is_some_and(hidden)
+                    !(*m > 0.0 && hidden)
                 };
             if in_measured || in_rendered {
                 union += 1.0;

@@ -7,7 +7,7 @@ use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
     TriMesh, sample_surface,
 };
-use hicp_score::{SampledMve, Score, VISIBILITY_TOLERANCE_METERS, tolerances};
+use hicp_score::{Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, tolerances};
 
 fn camera() -> PinholeCamera {
     PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
@@ -238,7 +238,7 @@ fn what_is_exactly_the_tolerance_in_front_does_not_hide() {
     let observation = wall(camera, Some(3 * 8 + 4), 0.25);
     let found = |tolerance: f64| {
         let mut sampled = SampledMve::new(20_000, 100_000);
-        sampled.occlusion_tolerance = tolerance;
+        sampled.occlusion = Occlusion::Tolerated { meters: tolerance };
         score(&mut sampled, &model, &observation, &pose)
     };
     // All others agree.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use hicp_bop::{Scenes, frames_of};
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Judgement, reliability, roc_area};
+use hybrid_icp::{LabeledScore, reliability, roc_area};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -49,7 +49,7 @@ impl Calibration {
         objects: &BTreeMap<u32, EvaluatedObject<'_>>,
     ) -> Self {
         let frames = frames_of(rows);
-        let judged = frames
+        let labeled = frames
             .par_iter()
             .with_max_len(1)
             .flat_map_iter(|(frame, indices)| {
@@ -75,21 +75,21 @@ impl Calibration {
                             }
                         });
                     let nearest = errors.reduce(f64::min)?;
-                    Some(Judgement {
+                    Some(LabeledScore {
                         score: row.score,
                         correct: nearest < THRESHOLD * diameter,
                     })
                 })
             });
-        Self::from_judgements(&judged.collect::<Vec<_>>())
+        Self::from_labeled(&labeled.collect::<Vec<_>>())
     }
 
-    fn from_judgements(judged: &[Judgement]) -> Self {
-        let table = reliability(judged, BINS).into_iter();
+    fn from_labeled(labeled: &[LabeledScore]) -> Self {
+        let table = reliability(labeled, BINS).into_iter();
         Self {
-            estimates: judged.len(),
-            correct: judged.iter().filter(|j| j.correct).count(),
-            roc_area: roc_area(judged),
+            estimates: labeled.len(),
+            correct: labeled.iter().filter(|j| j.correct).count(),
+            roc_area: roc_area(labeled),
             reliability: table
                 .filter(|bin| bin.count > 0)
                 .map(|bin| Line {

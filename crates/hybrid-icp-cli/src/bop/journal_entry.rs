@@ -147,17 +147,18 @@ fn bits_of_flatness(flatness: Flatness) -> [u64; 4] {
         measured,
         rendered,
         diameter,
+        ..
     } = flatness;
     [residual, measured, rendered, diameter].map(f64::to_bits)
 }
 
 fn flatness_of([residual, measured, rendered, diameter]: [u64; 4]) -> Option<Flatness> {
-    Some(Flatness {
-        residual: finite(residual)?,
-        measured: finite(measured)?,
-        rendered: finite(rendered)?,
-        diameter: finite(diameter)?,
-    })
+    Some(Flatness::new(
+        finite(residual)?,
+        finite(measured)?,
+        finite(rendered)?,
+        finite(diameter)?,
+    ))
 }
 
 fn pose_of(bits: [u64; 7]) -> Option<Isometry3<f64>> {
@@ -228,12 +229,7 @@ pub(super) mod tests {
 
     pub(crate) fn result() -> FrameResult {
         let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.7), Vector3::new(0.3, 2.0, -1.0));
-        let flatness = Flatness {
-            residual: 0.1 + 0.2,
-            measured: 1.0 / 3.0,
-            rendered: 0.7 / 3.0,
-            diameter: 1e9 / 3.0,
-        };
+        let flatness = Flatness::new(0.1 + 0.2, 1.0 / 3.0, 0.7 / 3.0, 1e9 / 3.0);
         let row = |index, status, pose, mve: Option<(f64, f64)>| RowResult {
             index,
             status,

@@ -75,12 +75,7 @@ mod tests {
         let rows: Vec<ResultRow> = (5..8)
             .map(|obj_id| ResultRow::new(1, 2, obj_id, Isometry3::identity()))
             .collect();
-        let flatness = Flatness {
-            residual: 0.01,
-            measured: 0.001,
-            rendered: 0.01,
-            diameter: 0.2,
-        };
+        let flatness = Flatness::new(0.01, 0.001, 0.01, 0.2);
         let row = |index, status, mve, flatness| RowResult {
             index,
             status,
