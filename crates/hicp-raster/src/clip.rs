@@ -26,8 +26,8 @@ pub(crate) struct Clipper {
 }
 
 impl Clipper {
-    /// Returns the convex polygon that is left of a triangle beyond the near plane and inside the guard band, in the
-    /// triangle's winding; empty when nothing is left.
+    /// Returns the convex polygon that is left of a triangle beyond the near plane and inside the
+    /// guard band, in the triangle's winding; empty when nothing is left.
     ///
     /// Corners are homogeneous pixels (u·z, v·z, z); all that is returned has z ≥ `near` > 0.
     ///
@@ -69,8 +69,8 @@ impl Clipper {
         for &to in &self.polygon {
             let to_distance = inside.distance(to);
             if (from_distance >= 0.0) != (to_distance >= 0.0) {
-                // Always from the inside to the outside: both triangles at an edge then round alike, though they walk it
-                // in opposite directions.
+                // Always from the inside to the outside: both triangles at an edge then round
+                // alike, though they walk it in opposite directions.
                 self.next.push(if from_distance >= 0.0 {
                     crossing(from, from_distance, to, to_distance)
                 } else {

@@ -4,8 +4,8 @@ use hicp_core::PixelRegion;
 
 use crate::fixed::{FRACTION_BITS, FixedPoint, first_pixel, last_pixel};
 
-/// Sides below this many grid units (512 px) from the first corner make an extent below twice as much, and edge functions
-/// that fit 64 bits: two products of 2³⁰ by 2³⁰.
+/// Sides below this many grid units (512 px) from the first corner make an extent below twice as
+/// much, and edge functions that fit 64 bits: two products of 2³⁰ by 2³⁰.
 const SMALL_SIDE: i64 = 1 << 29;
 
 /// Which triangles are drawn, by the sign of their area in the image (u right, v down).
@@ -21,8 +21,9 @@ pub(crate) enum Keep {
 
 /// One edge function over the pixels of a triangle's bounding box.
 ///
-/// The function is kept divided by the grid units of a pixel and rounded down: one pixel changes it by a multiple of the
-/// divisor, so that the sign, which is all that counts, survives exactly and the numbers stay small.
+/// The function is kept divided by the grid units of a pixel and rounded down: one pixel changes it
+/// by a multiple of the divisor, so that the sign, which is all that counts, survives exactly and
+/// the numbers stay small.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Edge {
     /// Value at the first pixel of the bounding box; a pixel is inside where no edge is negative.
@@ -34,12 +35,14 @@ pub(crate) struct Edge {
 }
 
 impl Edge {
-    /// Makes the edge from `p` to `q` of a triangle of positive area, seen from the pixel centre `at`.
+    /// Makes the edge from `p` to `q` of a triangle of positive area, seen from the pixel centre
+    /// `at`.
     #[inline(always)]
     fn new<const SMALL: bool>(p: FixedPoint, q: FixedPoint, at: FixedPoint) -> Self {
         let (du, dv) = (q.u - p.u, q.v - p.v);
-        // With rows growing downwards and positive area the inside lies below an edge that runs to the right and to the
-        // right of one that runs upwards: these are the top and left edges, which own the pixel centres on them.
+        // With rows growing downwards and positive area the inside lies below an edge that runs to
+        // the right and to the right of one that runs upwards: these are the top and left edges,
+        // which own the pixel centres on them.
         let owns = dv < 0 || (dv == 0 && du > 0);
         let (u, v) = (at.u - p.u, at.v - p.v);
         let value = if SMALL {
@@ -59,7 +62,8 @@ impl Edge {
 /// Whether all sides lie within plus or minus [`SMALL_SIDE`].
 #[inline]
 fn are_small(sides: [i64; 4]) -> bool {
-    // Moved to start at 0 and taken together: one comparison, and negative numbers are large ones without their sign.
+    // Moved to start at 0 and taken together: one comparison, and negative numbers are large ones
+    // without their sign.
     let together = sides
         .iter()
         .fold(0, |bits, side| bits | (side + SMALL_SIDE).cast_unsigned());
@@ -70,7 +74,8 @@ fn wide_cross(au: i64, av: i64, bu: i64, bv: i64) -> i128 {
     i128::from(au) * i128::from(bv) - i128::from(av) * i128::from(bu)
 }
 
-/// Coordinates reach 2³⁷ units (two guard bands), differences 2³⁸, edge functions 2⁷⁷: a pixel's worth less is 2⁵⁷.
+/// Coordinates reach 2³⁷ units (two guard bands), differences 2³⁸, edge functions 2⁷⁷: a pixel's
+/// worth less is 2⁵⁷.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "bounded as the comment above shows"
@@ -92,9 +97,10 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// Sets up a triangle, or returns `None` if it has no area, is not to be kept, or no pixel centre of `region` lies in
-    /// its bounding box.
-    // Half of all triangles end after the area, most of a fine mesh after the bounding box: worth not being a call.
+    /// Sets up a triangle, or returns `None` if it has no area, is not to be kept, or no pixel
+    /// centre of `region` lies in its bounding box.
+    // Half of all triangles end after the area, most of a fine mesh after the bounding box: worth
+    // not being a call.
     #[inline(always)]
     pub(crate) fn new(
         a: FixedPoint,

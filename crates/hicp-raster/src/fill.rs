@@ -1,97 +1,12 @@
 //! Depth of covered pixels.
 
-use glam::DVec3;
 use hicp_core::internal::{VectorLoop, Work, vectorized};
 use hicp_core::{PixelRegion, RenderedView};
 
 use crate::edge::{Coverage, Edge};
-use crate::projection::ProjectedVertex;
+use crate::inverse_depth::InverseDepth;
 
-/// The plane of a triangle as the image sees it: 1/z is affine in the pixel.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct InverseDepth {
-    per_u: f64,
-    per_v: f64,
-    at_origin: f64,
-    low: f64,
-    high: f64,
-}
-
-impl InverseDepth {
-    /// Makes the plane through three vertices, none of them to be clipped.
-    #[inline(always)]
-    pub(crate) fn through(a: &ProjectedVertex, b: &ProjectedVertex, c: &ProjectedVertex) -> Self {
-        let (u1, v1, w1) = (b.u - a.u, b.v - a.v, b.inverse_depth - a.inverse_depth);
-        let (u2, v2, w2) = (c.u - a.u, c.v - a.v, c.inverse_depth - a.inverse_depth);
-        // A triangle that has an area only by rounding to the grid may have none here: the values are then infinite or
-        // not numbers, and the clamp below makes a depth of the triangle of them.
-        let scale = 1.0 / (u1 * v2 - u2 * v1);
-        let per_u = (w1 * v2 - w2 * v1) * scale;
-        let per_v = (u1 * w2 - u2 * w1) * scale;
-        Self {
-            per_u,
-            per_v,
-            at_origin: a.inverse_depth - per_u * a.u - per_v * a.v,
-            low: lesser(lesser(a.inverse_depth, b.inverse_depth), c.inverse_depth),
-            high: greater(greater(a.inverse_depth, b.inverse_depth), c.inverse_depth),
-        }
-    }
-
-    /// Makes the plane through three homogeneous pixels (u·z, v·z, z), also behind the camera, for the part of it between
-    /// two values of 1/z.
-    pub(crate) fn through_homogeneous([a, b, c]: [DVec3; 3], low: f64, high: f64) -> Self {
-        // 1/z = α u + β v + γ, times z: α (u z) + β (v z) + γ z = 1 at all three.
-        let normal = (b - a).cross(c - a);
-        let plane = normal / normal.dot(a);
-        Self {
-            per_u: plane.x,
-            per_v: plane.y,
-            at_origin: plane.z,
-            low,
-            high,
-        }
-    }
-
-    #[inline(always)]
-    fn at_row(&self, v: f64) -> f64 {
-        self.at_origin + self.per_v * v
-    }
-
-    /// Returns the depth in metres at column `u` of a row, never outside the triangle's own range.
-    #[inline(always)]
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "depth is handed out as f32"
-    )]
-    fn depth(&self, row: f64, u: f64) -> f32 {
-        // `greater` comes first and turns what is not a number into the far end of the range.
-        let inverse = lesser(greater(row + self.per_u * u, self.low), self.high);
-        (1.0 / inverse) as f32
-    }
-
-    /// Returns the depths at some columns of a row.
-    #[inline(always)]
-    fn depths<const N: usize>(&self, row: f64, us: &[f64; N]) -> [f32; N] {
-        let mut depths = [0.0; N];
-        for (depth, u) in depths.iter_mut().zip(us) {
-            *depth = self.depth(row, *u);
-        }
-        depths
-    }
-}
-
-/// Returns `b` unless `a` is greater: one instruction, where `f64::max` has to look after NaN in both.
-#[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The buffers of a view that is being filled.
+/// The buffers of the view that is filled.
 #[derive(Debug)]
 pub(crate) struct Target<'a> {
     pub(crate) region: PixelRegion,
@@ -112,10 +27,10 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Writes the pixels of a triangle where it is nearer than what is there.
+    /// Writes the pixels of a triangle where it is nearer than the depth already there.
     #[inline(always)]
     pub(crate) fn fill(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
-        // Rows that fit a few vectors are tried whole.
+        // Rows that fit a few vectors are tested whole.
         match coverage.columns {
             ..5 => self.fill_narrow::<4>(coverage, plane, triangle),
             5..9 => self.fill_narrow::<8>(coverage, plane, triangle),
@@ -145,12 +60,13 @@ impl<'a> Target<'a> {
             let outside = edges.outside();
             let candidates = plane.depths(plane.at_row(v), &us);
             let row = start..start + N;
-            if let (Some(depths), Some(ids)) = (
+            let (Some(depths), Some(ids)) = (
                 self.depth[row.clone()].first_chunk_mut::<N>(),
                 self.triangles[row].first_chunk_mut::<N>(),
-            ) {
-                keep_nearer(depths, ids, &candidates, &outside, triangle);
-            }
+            ) else {
+                unreachable!("the row has N pixels")
+            };
+            keep_nearer(depths, ids, &candidates, &outside, triangle);
             edges.next_row();
             start += self.width;
             v += 1.0;
@@ -323,7 +239,8 @@ fn inside_columns(edges: &[Edge; 3], columns: i64) -> (i64, i64) {
     (first, end)
 }
 
-/// The nearer depth wins, and of equal ones the first. 0 is no depth; what is outside (negative) stays as it is.
+/// The nearer depth wins, and of equal ones the first. 0 is no depth; what is outside (negative)
+/// stays as it is.
 #[inline(always)]
 fn keep_nearer<const N: usize>(
     depths: &mut [f32; N],
@@ -332,7 +249,7 @@ fn keep_nearer<const N: usize>(
     outside: &[i32; N],
     triangle: u32,
 ) {
-    // All bits or none, lane by lane: what reads like a choice here becomes a branch per lane.
+    // Masks are all-ones or zero, lane by lane: a choice here becomes a branch per lane.
     let mut taken = [0_u32; N];
     for lane in 0..N {
         taken[lane] = !(outside[lane] >> 31).cast_unsigned();

@@ -1,14 +1,15 @@
 //! The sub-pixel grid that projected vertices are rounded to.
 
-/// Binary digits of a pixel. With 20, rounding moves a vertex by less than the `f32` coordinates of the mesh are good
-/// for, and triangles up to 512 px still have edge functions in 64 bits.
+/// Binary digits of a pixel. With 20, rounding moves a vertex by less than the `f32` coordinates of
+/// the mesh are good for, and triangles up to 512 px still have edge functions in 64 bits.
 pub(crate) const FRACTION_BITS: u32 = 20;
 
 /// Grid units per pixel.
 pub(crate) const UNITS_PER_PIXEL: f64 = (1_u64 << FRACTION_BITS) as f64;
 
-/// Projected coordinates beyond this many pixels from the origin are clipped. Twice the largest image side, and a constant,
-/// so that the bits of a pixel depend neither on the image nor on the requested region.
+/// Projected coordinates beyond this many pixels from the origin are clipped. Twice the largest
+/// image side, and a constant, so that the bits of a pixel depend neither on the image nor on the
+/// requested region.
 pub(crate) const GUARD_PIXELS: f64 = 65_536.0;
 
 /// Adding this to a number below 2⁵¹ leaves its nearest integer in the low digits of the mantissa.
@@ -32,7 +33,8 @@ impl FixedPoint {
     }
 }
 
-/// Rounds to the nearest integer, half to even. `f64::round` is a library call without SSE4.1, and this is the hot path.
+/// Rounds to the nearest integer, half to even. `f64::round` is a library call without SSE4.1, and
+/// this is the hot path.
 #[inline]
 fn round(x: f64) -> i64 {
     (x + ROUNDER)

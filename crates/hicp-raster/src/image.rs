@@ -7,8 +7,9 @@ use crate::rasterizer::Rasterizer;
 /// Renders the depth of a mesh into an image of the camera's size, with the default [`Rasterizer`].
 ///
 /// Depth is along the optical axis in metres, 0 where there is nothing, and 0 beyond
-/// [`MAX_DEPTH_METERS`](hicp_core::MAX_DEPTH_METERS). For tests, tools and first steps: it allocates everything anew and
-/// costs O(image). What renders repeatedly keeps a [`Rasterizer`] and a [`RenderedView`].
+/// [`MAX_DEPTH_METERS`](hicp_core::MAX_DEPTH_METERS). For tests, tools and first steps: it
+/// allocates everything anew and costs O(image). What renders repeatedly keeps a [`Rasterizer`] and
+/// a [`RenderedView`].
 ///
 /// ```
 /// use hicp_core::{Isometry3, PinholeCamera, Point3, TriMesh};

@@ -1,30 +1,35 @@
 //! A software rasterizer: depth and visible triangle of a mesh at a pose.
 //!
-//! [`Rasterizer`] implements [`hicp_core::Renderer`] on the CPU. It is made for what pose refinement asks for, thousands
-//! of times: one mesh of some thousand triangles that covers a small part of the image. Work is proportional to the mesh
-//! and the pixels it covers, and a warm rasterizer allocates nothing.
+//! [`Rasterizer`] implements [`hicp_core::Renderer`] on the CPU. It is built for pose refinement,
+//! which renders one mesh of some thousand triangles thousands of times, in a small part of the
+//! image. The work is proportional to the mesh and the covered pixels, and a warm rasterizer
+//! allocates nothing.
 //!
 //! # Should you use this crate?
 //!
-//! Yes, to render depth or visible triangles of a mesh without a GPU, in a result that is the same on every run and every
-//! machine. No, for colour, texture, anti-aliasing, lens distortion or transparency: there is none of that here.
+//! Yes, to render depth or visible triangles of a mesh without a GPU, with the same result on every
+//! run and every machine. No, if you need color, texture, anti-aliasing, lens distortion or
+//! transparency. `hicp-core` is re-exported.
 //!
 //! # What is exact and what is not
 //!
-//! - Pixel (u, v) samples the ray through ((u−cx)/fx, (v−cy)/fy, 1). A [`hicp_core::PinholeCamera`] has its pixel centres
-//!   at integers whatever convention its calibration was stated in (see [`hicp_core::PixelCenters`]), so there is no half
-//!   pixel to add here.
-//! - Coverage is decided in integers: projected vertices are rounded to a grid of 2⁻²⁰ pixel, and edge functions are exact
-//!   from there on. Triangles that share an edge leave no gap and never both cover a pixel, by the top-left rule.
-//! - Depth comes from the plane through the vertices as they were before rounding, in `f64`, and is rounded to `f32` once.
-//! - The bits of a pixel do not depend on the requested region, on what was rendered before, or on the order of triangles
-//!   (where two triangles give the same depth, the one that comes first in the mesh is named).
+//! - Pixel (u, v) samples the ray through ((u−cx)/fx, (v−cy)/fy, 1). A [`hicp_core::PinholeCamera`]
+//!   has its pixel centres at integers whatever convention its calibration was stated in (see
+//!   [`hicp_core::PixelCenters`]), so there is no half pixel to add here.
+//! - Coverage is decided in integers: projected vertices are rounded to a grid of 2⁻²⁰ pixel, and
+//!   edge functions are exact from there on. Triangles that share an edge leave no gap and never
+//!   both cover a pixel, by the top-left rule.
+//! - Depth comes from the plane through the vertices as they were before rounding, in `f64`, and is
+//!   rounded to `f32` once.
+//! - The bits of a pixel do not depend on the requested region, on what was rendered before, or on
+//!   the order of triangles (where two triangles give the same depth, the one that comes first in
+//!   the mesh is named).
 //!
 //! # Example
 //!
 //! ```
-//! use hicp_core::{Isometry3, PinholeCamera, Point3, RenderedView, Renderer, TriMesh};
 //! use hicp_raster::Rasterizer;
+//! use hicp_raster::hicp_core::{Isometry3, PinholeCamera, Point3, RenderedView, Renderer, TriMesh};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mesh = TriMesh::new(
@@ -53,10 +58,13 @@ mod edge;
 mod fill;
 mod fixed;
 mod image;
+mod inverse_depth;
 mod projection;
 mod rasterizer;
 mod region;
 
+pub use hicp_core;
 pub use image::render_depth_image;
-pub use rasterizer::{Culling, DEFAULT_NEAR_METERS, RasterConfig, Rasterizer};
+pub use projection::DEFAULT_NEAR_METERS;
+pub use rasterizer::{Culling, RasterConfig, Rasterizer};
 pub use region::projected_region;

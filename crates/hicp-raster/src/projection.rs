@@ -5,10 +5,24 @@ use hicp_core::{Isometry3, PinholeCamera, Point3};
 
 use crate::fixed::{FixedPoint, GUARD_PIXELS};
 
-/// Translations beyond this many metres are taken as broken poses: depth would leave the range of `f32`.
+/// Translations beyond this many metres are taken as broken poses: depth would leave the range of
+/// `f32`.
 const MAX_TRANSLATION_METERS: f64 = 1.0e30;
 
-/// Maps object coordinates to homogeneous pixels (u·z, v·z, z): K · `camera_from_object` as one affine map.
+/// Default depth of the near plane, meters.
+pub const DEFAULT_NEAR_METERS: f64 = 0.01;
+
+/// Smallest depth of the near plane, meters: 1/z must stay finite.
+const MIN_NEAR_METERS: f64 = 1.0e-6;
+
+/// Returns the near plane of a configured value.
+pub(crate) fn effective_near(near_meters: f64) -> f64 {
+    // `max` returns the other argument for NaN.
+    near_meters.max(MIN_NEAR_METERS)
+}
+
+/// Maps object coordinates to homogeneous pixels (u·z, v·z, z): K · `camera_from_object` as one
+/// affine map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projection {
     linear: DMat3,
@@ -53,7 +67,8 @@ pub(crate) struct ProjectedVertex {
     /// Column and row in pixels, not rounded: what depth is computed from.
     pub(crate) u: f64,
     pub(crate) v: f64,
-    /// 1/z, 1/m; 0 marks a vertex whose triangles must be clipped, and leaves the other fields without meaning.
+    /// 1/z, 1/m; 0 marks a vertex whose triangles must be clipped, and leaves the other fields
+    /// without meaning.
     pub(crate) inverse_depth: f64,
     /// Column and row on the sub-pixel grid: what coverage is decided from.
     pub(crate) fixed: FixedPoint,

@@ -5,47 +5,40 @@ use hicp_core::{Facing, Isometry3, PinholeCamera, PixelRegion, RenderedView, Ren
 
 use crate::clip::Clipper;
 use crate::edge::{Coverage, Keep};
-use crate::fill::{InverseDepth, Target};
+use crate::fill::Target;
 use crate::fixed::{FixedPoint, GUARD_PIXELS};
-use crate::projection::{ProjectedVertex, Projection};
+use crate::inverse_depth::InverseDepth;
+use crate::projection::{DEFAULT_NEAR_METERS, ProjectedVertex, Projection, effective_near};
 use crate::region::Bounds;
 
-/// Where the near plane is unless configured otherwise, metres along the optical axis.
-pub const DEFAULT_NEAR_METERS: f64 = 0.01;
-
-/// The nearest near plane, metres: 1/z has to stay a number.
-const MIN_NEAR_METERS: f64 = 1.0e-6;
-
-/// Returns the near plane that a configured value stands for.
-pub(crate) fn effective_near(near_meters: f64) -> f64 {
-    // `max` returns the other argument for NaN.
-    near_meters.max(MIN_NEAR_METERS)
-}
-
-/// Which triangles are left out because they face away from the camera.
+/// Which triangles are skipped because they face away from the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Culling {
-    /// Those that cannot be seen: back faces of a mesh that is closed and consistently wound either way
-    /// ([`TriMesh::facing`]) and lies beyond the near plane with all its vertices. Every other mesh is drawn two-sided.
+    /// Skips the back faces of a mesh if it is closed, consistently wound ([`TriMesh::facing`]),
+    /// and beyond the near plane with all its vertices. Draws every other mesh two-sided.
     ///
-    /// The depth is that of [`Culling::Never`] for half the work. The two can differ only where a mesh intersects itself
-    /// so that its inside lies open, and at a pixel centre within 2⁻²⁰ pixel of the silhouette, where front and back meet.
+    /// The depth is that of [`Culling::Never`] for half the work. The two can differ only where a
+    /// mesh intersects itself so that its inside is visible, and at a pixel center within 2⁻²⁰
+    /// pixel of the silhouette, where front and back meet.
     #[default]
     Auto,
-    /// None: every triangle is drawn two-sided.
+    /// Draws every triangle two-sided.
     Never,
-    /// Back faces by their winding: triangles that are clockwise as seen from the camera. The mesh is taken to be wound
-    /// counter-clockwise seen from outside, without a look at it.
+    /// Skips triangles that are clockwise as seen from the camera. Assumes, without a check, that
+    /// the mesh is wound counter-clockwise seen from outside.
     BackFaces,
 }
 
-/// What a [`Rasterizer`] can be told. Any value is valid.
+/// Options of a [`Rasterizer`]. Any value is valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RasterConfig {
-    /// Surface nearer than this along the optical axis is cut away, metres. Values below 1 µm, and what is not a number,
-    /// count as 1 µm. Default: [`DEFAULT_NEAR_METERS`].
+    /// Depth of the near plane, meters: nearer surface is cut away. Values below 1 µm and NaN count
+    /// as 1 µm. Default: [`DEFAULT_NEAR_METERS`].
     pub near_meters: f64,
-    /// Which triangles are left out because they face away. Default: [`Culling::Auto`].
+    /// Which triangles are skipped because they face away. Default: [`Culling::Auto`].
     pub culling: Culling,
 }
 
@@ -60,21 +53,24 @@ impl Default for RasterConfig {
 
 /// Renders depth and visible triangles of meshes on the CPU; implements [`Renderer`].
 ///
-/// Holds its configuration and scratch memory, which grows with the largest mesh seen: 40 bytes per vertex. The result
-/// of a render depends on its arguments and the configuration alone. Use one per thread.
+/// Holds its configuration and scratch memory, which grows with the largest mesh seen: 40 bytes per
+/// vertex. The result of a render depends on its arguments and the configuration alone. Use one per
+/// thread.
 ///
 /// Beyond the contract of [`Renderer`]:
 ///
-/// - The requested region is cut to the image. The view is then reset to [`projected_region`](crate::projected_region)
-///   over all vertices, used or not, or to an empty region at the origin.
-/// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]; of several at the same depth, the first.
-/// - Depth agrees with the ray's intersection to about 10⁻⁷ of its value, except within 2⁻²⁰ pixel of an edge and for
-///   triangles seen so nearly edge-on that the vertices do not determine it; it always lies in the depth range of the
-///   triangle.
+/// - The requested region is cut to the image. The view is then reset to
+///   [`projected_region`](crate::projected_region) over all vertices, used or not, or to an empty
+///   region at the origin.
+/// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]; of several at the
+///   same depth, the first.
+/// - Depth agrees with the ray's intersection to about 10⁻⁷ of its value, except within 2⁻²⁰ pixel
+///   of an edge and for triangles seen so nearly edge-on that the vertices do not determine it; it
+///   always lies in the depth range of the triangle.
 /// - A pose that is not finite, or beyond 10³⁰ m, shows nothing.
 ///
-/// Cost: O(vertices + triangles + pixels of the view + pixels covered, counting overdraw). The first render of a mesh with
-/// [`Culling::Auto`] also finds its facing, once per mesh.
+/// Cost: O(vertices + triangles + pixels of the view + pixels covered, counting overdraw). The
+/// first render of a mesh with [`Culling::Auto`] also finds its facing, once per mesh.
 #[derive(Clone, Default)]
 pub struct Rasterizer {
     config: RasterConfig,
@@ -83,7 +79,7 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// Makes a rasterizer. Allocates nothing yet.
+    /// Creates a rasterizer. Allocates nothing.
     #[must_use]
     pub fn new(config: RasterConfig) -> Self {
         Self {
@@ -219,7 +215,8 @@ fn draw_clipped(draw: &mut Draw<'_>, id: u32) {
     let plane = InverseDepth::through_homogeneous(triangle, low, high);
     let fixed = |index: usize| {
         let h = polygon[index];
-        // Where coordinates are so large that clipping is inexact, this keeps the integers in their range.
+        // Where coordinates are so large that clipping is inexact, this keeps the integers in their
+        // range.
         let limit = 2.0 * GUARD_PIXELS;
         FixedPoint::nearest(
             (h.x / h.z).clamp(-limit, limit),

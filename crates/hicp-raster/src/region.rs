@@ -2,10 +2,10 @@
 
 use hicp_core::{Isometry3, PinholeCamera, PixelRegion, Point3};
 
-use crate::projection::Projection;
-use crate::rasterizer::effective_near;
+use crate::projection::{Projection, effective_near};
 
-/// How far rounding to the sub-pixel grid and in the projection can move an edge, generously, in pixels.
+/// How far rounding to the sub-pixel grid and in the projection can move an edge, generously, in
+/// pixels.
 const ROUNDING_MARGIN_PIXELS: f64 = 1.0e-5;
 
 /// Where the vertices of a mesh project to.
@@ -49,7 +49,8 @@ impl Bounds {
         self.cut
     }
 
-    /// Returns the part of `region` that triangles over these vertices can cover, of area 0 in the default place if none.
+    /// Returns the part of `region` that triangles over these vertices can cover, of area 0 in the
+    /// default place if none.
     pub(crate) fn region_within(&self, region: &PixelRegion) -> PixelRegion {
         if self.u_min > self.u_max || region.is_empty() {
             return PixelRegion::default();
@@ -73,7 +74,8 @@ impl Bounds {
     }
 }
 
-/// Converts to a pixel index; what lies outside saturates, and the intersection with the image does the rest.
+/// Converts to a pixel index; what lies outside saturates, and the intersection with the image does
+/// the rest.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -83,14 +85,17 @@ fn to_pixel(x: f64) -> u32 {
     x as u32
 }
 
-/// Returns the part of `region` that the projection of some points, or of any triangles over them, can cover.
+/// Returns the part of `region` that the projection of some points, or of any triangles over them,
+/// can cover.
 ///
-/// Points are in metres in the object frame. `region` is cut to the image first. The result is the bounding box of the
-/// projected points, in whole pixels whose centres it holds; all of `region` if some points lie in front of the near
-/// plane (`near_meters` along the optical axis, as in [`RasterConfig`](crate::RasterConfig)) and some beyond it; empty if
-/// all lie in front of it or nothing projects into `region`.
+/// Points are in metres in the object frame. `region` is cut to the image first. The result is the
+/// bounding box of the projected points, in whole pixels whose centres it holds; all of `region` if
+/// some points lie in front of the near plane (`near_meters` along the optical axis, as in
+/// [`RasterConfig`](crate::RasterConfig)) and some beyond it; empty if all lie in front of it or
+/// nothing projects into `region`.
 ///
-/// [`Rasterizer`](crate::Rasterizer) resets its view to this region over all vertices of the mesh. Cost: O(points).
+/// [`Rasterizer`](crate::Rasterizer) resets its view to this region over all vertices of the mesh.
+/// Cost: O(points).
 ///
 /// ```
 /// use hicp_core::{Isometry3, PinholeCamera, PixelRegion, Point3};
