@@ -1,6 +1,6 @@
-//! NumPy arrays in and out: shapes and types checked, with messages that say what was passed.
+//! Reads and creates NumPy arrays, and checks shapes and types.
 
-use hybrid_icp::{Isometry3, Matrix3, Point3, Translation3, rotation_from_matrix};
+use hybrid_icp::{Isometry3, Matrix3, Matrix6, Point3, Translation3, rotation_from_matrix};
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{
     AllowTypeChange, Element, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
@@ -13,7 +13,7 @@ use crate::errors::InputError;
 /// Translations beyond this many metres are taken for millimetres: no depth camera sees as far.
 const MAX_TRANSLATION_METERS: f64 = 100.0;
 
-/// Says what a value is: its type, and for arrays dtype and shape.
+/// Describes a value: its type, and for arrays dtype and shape.
 pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     match value.cast::<PyUntypedArray>() {
         Ok(array) => format!("{} with shape {}", kind(value), shape(array.shape())),
@@ -21,7 +21,7 @@ pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     }
 }
 
-/// Says of which type a value is, and for arrays of which dtype.
+/// Names the type of a value, and for arrays the dtype.
 pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
         format!("an array of {}", array.dtype())
@@ -40,7 +40,21 @@ pub(crate) fn shape(lengths: &[usize]) -> String {
     }
 }
 
-/// Refuses a value, saying what it is and what was expected.
+/// Returns the one of two choices that a word names.
+pub(crate) fn choice<T>(name: &str, word: &str, [a, b]: [(&str, T); 2]) -> PyResult<T> {
+    if word == a.0 {
+        Ok(a.1)
+    } else if word == b.0 {
+        Ok(b.1)
+    } else {
+        Err(InputError::new_err(format!(
+            "{name} is {word:?}, expected {:?} or {:?}",
+            a.0, b.0
+        )))
+    }
+}
+
+/// Creates the error that names a value and what was expected.
 pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
     InputError::new_err(format!(
         "{name} is {}, expected {expected}",
@@ -48,7 +62,7 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     ))
 }
 
-/// Returns an array whose numbers lie where the processor may read them: a copy of one that does not, such as a field of packed records.
+/// Returns an aligned array: a copy of one that is not, such as a field of packed records.
 pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match value.cast::<PyUntypedArray>() {
         Ok(array) if !array.is_aligned() => value.call_method0("copy"),
@@ -89,7 +103,8 @@ where
     Ok((numbers, found.to_vec()))
 }
 
-/// Copies an array in row-major order, in one piece where it lies so. (`PyReadonlyArray::as_slice` also takes column-major ones.)
+/// Copies an array in row-major order, in one piece where it lies so. (`PyReadonlyArray::as_slice`
+/// also takes column-major ones.)
 pub(crate) fn row_major<T: Copy, D: Dimension>(array: &ArrayView<'_, T, D>) -> Vec<T> {
     match array.as_slice() {
         Some(contiguous) => contiguous.to_vec(),
@@ -98,9 +113,9 @@ pub(crate) fn row_major<T: Copy, D: Dimension>(array: &ArrayView<'_, T, D>) -> V
 }
 
 /// Reads a 6×6 matrix.
-pub(crate) fn matrix6(value: &Bound<'_, PyAny>, name: &str) -> PyResult<hybrid_icp::Matrix6<f64>> {
+pub(crate) fn matrix6(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix6<f64>> {
     let (numbers, _) = numbers::<f64>(value, &[Some(6), Some(6)], name, "a (6, 6) float64 matrix")?;
-    Ok(hybrid_icp::Matrix6::from_row_slice(&numbers))
+    Ok(Matrix6::from_row_slice(&numbers))
 }
 
 /// Reads points of shape (N, 3), metres.
@@ -121,7 +136,7 @@ pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point
         .collect())
 }
 
-/// A rigid motion with the numbers that stated it.
+/// A rigid motion with the numbers that it was read from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
     pub(crate) isometry: Isometry3<f64>,
@@ -135,18 +150,27 @@ pub(crate) fn motion(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Motion> {
     rigid(&numbers, name)
 }
 
-/// Reads rigid motions from an array of shape (N, 4, 4), metres.
-pub(crate) fn motions(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Motion>> {
-    let expected = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], metres";
-    let (numbers, _) = numbers::<f64>(value, &[None, Some(4), Some(4)], name, expected)?;
+/// Reads rigid motions from an array of shape (N, 4, 4) with translations in some unit.
+pub(crate) fn motions(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    expected: &str,
+    meters_per_unit: f64,
+) -> PyResult<Vec<Motion>> {
+    let (mut numbers, _) = numbers::<f64>(value, &[None, Some(4), Some(4)], name, expected)?;
     (0..)
-        .zip(numbers.chunks_exact(16))
-        .map(|(index, matrix): (usize, _)| rigid(matrix, &format!("{name}[{index}]")))
+        .zip(numbers.chunks_exact_mut(16))
+        .map(|(index, matrix): (usize, _)| {
+            for entry in [3, 7, 11] {
+                matrix[entry] *= meters_per_unit;
+            }
+            rigid(matrix, &format!("{name}[{index}]"))
+        })
         .collect()
 }
 
 /// Reads a rigid motion from sixteen row-major numbers.
-pub(crate) fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
+fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     let mut matrix = [0.0; 16];
     matrix.copy_from_slice(numbers);
     for (column, expected) in [0.0, 0.0, 0.0, 1.0].into_iter().enumerate() {
@@ -190,20 +214,47 @@ pub(crate) fn to_matrix(motion: &Isometry3<f64>) -> [f64; 16] {
     })
 }
 
-/// Makes a matrix of row-major numbers.
-pub(crate) fn matrix<'py, T: Element>(
-    py: Python<'py>,
+/// A matrix that Python receives as an array of shape (rows, columns).
+#[derive(Clone, Debug)]
+pub(crate) struct Matrix<T = f64> {
     columns: usize,
     numbers: Vec<T>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let rows = numbers.len() / columns.max(1);
-    PyArray1::from_vec(py, numbers).reshape([rows, columns])
 }
 
-/// Makes a 6×6 matrix.
-pub(crate) fn from_matrix6<'py>(
-    py: Python<'py>,
-    value: &hybrid_icp::Matrix6<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    matrix(py, 6, value.transpose().as_slice().to_vec())
+impl<T> Matrix<T> {
+    /// Creates a matrix from row-major numbers.
+    pub(crate) fn new(columns: usize, numbers: Vec<T>) -> Self {
+        Self { columns, numbers }
+    }
+}
+
+impl Matrix {
+    /// Returns the translation of a pose as text, metres.
+    pub(crate) fn translation(&self) -> String {
+        let [x, y, z] = [3, 7, 11].map(|entry| self.numbers[entry]);
+        format!("({x:.4}, {y:.4}, {z:.4})")
+    }
+}
+
+impl From<&Isometry3<f64>> for Matrix {
+    fn from(motion: &Isometry3<f64>) -> Self {
+        Self::new(4, to_matrix(motion).to_vec())
+    }
+}
+
+impl From<&Matrix6<f64>> for Matrix {
+    fn from(matrix: &Matrix6<f64>) -> Self {
+        Self::new(6, matrix.transpose().as_slice().to_vec())
+    }
+}
+
+impl<'py, T: Element> IntoPyObject<'py> for Matrix<T> {
+    type Target = PyArray2<T>;
+    type Output = Bound<'py, PyArray2<T>>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        let rows = self.numbers.len() / self.columns.max(1);
+        PyArray1::from_vec(py, self.numbers).reshape([rows, self.columns])
+    }
 }

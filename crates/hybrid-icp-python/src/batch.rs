@@ -14,12 +14,14 @@ const SIGNALS: Duration = Duration::from_millis(50);
 /// One hypothesis refined.
 pub(crate) type Refined = (Refinement, Vec<StageRecord>);
 
-/// Refines every hypothesis, one refiner per thread; results are in the order of the hypotheses, with the bits of single calls.
+/// Refines every hypothesis, one refiner per thread; results are in the order of the hypotheses,
+/// with the bits of single calls.
 ///
-/// Called without the GIL. The threads take one hypothesis after the other from a counter and keep their results to themselves; the
-/// caller sleeps meanwhile, but for a look at the signals now and then. An exception of a signal handler, such as
-/// `KeyboardInterrupt`, ends it after the hypotheses in hand. Threads are started anew for every batch: a pool would be lost,
-/// and waited for in vain, in a process that was forked.
+/// Called without the GIL. The threads take one hypothesis after the other from a counter and keep
+/// their results to themselves; the caller sleeps meanwhile, but for a look at the signals now and
+/// then. An exception of a signal handler, such as `KeyboardInterrupt`, ends it after the
+/// hypotheses in hand. Threads are started anew for every batch: a pool would be lost, and waited
+/// for in vain, in a process that was forked.
 pub(crate) fn run(
     model: &Model,
     observation: &Observation,

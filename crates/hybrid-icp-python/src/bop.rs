@@ -11,13 +11,16 @@ use hicp_io::bop::{Dataset, ResultRow, read_detections, read_results, results_fr
 use hybrid_icp::Refiner;
 use pyo3::prelude::*;
 
+use crate::array;
 use crate::errors::{self, InputError};
+use crate::mutex::locked;
 use crate::pipeline::PyPipeline;
 
 /// Scenes whose annotations are kept at hand: images come scene by scene.
 const OPEN_SCENES: usize = 2;
 
-/// The rows of one image: scene, image, where they stand in the file, and their lines under a header.
+/// The rows of one image: scene, image, where they stand in the file, and their lines under a
+/// header.
 type ImageRows = (u32, u32, Vec<usize>, String);
 
 /// Reads a result file and groups its rows by image, in the order of scene and image.
@@ -66,8 +69,8 @@ pub(crate) fn result_header() -> String {
     ResultRow::header()
 }
 
-/// Refines the rows of result files, image by image, with the models of a dataset read once: `hybrid-icp bop refine` without its
-/// threads and files.
+/// Refines the rows of result files, image by image, with the models of a dataset read once:
+/// `hybrid-icp bop refine` without its threads and files.
 ///
 /// Parameters
 /// ----------
@@ -102,15 +105,8 @@ impl PyDatasetRefiner {
         detections: Option<PathBuf>,
         rescore: &str,
     ) -> PyResult<Self> {
-        let rescore = match rescore {
-            "keep" => Rescore::Keep,
-            "mve" => Rescore::Mve,
-            other => {
-                return Err(InputError::new_err(format!(
-                    "rescore is {other:?}, expected \"keep\" or \"mve\""
-                )));
-            }
-        };
+        let choices = [("keep", Rescore::Keep), ("mve", Rescore::Mve)];
+        let rescore = array::choice("rescore", rescore, choices)?;
         let refiner = Mutex::new(Refiner::boxed(pipeline.get().build()?));
         let shared = py
             .detach(|| -> Result<_, hicp_io::IoError> {
@@ -136,7 +132,8 @@ impl PyDatasetRefiner {
 
     /// Refines the rows of one image.
     ///
-    /// Rows that cannot be refined keep their numbers. The time column is -1: equal input gives equal bytes.
+    /// Rows that cannot be refined keep their numbers. The time column is -1: equal input gives
+    /// equal bytes.
     ///
     /// Parameters
     /// ----------
@@ -167,12 +164,11 @@ impl PyDatasetRefiner {
                     images.len()
                 )));
             };
-            // One image at a time: the scratch memory is one thread's. A panic leaves it usable, for runs do not depend on it.
-            let result = {
-                let locked = self.refiner.lock();
-                let mut refiner = locked.unwrap_or_else(std::sync::PoisonError::into_inner);
-                self.shared.frame(&mut refiner, *key, &rows, indices)
-            };
+            // One image at a time: the scratch memory is one thread's. A panic leaves it usable,
+            // for runs do not depend on it.
+            let result = self
+                .shared
+                .frame(&mut locked(&self.refiner), *key, &rows, indices);
             result.enter(&mut rows, self.rescore, false);
             let damaged = result
                 .faults

@@ -1,13 +1,13 @@
 //! `Camera`.
 
 use hybrid_icp::{Matrix3, PinholeCamera, PixelCenters};
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::array;
-use crate::errors::{self, InputError};
+use crate::array::{self, Matrix};
+use crate::errors;
 
-/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV frame).
+/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV
+/// frame).
 ///
 /// A point (x, y, z) in metres is seen at u = fx·x/z + cx, v = fy·y/z + cy.
 ///
@@ -20,8 +20,8 @@ use crate::errors::{self, InputError};
 /// width, height : int
 ///     Size of the image, pixels.
 /// pixel_centers : {"integers", "halves"}, optional
-///     Where the calibration puts the centre of the first pixel: at (0, 0), as OpenCV and BOP do, or at (½, ½), as OpenGL and
-///     BlenderProc do.
+///     Where the calibration puts the centre of the first pixel: at (0, 0), as OpenCV and BOP do,
+///     or at (½, ½), as OpenGL and BlenderProc do.
 ///
 /// Examples
 /// --------
@@ -46,15 +46,11 @@ impl PyCamera {
         height: u32,
         pixel_centers: &str,
     ) -> PyResult<Self> {
-        let centers = match pixel_centers {
-            "integers" => PixelCenters::AtIntegers,
-            "halves" => PixelCenters::AtHalves,
-            other => {
-                return Err(InputError::new_err(format!(
-                    "pixel_centers is {other:?}, expected \"integers\" or \"halves\""
-                )));
-            }
-        };
+        let choices = [
+            ("integers", PixelCenters::AtIntegers),
+            ("halves", PixelCenters::AtHalves),
+        ];
+        let centers = array::choice("pixel_centers", pixel_centers, choices)?;
         PinholeCamera::with_pixel_centers(centers, fx, fy, cx, cy, width, height)
             .map(Self)
             .map_err(errors::input)
@@ -127,38 +123,26 @@ impl PyCamera {
 
     /// The calibration matrix, shape (3, 3), float64, pixels.
     #[getter(K)]
-    fn matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let camera = &self.0;
-        let rows = [
-            [camera.fx(), 0.0, camera.cx()],
-            [0.0, camera.fy(), camera.cy()],
-            [0.0, 0.0, 1.0],
-        ];
-        array::matrix(py, 3, rows.concat())
+    fn matrix(&self) -> Matrix {
+        let (fx, fy, cx, cy, ..) = self.__getnewargs__();
+        Matrix::new(3, vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
     }
 
     fn __getnewargs__(&self) -> (f64, f64, f64, f64, u32, u32) {
         let camera = &self.0;
+        let (width, height) = (camera.width(), camera.height());
         (
             camera.fx(),
             camera.fy(),
             camera.cx(),
             camera.cy(),
-            camera.width(),
-            camera.height(),
+            width,
+            height,
         )
     }
 
     fn __repr__(&self) -> String {
-        let camera = &self.0;
-        format!(
-            "Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})",
-            camera.fx(),
-            camera.fy(),
-            camera.cx(),
-            camera.cy(),
-            camera.width(),
-            camera.height()
-        )
+        let (fx, fy, cx, cy, width, height) = self.__getnewargs__();
+        format!("Camera(fx={fx}, fy={fy}, cx={cx}, cy={cy}, width={width}, height={height})")
     }
 }

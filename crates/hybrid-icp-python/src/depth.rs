@@ -5,32 +5,37 @@ use std::sync::Arc;
 
 use hybrid_icp::{DepthImage, Mask};
 use numpy::ndarray::ArrayView2;
-use numpy::{Element, PyArray2, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::array::{self, unexpected};
+use crate::array::{self, Matrix, unexpected};
 use crate::errors::{self, InputError};
 
 const EXPECTED_DEPTH: &str =
     "an (H, W) array of float32 metres, or of uint16 together with scale= (metres per unit)";
 
-/// Medians beyond this many metres are taken for millimetres; those of real millimetres are above it, as no camera sees so near.
+/// Medians beyond this many metres are taken for millimetres; those of real millimetres are above
+/// it, as no camera sees so near.
 const MAX_MEDIAN_METERS: f32 = 100.0;
 
 /// Medians below this many metres are taken for metres that were scaled twice.
 const MIN_MEDIAN_METERS: f32 = 0.01;
 
-/// Rows and columns of the grid of pixels by which an image is judged before the others are looked at.
+/// Rows and columns of the grid of pixels by which an image is judged before the others are looked
+/// at.
 const GRID: usize = 64;
 
-/// A depth image to be shared by the observations of its objects: read and checked once, however many masks there are.
+/// A depth image to be shared by the observations of its objects: read and checked once, however
+/// many masks there are.
 ///
-/// The array is read in one pass, which copies it: other threads may write to it while the GIL is released. Masks share the copy.
+/// The array is read in one pass, which copies it: other threads may write to it while the GIL is
+/// released. Masks share the copy.
 ///
 /// Parameters
 /// ----------
 /// depth : numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0, negative or NaN where nothing was measured.
+///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0,
+///     negative or NaN where nothing was measured.
 /// scale : float, optional
 ///     Metres per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///
@@ -80,7 +85,7 @@ impl PyDepthImage {
     /// FileError
     ///     When the file cannot be read or is no such image.
     #[staticmethod]
-    fn from_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Self> {
+    pub(crate) fn from_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Self> {
         py.detach(|| hicp_io::read_depth_png(&path, scale * 1000.0))
             .map(|image| Self(Arc::new(image)))
             .map_err(errors::file)
@@ -104,8 +109,8 @@ impl PyDepthImage {
     /// -------
     /// numpy.ndarray, shape (H, W), float32
     ///     Metres, 0 where nothing was measured.
-    fn to_numpy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        image(py, self.0.width(), self.0.pixels().to_vec())
+    pub(crate) fn to_numpy(&self) -> Matrix<f32> {
+        image(self.0.width(), self.0.pixels())
     }
 
     fn __repr__(&self) -> String {
@@ -207,18 +212,15 @@ pub(crate) fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
     (middle < positive.len()).then(|| *positive.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-/// Returns the strides at which at most 64 × 64 pixels of an area of some height and width are looked at.
+/// Returns the strides at which at most 64 × 64 pixels of an area of some height and width are
+/// looked at.
 pub(crate) fn strides(height: usize, width: usize) -> (usize, usize) {
     (height.div_ceil(GRID).max(1), width.div_ceil(GRID).max(1))
 }
 
-/// Makes an array of an image.
-pub(crate) fn image<'py, T: Element>(
-    py: Python<'py>,
-    width: u32,
-    pixels: Vec<T>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    array::matrix(py, width as usize, pixels)
+/// Returns an image that Python receives as an array of shape (H, W).
+pub(crate) fn image<T: Copy>(width: u32, pixels: &[T]) -> Matrix<T> {
+    Matrix::new(width as usize, pixels.to_vec())
 }
 
 fn no_scale(scale: Option<f64>, depth: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -241,7 +243,8 @@ fn size<T>(array: &ArrayView2<'_, T>) -> PyResult<(u32, u32)> {
     Ok((side(array.ncols())?, side(array.nrows())?))
 }
 
-/// Refuses what cannot be metres, by pixels on a grid; by all of them only where none of those was measured.
+/// Refuses what cannot be metres, by pixels on a grid; by all of them only where none of those was
+/// measured.
 fn check_unit<T: Copy>(
     array: &ArrayView2<'_, T>,
     meters: impl Fn(T) -> f32 + Copy,

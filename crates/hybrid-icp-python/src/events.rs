@@ -1,231 +1,204 @@
-//! What observers are told.
+//! The events that observers receive.
 
-use hybrid_icp::{Evaluation, Isometry3, IterationEvent, RegimeEvent, StageEvent, StageRecord};
-use numpy::PyArray2;
+use hybrid_icp::{IterationEvent, RegimeEvent, StageEvent, StageRecord, Verdict};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::result::{pose, verdict};
+use crate::array::Matrix;
 
 /// An iteration: a pose that was evaluated.
-#[pyclass(frozen, module = "hybrid_icp", name = "IterationEvent")]
+#[pyclass(frozen, get_all, module = "hybrid_icp", name = "IterationEvent")]
 #[derive(Debug)]
+#[allow(non_snake_case)]
 pub(crate) struct PyIterationEvent {
     /// Iteration within the stage, from 0.
-    #[pyo3(get)]
     iteration: usize,
-    camera_from_object: Isometry3<f64>,
-    increment: Isometry3<f64>,
-    evaluation: Evaluation,
+    /// The pose evaluated, camera from object, shape (4, 4), float64, metres.
+    T_co: Matrix,
+    /// The increment found there, shape (4, 4), float64, metres: the next pose is `increment @
+    /// T_co`.
+    increment: Matrix,
+    /// Number of pairs after filtering.
+    n_pairs: usize,
+    /// Weighted mean of the metric's squared residuals, m².
+    mean_loss: f64,
 }
 
 impl PyIterationEvent {
     pub(crate) fn new(event: &IterationEvent<'_>) -> Self {
         Self {
             iteration: event.iteration,
-            camera_from_object: *event.camera_from_object,
-            increment: *event.increment,
-            evaluation: event.evaluation,
+            T_co: event.camera_from_object.into(),
+            increment: event.increment.into(),
+            n_pairs: event.evaluation.n_pairs,
+            mean_loss: event.evaluation.mean_loss,
         }
     }
 }
 
 #[pymethods]
-#[allow(non_snake_case)]
 impl PyIterationEvent {
-    /// The pose evaluated, camera from object, shape (4, 4), float64, metres.
-    #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.camera_from_object)
-    }
-
-    /// The increment found there, shape (4, 4), float64, metres: the next pose is `increment @ T_co`.
-    #[getter]
-    fn increment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.increment)
-    }
-
-    /// Number of pairs after filtering.
-    #[getter]
-    fn n_pairs(&self) -> usize {
-        self.evaluation.n_pairs
-    }
-
-    /// Weighted mean of the metric's squared residuals, m².
-    #[getter]
-    fn mean_loss(&self) -> f64 {
-        self.evaluation.mean_loss
-    }
-
     fn __repr__(&self) -> String {
         format!(
             "IterationEvent(iteration {}, {} pairs, mean loss {:e} m²)",
-            self.iteration, self.evaluation.n_pairs, self.evaluation.mean_loss
+            self.iteration, self.n_pairs, self.mean_loss
         )
     }
 }
 
 /// A switcher's choice.
-#[pyclass(frozen, module = "hybrid_icp", name = "RegimeEvent")]
+#[pyclass(frozen, get_all, module = "hybrid_icp", name = "RegimeEvent")]
 #[derive(Debug)]
-pub(crate) struct PyRegimeEvent(pub(crate) RegimeEvent);
+pub(crate) struct PyRegimeEvent {
+    /// The selected branch: "aligned", "misaligned" or "regime-N".
+    regime: &'static str,
+    /// The score that decided, if there is one.
+    score: Option<f64>,
+}
+
+impl PyRegimeEvent {
+    pub(crate) fn new(event: &RegimeEvent) -> Self {
+        Self {
+            regime: event.regime.name(),
+            score: event.score,
+        }
+    }
+}
 
 #[pymethods]
 impl PyRegimeEvent {
-    /// The branch taken: "aligned", "misaligned" or "regime-N".
-    #[getter]
-    fn regime(&self) -> &'static str {
-        self.0.regime.name()
-    }
-
-    /// The score that decided, if there is one.
-    #[getter]
-    fn score(&self) -> Option<f64> {
-        self.0.score
-    }
-
     fn __repr__(&self) -> String {
-        match self.0.score {
-            Some(score) => format!("RegimeEvent({}, score {score:.3})", self.regime()),
-            None => format!("RegimeEvent({})", self.regime()),
+        match self.score {
+            Some(score) => format!("RegimeEvent({}, score {score:.3})", self.regime),
+            None => format!("RegimeEvent({})", self.regime),
         }
     }
 }
 
 /// An ICP stage that ended.
-#[pyclass(frozen, module = "hybrid_icp", name = "StageEvent")]
+#[pyclass(frozen, get_all, module = "hybrid_icp", name = "StageEvent")]
 #[derive(Debug)]
-pub(crate) struct PyStageEvent(StageRecord);
+#[allow(non_snake_case)]
+pub(crate) struct PyStageEvent {
+    /// The branch that the switch selected before this stage, if this is the first stage after a
+    /// choice; always None in an observer.
+    regime: Option<&'static str>,
+    /// The MVE of that choice.
+    regime_mve: Option<f64>,
+    /// Name of the point selection.
+    selection: &'static str,
+    /// Name of the data association.
+    association: &'static str,
+    /// Names of the outlier filters and weights, in order.
+    filters: Vec<&'static str>,
+    /// Name of the error metric.
+    metric: &'static str,
+    /// Names of the stop rules, in order.
+    stop_rules: Vec<&'static str>,
+    /// Number of points selected.
+    n_source: usize,
+    /// The pose that the stage returned, camera from object, shape (4, 4), float64, metres.
+    T_co: Matrix,
+    /// "refined", or "kept_initial" if the stage returned the pose that it started from.
+    outcome: &'static str,
+    /// Why the stage ended.
+    termination: &'static str,
+    /// Number of evaluations, including rejected ones.
+    iterations: usize,
+    /// Number of pairs at the pose that was returned.
+    n_pairs: usize,
+    /// Weighted mean of the metric's squared residuals there, m²; None if it was never evaluated.
+    mean_loss: Option<f64>,
+}
+
+impl From<&StageRecord> for PyStageEvent {
+    fn from(record: &StageRecord) -> Self {
+        let outcome = &record.outcome;
+        Self {
+            regime: record.switched.map(|event| event.regime.name()),
+            regime_mve: record.switched.and_then(|event| event.score),
+            selection: record.selection,
+            association: record.association,
+            filters: record.filters.clone(),
+            metric: record.metric,
+            stop_rules: record.stop_rules.clone(),
+            n_source: record.n_source,
+            T_co: (&outcome.camera_from_object).into(),
+            outcome: name(outcome.verdict),
+            termination: outcome.termination.name(),
+            iterations: outcome.iterations,
+            n_pairs: outcome.n_pairs(),
+            mean_loss: outcome.evaluation.map(|e| e.mean_loss),
+        }
+    }
+}
 
 impl PyStageEvent {
-    pub(crate) fn of_record(record: &StageRecord) -> Self {
-        Self(record.clone())
-    }
-
     pub(crate) fn new(event: &StageEvent<'_>) -> Self {
-        Self(StageRecord::from(event))
+        Self::from(&StageRecord::from(event))
+    }
+}
+
+/// Name of a verdict, as in the program's reports.
+pub(crate) fn name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Refined => "refined",
+        Verdict::KeptInitial(_) => "kept_initial",
     }
 }
 
 #[pymethods]
-#[allow(non_snake_case)]
 impl PyStageEvent {
-    /// What the switch chose before this stage, if it was the first to run after a choice; always None in an observer.
-    #[getter]
-    fn regime(&self) -> Option<&'static str> {
-        self.0.switched.map(|event| event.regime.name())
-    }
-
-    /// The MVE that the switch chose by, likewise.
-    #[getter]
-    fn regime_mve(&self) -> Option<f64> {
-        self.0.switched.and_then(|event| event.score)
-    }
-
-    /// Name of the point selection.
-    #[getter]
-    fn selection(&self) -> &'static str {
-        self.0.selection
-    }
-
-    /// Name of the data association.
-    #[getter]
-    fn association(&self) -> &'static str {
-        self.0.association
-    }
-
-    /// Names of the outlier filters and weights, in order.
-    #[getter]
-    fn filters(&self) -> Vec<&'static str> {
-        self.0.filters.clone()
-    }
-
-    /// Names of the stop rules, in order.
-    #[getter]
-    fn stop_rules(&self) -> Vec<&'static str> {
-        self.0.stop_rules.clone()
-    }
-
-    /// Name of the error metric.
-    #[getter]
-    fn metric(&self) -> &'static str {
-        self.0.metric
-    }
-
-    /// Number of points selected.
-    #[getter]
-    fn n_source(&self) -> usize {
-        self.0.n_source
-    }
-
-    /// The pose that the stage returned, camera from object, shape (4, 4), float64, metres.
-    #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.0.outcome.camera_from_object)
-    }
-
-    /// "refined", or "kept_initial" when the stage returned the pose that it started from.
-    #[getter]
-    fn outcome(&self) -> &'static str {
-        verdict(self.0.outcome.verdict)
-    }
-
-    /// Why the stage ended.
-    #[getter]
-    fn termination(&self) -> &'static str {
-        self.0.outcome.termination.name()
-    }
-
-    /// Number of evaluations, rejected ones included.
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.0.outcome.iterations
-    }
-
-    /// Number of pairs at the pose that was returned.
-    #[getter]
-    fn n_pairs(&self) -> usize {
-        self.0.outcome.n_pairs()
-    }
-
-    /// Weighted mean of the metric's squared residuals there, m²; None if it was never evaluated.
-    #[getter]
-    fn mean_loss(&self) -> Option<f64> {
-        self.0.outcome.evaluation.map(|e| e.mean_loss)
-    }
-
     /// Returns everything but the pose as plain Python values.
     ///
     /// Returns
     /// -------
     /// dict
-    pub(crate) fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        dict.set_item("regime", self.regime())?;
-        dict.set_item("regime_mve", self.regime_mve())?;
-        dict.set_item("selection", self.selection())?;
-        dict.set_item("association", self.association())?;
-        dict.set_item("filters", self.filters())?;
-        dict.set_item("metric", self.metric())?;
-        dict.set_item("stop_rules", self.stop_rules())?;
-        dict.set_item("n_source", self.n_source())?;
-        dict.set_item("iterations", self.iterations())?;
-        dict.set_item("n_pairs", self.n_pairs())?;
-        dict.set_item("mean_loss", self.mean_loss())?;
-        dict.set_item("termination", self.termination())?;
-        dict.set_item("outcome", self.outcome())?;
-        Ok(dict)
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let names = [
+            "regime",
+            "regime_mve",
+            "selection",
+            "association",
+            "filters",
+            "metric",
+            "stop_rules",
+            "n_source",
+            "iterations",
+            "n_pairs",
+            "mean_loss",
+            "termination",
+            "outcome",
+        ];
+        plain(slf, &names)
     }
 
     fn __repr__(&self) -> String {
         format!(
             "StageEvent({}, {}, {}: {} iterations, {} pairs, {})",
-            self.selection(),
-            self.association(),
-            self.metric(),
-            self.iterations(),
-            self.n_pairs(),
-            self.termination()
+            self.selection,
+            self.association,
+            self.metric,
+            self.iterations,
+            self.n_pairs,
+            self.termination
         )
     }
+}
+
+/// Returns attributes as plain Python values that `json.dumps` accepts: arrays as nested lists.
+pub(crate) fn plain<'py>(
+    object: &Bound<'py, PyAny>,
+    names: &[&str],
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(object.py());
+    for name in names {
+        let value = object.getattr(*name)?;
+        let value = match value.getattr_opt("tolist")? {
+            Some(to_list) => to_list.call0()?,
+            None => value,
+        };
+        dict.set_item(name, value)?;
+    }
+    Ok(dict)
 }

@@ -1,18 +1,17 @@
 //! Fusing pose estimates.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use hybrid_icp::fusion::{
     BoxedFuser, CameraMotion, Fuser as _, FuserConfig, FusionLimits, FusionMethod, Gate, Gated,
     PoseEstimate, SymmetryAware, Transport, UnitCovariance,
 };
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::array;
-use crate::errors::{self, InputError};
+use crate::array::{self, Matrix};
+use crate::errors;
 use crate::model::PyModel;
-use crate::result::pose;
+use crate::mutex::locked;
 
 /// An estimate of an object's pose with its covariance and, where known, its MVE.
 ///
@@ -21,7 +20,8 @@ use crate::result::pose;
 /// T_co : array_like, shape (4, 4)
 ///     Camera from object, metres.
 /// covariance : array_like, shape (6, 6)
-///     Of ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera frame; may be singular.
+///     Of ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera frame;
+///     may be singular.
 /// mve : float, optional
 ///     Mean VSD estimate, 0 to 1.
 ///
@@ -57,14 +57,14 @@ impl PyPoseEstimate {
 
     /// The pose, camera from object, shape (4, 4), float64, metres.
     #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, self.0.camera_from_object())
+    fn T_co(&self) -> Matrix {
+        self.0.camera_from_object().into()
     }
 
     /// The covariance of ξ = [ρ; φ], shape (6, 6), float64, m², m·rad and rad².
     #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array::from_matrix6(py, self.0.covariance())
+    fn covariance(&self) -> Matrix {
+        self.0.covariance().into()
     }
 
     /// The mean VSD estimate, where known.
@@ -73,8 +73,8 @@ impl PyPoseEstimate {
         self.0.mve()
     }
 
-    /// Squared Mahalanobis distance of two independent estimates of one pose: χ² with 6 degrees of freedom if both covariances are
-    /// right and small.
+    /// Squared Mahalanobis distance of two independent estimates of one pose: χ² with 6 degrees of
+    /// freedom if both covariances are right and small.
     ///
     /// Parameters
     /// ----------
@@ -88,8 +88,7 @@ impl PyPoseEstimate {
     }
 
     fn __repr__(&self) -> String {
-        let t = &self.0.camera_from_object().translation.vector;
-        format!("PoseEstimate(t = ({:.4}, {:.4}, {:.4}) m)", t.x, t.y, t.z)
+        format!("PoseEstimate(t = {} m)", self.T_co().translation())
     }
 }
 
@@ -122,15 +121,16 @@ pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
         .map_err(errors::input)
 }
 
-/// Turns the estimates that come in while the camera moves into one, in the current camera frame (§V of the paper).
+/// Turns the estimates that come in while the camera moves into one, in the current camera frame
+/// (§V of the paper).
 ///
 /// Parameters
 /// ----------
 /// method : str
 ///     One of `Fuser.methods()`.
 /// model : Model, optional
-///     With it one unit of uncertainty is the object's radius and 1 rad about its centre, and symmetric poses are brought
-///     together; without, it is 1 m and 1 rad about the camera.
+///     With it one unit of uncertainty is the object's radius and 1 rad about its centre, and
+///     symmetric poses are brought together; without, it is 1 m and 1 rad about the camera.
 /// max_mve, max_mahalanobis_squared : float, optional
 ///     Estimates beyond are left out.
 /// restart_after : int, optional
@@ -174,15 +174,11 @@ impl PyFuser {
         let method: FusionMethod = method.parse().map_err(errors::input)?;
         let model = model.map(|model| &model.get().model);
         let config = FuserConfig {
-            transport: match transport {
-                "adjoint" => Transport::Adjoint,
-                "kept" => Transport::Kept,
-                other => {
-                    return Err(InputError::new_err(format!(
-                        "transport is {other:?}, expected \"adjoint\" or \"kept\""
-                    )));
-                }
-            },
+            transport: array::choice(
+                "transport",
+                transport,
+                [("adjoint", Transport::Adjoint), ("kept", Transport::Kept)],
+            )?,
             unit: match model {
                 Some(model) => UnitCovariance::about_object(model.center(), model.radius())
                     .map_err(errors::input)?,
@@ -235,7 +231,7 @@ impl PyFuser {
         T_nc: &Bound<'_, PyAny>,
         covariance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        self.locked().propagate(&motion(Some(T_nc), covariance)?);
+        locked(&self.fuser).propagate(&motion(Some(T_nc), covariance)?);
         Ok(())
     }
 
@@ -248,30 +244,25 @@ impl PyFuser {
     /// Returns
     /// -------
     /// str
-    ///     "accepted"; "provisional" when it failed the gate but there is nothing else; "rejected"; or "restarted".
+    ///     "accepted"; "provisional" when it failed the gate but there is nothing else; "rejected";
+    ///     or "restarted".
     fn update(&self, estimate: &PyPoseEstimate) -> &'static str {
-        self.locked().update(&estimate.0).name()
+        locked(&self.fuser).update(&estimate.0).name()
     }
 
     /// The fused estimate in the current camera frame; None before the first.
     #[getter]
     fn estimate(&self) -> Option<PyPoseEstimate> {
-        self.locked().estimate().map(PyPoseEstimate)
+        locked(&self.fuser).estimate().map(PyPoseEstimate)
     }
 
     /// Forgets everything.
     fn reset(&self) {
-        self.locked().reset();
+        locked(&self.fuser).reset();
     }
 
     fn __repr__(&self) -> String {
         format!("Fuser('{}')", self.method)
-    }
-}
-
-impl PyFuser {
-    fn locked(&self) -> std::sync::MutexGuard<'_, BoxedFuser> {
-        self.fuser.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

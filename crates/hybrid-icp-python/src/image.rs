@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::depth;
+use crate::array::Matrix;
+use crate::depth::{self, PyDepthImage};
 use crate::errors;
 
 /// Reads a 16-bit grey PNG as metres.
@@ -21,15 +21,8 @@ use crate::errors;
 /// numpy.ndarray, shape (H, W), float32
 ///     Metres, 0 where nothing was measured.
 #[pyfunction]
-pub(crate) fn read_depth_png(
-    py: Python<'_>,
-    path: PathBuf,
-    scale: f64,
-) -> PyResult<Bound<'_, PyArray2<f32>>> {
-    let image = py
-        .detach(|| hicp_io::read_depth_png(&path, scale * 1000.0))
-        .map_err(errors::file)?;
-    depth::image(py, image.width(), image.pixels().to_vec())
+pub(crate) fn read_depth_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Matrix<f32>> {
+    Ok(PyDepthImage::from_png(py, path, scale)?.to_numpy())
 }
 
 /// Reads a mask: a PNG that is not zero on the object.
@@ -42,9 +35,8 @@ pub(crate) fn read_depth_png(
 /// -------
 /// numpy.ndarray, shape (H, W), bool
 #[pyfunction]
-pub(crate) fn read_mask_png(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyArray2<bool>>> {
-    let mask = py
-        .detach(|| hicp_io::read_mask_png(&path))
-        .map_err(errors::file)?;
-    depth::image(py, mask.width(), mask.pixels().to_vec())
+pub(crate) fn read_mask_png(py: Python<'_>, path: PathBuf) -> PyResult<Matrix<bool>> {
+    py.detach(|| hicp_io::read_mask_png(&path))
+        .map(|mask| depth::image(mask.width(), mask.pixels()))
+        .map_err(errors::file)
 }

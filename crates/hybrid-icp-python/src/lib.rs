@@ -1,7 +1,8 @@
 //! The Python module `hybrid_icp`: refine 6D object poses in depth images from NumPy arrays.
 //!
-//! **Should you use this crate?** From Python, through the wheel that `cargo xtask wheel` builds. Rust programs depend on `hybrid-icp`,
-//! which this crate only translates: arrays are checked and read, the GIL is released, and results are the same bits.
+//! **Should you use this crate?** From Python, through the wheel that `cargo xtask wheel` builds.
+//! Rust programs depend on `hybrid-icp`, which this crate only translates: arrays are checked and
+//! read, the GIL is released, and results are the same bits.
 //!
 //! ```python
 //! from hybrid_icp import Camera, Model, Observation, Pipeline
@@ -11,10 +12,12 @@
 //! result = Pipeline.preset("hybrid").refine(model, observation, T_co)
 //! ```
 //!
-//! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has the types, and a test holds the two together.
+//! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has
+//! the types, and a test holds the two together.
 //!
-//! Modules in reading order, by file: `errors`, `array` (numbers in and out), `camera`, `model`, `depth` and `observation`, `pipeline` (with
-//! `batch` and `observer`), `result` and `events`, `score`, `step`, `fusion`, `sequential`, `image`, `bop`.
+//! Modules in reading order, by file: `errors`, `array` (numbers in and out), `camera`, `model`,
+//! `depth` and `observation`, `pipeline` (with `batch` and `observer`), `result` and `events`,
+//! `score`, `step`, `fusion`, `sequential`, `image`, `bop`.
 
 mod array;
 mod batch;
@@ -26,6 +29,7 @@ mod events;
 mod fusion;
 mod image;
 mod model;
+mod mutex;
 mod observation;
 mod observer;
 mod pipeline;
@@ -34,7 +38,7 @@ mod score;
 mod sequential;
 mod step;
 
-/// What Python imports; the package re-exports it.
+/// The native module that the package re-exports.
 #[pyo3::pymodule]
 #[pyo3(name = "_native")]
 mod native {

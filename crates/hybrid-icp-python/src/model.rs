@@ -6,18 +6,16 @@ use std::sync::OnceLock;
 use hicp_io::LengthUnit;
 use hybrid_icp::{
     MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, ModelPoints, Point3, Symmetries,
-    SymmetryAxis, TriMesh, Vector3,
+    SymmetryAxis, TriMesh, Vector3, warnings_of_model,
 };
-use numpy::{PyArray2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
 use crate::errors::{self, InputError};
 
-/// Diameters beyond which an object is taken for one in another unit: a coin in metres, a car in millimetres.
-const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
-
-/// An object to be registered: its mesh, surface samples, size and symmetries. Immutable; share it between threads.
+/// An object to be registered: its mesh, surface samples, size and symmetries. Immutable; share it
+/// between threads.
 ///
 /// Make one per object: it holds what is computed from the mesh once.
 ///
@@ -28,15 +26,18 @@ const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 /// faces : array_like of int, shape (F, 3)
 ///     Indices of the triangles' corners, counter-clockwise seen from outside.
 /// unit : {"m", "mm", "cm"}, optional
-///     Unit of the vertices and of `diameter`, of the offsets and translations of the symmetries too.
+///     Unit of the vertices and of `diameter`, of the offsets and translations of the symmetries
+///     too.
 /// samples : int, optional
 ///     Number of area-uniform surface samples.
 /// diameter : float, optional
 ///     Where a dataset prescribes one; otherwise the largest distance between two vertices.
 /// symmetries : array_like, shape (N, 4, 4), optional
-///     Discrete symmetries: rigid motions of the object frame that leave it looking the same, the identity not counted.
+///     Discrete symmetries: rigid motions of the object frame that leave it looking the same, the
+///     identity not counted.
 /// symmetry_axes : sequence of (axis, offset), optional
-///     Continuous symmetries: any rotation about the line through `offset` along `axis`, three numbers each.
+///     Continuous symmetries: any rotation about the line through `offset` along `axis`, three
+///     numbers each.
 ///
 /// Examples
 /// --------
@@ -122,19 +123,15 @@ impl PyModel {
 
     /// The vertices, shape (V, 3), float32, metres, object frame.
     #[getter]
-    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let vertices = self.model.mesh().vertices();
-        array::matrix(
-            py,
-            3,
-            vertices.iter().flat_map(|p| [p.x, p.y, p.z]).collect(),
-        )
+    fn vertices(&self) -> Matrix<f32> {
+        let vertices = self.model.mesh().vertices().iter();
+        Matrix::new(3, vertices.flat_map(|p| [p.x, p.y, p.z]).collect())
     }
 
     /// The triangles as indices into `vertices`, shape (F, 3), uint32.
     #[getter]
-    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        array::matrix(py, 3, self.model.mesh().triangles().concat())
+    fn faces(&self) -> Matrix<u32> {
+        Matrix::new(3, self.model.mesh().triangles().concat())
     }
 
     /// Largest distance between two vertices, or as prescribed, metres.
@@ -208,7 +205,11 @@ impl<'a, 'py> Options<'a, 'py> {
         }
         let symmetries = Symmetries {
             discrete: match self.symmetries {
-                Some(value) => discrete(value, scale)?,
+                Some(value) => {
+                    let expected = "an (N, 4, 4) array of rigid motions of the object frame";
+                    let motions = array::motions(value, "symmetries", expected, scale)?;
+                    motions.iter().map(|motion| motion.isometry).collect()
+                }
                 None => Vec::new(),
             },
             continuous: self
@@ -232,40 +233,15 @@ impl<'a, 'py> Options<'a, 'py> {
             symmetries,
         };
         let model = py.detach(|| Model::with_config(mesh, config));
-        let diameter = model.diameter();
-        if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
-            errors::warn(
-                py,
-                &format!(
-                    "the model's diameter is {diameter:.4} m: check unit={:?}, expected an object of {} to {} m",
-                    self.unit.to_string(),
-                    PLAUSIBLE_DIAMETERS_METERS.start(),
-                    PLAUSIBLE_DIAMETERS_METERS.end()
-                ),
-            )?;
+        for warning in warnings_of_model(&model) {
+            let unit = self.unit.to_string();
+            errors::warn(py, &format!("{warning}: check unit={unit:?}"))?;
         }
         Ok(PyModel {
             model,
             points: OnceLock::new(),
         })
     }
-}
-
-/// Reads discrete symmetries; translations in the model's unit.
-fn discrete(value: &Bound<'_, PyAny>, scale: f64) -> PyResult<Vec<hybrid_icp::Isometry3<f64>>> {
-    let expected = "an (N, 4, 4) array of rigid motions of the object frame";
-    let lengths = [None, Some(4), Some(4)];
-    let (numbers, _) = array::numbers::<f64>(value, &lengths, "symmetries", expected)?;
-    (0..)
-        .zip(numbers.chunks_exact(16))
-        .map(|(index, matrix): (usize, _)| {
-            let mut matrix = matrix.to_vec();
-            for entry in [3, 7, 11] {
-                matrix[entry] *= scale;
-            }
-            array::rigid(&matrix, &format!("symmetries[{index}]")).map(|motion| motion.isometry)
-        })
-        .collect()
 }
 
 /// Reads a mesh from arrays.

@@ -3,24 +3,24 @@
 use std::sync::Arc;
 
 use hybrid_icp::{DepthImage, Mask, Observation, PinholeCamera};
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
 use crate::camera::PyCamera;
 use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
 
-/// A segmented depth image: what poses are refined against. Immutable; share it between hypotheses and threads.
+/// A segmented depth image: what poses are refined against. Immutable; share it between hypotheses
+/// and threads.
 ///
-/// Arrays are copied, each once; changing them afterwards changes nothing. Several objects of one image share its depth: make a
-/// `DepthImage`, and an observation of it for each mask.
+/// Arrays are copied, each once; changing them afterwards changes nothing. Several objects of one
+/// image share its depth: make a `DepthImage`, and an observation of it for each mask.
 ///
 /// Parameters
 /// ----------
 /// depth : DepthImage or numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0, negative or NaN where nothing was measured.
-///     A `DepthImage` is shared, not copied.
+///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0,
+///     negative or NaN where nothing was measured. A `DepthImage` is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W), or None
 ///     Not zero on the object; `None` for every pixel.
 /// camera : Camera
@@ -44,7 +44,8 @@ use crate::errors::{self, InputError};
 /// >>> Observation(wall * 1000, None, camera)
 /// Traceback (most recent call last):
 /// ...
-/// hybrid_icp.InputError: depth looks like millimetres: median 800, expected metres (divide by 1000, or pass uint16 with scale=0.001)
+/// hybrid_icp.InputError: depth looks like millimetres: median 800, expected metres (divide by
+/// 1000, or pass uint16 with scale=0.001)
 #[pyclass(frozen, module = "hybrid_icp", name = "Observation")]
 #[derive(Debug)]
 pub(crate) struct PyObservation {
@@ -90,12 +91,12 @@ impl PyObservation {
 
     /// A copy of the depth image, shape (H, W), float32, metres, 0 where nothing was measured.
     #[getter]
-    fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let image = self.observation.depth();
-        depth::image(py, image.width(), image.pixels().to_vec())
+    fn depth(&self) -> Matrix<f32> {
+        self.image().to_numpy()
     }
 
-    /// The depth image, to make observations of other masks with: a `DepthImage`, (H, W) metres, shared and not copied.
+    /// The depth image, to make observations of other masks with: a `DepthImage`, (H, W) metres,
+    /// shared and not copied.
     #[getter]
     fn image(&self) -> PyDepthImage {
         PyDepthImage(Arc::clone(self.observation.shared_depth()))
@@ -103,9 +104,9 @@ impl PyObservation {
 
     /// A copy of the mask, shape (H, W), bool.
     #[getter]
-    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    fn mask(&self) -> Matrix<bool> {
         let mask = self.observation.mask();
-        depth::image(py, mask.width(), mask.pixels().to_vec())
+        depth::image(mask.width(), mask.pixels())
     }
 
     /// Number of masked pixels that have a depth.
@@ -128,20 +129,13 @@ impl PyObservation {
     ///     Metres.
     /// normals : numpy.ndarray, shape (n_surfels, 3), float32
     ///     Of unit length, facing the camera.
-    #[allow(clippy::type_complexity)] // Two arrays.
-    fn surfels<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+    fn surfels(&self) -> (Matrix<f32>, Matrix<f32>) {
         let (mut points, mut normals) = (Vec::new(), Vec::new());
         for (_, surfel) in self.observation.surfels(1) {
             points.extend_from_slice(surfel.point.coords.as_slice());
             normals.extend_from_slice(surfel.normal.as_slice());
         }
-        Ok((
-            array::matrix(py, 3, points)?,
-            array::matrix(py, 3, normals)?,
-        ))
+        (Matrix::new(3, points), Matrix::new(3, normals))
     }
 
     fn __repr__(&self) -> String {

@@ -1,25 +1,27 @@
 //! `Pipeline`.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
-use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner};
+use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, Warning, warning_of_distance};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
 use crate::batch;
 use crate::errors::{self, InputError};
 use crate::model::PyModel;
+use crate::mutex::locked;
 use crate::observation::PyObservation;
 use crate::observer::Watch;
 use crate::result::PyResultOf;
 
-/// How many times nearer or further than the pose says the measured surface may be before it is doubted.
-const DEPTH_RATIO: f64 = 3.0;
+const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], metres";
 
-/// A refinement pipeline: Hybrid ICP, one of the classical variants that it was compared with, or your own from a TOML file.
+/// A refinement pipeline: Hybrid ICP, one of the classical variants that it was compared with, or
+/// your own from a TOML file.
 ///
-/// Made by `Pipeline.preset` or `Pipeline.from_toml`. It keeps scratch memory from call to call and may be shared by threads.
+/// Made by `Pipeline.preset` or `Pipeline.from_toml`. It keeps scratch memory from call to call and
+/// may be shared by threads.
 ///
 /// Examples
 /// --------
@@ -33,21 +35,15 @@ const DEPTH_RATIO: f64 = 3.0;
 pub(crate) struct PyPipeline {
     name: String,
     origin: String,
-    made_of: MadeOf,
+    file: PipelineFile,
     toml: String,
     overrides: Vec<String>,
-    /// Those not in use, warm.
+    /// Warm refiners that are not in use.
     refiners: Mutex<Vec<Refiner>>,
 }
 
 /// What restores a pipeline, and what it takes: origin, text and overrides.
 type Pickled = (Py<PyAny>, (String, String, Vec<String>));
-
-#[derive(Clone, Debug)]
-enum MadeOf {
-    Preset(Preset),
-    File(PipelineFile),
-}
 
 #[pymethods]
 #[allow(non_snake_case)]
@@ -57,8 +53,9 @@ impl PyPipeline {
     /// Parameters
     /// ----------
     /// name : str
-    ///     One of `Pipeline.presets()`: "hybrid" is Hybrid ICP; "hybrid-visible" and "local" refine better than it, "search" and
-    ///     "auto" also find the object where refinement fails, and take longer.
+    ///     One of `Pipeline.presets()`: "hybrid" is Hybrid ICP; "hybrid-visible" and "local" refine
+    ///     better than it, "search" and "auto" also find the object where refinement fails, and
+    ///     take longer.
     /// overrides : sequence of str, optional
     ///     Fields to set, such as "times=3" or "stage.switcher.alpha=0.5".
     ///
@@ -69,15 +66,6 @@ impl PyPipeline {
     #[pyo3(signature = (name, *, overrides = Vec::new()))]
     fn preset(name: &str, overrides: Vec<String>) -> PyResult<Self> {
         let preset: Preset = name.parse().map_err(errors::input)?;
-        if overrides.is_empty() {
-            let made_of = MadeOf::Preset(preset);
-            return Ok(Self::new(
-                name,
-                made_of,
-                preset.toml().to_owned(),
-                overrides,
-            ));
-        }
         Self::parse(name, preset.toml().to_owned(), overrides)
     }
 
@@ -155,8 +143,8 @@ impl PyPipeline {
 
     /// Refines a pose.
     ///
-    /// Deterministic, and never fails on data: no overlap, degenerate geometry and the like end with a result that says so.
-    /// The GIL is released.
+    /// Deterministic, and never fails on data: no overlap, degenerate geometry and the like end
+    /// with a result that says so. The GIL is released.
     ///
     /// Parameters
     /// ----------
@@ -167,9 +155,9 @@ impl PyPipeline {
     /// T_co : array_like, shape (4, 4)
     ///     The rough pose, camera from object, metres.
     /// observer : callable or object, optional
-    ///     A callable gets an `IterationEvent` per iteration; an object is told by those of its methods `on_iteration`, `on_regime`
-    ///     and `on_stage_end` that it has. `False` from any of them stops the run at the pose last evaluated; an exception stops it
-    ///     and is raised.
+    ///     A callable gets an `IterationEvent` per iteration; an object is told by those of its
+    ///     methods `on_iteration`, `on_regime` and `on_stage_end` that it has. `False` from any of
+    ///     them stops the run at the pose last evaluated; an exception stops it and is raised.
     ///
     /// Returns
     /// -------
@@ -183,7 +171,8 @@ impl PyPipeline {
     /// Warns
     /// -----
     /// InputWarning
-    ///     When pose and image do not go together: the object behind the camera, or at a third or three times of the depth measured.
+    ///     When pose and image do not go together: the object behind the camera, or at a third or
+    ///     three times of the depth measured.
     ///
     /// Examples
     /// --------
@@ -211,7 +200,7 @@ impl PyPipeline {
     ) -> PyResult<PyResultOf> {
         let init = array::motion(T_co, "T_co")?;
         let (model, observation) = (model.get(), observation.get());
-        warning(py, model, observation, [&init].into_iter())?;
+        warn(py, model, observation, [&init].into_iter())?;
         let mut watch = Watch::new(observer)?;
         let mut refiner = self.take()?;
         let refinement = py.detach(|| {
@@ -228,7 +217,8 @@ impl PyPipeline {
 
     /// Refines many poses of one object in one image, on several threads.
     ///
-    /// Same bits as `refine` for each, whatever the number of threads. The GIL is released; Ctrl-C ends it.
+    /// Same bits as `refine` for each, whatever the number of threads. The GIL is released; Ctrl-C
+    /// ends it.
     ///
     /// Parameters
     /// ----------
@@ -257,14 +247,14 @@ impl PyPipeline {
         T_co: &Bound<'_, PyAny>,
         threads: Option<usize>,
     ) -> PyResult<Vec<PyResultOf>> {
-        let inits = array::motions(T_co, "T_co")?;
+        let inits = array::motions(T_co, "T_co", EXPECTED_POSES, 1.0)?;
         let threads = match threads {
             Some(0) => return Err(InputError::new_err("threads is 0, expected 1 or more")),
             Some(threads) => threads,
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let (model, observation) = (model.get(), observation.get());
-        warning(py, model, observation, inits.iter())?;
+        warn(py, model, observation, inits.iter())?;
         let poses: Vec<Isometry3<f64>> = inits.iter().map(|init| init.isometry).collect();
         let mut refiners = (0..threads.min(poses.len()))
             .map(|_| self.take())
@@ -300,12 +290,7 @@ impl PyPipeline {
     /// Makes a pipeline again from what it was pickled as.
     #[staticmethod]
     fn _restore(origin: &str, toml: String, overrides: Vec<String>) -> PyResult<Self> {
-        match origin.parse::<Preset>() {
-            Ok(preset) if overrides.is_empty() && preset.toml() == toml => {
-                Self::preset(origin, overrides)
-            }
-            _ => Self::parse(origin, toml, overrides),
-        }
+        Self::parse(origin, toml, overrides)
     }
 
     fn __repr__(&self) -> String {
@@ -314,83 +299,70 @@ impl PyPipeline {
 }
 
 impl PyPipeline {
-    fn new(origin: &str, made_of: MadeOf, toml: String, overrides: Vec<String>) -> Self {
-        let words = std::iter::once(origin).chain(overrides.iter().map(String::as_str));
-        Self {
-            name: words.collect::<Vec<_>>().join(" "),
-            origin: origin.to_owned(),
-            made_of,
-            toml,
-            overrides,
-            refiners: Mutex::default(),
-        }
-    }
-
-    /// Parses a pipeline, applies the overrides, and makes sure that it builds.
+    /// Parses a pipeline, applies the overrides, and checks that it builds.
     fn parse(origin: &str, toml: String, overrides: Vec<String>) -> PyResult<Self> {
         let mut file = PipelineFile::parse(&toml, origin).map_err(errors::input)?;
         for assignment in &overrides {
             file.set(assignment).map_err(errors::input)?;
         }
         file.build().map_err(errors::input)?;
-        Ok(Self::new(origin, MadeOf::File(file), toml, overrides))
+        let words = std::iter::once(origin).chain(overrides.iter().map(String::as_str));
+        Ok(Self {
+            name: words.collect::<Vec<_>>().join(" "),
+            origin: origin.to_owned(),
+            file,
+            toml,
+            overrides,
+            refiners: Mutex::default(),
+        })
     }
 
-    /// Builds the pipeline anew.
+    /// Builds the pipeline.
     pub(crate) fn build(&self) -> PyResult<hybrid_icp::BoxedStage> {
-        match &self.made_of {
-            MadeOf::Preset(preset) => Ok(preset.build()),
-            MadeOf::File(file) => file.build().map_err(errors::input),
-        }
+        self.file.build().map_err(errors::input)
     }
 
-    /// Takes a refiner that is not in use, or makes one.
+    /// Returns a refiner that is not in use, or a new one.
     fn take(&self) -> PyResult<Refiner> {
-        let mut free = self.refiners.lock().unwrap_or_else(PoisonError::into_inner);
-        match free.pop() {
+        match locked(&self.refiners).pop() {
             Some(refiner) => Ok(refiner),
             None => self.build().map(Refiner::boxed),
         }
     }
 
     fn put_back(&self, refiners: impl IntoIterator<Item = Refiner>) {
-        let mut free = self.refiners.lock().unwrap_or_else(PoisonError::into_inner);
-        free.extend(refiners);
+        locked(&self.refiners).extend(refiners);
     }
 }
 
-/// Warns where no pose goes together with the image.
-fn warning<'a>(
+/// Warns if no pose fits the image.
+fn warn<'a>(
     py: Python<'_>,
     model: &PyModel,
     observation: &PyObservation,
-    mut inits: impl Iterator<Item = &'a Motion>,
+    inits: impl Iterator<Item = &'a Motion>,
 ) -> PyResult<()> {
     let center = model.model.center();
     let mut first = None;
-    let fits = |distance: f64| {
-        distance > 0.0
-            && observation.median_depth.is_none_or(|depth| {
-                (distance / DEPTH_RATIO..=distance * DEPTH_RATIO).contains(&depth)
-            })
-    };
-    let any = inits.any(|init| {
+    for init in inits {
         let distance = (init.isometry * center).z;
-        first.get_or_insert(distance);
-        fits(distance)
-    });
-    match (any, first, observation.median_depth) {
-        (false, Some(distance), _) if distance <= 0.0 => errors::warn(
+        match warning_of_distance(distance, observation.median_depth) {
+            Some(warning) => first.get_or_insert(warning),
+            None => return Ok(()),
+        };
+    }
+    match first {
+        Some(Warning::BehindCamera { z }) => errors::warn(
             py,
             &format!(
-                "T_co puts the object's centre at z = {distance:.4} m, behind the camera, which looks along +z: expected camera \
+                "T_co puts the object's centre at z = {z:.4} m, behind the camera, which looks along +z: expected camera \
                  from object, not object from camera"
             ),
         ),
-        (false, Some(distance), Some(depth)) => errors::warn(
+        Some(Warning::Depth { measured, expected }) => errors::warn(
             py,
             &format!(
-                "T_co puts the object's centre at z = {distance:.4} m, but the median depth inside the mask is {depth:.4} m: \
+                "T_co puts the object's centre at z = {expected:.4} m, but the median depth inside the mask is {measured:.4} m: \
                  check the units of both, expected metres"
             ),
         ),

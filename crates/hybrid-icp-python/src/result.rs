@@ -1,16 +1,16 @@
 //! `Result`.
 
-use hybrid_icp::{Isometry3, Quality, Refinement, StageRecord, Verdict};
-use numpy::PyArray2;
+use hybrid_icp::{Quality, Refinement, StageRecord, Verdict};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::array::{self, Motion};
-use crate::events::PyStageEvent;
+use crate::array::{self, Matrix, Motion};
+use crate::events::{self, PyStageEvent};
 
 /// What a refinement returns: a pose, how it came about, and how well it explains the image.
 ///
-/// A pose that could not be refined is given back with the numbers that were passed, and `outcome` says so; that is no error.
+/// A pose that could not be refined is given back with the numbers that were passed, and `outcome`
+/// says so; that is no error.
 #[pyclass(frozen, module = "hybrid_icp", name = "Result")]
 #[derive(Debug)]
 pub(crate) struct PyResultOf {
@@ -39,32 +39,17 @@ impl PyResultOf {
     }
 }
 
-/// Name of a verdict, as in the program's reports.
-pub(crate) fn verdict(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Refined => "refined",
-        Verdict::KeptInitial(_) => "kept_initial",
-    }
-}
-
-/// A pose as a 4×4 array.
-pub(crate) fn pose<'py>(
-    py: Python<'py>,
-    pose: &Isometry3<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    array::matrix(py, 4, array::to_matrix(pose).to_vec())
-}
-
 #[pymethods]
 #[allow(non_snake_case)] // T_co is the frame-explicit name of the pose, the same on both sides.
 impl PyResultOf {
     /// The pose, camera from object, shape (4, 4), float64, metres.
     #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array::matrix(py, 4, self.matrix.to_vec())
+    fn T_co(&self) -> Matrix {
+        Matrix::new(4, self.matrix.to_vec())
     }
 
-    /// Mean VSD estimate of the returned pose: 0 where it explains the image everywhere, 1 nowhere. Above 0.4, do not use the pose.
+    /// Mean VSD estimate of the returned pose: 0 where it explains the image everywhere, 1 nowhere.
+    /// Above 0.4, do not use the pose.
     #[getter]
     fn mve(&self) -> f64 {
         self.refinement.mve
@@ -76,8 +61,9 @@ impl PyResultOf {
         self.refinement.mve_initial
     }
 
-    /// Why the pose is not to be trusted, in words: it does not explain the image, got worse, was found where the initial pose explained
-    /// nothing, or lies on a surface that is flat where the model is not. Empty where the scores say nothing against it.
+    /// Why the pose is not to be trusted, in words: it does not explain the image, got worse, was
+    /// found where the initial pose explained nothing, or lies on a surface that is flat where the
+    /// model is not. Empty where the scores say nothing against it.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let warnings = self.refinement.warnings();
@@ -87,7 +73,7 @@ impl PyResultOf {
     /// "refined", or "kept_initial" when the initial pose is returned.
     #[getter]
     fn outcome(&self) -> &'static str {
-        verdict(self.refinement.outcome.verdict)
+        events::name(self.refinement.outcome.verdict)
     }
 
     /// Whether the returned pose is a new one.
@@ -96,7 +82,8 @@ impl PyResultOf {
         self.refinement.outcome.verdict == Verdict::Refined
     }
 
-    /// Why the pipeline ended, such as "converged", "iteration_limit", "loss_increased" or "no_pairs".
+    /// Why the pipeline ended, such as "converged", "iteration_limit", "loss_increased" or
+    /// "no_pairs".
     #[getter]
     fn termination(&self) -> &'static str {
         self.refinement.outcome.termination.name()
@@ -114,7 +101,8 @@ impl PyResultOf {
         self.refinement.outcome.n_pairs()
     }
 
-    /// Weighted mean of the metric's squared residuals at the returned pose, m²; None if it was never evaluated.
+    /// Weighted mean of the metric's squared residuals at the returned pose, m²; None if it was
+    /// never evaluated.
     #[getter]
     fn mean_loss(&self) -> Option<f64> {
         self.refinement.outcome.evaluation.map(|e| e.mean_loss)
@@ -126,13 +114,15 @@ impl PyResultOf {
         self.quality().map(|quality| quality.fitness)
     }
 
-    /// Root mean square of the distances between the points of the pairs, metres; None if the pose was never evaluated.
+    /// Root mean square of the distances between the points of the pairs, metres; None if the pose
+    /// was never evaluated.
     #[getter]
     fn point_rmse(&self) -> Option<f64> {
         self.quality().map(|quality| quality.point_rmse)
     }
 
-    /// Root mean square of the distances from the observed tangent planes, metres; None if the pose was never evaluated.
+    /// Root mean square of the distances from the observed tangent planes, metres; None if the pose
+    /// was never evaluated.
     #[getter]
     fn plane_rmse(&self) -> Option<f64> {
         self.quality().map(|quality| quality.plane_rmse)
@@ -140,25 +130,26 @@ impl PyResultOf {
 
     /// Information of the pose, shape (6, 6), float64; None where the metric has none.
     ///
-    /// For ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera frame.
+    /// For ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera
+    /// frame.
     #[getter]
-    fn information<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn information(&self) -> Option<Matrix> {
         let information = self.quality().and_then(Quality::information);
-        information.map(|m| array::from_matrix6(py, &m)).transpose()
+        information.as_ref().map(Matrix::from)
     }
 
-    /// Covariance of the pose in the same convention, shape (6, 6), float64, if pairs are right and residuals independent; None
-    /// where a direction is not determined.
+    /// Covariance of the pose in the same convention, shape (6, 6), float64, if pairs are right and
+    /// residuals independent; None where a direction is not determined.
     #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn covariance(&self) -> Option<Matrix> {
         let covariance = self.quality().and_then(Quality::covariance);
-        covariance.map(|m| array::from_matrix6(py, &m)).transpose()
+        covariance.as_ref().map(Matrix::from)
     }
 
     /// The ICP stages that ran, in order.
     #[getter]
     fn stages(&self) -> Vec<PyStageEvent> {
-        self.stages.iter().map(PyStageEvent::of_record).collect()
+        self.stages.iter().map(PyStageEvent::from).collect()
     }
 
     /// Returns everything as plain Python values that `json.dumps` takes.
@@ -167,28 +158,26 @@ impl PyResultOf {
     /// -------
     /// dict
     ///     The attributes by name; matrices as nested lists.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let list = |array: Option<Bound<'py, PyArray2<f64>>>| match array {
-            Some(array) => array.call_method0("tolist").map(Some),
-            None => Ok(None),
-        };
-        let stages = self.stages.iter().map(PyStageEvent::of_record);
-        let stages: PyResult<Vec<_>> = stages.map(|stage| stage.to_dict(py)).collect();
-        let dict = PyDict::new(py);
-        dict.set_item("T_co", list(Some(self.T_co(py)?))?)?;
-        dict.set_item("mve", self.mve())?;
-        dict.set_item("mve_initial", self.mve_initial())?;
-        dict.set_item("warnings", self.warnings())?;
-        dict.set_item("outcome", self.outcome())?;
-        dict.set_item("termination", self.termination())?;
-        dict.set_item("iterations", self.iterations())?;
-        dict.set_item("n_pairs", self.n_pairs())?;
-        dict.set_item("mean_loss", self.mean_loss())?;
-        dict.set_item("fitness", self.fitness())?;
-        dict.set_item("point_rmse", self.point_rmse())?;
-        dict.set_item("plane_rmse", self.plane_rmse())?;
-        dict.set_item("information", list(self.information(py)?)?)?;
-        dict.set_item("covariance", list(self.covariance(py)?)?)?;
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let names = [
+            "T_co",
+            "mve",
+            "mve_initial",
+            "warnings",
+            "outcome",
+            "termination",
+            "iterations",
+            "n_pairs",
+            "mean_loss",
+            "fitness",
+            "point_rmse",
+            "plane_rmse",
+            "information",
+            "covariance",
+        ];
+        let dict = events::plain(slf, &names)?;
+        let stages = slf.getattr("stages")?.try_iter()?;
+        let stages: PyResult<Vec<_>> = stages.map(|stage| stage?.call_method0("to_dict")).collect();
         dict.set_item("stages", stages?)?;
         Ok(dict)
     }

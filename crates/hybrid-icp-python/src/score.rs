@@ -1,13 +1,13 @@
 //! Renders, scores and pose errors.
 
 use hybrid_icp::{
-    MeanVsd, Occlusion, Problem, Rasterizer, RenderedView, Renderer, Score,
+    Isometry3, MeanVsd, Occlusion, Problem, Rasterizer, RenderedView, Renderer, Score,
     VISIBILITY_TOLERANCE_METERS, Workspace,
 };
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
 use crate::camera::PyCamera;
 use crate::depth;
 use crate::errors;
@@ -29,19 +29,20 @@ use crate::observation::PyObservation;
 ///     Depth along the optical axis, metres; 0 = nothing.
 #[pyfunction]
 #[allow(non_snake_case)]
-pub(crate) fn render_depth<'py>(
-    py: Python<'py>,
-    model: &Bound<'py, PyModel>,
+pub(crate) fn render_depth(
+    py: Python<'_>,
+    model: &Bound<'_, PyModel>,
     camera: PyCamera,
-    T_co: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    T_co: &Bound<'_, PyAny>,
+) -> PyResult<Matrix<f32>> {
     let pose = array::motion(T_co, "T_co")?.isometry;
     let mesh = model.get().model.mesh();
     let image = py.detach(|| hybrid_icp::render_depth_image(mesh, &camera.0, &pose));
-    depth::image(py, image.width(), image.pixels().to_vec())
+    Ok(depth::image(image.width(), image.pixels()))
 }
 
-/// Mean VSD estimate of a pose: 0 where it explains the image everywhere, 1 nowhere. Needs no ground truth.
+/// Mean VSD estimate of a pose: 0 where it explains the image everywhere, 1 nowhere. Needs no
+/// ground truth.
 ///
 /// Parameters
 /// ----------
@@ -50,9 +51,9 @@ pub(crate) fn render_depth<'py>(
 /// T_co : array_like, shape (4, 4)
 ///     Camera from object, metres.
 /// occlusion_tolerance : float or None, optional
-///     Rendered pixels outside the mask that something hides by more than this many metres do not count.
-///     Below 0, the measured surface may also lie that far behind, for masks that miss a part of the
-///     object. `None` is the paper's definition: every rendered pixel counts.
+///     Rendered pixels outside the mask that something hides by more than this many metres do not
+///     count. Below 0, the measured surface may also lie that far behind, for masks that miss a
+///     part of the object. `None` is the paper's definition: every rendered pixel counts.
 ///
 /// Returns
 /// -------
@@ -95,7 +96,8 @@ pub(crate) fn mve(
 /// Returns
 /// -------
 /// numpy.ndarray, shape (10,), float64
-///     e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 where neither render shows a visible pixel.
+///     e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 where neither render shows a visible
+///     pixel.
 #[pyfunction]
 #[pyo3(signature = (model, observation, T_est, T_gt, *, delta = VISIBILITY_TOLERANCE_METERS))]
 #[allow(non_snake_case)]
@@ -107,8 +109,7 @@ pub(crate) fn vsd<'py>(
     T_gt: &Bound<'py, PyAny>,
     delta: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let estimate = array::motion(T_est, "T_est")?.isometry;
-    let truth = array::motion(T_gt, "T_gt")?.isometry;
+    let (estimate, truth) = poses(T_est, T_gt)?;
     let (model, observation) = (&model.get().model, &observation.get().observation);
     let camera = observation.camera();
     let errors = py.detach(|| {
@@ -151,12 +152,13 @@ pub(crate) fn add(
     T_gt: &Bound<'_, PyAny>,
     model: &Bound<'_, PyModel>,
 ) -> PyResult<f64> {
-    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let (estimate, truth) = poses(T_est, T_gt)?;
     let points = model.get().points();
-    Ok(points.add(&estimate.isometry, &truth.isometry))
+    Ok(points.add(&estimate, &truth))
 }
 
-/// ADI (ADD-S): mean distance from a model point at the true pose to the closest model point at the estimate.
+/// ADI (ADD-S): mean distance from a model point at the true pose to the closest model point at the
+/// estimate.
 ///
 /// Parameters
 /// ----------
@@ -177,9 +179,9 @@ pub(crate) fn adi(
     T_gt: &Bound<'_, PyAny>,
     model: &Bound<'_, PyModel>,
 ) -> PyResult<f64> {
-    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let (estimate, truth) = poses(T_est, T_gt)?;
     let model = model.get();
-    Ok(py.detach(|| model.points().adi(&estimate.isometry, &truth.isometry)))
+    Ok(py.detach(|| model.points().adi(&estimate, &truth)))
 }
 
 /// MSSD: maximum symmetry-aware surface distance of BOP.
@@ -203,9 +205,9 @@ pub(crate) fn mssd(
     T_gt: &Bound<'_, PyAny>,
     model: &Bound<'_, PyModel>,
 ) -> PyResult<f64> {
-    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let (estimate, truth) = poses(T_est, T_gt)?;
     let model = model.get();
-    Ok(py.detach(|| model.points().mssd(&estimate.isometry, &truth.isometry)))
+    Ok(py.detach(|| model.points().mssd(&estimate, &truth)))
 }
 
 /// MSPD: maximum symmetry-aware projection distance of BOP.
@@ -231,10 +233,17 @@ pub(crate) fn mspd(
     model: &Bound<'_, PyModel>,
     camera: PyCamera,
 ) -> PyResult<f64> {
-    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    let (estimate, truth) = poses(T_est, T_gt)?;
     let model = model.get();
-    Ok(py.detach(|| {
-        let (estimate, truth) = (&estimate.isometry, &truth.isometry);
-        model.points().mspd(estimate, truth, &camera.0)
-    }))
+    Ok(py.detach(|| model.points().mspd(&estimate, &truth, &camera.0)))
+}
+
+/// Reads the estimated and the true pose.
+#[allow(non_snake_case)]
+fn poses(
+    T_est: &Bound<'_, PyAny>,
+    T_gt: &Bound<'_, PyAny>,
+) -> PyResult<(Isometry3<f64>, Isometry3<f64>)> {
+    let (estimate, truth) = (array::motion(T_est, "T_est")?, array::motion(T_gt, "T_gt")?);
+    Ok((estimate.isometry, truth.isometry))
 }

@@ -1,23 +1,24 @@
 //! Estimates fused while the camera moves.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use hybrid_icp::fusion::FusionMethod;
 use hybrid_icp::{SequentialEstimator, SequentialEvent, SequentialStep};
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
 use crate::errors;
 use crate::fusion::{self, PyPoseEstimate};
 use crate::model::PyModel;
+use crate::mutex::locked;
 use crate::observation::PyObservation;
 use crate::pipeline::PyPipeline;
-use crate::result::pose;
 
-/// Estimates the pose of an object that stands still from images along the path of a moving camera (§V of the paper).
+/// Estimates the pose of an object that stands still from images along the path of a moving camera
+/// (§V of the paper).
 ///
-/// Each image is registered from the pose fused so far, moved with the camera; what comes out is fused, and is the next start.
+/// Each image is registered from the pose fused so far, moved with the camera; what comes out is
+/// fused, and is the next start.
 ///
 /// Parameters
 /// ----------
@@ -29,8 +30,9 @@ use crate::result::pose;
 /// T_co : array_like, shape (4, 4)
 ///     The rough pose in the first camera frame, camera from object, metres.
 /// paper : bool, optional
-///     §V to the letter: no gate, covariances e_MVE·I₆ that stay as they are. Otherwise uncertainty is about the object's centre,
-///     estimates with an MVE above 0.4 are left out, and symmetric poses are brought together.
+///     §V to the letter: no gate, covariances e_MVE·I₆ that stay as they are. Otherwise uncertainty
+///     is about the object's centre, estimates with an MVE above 0.4 are left out, and symmetric
+///     poses are brought together.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
@@ -69,7 +71,8 @@ impl PySequentialEstimator {
     /// ----------
     /// observation : Observation
     /// T_nc : array_like, shape (4, 4), optional
-    ///     This image's camera from that of the image before, metres; a camera that stood still if not given.
+    ///     This image's camera from that of the image before, metres; a camera that stood still if
+    ///     not given.
     /// covariance : array_like, shape (6, 6), optional
     ///     Of the motion: a left perturbation in this image's camera frame.
     ///
@@ -86,9 +89,9 @@ impl PySequentialEstimator {
     ) -> PyResult<PySequentialStep> {
         let motion = fusion::motion(T_nc, covariance)?;
         let (model, observation) = (&self.model.get().model, &observation.get().observation);
-        Ok(PySequentialStep(py.detach(|| {
-            self.locked().step(model, observation, &motion)
-        })))
+        // Without the GIL: another thread may hold the lock for a whole step.
+        let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
+        Ok(PySequentialStep::new(&step))
     }
 
     /// Moves the camera without an image.
@@ -107,7 +110,7 @@ impl PySequentialEstimator {
         covariance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let motion = fusion::motion(Some(T_nc), covariance)?;
-        py.detach(|| self.locked().move_camera(&motion));
+        py.detach(|| locked(&self.estimator).move_camera(&motion));
         Ok(())
     }
 
@@ -119,97 +122,71 @@ impl PySequentialEstimator {
     ///     Camera from object, metres.
     fn restart(&self, py: Python<'_>, T_co: &Bound<'_, PyAny>) -> PyResult<()> {
         let init = array::motion(T_co, "T_co")?.isometry;
-        py.detach(|| self.locked().restart(&init))
+        py.detach(|| locked(&self.estimator).restart(&init))
             .map_err(errors::input)
     }
 
-    /// The pose in the current camera frame, shape (4, 4), float64, metres: fused, or the initial one while there is no estimate.
+    /// The pose in the current camera frame, shape (4, 4), float64, metres: fused, or the initial
+    /// one while there is no estimate.
     #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let current = py.detach(|| self.locked().camera_from_object());
-        pose(py, &current)
+    fn T_co(&self, py: Python<'_>) -> Matrix {
+        (&py.detach(|| locked(&self.estimator).camera_from_object())).into()
     }
 
     /// The fused estimate in the current camera frame; None before the first.
     #[getter]
     fn estimate(&self, py: Python<'_>) -> Option<PyPoseEstimate> {
-        py.detach(|| self.locked().estimate()).map(PyPoseEstimate)
+        py.detach(|| locked(&self.estimator).estimate())
+            .map(PyPoseEstimate)
     }
 }
 
-impl PySequentialEstimator {
-    /// Called without the GIL: another thread may hold the lock for a whole step.
-    fn locked(&self) -> MutexGuard<'_, SequentialEstimator> {
-        self.estimator
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// The object's pose after one image, and how it came about, in the camera frame of that image.
-#[pyclass(frozen, module = "hybrid_icp", name = "SequentialStep")]
+/// The object's pose after one image and how it was estimated, in the camera frame of that image.
+#[pyclass(frozen, get_all, module = "hybrid_icp", name = "SequentialStep")]
 #[derive(Debug)]
-pub(crate) struct PySequentialStep(SequentialStep);
-
-#[pymethods]
 #[allow(non_snake_case)]
-impl PySequentialStep {
-    /// The fused pose, shape (4, 4), float64, metres; the initial one, carried along, while there is no estimate.
-    #[getter]
-    fn T_co<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.0.camera_from_object)
-    }
-
+pub(crate) struct PySequentialStep {
+    /// The fused pose, shape (4, 4), float64, metres. While there is no estimate, the initial pose,
+    /// moved with the camera.
+    T_co: Matrix,
     /// Its covariance of ξ = [ρ; φ], shape (6, 6), float64; None while there is no estimate.
-    #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let covariance = self.0.covariance.as_ref();
-        covariance.map(|m| array::from_matrix6(py, m)).transpose()
-    }
-
-    /// Where ICP started, shape (4, 4), float64, metres: what was fused before, moved with the camera.
-    #[getter]
-    fn T_init<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.0.init)
-    }
-
-    /// What ICP made of this image alone, shape (4, 4), float64, metres.
-    #[getter]
-    fn T_registered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        pose(py, &self.0.outcome.camera_from_object)
-    }
-
+    covariance: Option<Matrix>,
+    /// The pose that ICP started from, shape (4, 4), float64, metres: the last fused pose, moved
+    /// with the camera.
+    T_init: Matrix,
+    /// The pose that ICP found in this image alone, shape (4, 4), float64, metres.
+    T_registered: Matrix,
     /// Why the registration ended.
-    #[getter]
-    fn termination(&self) -> &'static str {
-        self.0.outcome.termination.name()
-    }
+    termination: &'static str,
+    /// The mean VSD estimate of `T_registered`; None if it was not scored.
+    mve: Option<f64>,
+    /// One word for the result: as `Fuser.update` returns, or "no_estimate" or "refused".
+    event: &'static str,
+}
 
-    /// The mean VSD estimate of `T_registered`, where it was scored.
-    #[getter]
-    fn mve(&self) -> Option<f64> {
-        self.0.mve
-    }
-
-    /// What became of it: as `Fuser.update` returns, or "no_estimate" or "refused".
-    #[getter]
-    fn event(&self) -> &'static str {
-        match &self.0.event {
-            SequentialEvent::Estimated(update) => update.name(),
-            SequentialEvent::NoEstimate(_) => "no_estimate",
-            SequentialEvent::Refused(_) => "refused",
-            _ => "other",
+impl PySequentialStep {
+    fn new(step: &SequentialStep) -> Self {
+        Self {
+            T_co: (&step.camera_from_object).into(),
+            covariance: step.covariance.as_ref().map(Matrix::from),
+            T_init: (&step.init).into(),
+            T_registered: (&step.outcome.camera_from_object).into(),
+            termination: step.outcome.termination.name(),
+            mve: step.mve,
+            event: match &step.event {
+                SequentialEvent::Estimated(update) => update.name(),
+                SequentialEvent::NoEstimate(_) => "no_estimate",
+                SequentialEvent::Refused(_) => "refused",
+                _ => "other",
+            },
         }
     }
+}
 
+#[pymethods]
+impl PySequentialStep {
     fn __repr__(&self) -> String {
-        let t = &self.0.camera_from_object.translation.vector;
-        format!(
-            "SequentialStep({}, t = ({:.4}, {:.4}, {:.4}) m)",
-            self.event(),
-            t.x,
-            t.y,
-            t.z
-        )
+        let t = self.T_co.translation();
+        format!("SequentialStep({}, t = {t} m)", self.event)
     }
 }

@@ -1,19 +1,16 @@
 //! Single steps of the error metrics.
 
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
 use hybrid_icp::{
-    Correspondences, Isometry3, Pair, Point3, PointToPlane, PointToPoint, Step, Surfel,
-    UnitVector3, Vector3,
+    Correspondences, Isometry3, Iteration, Minimize, Pair, Point3, PointToPlane, PointToPoint,
+    Step, Surfel, UnitVector3, Vector3,
 };
-use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
 use crate::errors::InputError;
-use crate::result::pose;
 
-/// One step of point-to-point ICP on given pairs: the rigid motion that minimises Σ|T pᵢ − cᵢ|² (Kabsch).
+/// One step of point-to-point ICP on given pairs: the rigid motion that minimises Σ|T pᵢ − cᵢ|²
+/// (Kabsch).
 ///
 /// Parameters
 /// ----------
@@ -43,18 +40,13 @@ use crate::result::pose;
 /// >>> np.round(increment[:3, 3], 6) + 0.0
 /// array([0. , 0. , 0.5])
 #[pyfunction]
-#[allow(clippy::type_complexity)]
-pub(crate) fn point_to_point_step<'py>(
-    py: Python<'py>,
-    sources: &Bound<'py, PyAny>,
-    targets: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+pub(crate) fn point_to_point_step(
+    sources: &Bound<'_, PyAny>,
+    targets: &Bound<'_, PyAny>,
+) -> PyResult<(Matrix, f64)> {
     let pairs = pairs(sources, targets, None)?;
-    finish(
-        py,
-        PointToPoint.minimize(&Iteration::default(), &pairs),
-        pairs.len(),
-    )
+    let step = PointToPoint.minimize(&Iteration::default(), &pairs);
+    finish(step, pairs.len())
 }
 
 /// One step of point-to-plane ICP on given pairs: Gauss–Newton on Σ(nᵢ·(T pᵢ − cᵢ))².
@@ -71,7 +63,8 @@ pub(crate) fn point_to_point_step<'py>(
 /// Returns
 /// -------
 /// increment : numpy.ndarray, shape (4, 4), float64
-///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left; metres.
+///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left;
+///     metres.
 /// mean_loss : float
 ///     Mean of (nᵢ·(pᵢ − cᵢ))² before the step, m².
 ///
@@ -80,30 +73,20 @@ pub(crate) fn point_to_point_step<'py>(
 /// InputError
 ///     When the pairs do not determine a step.
 #[pyfunction]
-#[allow(clippy::type_complexity)]
-pub(crate) fn point_to_plane_step<'py>(
-    py: Python<'py>,
-    sources: &Bound<'py, PyAny>,
-    targets: &Bound<'py, PyAny>,
-    normals: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+pub(crate) fn point_to_plane_step(
+    sources: &Bound<'_, PyAny>,
+    targets: &Bound<'_, PyAny>,
+    normals: &Bound<'_, PyAny>,
+) -> PyResult<(Matrix, f64)> {
     let pairs = pairs(sources, targets, Some(normals))?;
-    finish(
-        py,
-        PointToPlane.minimize(&Iteration::default(), &pairs),
-        pairs.len(),
-    )
+    let step = PointToPlane.minimize(&Iteration::default(), &pairs);
+    finish(step, pairs.len())
 }
 
-#[allow(clippy::type_complexity)]
-fn finish<'py>(
-    py: Python<'py>,
-    step: Option<Step>,
-    count: usize,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, f64)> {
+fn finish(step: Option<Step>, count: usize) -> PyResult<(Matrix, f64)> {
     let step = step
         .ok_or_else(|| InputError::new_err(format!("the {count} pairs do not determine a step")))?;
-    Ok((pose(py, &step.increment)?, step.mean_loss))
+    Ok(((&step.increment).into(), step.mean_loss))
 }
 
 fn pairs(

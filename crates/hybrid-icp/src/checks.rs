@@ -57,19 +57,14 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
     let mut warnings = warnings_of_model(model);
     let diameter = model.diameter();
     let distance = (init * model.center()).z;
-    if distance.is_nan() || distance <= 0.0 {
-        warnings.push(Warning::BehindCamera { z: distance });
-        return warnings;
-    }
     let (pixels, median) = inside_mask(observation);
-    let plausible = distance / DEPTH_RATIO..=distance * DEPTH_RATIO;
-    match median {
-        None if pixels > 0 => warnings.push(Warning::NoDepth),
-        Some(measured) if !plausible.contains(&measured) => warnings.push(Warning::Depth {
-            measured,
-            expected: distance,
-        }),
-        _ => {}
+    match warning_of_distance(distance, median) {
+        Some(warning @ Warning::BehindCamera { .. }) => {
+            warnings.push(warning);
+            return warnings;
+        }
+        None if median.is_none() && pixels > 0 => warnings.push(Warning::NoDepth),
+        warning => warnings.extend(warning),
     }
     // No silhouette of that diameter is larger than a disc.
     let camera = observation.camera();
@@ -97,6 +92,30 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
         });
     }
     warnings
+}
+
+/// Checks the distance of the object at the initial pose against the depth inside the mask.
+///
+/// `distance` is z of the object's center in the camera frame, `median_depth` the median depth
+/// inside the mask, both in meters. Returns [`Warning::BehindCamera`] or [`Warning::Depth`].
+///
+/// ```
+/// use hybrid_icp::{Warning, warning_of_distance};
+/// assert_eq!(warning_of_distance(0.5, Some(0.6)), None);
+/// assert!(matches!(warning_of_distance(-0.5, None), Some(Warning::BehindCamera { .. })));
+/// assert!(matches!(warning_of_distance(5.0, Some(0.6)), Some(Warning::Depth { .. })));
+/// ```
+#[must_use]
+pub fn warning_of_distance(distance: f64, median_depth: Option<f64>) -> Option<Warning> {
+    if distance.is_nan() || distance <= 0.0 {
+        return Some(Warning::BehindCamera { z: distance });
+    }
+    let plausible = distance / DEPTH_RATIO..=distance * DEPTH_RATIO;
+    let measured = median_depth.filter(|measured| !plausible.contains(measured))?;
+    Some(Warning::Depth {
+        measured,
+        expected: distance,
+    })
 }
 
 /// Returns what looks wrong about a model by itself: the [`warnings`] that need no image.

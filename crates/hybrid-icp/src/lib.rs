@@ -50,7 +50,8 @@ mod warning;
 
 pub use calibration::Calibration;
 pub use checks::{
-    EXPLAINS_NOTHING, warning_of_diameter, warnings, warnings_of_model, warnings_of_result,
+    EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings, warnings_of_model,
+    warnings_of_result,
 };
 pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,

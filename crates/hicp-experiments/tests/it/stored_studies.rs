@@ -545,7 +545,10 @@ fn a_study_goes_on_only_from_its_own_first_rows() {
         stored.write(stored.rows, &foreign);
         let told = resume(&stored).unwrap_err().to_string();
         let (line, field) = (whole.lines().count(), "vsd_final is \"\u{fffd}.04\"");
-        assert!(told.contains(&format!("line {line}")) && told.contains(field), "{told}");
+        assert!(
+            told.contains(&format!("line {line}")) && told.contains(field),
+            "{told}"
+        );
         assert_eq!(std::fs::read(stored.path(stored.rows)).unwrap(), foreign);
         let utf16: Vec<u8> = whole.encode_utf16().flat_map(u16::to_be_bytes).collect();
         stored.write(stored.rows, &utf16);
