@@ -20,13 +20,13 @@ pub(crate) enum Weights {
 
 /// Keeps every estimate and fuses all of them again with every update (§V-A).
 ///
-/// `average` gives the estimates equal covariances; `weighted-average` uses their own. In both methods
-/// the covariance of the result follows from the estimates' own. The covariance of a camera motion is
-/// added to every estimate held. Its errors are the same in all of them, which [`crate::RecursiveFuser`]
-/// accounts for and this fuser does not.
+/// `average` gives the estimates equal covariances; `weighted-average` uses their own. In both
+/// methods the covariance of the result follows from the estimates' own. The covariance of a camera
+/// motion is added to every estimate held. Its errors are the same in all of them, which
+/// [`crate::RecursiveFuser`] accounts for and this fuser does not.
 ///
-/// Cost of an update: about 1 µs per estimate held, see [`Fusion`]. Memory: about 700 bytes per estimate,
-/// up to the window.
+/// Cost of an update: about 1 µs per estimate held, see [`Fusion`]. Memory: about 700 bytes per
+/// estimate, up to the window.
 #[derive(Clone, Debug)]
 pub struct BatchFuser {
     config: FuserConfig,
@@ -37,8 +37,8 @@ pub struct BatchFuser {
     fused: Option<PoseEstimate>,
     /// Invariant: its terms are those of `held`.
     fusion: Fusion,
-    /// From the camera frame in which the estimates are held. Fusing is equivariant, so they need not move
-    /// with the camera.
+    /// From the camera frame in which the estimates are held. Fusing is equivariant, so they need
+    /// not move with the camera.
     camera_from_anchor: CameraMotion,
 }
 
@@ -137,8 +137,8 @@ impl Fuser for BatchFuser {
             self.fusion
                 .push_weighted(&held.estimate.camera_from_object, &held.weight);
         }
-        // With the adjoint, the carried result is the result of the carried estimates. Kept covariances
-        // weigh differently in the new frame.
+        // With the adjoint, the carried result is the result of the carried estimates. Kept
+        // covariances weigh differently in the new frame.
         if let (Transport::Kept, Some(start), 2..) = (transport, self.fused, self.held.len()) {
             self.fuse(&start);
         }

@@ -7,7 +7,8 @@ use crate::unit::UnitCovariance;
 /// The paper's floor is open; this one keeps an exact match (e_MVE = 0) invertible.
 pub const MVE_FLOOR: f64 = 1e-3;
 
-/// e_MVE times a unit covariance: the paper's proxy (§V), which it calls "not theoretically grounded".
+/// e_MVE times a unit covariance: the paper's proxy (§V), which it calls "not theoretically
+/// grounded".
 ///
 /// An MVE that is not known counts as 1.
 ///
@@ -21,6 +22,7 @@ pub const MVE_FLOOR: f64 = 1e-3;
 /// ```
 // Deviation: §V weighs by e_MVE as it is; an exact match would weigh infinitely, so e_MVE is floored at 1e-3.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MveCovariance {
     /// What an MVE of 1 means.
     pub unit: UnitCovariance,
@@ -51,16 +53,21 @@ impl MveCovariance {
     }
 }
 
-/// The covariance of the registration itself, inflated by what the MVE says about wrong correspondences.
+/// The covariance of the registration itself, inflated by what the MVE says about wrong
+/// correspondences.
 ///
-/// Σ = s² Σ_reg + (f² + (g e^p)²) U with U the unit covariance. Σ_reg (`Quality::covariance` of an outcome) knows which directions the
-/// geometry constrains, but assumes that the pairs are right and their errors independent; the second term is what it does not
-/// know: a floor of f units that no image is better than (systematic errors of camera and model), and a share that grows with
-/// the MVE e. Where the pairs leave a direction open there is no Σ_reg, and the share is `undetermined` units instead of f.
+/// Σ = s² Σ_reg + (f² + (g e^p)²) U with U the unit covariance. Σ_reg (`Quality::covariance` of an
+/// outcome) knows which directions the geometry constrains, but assumes that the pairs are right
+/// and their errors independent; the second term is what it does not know: a floor of f units that
+/// no image is better than (systematic errors of camera and model), and a share that grows with the
+/// MVE e. Where the pairs leave a direction open there is no Σ_reg, and the share is `undetermined`
+/// units instead of f.
 ///
-/// With `UnitCovariance::AboutObject` a standard deviation of one unit is a radius and 1 rad. **The defaults are not calibrated**:
-/// fit the factors where the truth is known, until ξᵀΣ⁻¹ξ of the errors is distributed like χ²₆.
+/// With `UnitCovariance::AboutObject` a standard deviation of one unit is a radius and 1 rad. **The
+/// defaults are not calibrated**: fit the factors where the truth is known, until ξᵀΣ⁻¹ξ of the
+/// errors is distributed like χ²₆.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InflatedCovariance {
     /// What one unit of the factors below means.
     pub unit: UnitCovariance,
@@ -77,7 +84,8 @@ pub struct InflatedCovariance {
 }
 
 impl InflatedCovariance {
-    /// Makes the model with plausible, uncalibrated factors: s = 3, f = 0.01, g = 1, p = 2, undetermined 0.3.
+    /// Makes the model with plausible, uncalibrated factors: s = 3, f = 0.01, g = 1, p = 2,
+    /// undetermined 0.3.
     #[must_use]
     pub fn uncalibrated(unit: UnitCovariance) -> Self {
         Self {
@@ -90,7 +98,8 @@ impl InflatedCovariance {
         }
     }
 
-    /// Returns Σ for an estimate with the given MVE (1 where not known) and covariance of the registration.
+    /// Returns Σ for an estimate with the given MVE (1 where not known) and covariance of the
+    /// registration.
     #[must_use]
     pub fn covariance(
         &self,
@@ -113,6 +122,7 @@ impl InflatedCovariance {
 
 /// Where the covariance of an estimate comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CovarianceModel {
     /// A unit for every estimate.

@@ -11,7 +11,8 @@ pub const MAX_TRANSLATION_METERS: f64 = 1e6;
 /// Largest accepted entry of a covariance, m² or rad².
 pub const MAX_VARIANCE: f64 = 1e60;
 
-/// Share of the largest entry that rounding may take from symmetry and from the smallest eigenvalue.
+/// Share of the largest entry that rounding may take from symmetry and from the smallest
+/// eigenvalue.
 const ROUNDING: f64 = 1e-9;
 
 /// An invalid estimate, motion or parameter.
@@ -95,10 +96,12 @@ pub enum FusionError {
     Empty,
 }
 
-/// An object's estimated pose in the current camera frame, with its 6×6 covariance and optional MVE.
+/// An object's estimated pose in the current camera frame, with its 6×6 covariance and optional
+/// MVE.
 ///
-/// The covariance describes a *left* perturbation T = exp(ξ^) T̄ with ξ = [ρ; φ] (meters, then radians)
-/// in the camera frame (Barfoot & Furgale 2014; see [`hicp_core::se3`]). It may be singular, or zero.
+/// The covariance describes a *left* perturbation T = exp(ξ^) T̄ with ξ = [ρ; φ] (meters, then
+/// radians) in the camera frame (Barfoot & Furgale 2014; see [`hicp_core::se3`]). It may be
+/// singular, or zero.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -114,6 +117,7 @@ pub enum FusionError {
 /// # Ok(()) }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PoseEstimate {
     pub(crate) camera_from_object: Isometry3<f64>,
     pub(crate) covariance: Matrix6<f64>,
@@ -125,8 +129,8 @@ impl PoseEstimate {
     ///
     /// # Errors
     ///
-    /// [`FusionError`] if the pose is not a rigid motion within ±[`MAX_TRANSLATION_METERS`], or if the
-    /// covariance is not symmetric, positive semidefinite and within [`MAX_VARIANCE`].
+    /// [`FusionError`] if the pose is not a rigid motion within ±[`MAX_TRANSLATION_METERS`], or if
+    /// the covariance is not symmetric, positive semidefinite and within [`MAX_VARIANCE`].
     pub fn new(
         camera_from_object: Isometry3<f64>,
         covariance: Matrix6<f64>,
@@ -176,8 +180,8 @@ impl PoseEstimate {
 
     /// Returns the squared Mahalanobis distance of two independent estimates of one pose.
     ///
-    /// The distance is ξᵀ(Σ + Σ′)⁻¹ξ with ξ = ln(T T′⁻¹)^∨. If both covariances are right and small, it
-    /// follows χ² with 6 degrees of freedom: mean 6, 99 % below 16.8, 99.9 % below 22.5.
+    /// The distance is ξᵀ(Σ + Σ′)⁻¹ξ with ξ = ln(T T′⁻¹)^∨. If both covariances are right and
+    /// small, it follows χ² with 6 degrees of freedom: mean 6, 99 % below 16.8, 99.9 % below 22.5.
     #[must_use]
     pub fn mahalanobis_squared(&self, other: &Self) -> f64 {
         let xi = se3::log(&(self.camera_from_object * other.camera_from_object.inverse()));

@@ -7,20 +7,22 @@ use crate::estimate::PoseEstimate;
 use crate::motion::CameraMotion;
 use crate::solution::Solution;
 
-/// Fuses the estimates that arrive while the camera moves into one, in the current camera frame (§V).
+/// Fuses the estimates that arrive while the camera moves into one, in the current camera frame
+/// (§V).
 ///
 /// A custom fuser moves what it holds with [`CameraMotion::carry`] and fuses with
-/// [`Fusion`](crate::Fusion) or in its own way. It reports [`Solution::NONE`] if it solves nothing, and
-/// [`Failure::Custom`] if it rejects an estimate. `hicp-testkit` checks the contract.
+/// [`Fusion`](crate::Fusion) or in its own way. It reports [`Solution::NONE`] if it solves nothing,
+/// and [`Failure::Custom`] if it rejects an estimate. `hicp-testkit` checks the contract.
 ///
 /// # Contract
 ///
-/// - [`Fuser::propagate`] takes everything held to the next camera frame. [`Fuser::update`] takes an
-///   estimate in the current frame. [`Fuser::estimate`] returns the fused one there, and `None` before the
-///   first update.
-/// - After one update the fused estimate is that update's, covariance included, unless it was rejected.
-/// - A fuser never panics and never returns numbers that are not finite. Estimates and motions are checked
-///   when they are created.
+/// - [`Fuser::propagate`] takes everything held to the next camera frame. [`Fuser::update`] takes
+///   an estimate in the current frame. [`Fuser::estimate`] returns the fused one there, and `None`
+///   before the first update.
+/// - After one update the fused estimate is that update's, covariance included, unless it was
+///   rejected.
+/// - A fuser never panics and never returns numbers that are not finite. Estimates and motions are
+///   checked when they are created.
 /// - Pure: equal calls since the last [`Fuser::reset`] give equal bits.
 /// - A warm update (as many estimates held before, then reset) makes no heap allocation.
 ///
@@ -62,7 +64,7 @@ use crate::solution::Solution;
 /// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a fuser",
-    label = "expected a type that implements `Fuser`",
+    label = "this must implement `Fuser`",
     note = "`Fuser` is implemented by `BatchFuser`, `RecursiveFuser`, `LastEstimate`, `MostConfident`, by `Gated`, \
             `SymmetryAware` and `SharedError` around a fuser, and by the boxes that `FusionMethod::build` returns"
 )]
@@ -85,7 +87,7 @@ pub trait Fuser {
     }
 }
 
-macro_rules! forward_fuser {
+macro_rules! forward {
     ($($pointer:ty),*) => {$(
         impl<T: Fuser + ?Sized> Fuser for $pointer {
             fn propagate(&mut self, motion: &CameraMotion) {
@@ -111,20 +113,22 @@ macro_rules! forward_fuser {
     )*};
 }
 
-forward_fuser!(Box<T>, &mut T);
+forward!(Box<T>, &mut T);
 
 /// The decision of a [`Fuser`] about an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Update {
     /// The estimate was fused.
     Accepted(Solution),
-    /// The estimate failed a gate, but stands until a better one arrives, because nothing else is held.
+    /// The estimate failed a gate, but stands until a better one arrives, because nothing else is
+    /// held.
     Provisional(Failure, Solution),
     /// The estimate was left out.
     Rejected(Failure),
-    /// The estimate contradicts what was held, as those before it did. Everything held was removed, and
-    /// the estimate is the new start.
+    /// The estimate contradicts what was held, as those before it did. Everything held was removed,
+    /// and the estimate is the new start.
     Restarted(Failure, Solution),
 }
 
@@ -171,6 +175,7 @@ impl Update {
 
 /// The reason why an estimate failed.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Failure {
     /// The pose does not explain its image: the MVE is too large.

@@ -6,15 +6,17 @@ use crate::estimate::{FusionError, PoseEstimate};
 use crate::information::{information, symmetrized};
 use crate::solution::{Fused, FusionLimits, Solution};
 
-/// The fusion of Barfoot & Furgale (T-RO 2014, §V): the pose that minimises V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ with
-/// ξₖ = ln(T Tₖ⁻¹)^∨, by Gauss–Newton on SE(3).
+/// The fusion of Barfoot & Furgale (T-RO 2014, §V): the pose that minimises V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ
+/// with ξₖ = ln(T Tₖ⁻¹)^∨, by Gauss–Newton on SE(3).
 ///
-/// Per evaluation, with Gₖ = 𝓙(ξₖ)⁻¹ (the *left* Jacobian for this sign of ξ):
-/// A = Σ Gₖᵀ Σₖ⁻¹ Gₖ, b = Σ Gₖᵀ Σₖ⁻¹ ξₖ, ε = −A⁻¹ b, T ← exp(ε^) T. A step that raises V is halved until it does not, so that
-/// estimates scattered over half turns, between which V has several minima, end in one of them.
+/// Per evaluation, with Gₖ = 𝓙(ξₖ)⁻¹ (the *left* Jacobian for this sign of ξ): A = Σ Gₖᵀ Σₖ⁻¹ Gₖ, b
+/// = Σ Gₖᵀ Σₖ⁻¹ ξₖ, ε = −A⁻¹ b, T ← exp(ε^) T. A step that raises V is halved until it does not, so
+/// that estimates scattered over half turns, between which V has several minima, end in one of
+/// them.
 ///
-/// The workspace keeps its memory: pushing no more estimates than before allocates nothing. Cost: per estimate an inversion, and
-/// per evaluation and estimate a logarithm, a Jacobian and two products of 6×6 matrices.
+/// The workspace keeps its memory: pushing no more estimates than before allocates nothing. Cost:
+/// per estimate an inversion, and per evaluation and estimate a logarithm, a Jacobian and two
+/// products of 6×6 matrices.
 #[derive(Clone, Debug, Default)]
 pub struct Fusion {
     /// When to end.
@@ -52,7 +54,8 @@ impl Fusion {
         self.terms.clear();
     }
 
-    /// Adds an estimate. Directions without variance count as known to [`crate::MIN_STANDARD_DEVIATION`].
+    /// Adds an estimate. Directions without variance count as known to
+    /// [`crate::MIN_STANDARD_DEVIATION`].
     pub fn push(&mut self, estimate: &PoseEstimate) {
         self.push_weighted(&estimate.camera_from_object, &estimate.covariance);
     }
@@ -120,7 +123,8 @@ impl Fusion {
                 break;
             }
             if step.norm() < self.limits.tolerance {
-                // Below the tolerance the step is an improvement beyond question, and not worth an evaluation.
+                // Below the tolerance the step is an improvement beyond question, and not worth an
+                // evaluation.
                 pose = moved(&pose, &step);
                 converged = true;
                 break;
@@ -141,7 +145,8 @@ impl Fusion {
                 step *= 0.5;
             };
             if !falls {
-                // The smallest step raises V: as near to a minimum as rounding allows, or out of evaluations.
+                // The smallest step raises V: as near to a minimum as rounding allows, or out of
+                // evaluations.
                 converged = step.norm() < self.limits.tolerance;
                 break;
             }
@@ -157,8 +162,9 @@ impl Fusion {
         })
     }
 
-    /// Returns the covariance of the fused pose when the estimates, weighed as they were pushed, have covariances of their own:
-    /// A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. One matrix per estimate, in the order of pushing.
+    /// Returns the covariance of the fused pose when the estimates, weighed as they were pushed,
+    /// have covariances of their own: A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. One
+    /// matrix per estimate, in the order of pushing.
     pub(crate) fn covariance_from<'a>(
         &self,
         fused: &PoseEstimate,
@@ -238,8 +244,8 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
 ///
 /// # Errors
 ///
-/// [`FusionError::Empty`] without estimates. An iteration that does not converge is not an error; see
-/// [`Fused::solution`].
+/// [`FusionError::Empty`] without estimates. An iteration that does not converge is not an error;
+/// see [`Fused::solution`].
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};

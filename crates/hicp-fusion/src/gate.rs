@@ -10,14 +10,16 @@ pub const CHI_SQUARED_6_999: f64 = 22.458;
 
 /// Which estimates pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gate {
     /// Largest MVE that passes; `None` asks for none. An estimate without an MVE passes.
     pub max_mve: Option<f64>,
-    /// Largest squared Mahalanobis distance from what is held, by both covariances together; `None` asks for none. Only as good as
-    /// the covariances: χ²₆ if they are right.
+    /// Largest squared Mahalanobis distance from what is held, by both covariances together; `None`
+    /// asks for none. Only as good as the covariances: χ²₆ if they are right.
     pub max_mahalanobis_squared: Option<f64>,
-    /// Consecutive estimates too far from what is held after which what is held is the one that is wrong: it is forgotten, and
-    /// the last of them starts anew. `None` never gives up, and neither does 0.
+    /// Consecutive estimates too far from what is held after which what is held is the one that is
+    /// wrong: it is forgotten, and the last of them starts anew. `None` never gives up, and neither
+    /// does 0.
     pub restart_after: Option<usize>,
 }
 
@@ -34,8 +36,8 @@ impl Default for Gate {
 
 /// A fuser behind a [`Gate`]: what fails is not fused.
 ///
-/// While nothing has passed, there is something all the same: the estimate with the lowest MVE, the first of equals, stands
-/// provisionally, alone, until the first one passes.
+/// While nothing has passed, there is something all the same: the estimate with the lowest MVE, the
+/// first of equals, stands provisionally, alone, until the first one passes.
 ///
 /// Inside [`crate::SymmetryAware`], not around it: a symmetric pose is no outlier.
 ///

@@ -22,7 +22,8 @@ pub(crate) fn transported(covariance: &Matrix6<f64>, adjoint: &Matrix6<f64>) -> 
     symmetrized(&(adjoint * covariance * adjoint.transpose()))
 }
 
-/// Returns Σ⁻¹. A Σ that is singular to working precision first has its eigenvalues raised to [`MIN_STANDARD_DEVIATION`]².
+/// Returns Σ⁻¹. A Σ that is singular to working precision first has its eigenvalues raised to
+/// [`MIN_STANDARD_DEVIATION`]².
 pub(crate) fn information(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     if let Some(factor) = regular_factor(covariance) {
         return symmetrized(&factor.inverse());
@@ -32,7 +33,8 @@ pub(crate) fn information(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     symmetrized(&(vectors * inverse * vectors.transpose()))
 }
 
-/// Returns ln det Σ, with the eigenvalues of a singular Σ raised as in [`information`]. Motions do not change it: det Ad = 1.
+/// Returns ln det Σ, with the eigenvalues of a singular Σ raised as in [`information`]. Motions do
+/// not change it: det Ad = 1.
 pub(crate) fn log_determinant(covariance: &Matrix6<f64>) -> f64 {
     if let Some(factor) = regular_factor(covariance) {
         let l = factor.l_dirty();

@@ -5,8 +5,8 @@
 //! - [`FusionMethod`]: the paper's six methods (§V-A).
 //! - [`Gated`], [`SymmetryAware`], [`SharedError`]: fusers around a fuser.
 //!
-//! **Should you use this crate?** Yes, to fuse poses with covariances from any source: it depends on
-//! `hicp-core` only, and re-exports it. To estimate a pose from images along a trajectory, use
+//! **Should you use this crate?** Yes, to fuse poses with covariances from any source: it depends
+//! on `hicp-core` only, and re-exports it. To estimate a pose from images along a trajectory, use
 //! `hybrid_icp::SequentialEstimator`, which drives a fuser.
 //!
 //! ```
@@ -31,8 +31,8 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Conventions: poses are `camera_from_object`. Twists are ξ = [ρ; φ], translation first, in meters and
-//! radians. Covariances describe left perturbations T = exp(ξ^) T̄ in the camera frame.
+//! Conventions: poses are `camera_from_object`. Twists are ξ = [ρ; φ], translation first, in meters
+//! and radians. Covariances describe left perturbations T = exp(ξ^) T̄ in the camera frame.
 
 mod batch;
 mod config;

@@ -15,6 +15,8 @@ pub type BoxedFuser = Box<dyn Fuser + Send>;
 
 /// A method of §V-A, by its name in the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum FusionMethod {
     /// [`LastEstimate`].
@@ -72,7 +74,8 @@ impl FusionMethod {
         }
     }
 
-    /// Returns whether the result depends on the covariances of the estimates, which in the paper take an MVE.
+    /// Returns whether the result depends on the covariances of the estimates, which in the paper
+    /// take an MVE.
     #[must_use]
     pub fn uses_covariances(self) -> bool {
         matches!(

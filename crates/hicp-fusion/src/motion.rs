@@ -5,10 +5,11 @@ use hicp_core::{Isometry3, Matrix6, se3};
 use crate::estimate::{FusionError, PoseEstimate, check_motion, checked_covariance};
 use crate::information::transported;
 
-/// A known motion of the camera, T_C′C of §V: takes coordinates in the previous camera frame to the next.
+/// A known motion of the camera, T_C′C of §V: takes coordinates in the previous camera frame to the
+/// next.
 ///
-/// It may have a covariance, of a left perturbation in the *next* camera frame, for the uncertainty of
-/// the kinematics or the odometry.
+/// It may have a covariance, of a left perturbation in the *next* camera frame, for the uncertainty
+/// of the kinematics or the odometry.
 ///
 /// ```
 /// use hicp_core::Isometry3;
@@ -52,7 +53,8 @@ impl CameraMotion {
         }
     }
 
-    /// Returns the motion with a covariance of ξ = [ρ; φ], a left perturbation in the next camera frame.
+    /// Returns the motion with a covariance of ξ = [ρ; φ], a left perturbation in the next camera
+    /// frame.
     ///
     /// # Errors
     ///
@@ -87,9 +89,9 @@ impl CameraMotion {
 
     /// Returns an estimate in the next camera frame.
     ///
-    /// To first order the covariance becomes Σ_A + Ad(A) Σ Ad(A)ᵀ with Σ_A the motion's own covariance, or
-    /// Σ_A + Σ with [`Transport::Kept`]. The MVE stays. A custom [`Fuser`](crate::Fuser) calls this in
-    /// [`propagate`](crate::Fuser::propagate).
+    /// To first order the covariance becomes Σ_A + Ad(A) Σ Ad(A)ᵀ with Σ_A the motion's own
+    /// covariance, or Σ_A + Σ with [`Transport::Kept`]. The MVE stays. A custom
+    /// [`Fuser`](crate::Fuser) calls this in [`propagate`](crate::Fuser::propagate).
     ///
     /// ```
     /// use hicp_core::{Isometry3, Matrix6};
@@ -134,13 +136,14 @@ impl CameraMotion {
 /// The effect of a camera motion A on the covariance of an estimate.
 // Deviation: §V moves poses and is silent on covariances; by default they move along. `Transport::Kept` is the plain reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Transport {
-    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty, written in the next camera frame. The fused estimate
-    /// then does not depend on the frame in which it is fused.
+    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty, written in the next camera frame. The fused
+    /// estimate then does not depend on the frame in which it is fused.
     #[default]
     Adjoint,
-    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention the covariances.
-    /// The fused estimate depends on the frame.
+    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention the
+    /// covariances. The fused estimate depends on the frame.
     Kept,
 }

@@ -12,10 +12,10 @@ use crate::solution::Solution;
 
 /// Keeps one estimate, and fuses each new one with it (§V-A).
 ///
-/// `filtering-constant` gives every new estimate the unit covariance; `filtering` uses its own. The pose
-/// differs from that of all estimates fused at once by terms of second order in their spread. The
-/// covariance of a camera motion is added to the estimate held, so older estimates lose weight against
-/// newer ones in `filtering`.
+/// `filtering-constant` gives every new estimate the unit covariance; `filtering` uses its own. The
+/// pose differs from that of all estimates fused at once by terms of second order in their spread.
+/// The covariance of a camera motion is added to the estimate held, so older estimates lose weight
+/// against newer ones in `filtering`.
 ///
 /// Cost of an update: that of fusing two estimates. Memory does not grow.
 #[derive(Clone, Debug)]

@@ -5,12 +5,12 @@ use crate::fuser::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 
-/// Adds to what a fuser believes the error that its estimates share: that of the model, of the camera's calibration. However many
-/// estimates there are, it does not average away.
+/// Adds to what a fuser believes the error that its estimates share: that of the model, of the
+/// camera's calibration. However many estimates there are, it does not average away.
 ///
-/// The estimates that go in have the covariances of what differs between them; these alone weigh and are gated. The covariance that
-/// comes out is that of the fuser inside plus σ² U, with U the unit covariance at the pose: after one update it is larger than that
-/// update's.
+/// The estimates that go in have the covariances of what differs between them; these alone weigh
+/// and are gated. The covariance that comes out is that of the fuser inside plus σ² U, with U the
+/// unit covariance at the pose: after one update it is larger than that update's.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};

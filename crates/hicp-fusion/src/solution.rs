@@ -4,6 +4,7 @@ use crate::estimate::PoseEstimate;
 
 /// When the iteration of [`Fusion`](crate::Fusion) ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FusionLimits {
     /// Largest number of evaluations of the cost.
     pub max_iterations: usize,
@@ -12,8 +13,8 @@ pub struct FusionLimits {
 }
 
 impl Default for FusionLimits {
-    /// 50 evaluations, 10⁻¹⁰. Estimates that spread over 0.1 rad need about 6 evaluations, over 0.4 rad
-    /// about 9.
+    /// 50 evaluations, 10⁻¹⁰. Estimates that spread over 0.1 rad need about 6 evaluations, over 0.4
+    /// rad about 9.
     fn default() -> Self {
         Self {
             max_iterations: 50,
@@ -24,14 +25,16 @@ impl Default for FusionLimits {
 
 /// How an iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Solution {
     /// Evaluations of the cost; 0 if nothing was solved.
     pub iterations: usize,
-    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the pose evaluated last: about 3(K − 1) for K estimates whose covariances
-    /// are right.
+    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the pose evaluated last: about 3(K − 1) for K estimates whose
+    /// covariances are right.
     pub cost: f64,
-    /// Whether the last step was shorter than the tolerance. Otherwise the pose is the best one evaluated.
+    /// Whether the last step was shorter than the tolerance. Otherwise the pose is the best one
+    /// evaluated.
     pub converged: bool,
 }
 
@@ -56,10 +59,11 @@ impl Solution {
 
 /// Several estimates fused into one.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Fused {
-    /// The fused pose, without an MVE. Its covariance is A⁻¹ at the minimum (Laplace), which holds if the
-    /// covariances of the estimates are right and their errors independent.
+    /// The fused pose, without an MVE. Its covariance is A⁻¹ at the minimum (Laplace), which holds
+    /// if the covariances of the estimates are right and their errors independent.
     pub estimate: PoseEstimate,
     /// How the iteration ended.
     pub solution: Solution,

@@ -10,16 +10,19 @@ use crate::unit::UnitCovariance;
 /// Share of a length that is rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Square of the sine of an angle below which two axes are one, declared twice: ten degrees, for those of a sphere are far apart.
+/// Square of the sine of an angle below which two axes are one, declared twice: ten degrees, for
+/// those of a sphere are far apart.
 const PARALLEL: f64 = 0.03;
 
-/// A fuser for an object with declared symmetries: each estimate is replaced by the equivalent pose nearest to what is held.
+/// A fuser for an object with declared symmetries: each estimate is replaced by the equivalent pose
+/// nearest to what is held.
 ///
-/// Poses T and T·S are the same to the eye for a symmetry S; averaged as they come, 0° and 180° make 90°. Nearest is by
+/// Poses T and T·S are the same to the eye for a symmetry S; averaged as they come, 0° and 180°
+/// make 90°. Nearest is by
 /// |φ|²r² + |Δc|² with φ the rotation between the poses, c the object's centre and r its radius. Continuous symmetries are
-/// solved in closed form for φ (the centre lies on the axis of such an object), for every discrete one. Two axes make a sphere, for
-/// which every rotation about the point where they meet is a symmetry. The covariance needs no change: it lives in the camera frame,
-/// on the other side.
+/// solved in closed form for φ (the centre lies on the axis of such an object), for every discrete
+/// one. Two axes make a sphere, for which every rotation about the point where they meet is a
+/// symmetry. The covariance needs no change: it lives in the camera frame, on the other side.
 ///
 /// Cost of an update: well below a microsecond per discrete symmetry and axis.
 ///
@@ -51,11 +54,13 @@ pub struct SymmetryAware<F> {
 }
 
 impl<F: Fuser> SymmetryAware<F> {
-    /// Makes a fuser of estimates of an object; centre (object frame) and radius (metres) are those of `hicp_core::Model`.
+    /// Makes a fuser of estimates of an object; centre (object frame) and radius (metres) are those
+    /// of `hicp_core::Model`.
     ///
     /// # Errors
     ///
-    /// [`FusionError`] when a discrete symmetry is not a rigid motion, or the centre or radius is out of range.
+    /// [`FusionError`] when a discrete symmetry is not a rigid motion, or the centre or radius is
+    /// out of range.
     pub fn new(
         inner: F,
         symmetries: Symmetries,
@@ -82,7 +87,8 @@ impl<F: Fuser> SymmetryAware<F> {
         &self.inner
     }
 
-    /// Returns the pose equivalent to `pose` that is nearest to `reference`; `pose` bit for bit if it is that itself.
+    /// Returns the pose equivalent to `pose` that is nearest to `reference`; `pose` bit for bit if
+    /// it is that itself.
     #[must_use]
     pub fn representative(
         &self,
@@ -94,7 +100,8 @@ impl<F: Fuser> SymmetryAware<F> {
         let rounding = ROUNDING * (self.radius + places);
         let mut consider = |candidate: Isometry3<f64>| {
             let distance = self.distance(&candidate, reference);
-            // By more than the rounding of the lengths that it is a difference of: what is nearest already stays as it is.
+            // By more than the rounding of the lengths that it is a difference of: what is nearest
+            // already stays as it is.
             if distance < best.1 - rounding {
                 best = (candidate, distance);
             }
@@ -124,7 +131,8 @@ impl<F: Fuser> SymmetryAware<F> {
     }
 }
 
-/// The point where two axes of a sphere meet (the one nearest to both, as declared axes are rounded); `None` where all are one.
+/// The point where two axes of a sphere meet (the one nearest to both, as declared axes are
+/// rounded); `None` where all are one.
 fn center_of_all_turns(axes: &[SymmetryAxis]) -> Option<Point3<f64>> {
     let (first, others) = axes.split_first()?;
     others.iter().find_map(|second| {
@@ -144,7 +152,8 @@ fn center_of_all_turns(axes: &[SymmetryAxis]) -> Option<Point3<f64>> {
 
 /// Turns the object about an axis of its own so that its rotation comes nearest to the reference's.
 ///
-/// tr(C_refᵀ C R(θ)) = const + p cos θ + q sin θ, with p = tr M − aᵀMa and q = tr(M a^) for M = C_refᵀ C: largest at atan2(q, p).
+/// tr(C_refᵀ C R(θ)) = const + p cos θ + q sin θ, with p = tr M − aᵀMa and q = tr(M a^) for M =
+/// C_refᵀ C: largest at atan2(q, p).
 fn turned(
     pose: &Isometry3<f64>,
     reference: &Isometry3<f64>,

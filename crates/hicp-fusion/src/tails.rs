@@ -2,11 +2,13 @@
 
 /// Returns the probability that ξᵀΣ⁻¹ξ of a pose's error ξ is at most `mahalanobis_squared`.
 ///
-/// With `degrees_of_freedom` ν the error follows Student's distribution in six dimensions with scale matrix Σ: outliers that no
-/// covariance foresees give it heavy tails. ν = ∞ is the normal distribution, and the result that of χ²₆. What is not between 0 and
-/// ∞ (NaN included) has probability 0; a ν that is not positive counts as ∞, and so does one from 10⁷ on.
+/// With `degrees_of_freedom` ν the error follows Student's distribution in six dimensions with
+/// scale matrix Σ: outliers that no covariance foresees give it heavy tails. ν = ∞ is the normal
+/// distribution, and the result that of χ²₆. What is not between 0 and ∞ (NaN included) has
+/// probability 0; a ν that is not positive counts as ∞, and so does one from 10⁷ on.
 ///
-/// With u = x/(x + ν) and b = ν/2 it is the regularised incomplete beta function I_u(3, b) = 1 − (1 − u)ᵇ (1 + b u + b (b + 1) u²/2).
+/// With u = x/(x + ν) and b = ν/2 it is the regularised incomplete beta function I_u(3, b) = 1 − (1
+/// − u)ᵇ (1 + b u + b (b + 1) u²/2).
 ///
 /// ```
 /// use hicp_fusion::{CHI_SQUARED_6_999, probability_within};
@@ -43,7 +45,8 @@ mod tests {
     #[test]
     fn it_is_the_integral_of_the_density() {
         for nu in [1.0, 2.5, 4.0, 30.0] {
-            // Γ((ν + 6)/2)/(Γ(ν/2) Γ(3) ν³) x² (1 + x/ν)^(−(ν + 6)/2), with Γ(b + 3)/Γ(b) = b (b + 1) (b + 2).
+            // Γ((ν + 6)/2)/(Γ(ν/2) Γ(3) ν³) x² (1 + x/ν)^(−(ν + 6)/2), with Γ(b + 3)/Γ(b) = b (b +
+            // 1) (b + 2).
             let b = 0.5 * nu;
             let factor = b * (b + 1.0) * (b + 2.0) / (2.0 * nu * nu * nu);
             let density = |x: f64| factor * x * x * (1.0 + x / nu).powf(-(b + 3.0));

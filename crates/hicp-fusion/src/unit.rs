@@ -7,14 +7,17 @@ use crate::information::transported;
 
 /// The shape of a covariance whose size is a single number, as the paper's e_MVE·I₆ and I₆ are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum UnitCovariance {
-    /// I₆ in the camera frame, the paper's: metres and radians count alike, and a rotation is one about the *camera's* origin,
-    /// which takes the object along. What is fused depends on the camera's place.
+    /// I₆ in the camera frame, the paper's: metres and radians count alike, and a rotation is one
+    /// about the *camera's* origin, which takes the object along. What is fused depends on the
+    /// camera's place.
     #[default]
     Identity,
-    /// diag(r², r², r², 1, 1, 1) about the object's centre: a rotation by 1 rad counts as a translation by the object's radius.
-    /// Isotropic there, so that Ad(A) takes it to itself, whatever the motion A.
+    /// diag(r², r², r², 1, 1, 1) about the object's centre: a rotation by 1 rad counts as a
+    /// translation by the object's radius. Isotropic there, so that Ad(A) takes it to itself,
+    /// whatever the motion A.
     AboutObject {
         /// The point that the object turns about, object frame, metres.
         center: Point3<f64>,
@@ -28,7 +31,8 @@ impl UnitCovariance {
     ///
     /// # Errors
     ///
-    /// [`FusionError::Parameter`] when the radius is not between 10⁻⁶ and 10⁶ m or the centre not within 10⁶ m.
+    /// [`FusionError::Parameter`] when the radius is not between 10⁻⁶ and 10⁶ m or the centre not
+    /// within 10⁶ m.
     pub fn about_object(center: Point3<f64>, radius: f64) -> Result<Self, FusionError> {
         let farthest = center.coords.amax();
         for (name, value, least, expected) in [

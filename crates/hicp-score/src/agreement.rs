@@ -26,7 +26,8 @@ pub(crate) struct Agreement<R> {
     pub(crate) cx: f64,
     pub(crate) inverse_fx: f64,
     pub(crate) diameter: f64,
-    /// Rendered pixels outside the mask do not count if they are this far behind the measured surface, meters.
+    /// Rendered pixels outside the mask do not count if they are this far behind the measured
+    /// surface, meters.
     pub(crate) hidden_beyond: f64,
 }
 

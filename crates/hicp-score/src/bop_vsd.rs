@@ -7,14 +7,16 @@ use crate::vsd::{ScoreError, visibility_masks, vsd};
 
 /// Returns e_VSD(τ) for τ = 5 %, …, 50 % of the diameter with the visibility masks of BOP'19.
 ///
-/// `test` is the measured depth, `estimate` and `truth` are renders of the object at both poses with the camera of the
-/// test image; `delta` is the visibility tolerance (metres; [`crate::VISIBILITY_TOLERANCE_METERS`] for all datasets but
-/// ITODD, which has 0.005). 1 for every τ where neither render shows a visible pixel. Cost: O(pixels of the smallest
-/// rectangle around both renders): elsewhere neither pose can be visible.
+/// `test` is the measured depth, `estimate` and `truth` are renders of the object at both poses
+/// with the camera of the test image; `delta` is the visibility tolerance (metres;
+/// [`crate::VISIBILITY_TOLERANCE_METERS`] for all datasets but ITODD, which has 0.005). 1 for every
+/// τ where neither render shows a visible pixel. Cost: O(pixels of the smallest rectangle around
+/// both renders): elsewhere neither pose can be visible.
 ///
 /// # Errors
 ///
-/// [`ScoreError`] when the test image is not of the camera's size, or the diameter is not finite and positive.
+/// [`ScoreError`] when the test image is not of the camera's size, or the diameter is not finite
+/// and positive.
 pub fn bop_vsd(
     test: &DepthImage,
     camera: &PinholeCamera,
@@ -59,9 +61,11 @@ pub fn bop_vsd(
     )
 }
 
-/// Returns whether the spheres of the object's diameter about its origin at two poses overlap in the image.
+/// Returns whether the spheres of the object's diameter about its origin at two poses overlap in
+/// the image.
 ///
-/// Where they do not, BOP takes every e_VSD as 1 without rendering. False for a pose that is not in front of the camera.
+/// Where they do not, BOP takes every e_VSD as 1 without rendering. False for a pose that is not in
+/// front of the camera.
 #[must_use]
 pub fn spheres_overlap(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, diameter: f64) -> bool {
     let (a, b) = (&estimate.translation.vector, &truth.translation.vector);

@@ -2,6 +2,7 @@
 
 /// The score of an estimate, labeled with whether the estimate is correct.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LabeledScore {
     /// Confidence; higher is better.
     pub score: f64,
@@ -11,9 +12,9 @@ pub struct LabeledScore {
 
 /// Returns the area under the ROC curve; `None` unless there are correct and wrong estimates.
 ///
-/// The area is the probability that a correct estimate has a higher score than a wrong one, where equal
-/// scores count half (the Mann-Whitney statistic, exact with ties). ½ means that the score has no
-/// information, 1 that some threshold separates correct from wrong. Cost: O(n log n).
+/// The area is the probability that a correct estimate has a higher score than a wrong one, where
+/// equal scores count half (the Mann-Whitney statistic, exact with ties). ½ means that the score
+/// has no information, 1 that some threshold separates correct from wrong. Cost: O(n log n).
 ///
 /// ```
 /// use hicp_score::{LabeledScore, roc_area};
@@ -43,6 +44,7 @@ pub fn roc_area(labeled: &[LabeledScore]) -> Option<f64> {
 
 /// The estimates with scores in one range: a line of a reliability table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ReliabilityBin {
     /// Lower bound of the scores, included.
     pub lower: f64,
@@ -63,7 +65,8 @@ impl ReliabilityBin {
         (self.count > 0).then(|| self.correct as f64 / self.count as f64)
     }
 
-    /// Mean of the scores; `None` without any. A score is a probability of being correct when this is the share that is.
+    /// Mean of the scores; `None` without any. A score is a probability of being correct when this
+    /// is the share that is.
     #[must_use]
     pub fn mean_score(&self) -> Option<f64> {
         (self.count > 0).then(|| self.score_sum / self.count as f64)
@@ -72,7 +75,8 @@ impl ReliabilityBin {
 
 /// Returns the reliability table of scores from 0 to 1: `bins` ranges of equal width, lowest first.
 ///
-/// Scores outside are counted in the nearest range, as are those that are no number in the lowest. Cost: O(n + bins).
+/// Scores outside are counted in the nearest range, as are those that are no number in the lowest.
+/// Cost: O(n + bins).
 #[must_use]
 pub fn reliability(labeled: &[LabeledScore], bins: usize) -> Vec<ReliabilityBin> {
     let bound = |index: usize| index as f64 / bins as f64;

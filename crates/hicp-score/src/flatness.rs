@@ -6,30 +6,34 @@ use hicp_core::{Context, Isometry3, Matrix3, Observation, PixelRegion, RenderedV
 const MAX_PIXELS: usize = 512;
 /// Smallest number of pixels for a result.
 const MIN_PIXELS: usize = 64;
-/// Share of the pixels that are nearer than a reported distance. The rest may be another surface, flying
-/// pixels or edges.
+/// Share of the pixels that are nearer than a reported distance. The rest may be another surface,
+/// flying pixels or edges.
 const SHARE: f64 = 0.7;
 /// Share of the pixels, the nearest ones, that the next plane is fitted to.
 const FITTED: f64 = 0.8;
 /// Number of fits.
 const ROUNDS: usize = 4;
-/// Least ratio of the distances from the pose's surface and from the plane for [`Flatness::is_flat`].
+/// Least ratio of the distances from the pose's surface and from the plane for
+/// [`Flatness::is_flat`].
 const RATIO: f64 = 1.5;
 /// Share of the diameter below which a distance is the error of a sensor and an ICP.
 const SHARE_OF_DIAMETER: f64 = 0.01;
 /// Share of the diameter within which a surface is flat, as a sensor measures a wall.
 const FLAT: f64 = 0.03;
 
-/// How flat the measured and the rendered surface are where both are seen, and how far apart they are.
+/// How flat the measured and the rendered surface are where both are seen, and how far apart they
+/// are.
 ///
-/// A wall, a table or a box in the place of the object may still have a good MVE: its finest tolerance is
-/// 5 % of the diameter, so a face or a side of the object lies flat against it. A plane then explains the
-/// depth better than the pose does.
+/// A wall, a table or a box in the place of the object may still have a good MVE: its finest
+/// tolerance is 5 % of the diameter, so a face or a side of the object lies flat against it. A
+/// plane then explains the depth better than the pose does.
 ///
-/// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer. The
-/// pixels are those of the mask with depth where the model is rendered, on a grid of at most 512. The
-/// plane has the least squares of inverse depths, fitted again to the nearest eight tenths of the pixels.
+/// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer.
+/// The pixels are those of the mask with depth where the model is rendered, on a grid of at most
+/// 512. The plane has the least squares of inverse depths, fitted again to the nearest eight tenths
+/// of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Flatness {
     /// Distance from the measured to the rendered surface.
@@ -56,11 +60,11 @@ impl Flatness {
 
     /// Measures the flatness at a pose.
     ///
-    /// Returns `None` if fewer than 64 pixels show both surfaces, or if no plane in front of the camera
-    /// fits.
+    /// Returns `None` if fewer than 64 pixels show both surfaces, or if no plane in front of the
+    /// camera fits.
     ///
-    /// Cost: one render (shared with other components that use this pose) and about 500 pixels, more if
-    /// the common pixels are a small part of their boxes. Allocates nothing.
+    /// Cost: one render (shared with other components that use this pose) and about 500 pixels,
+    /// more if the common pixels are a small part of their boxes. Allocates nothing.
     #[must_use]
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
         let (model, observation) = context.problem.sides()?;
@@ -104,11 +108,13 @@ impl Flatness {
         })
     }
 
-    /// Whether what was measured is flat, a plane explains it better than the pose does, and the model is less flat: the measured surface is
-    /// within 3 % of the diameter of a plane and more than half as far again from the rendered one, the rendered one is further from a plane
-    /// than the measured one, and both these distances are more than 1 % of the diameter.
+    /// Whether what was measured is flat, a plane explains it better than the pose does, and the
+    /// model is less flat: the measured surface is within 3 % of the diameter of a plane and more
+    /// than half as far again from the rendered one, the rendered one is further from a plane than
+    /// the measured one, and both these distances are more than 1 % of the diameter.
     ///
-    /// A face of the model that is itself flat lies on a wall as in its own place: of that this says nothing.
+    /// A face of the model that is itself flat lies on a wall as in its own place: of that this
+    /// says nothing.
     #[must_use]
     pub fn is_flat(&self) -> bool {
         let least = SHARE_OF_DIAMETER * self.diameter;
@@ -127,7 +133,8 @@ struct Pixel {
     rendered: f64,
 }
 
-/// Gathers the pixels of a region that show both surfaces, on a grid of that step; returns how many, `None` when they are too many.
+/// Gathers the pixels of a region that show both surfaces, on a grid of that step; returns how
+/// many, `None` when they are too many.
 fn gather(
     observation: &Observation,
     view: &RenderedView,
@@ -166,8 +173,8 @@ fn nearest(distances: &mut [f64], share: f64) -> f64 {
     *distances.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
-/// The distance along the optical axis that seven tenths of a surface stay below, from the plane that fits it best; `scratch` is as long as
-/// `pixels`. `None` where no plane fits.
+/// The distance along the optical axis that seven tenths of a surface stay below, from the plane
+/// that fits it best; `scratch` is as long as `pixels`. `None` where no plane fits.
 ///
 /// In an image the inverse depth of a plane is linear: 1/z = a + b u + c v.
 fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f64]) -> Option<f64> {
@@ -192,7 +199,8 @@ fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f6
     Some(nearest(scratch, SHARE)).filter(|distance| distance.is_finite())
 }
 
-/// How far a depth is from a plane, along the optical axis; infinite where the plane is not in front of the camera.
+/// How far a depth is from a plane, along the optical axis; infinite where the plane is not in
+/// front of the camera.
 fn distance(plane: &Vector3<f64>, pixel: &Pixel, z: f64) -> f64 {
     let inverse = plane.x + plane.y * pixel.u + plane.z * pixel.v;
     if inverse > 0.0 {

@@ -3,11 +3,13 @@
 //! - [`Score`]: the trait. [`MeanVsd`] (the paper's MVE) scores a pose against the live image,
 //!   [`SampledMve`] ranks many poses, [`Vsd`] compares with a known true pose.
 //! - [`Flatness`]: recognizes a wall in the mask.
-//! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP benchmark.
+//! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
+//!   benchmark.
 //! - [`roc_area`], [`reliability`]: how well a score separates correct poses from wrong ones.
 //!
-//! **Should you use this crate?** Yes, to judge poses from any source, with or without ground truth. To
-//! refine poses, use `hybrid-icp`, which reports the MVE of the refined pose. `hicp-core` is re-exported.
+//! **Should you use this crate?** Yes, to judge poses from any source, with or without ground
+//! truth. To refine poses, use `hybrid-icp`, which reports the MVE of the refined pose. `hicp-core`
+//! is re-exported.
 //!
 //! ```
 //! use hicp_score::hicp_core::{DistanceImage, Mask};

@@ -5,10 +5,11 @@ use hicp_core::{Isometry3, Model, PinholeCamera, Point3};
 use crate::nearest::NearestPoints;
 use crate::pose_error::{add, mspd, mssd};
 
-/// The vertices of a model with its symmetries expanded and a search tree built, for many pairs of poses.
+/// The vertices of a model with its symmetries expanded and a search tree built, for many pairs of
+/// poses.
 ///
-/// BOP states its errors over the vertices of the meshes in `models_eval`. Building costs O(n log n) and O(symmetries);
-/// share it between threads by reference.
+/// BOP states its errors over the vertices of the meshes in `models_eval`. Building costs O(n log
+/// n) and O(symmetries); share it between threads by reference.
 #[derive(Debug)]
 pub struct ModelPoints {
     points: Vec<Point3<f32>>,
@@ -18,7 +19,8 @@ pub struct ModelPoints {
 }
 
 impl ModelPoints {
-    /// Takes all vertices of a model, used by a triangle or not, its declared symmetries and its diameter.
+    /// Takes all vertices of a model, used by a triangle or not, its declared symmetries and its
+    /// diameter.
     #[must_use]
     pub fn new(model: &Model) -> Self {
         let points = model.mesh().vertices().to_vec();

@@ -24,10 +24,12 @@ impl Node {
     }
 }
 
-/// A balanced tree of tight boxes over points, in `f64` so that nothing is lost against a search by definition.
+/// A balanced tree of tight boxes over points, in `f64` so that nothing is lost against a search by
+/// definition.
 ///
-/// An estimate may be far off, and then every query lies far outside the points: tight boxes still prune there, where the
-/// half-spaces of a k-d tree hardly do (kiddo's took 10 to 24 times as long for 30,000 points a little over a diameter off).
+/// An estimate may be far off, and then every query lies far outside the points: tight boxes still
+/// prune there, where the half-spaces of a k-d tree hardly do (kiddo's took 10 to 24 times as long
+/// for 30,000 points a little over a diameter off).
 #[derive(Debug)]
 pub(crate) struct NearestPoints {
     nodes: Vec<Node>,
@@ -93,7 +95,8 @@ impl NearestPoints {
             let [a, b] = [index + 1, node.first]
                 .map(|child| (child, self.nodes[child].distance_squared(from)));
             let (near, far) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-            // Every level leaves at most one node behind, so the stack never holds more than the depth plus one.
+            // Every level leaves at most one node behind, so the stack never holds more than the
+            // depth plus one.
             stack[depth] = far;
             stack[depth + 1] = near;
             depth += 2;
@@ -101,7 +104,8 @@ impl NearestPoints {
         best
     }
 
-    /// Returns ADI of `points`, which must be those of the tree; 0 without points, infinite for what is not finite.
+    /// Returns ADI of `points`, which must be those of the tree; 0 without points, infinite for
+    /// what is not finite.
     pub(crate) fn adi(
         &self,
         estimate: &Isometry3<f64>,
@@ -111,8 +115,8 @@ impl NearestPoints {
         if points.is_empty() {
             return 0.0;
         }
-        // The points at the true pose, seen from the frame of the estimate: the tree stays where it is. The translations
-        // are subtracted first, so that nothing is lost far from the camera.
+        // The points at the true pose, seen from the frame of the estimate: the tree stays where it
+        // is. The translations are subtracted first, so that nothing is lost far from the camera.
         let back = estimate.rotation.inverse();
         let shift = back * (truth.translation.vector - estimate.translation.vector);
         let rotation = (back * truth.rotation).to_rotation_matrix();

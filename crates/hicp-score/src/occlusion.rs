@@ -7,18 +7,20 @@ pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
 ///
 /// Distances are along the viewing ray. A negative `meters` counts as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Occlusion {
     /// All of them: the definition of §IV-A.
     Counted,
-    /// Those that nothing hides: pixels whose measured surface is more than `meters` in front of the
-    /// rendered one do not count.
+    /// Those that nothing hides: pixels whose measured surface is more than `meters` in front of
+    /// the rendered one do not count.
     Tolerated {
         /// The tolerance.
         meters: f64,
     },
-    /// Those that the camera sees through: only pixels without a measurement, or whose measured surface is
-    /// `meters` or more *behind* the rendered one, count. For masks that miss a part of the object.
+    /// Those that the camera sees through: only pixels without a measurement, or whose measured
+    /// surface is `meters` or more *behind* the rendered one, count. For masks that miss a part of
+    /// the object.
     Lenient {
         /// The tolerance.
         meters: f64,
@@ -61,7 +63,8 @@ impl Occlusion {
         }
     }
 
-    /// Returns by how much, in meters, a rendered surface must be behind the measured one not to count.
+    /// Returns by how much, in meters, a rendered surface must be behind the measured one not to
+    /// count.
     pub(crate) fn least_distance_behind(self) -> f64 {
         match self {
             Self::Counted => f64::INFINITY,

@@ -4,7 +4,8 @@ use hicp_core::{Isometry3, Matrix3, PinholeCamera, Point2, Point3, Vector3};
 
 use crate::nearest::NearestPoints;
 
-/// Returns ADD: the mean distance between corresponding model points at two poses, metres. 0 without points.
+/// Returns ADD: the mean distance between corresponding model points at two poses, metres. 0
+/// without points.
 ///
 /// ADD = mean |T_est x − T_gt x| (Hinterstoisser et al. 2012). Cost: O(points).
 #[must_use]
@@ -22,12 +23,14 @@ pub fn add(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f
     sum / points.len() as f64
 }
 
-/// Returns ADI (also ADD-S): the mean distance from a model point at the true pose to the *closest* model point at the estimate, metres.
+/// Returns ADI (also ADD-S): the mean distance from a model point at the true pose to the *closest*
+/// model point at the estimate, metres.
 ///
-/// ADI = mean over x of min over y |T_est y − T_gt x|; 0 without points. Never above ADD, and blind to symmetries, as far as the
-/// points are symmetric: of points sampled on the surface, an equivalent pose maps each between others, and ADI stays at about
-/// half their spacing. [`mssd`] over the symmetries has no such floor.
-/// Cost: O(n log n) for the search tree over the points and for the search; [`crate::ModelPoints::adi`] builds the tree once.
+/// ADI = mean over x of min over y |T_est y − T_gt x|; 0 without points. Never above ADD, and blind
+/// to symmetries, as far as the points are symmetric: of points sampled on the surface, an
+/// equivalent pose maps each between others, and ADI stays at about half their spacing. [`mssd`]
+/// over the symmetries has no such floor. Cost: O(n log n) for the search tree over the points and
+/// for the search; [`crate::ModelPoints::adi`] builds the tree once.
 #[must_use]
 pub fn adi(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f32>]) -> f64 {
     NearestPoints::new(points).adi(estimate, truth, points)
@@ -35,9 +38,10 @@ pub fn adi(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f
 
 /// Returns MSSD, the maximum symmetry-aware surface distance, metres. 0 without points.
 ///
-/// MSSD = min over S of max over x |T_est x − T_gt S x| (BOP'19). `symmetries` are motions of the object frame, as
-/// [`hicp_core::Symmetries::motions`] expands them; the identity always counts. Cost: O(points × symmetries) at most; a
-/// symmetry is given up at the first point that lies farther off than the best symmetry's farthest.
+/// MSSD = min over S of max over x |T_est x − T_gt S x| (BOP'19). `symmetries` are motions of the
+/// object frame, as [`hicp_core::Symmetries::motions`] expands them; the identity always counts.
+/// Cost: O(points × symmetries) at most; a symmetry is given up at the first point that lies
+/// farther off than the best symmetry's farthest.
 #[must_use]
 pub fn mssd(
     estimate: &Isometry3<f64>,
@@ -55,10 +59,12 @@ pub fn mssd(
     .sqrt()
 }
 
-/// Returns MSPD, the maximum symmetry-aware projection distance, pixels of this camera. 0 without points.
+/// Returns MSPD, the maximum symmetry-aware projection distance, pixels of this camera. 0 without
+/// points.
 ///
-/// MSPD = min over S of max over x |proj(T_est x) − proj(T_gt S x)| (BOP'19), over points seen or not, in the image or
-/// not. Infinite when a point at either pose is not in front of the camera. Symmetries and cost as for [`mssd`].
+/// MSPD = min over S of max over x |proj(T_est x) − proj(T_gt S x)| (BOP'19), over points seen or
+/// not, in the image or not. Infinite when a point at either pose is not in front of the camera.
+/// Symmetries and cost as for [`mssd`].
 #[must_use]
 pub fn mspd(
     estimate: &Isometry3<f64>,
@@ -85,7 +91,8 @@ pub fn mspd(
     .sqrt()
 }
 
-/// T_est x − T_gt x as one linear map, which is exactly zero for equal poses and loses nothing far from the camera.
+/// T_est x − T_gt x as one linear map, which is exactly zero for equal poses and loses nothing far
+/// from the camera.
 struct Difference {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
@@ -105,7 +112,8 @@ impl Difference {
     }
 }
 
-/// Returns the least of the identity's and the symmetries' maxima. `maximum_of` may return any value ≥ the limit once it is reached.
+/// Returns the least of the identity's and the symmetries' maxima. `maximum_of` may return any
+/// value ≥ the limit once it is reached.
 fn least_maximum(
     symmetries: &[Isometry3<f64>],
     maximum_of: impl Fn(&Isometry3<f64>, f64) -> f64,
@@ -120,7 +128,8 @@ fn least_maximum(
     least
 }
 
-/// Returns the largest value, or the first that reaches the limit. What is not a number is infinite.
+/// Returns the largest value, or the first that reaches the limit. What is not a number is
+/// infinite.
 fn maximum(values: impl Iterator<Item = f64>, limit: f64) -> f64 {
     let mut largest = 0.0;
     for value in values {

@@ -13,6 +13,7 @@ const AD_THRESHOLD: f64 = 0.1;
 
 /// All errors of an estimate against one instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseErrors {
     /// e_VSD(τ), see [`crate::bop_vsd`].
     pub vsd: [f64; N_TOLERANCES],
@@ -29,7 +30,8 @@ pub struct PoseErrors {
 }
 
 impl PoseErrors {
-    /// Returns whether the object's origins lie a diameter or more apart, where MSSD, ADD and ADI count as infinite.
+    /// Returns whether the object's origins lie a diameter or more apart, where MSSD, ADD and ADI
+    /// count as infinite.
     #[must_use]
     pub fn is_apart(&self, diameter: f64) -> bool {
         // A translation that is no number is apart from everything.
@@ -39,6 +41,7 @@ impl PoseErrors {
 
 /// The estimates of one object in one image against its instances.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TargetErrors {
     /// Diameter of the object, metres.
     pub diameter_m: f64,
@@ -48,12 +51,14 @@ pub struct TargetErrors {
     pub symmetric: bool,
     /// Instances to be found.
     pub instances: usize,
-    /// One list per estimate, by descending score ([`top_estimates`]), of its errors against every instance.
+    /// One list per estimate, by descending score ([`top_estimates`]), of its errors against every
+    /// instance.
     pub estimates: Vec<Vec<PoseErrors>>,
 }
 
 impl TargetErrors {
-    /// Returns, for every instance, which estimate is matched to it when `error` is below `threshold`.
+    /// Returns, for every instance, which estimate is matched to it when `error` is below
+    /// `threshold`.
     ///
     /// See [`match_instances`].
     #[must_use]
@@ -75,8 +80,9 @@ impl TargetErrors {
         taken
     }
 
-    /// Returns the ADI (metres) of the estimate that each instance is left with when every estimate, best score first,
-    /// takes the nearest instance by ADI; `None` for an instance without one.
+    /// Returns the ADI (metres) of the estimate that each instance is left with when every
+    /// estimate, best score first, takes the nearest instance by ADI; `None` for an instance
+    /// without one.
     #[must_use]
     pub fn adi_of_instances(&self) -> Vec<Option<f64>> {
         let matched = self.matches(f64::INFINITY, |e| e.adi_m);
@@ -94,10 +100,12 @@ impl TargetErrors {
     }
 }
 
-/// Returns which estimate is matched to every instance: greedily by descending score, each estimate takes the free
-/// instance with the lowest error that is strictly below the threshold, the first of equals.
+/// Returns which estimate is matched to every instance: greedily by descending score, each estimate
+/// takes the free instance with the lowest error that is strictly below the threshold, the first of
+/// equals.
 ///
-/// `errors[e][i]` is the error of estimate e, in descending order of score, against instance i. Cost: O(estimates × instances).
+/// `errors[e][i]` is the error of estimate e, in descending order of score, against instance i.
+/// Cost: O(estimates × instances).
 ///
 /// ```
 /// // The better estimate takes the instance that both are nearest to; the other one has to take the next.
@@ -139,15 +147,18 @@ fn assign(
     }
 }
 
-/// Returns the indices of the `count` estimates with the highest scores, highest first; of equals the first.
+/// Returns the indices of the `count` estimates with the highest scores, highest first; of equals
+/// the first.
 #[must_use]
 pub fn top_estimates(scores: &[f64], count: usize) -> Vec<usize> {
     descending(scores, count)
 }
 
-/// Returns the indices of the `count` instances with the largest visible fractions, largest first; of equals the first.
+/// Returns the indices of the `count` instances with the largest visible fractions, largest first;
+/// of equals the first.
 ///
-/// BOP asks for no more than `inst_count` instances of an object in an image, the most visible ones.
+/// BOP asks for no more than `inst_count` instances of an object in an image, the most visible
+/// ones.
 #[must_use]
 pub fn most_visible(fractions: &[f64], count: usize) -> Vec<usize> {
     descending(fractions, count)
@@ -162,9 +173,11 @@ fn descending(values: &[f64], count: usize) -> Vec<usize> {
 
 /// Recalls over any number of targets: of one object, of a scene, of a dataset.
 ///
-/// A recall is the number of matched instances over the number of all instances, so one that nobody estimated counts as
-/// not found. Recalls of several parts are not averaged: [`Recalls::merge`] adds their instances up.
+/// A recall is the number of matched instances over the number of all instances, so one that nobody
+/// estimated counts as not found. Recalls of several parts are not averaged: [`Recalls::merge`]
+/// adds their instances up.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Recalls {
     instances: usize,
     missing: usize,
@@ -177,8 +190,9 @@ pub struct Recalls {
 impl Recalls {
     /// Counts a target.
     ///
-    /// Thresholds θ: 0.05, 0.10, …, 0.50 for VSD at each of its tolerances, and times the diameter for MSSD; 5, 10, …, 50
-    /// pixels for MSPD in an image 640 pixels wide; a tenth of the diameter for AD. Correct is strictly below.
+    /// Thresholds θ: 0.05, 0.10, …, 0.50 for VSD at each of its tolerances, and times the diameter
+    /// for MSSD; 5, 10, …, 50 pixels for MSPD in an image 640 pixels wide; a tenth of the diameter
+    /// for AD. Correct is strictly below.
     pub fn count(&mut self, target: &TargetErrors) {
         self.instances += target.instances;
         self.missing += target.instances.saturating_sub(target.estimates.len());
@@ -222,13 +236,15 @@ impl Recalls {
         self.instances
     }
 
-    /// Instances beyond the number of estimates: whatever the thresholds, nobody can have found them.
+    /// Instances beyond the number of estimates: whatever the thresholds, nobody can have found
+    /// them.
     #[must_use]
     pub fn missing(&self) -> usize {
         self.missing
     }
 
-    /// AR_VSD: the mean recall over 10 tolerances and 10 thresholds. 0 without instances, as are all recalls.
+    /// AR_VSD: the mean recall over 10 tolerances and 10 thresholds. 0 without instances, as are
+    /// all recalls.
     #[must_use]
     pub fn vsd(&self) -> f64 {
         self.mean(self.vsd.as_flattened())

@@ -11,13 +11,13 @@ use crate::tolerances::{AgreementCounts, mean};
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
 /// Splats points of the model's surface into a coarse depth buffer and compares the buffer with the
-/// observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs whatever the mesh, and does
-/// not replace the MVE where a pose is accepted or reported: pixels without a sample count as not
-/// rendered, and thin parts may be missed. Samples of a closed mesh that face away from the camera are
-/// skipped.
+/// observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs whatever the mesh,
+/// and does not replace the MVE where a pose is accepted or reported: pixels without a sample count
+/// as not rendered, and thin parts may be missed. Samples of a closed mesh that face away from the
+/// camera are skipped.
 ///
-/// Cost: O(samples) per pose. The sampling is computed once per model and shared, and so is the coarse
-/// observation.
+/// Cost: O(samples) per pose. The sampling is computed once per model and shared, and so is the
+/// coarse observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledMve {
     /// Number of points on the model; 0 scores every pose 1.
@@ -45,7 +45,8 @@ impl SampledMve {
         }
     }
 
-    /// Creates the default for masks that miss a part of the object, as [`crate::MeanVsd::lenient`].
+    /// Creates the default for masks that miss a part of the object, as
+    /// [`crate::MeanVsd::lenient`].
     #[must_use]
     pub fn lenient() -> Self {
         Self {

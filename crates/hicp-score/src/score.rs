@@ -5,11 +5,11 @@ use hicp_core::{Context, Isometry3};
 
 /// Scores a pose: 0 is perfect, higher is worse.
 ///
-/// Pure: equal inputs give equal bits. Use `context.view(pose)` for the render at the pose; a selection
-/// that starts from the same pose then shares it.
+/// Pure: equal inputs give equal bits. Use `context.view(pose)` for the render at the pose; a
+/// selection that starts from the same pose then shares it.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a score",
-    label = "expected a type that implements `Score`",
+    label = "this must implement `Score`",
     note = "`Score` is implemented by `MeanVsd`, `SampledMve`, `Vsd` and boxes of scores"
 )]
 pub trait Score {
@@ -22,7 +22,7 @@ pub trait Score {
     }
 }
 
-macro_rules! forward_score {
+macro_rules! forward {
     ($($pointer:ty),*) => {$(
         impl<T: Score + ?Sized> Score for $pointer {
             fn score(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> f64 {
@@ -36,4 +36,4 @@ macro_rules! forward_score {
     )*};
 }
 
-forward_score!(Box<T>, &mut T);
+forward!(Box<T>, &mut T);

@@ -13,7 +13,8 @@ pub fn tolerances() -> [f64; N_TOLERANCES] {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AgreementCounts {
     tolerances: [f64; N_TOLERANCES],
-    /// `histogram[k]`: pixels whose smallest tolerance above the difference is the k-th; the last entry, pixels beyond all.
+    /// `histogram[k]`: pixels whose smallest tolerance above the difference is the k-th; the last
+    /// entry, pixels beyond all.
     histogram: [u64; N_TOLERANCES + 1],
     inverse_diameter: f64,
 }
@@ -31,7 +32,8 @@ impl AgreementCounts {
     #[inline]
     pub(crate) fn add(&mut self, difference: f64) {
         let relative = difference * self.inverse_diameter;
-        // A first guess that rounding may put one off, then the strict comparison that defines "correct".
+        // A first guess that rounding may put one off, then the strict comparison that defines
+        // "correct".
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // Clamped, and NaN becomes 0, from where it climbs to the end: it agrees with nothing.
         let mut k = (relative * 20.0).clamp(0.0, N_TOLERANCES as f64) as usize;
@@ -45,7 +47,8 @@ impl AgreementCounts {
         self.histogram[k] += 1;
     }
 
-    /// Returns e(τ) for every tolerance: the share of the union that is not in the intersection or differs by τ or more.
+    /// Returns e(τ) for every tolerance: the share of the union that is not in the intersection or
+    /// differs by τ or more.
     ///
     /// An empty union is an error of 1: nothing was seen where something should be.
     pub(crate) fn errors(&self, union: u64) -> [f64; N_TOLERANCES] {
@@ -58,7 +61,8 @@ impl AgreementCounts {
     }
 }
 
-/// Returns the share of `union` pixels that are not `correct`, for every tolerance; all 1 for an empty union.
+/// Returns the share of `union` pixels that are not `correct`, for every tolerance; all 1 for an
+/// empty union.
 pub(crate) fn errors(correct: [u64; N_TOLERANCES], union: u64) -> [f64; N_TOLERANCES] {
     correct.map(|correct| {
         if union == 0 {

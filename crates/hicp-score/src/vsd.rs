@@ -31,15 +31,17 @@ pub enum ScoreError {
     Image(#[from] hicp_core::ImageError),
 }
 
-/// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter, from distance maps and visibility masks.
+/// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter, from distance maps and
+/// visibility masks.
 ///
-/// A pixel of the union of the masks costs 0 when it is in both and the distances differ by strictly less than τ, else 1;
-/// e is the mean cost. An empty union gives 1. Distances and diameter in one unit, any. Symmetric in its two sides.
-/// Cost: O(pixels).
+/// A pixel of the union of the masks costs 0 when it is in both and the distances differ by
+/// strictly less than τ, else 1; e is the mean cost. An empty union gives 1. Distances and diameter
+/// in one unit, any. Symmetric in its two sides. Cost: O(pixels).
 ///
 /// # Errors
 ///
-/// [`ScoreError`] when the images are not all of one size, or the diameter is not finite and positive.
+/// [`ScoreError`] when the images are not all of one size, or the diameter is not finite and
+/// positive.
 pub fn vsd(
     estimate: &DistanceImage,
     estimate_mask: &Mask,
@@ -82,10 +84,12 @@ pub fn vsd(
     Ok(counts.errors(union))
 }
 
-/// Returns BOP'19's visibility masks (V_est, V_gt) from the distances of the test image and of the two renders.
+/// Returns BOP'19's visibility masks (V_est, V_gt) from the distances of the test image and of the
+/// two renders.
 ///
-/// V_gt holds where the true surface is at most δ behind the measured one, or nothing was measured; V_est likewise, and
-/// wherever V_gt does and the estimate shows anything. Same unit throughout; 0 is "nothing".
+/// V_gt holds where the true surface is at most δ behind the measured one, or nothing was measured;
+/// V_est likewise, and wherever V_gt does and the estimate shows anything. Same unit throughout; 0
+/// is "nothing".
 ///
 /// # Errors
 ///
@@ -134,10 +138,12 @@ fn in_front(model: f64, test: f64, delta: f64) -> bool {
     f64::from(model as f32 - test as f32) <= delta
 }
 
-/// Mean VSD against a known true pose, over τ = 5 %…50 % of the diameter: the evaluation metric of §VI-A.2.
+/// Mean VSD against a known true pose, over τ = 5 %…50 % of the diameter: the evaluation metric of
+/// §VI-A.2.
 ///
-/// Both poses are rendered; the visibility masks are the silhouettes, as for an object that nothing occludes. 1 when
-/// neither pose shows anything. Cost: two renders (one when the true pose is still remembered) and O(rendered pixels).
+/// Both poses are rendered; the visibility masks are the silhouettes, as for an object that nothing
+/// occludes. 1 when neither pose shows anything. Cost: two renders (one when the true pose is still
+/// remembered) and O(rendered pixels).
 #[derive(Clone, Debug)]
 pub struct Vsd {
     truth: Isometry3<f64>,
