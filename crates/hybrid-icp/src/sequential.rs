@@ -16,13 +16,10 @@ use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 /// Estimates the pose of a static object from images along the path of a moving camera (§V).
 ///
 /// Each image is registered from the pose fused so far, moved with the camera. The fuser receives
-/// the result, and its estimate is the answer and the next initial pose (§V-A). The estimator has no
-/// clock and starts no thread: the caller passes images and motions as they arrive.
+/// the result, and its estimate is the answer and the next initial pose (§V-A). If ICP finds no
+/// pairs, nothing is fused. The estimator has no clock and starts no thread.
 ///
-/// If ICP finds no pairs, nothing is fused: the pose would be the fused pose once more.
-///
-/// Cost of a step: that of the pipeline, one render and one score if the MVE is computed, and that
-/// of the fuser, which takes microseconds.
+/// Cost of a step: the pipeline, and one render and one score if the MVE is computed.
 ///
 /// ```
 /// use hybrid_icp::fusion::{CameraMotion, FusionMethod};
@@ -187,8 +184,7 @@ impl SequentialEstimator {
         self.init = motion.apply(&self.init);
     }
 
-    /// Returns the pose in the current camera frame: the fused one, or the initial one while there is
-    /// no estimate.
+    /// Returns the pose in the current camera frame: fused, or the initial one without an estimate.
     #[must_use]
     pub fn camera_from_object(&self) -> Isometry3<f64> {
         self.fuser
