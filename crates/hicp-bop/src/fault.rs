@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use hicp_io::IoError;
+use hicp_io::{IoError, IoErrorKind};
 
 /// What is the matter with a part of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +29,8 @@ impl Fault {
     #[must_use]
     pub fn of(error: &IoError) -> Self {
         Self {
-            kind: match error {
-                IoError::Missing { .. } => FaultKind::Missing,
+            kind: match error.kind {
+                IoErrorKind::Missing => FaultKind::Missing,
                 _ => FaultKind::Damaged,
             },
             text: chain(error),

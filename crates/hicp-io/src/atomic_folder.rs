@@ -1,4 +1,4 @@
-//! Writing folders whole or not at all.
+//! Folders written whole or not at all.
 
 use std::fs;
 use std::io;
@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::atomic::folder_of;
+use crate::atomic::{destination, folder_of};
 use crate::error::IoError;
 
-/// A folder in the making: it has a name of its own, beside the final one, until [`NewFolder::finish`].
+/// A folder that is being filled: it has a temporary name next to the final one until [`NewFolder::finish`].
 ///
-/// Dropped before that, it is removed with what is in it; a program that is killed leaves a `.hicp-*.tmp` behind, which nothing
+/// If it is dropped before that, it is removed with its content. A killed program leaves a `.hicp-*.tmp` behind, which nothing
 /// reads and which may be removed. Nobody ever sees a part of a folder under the final name.
 ///
 /// ```
@@ -27,53 +27,36 @@ use crate::error::IoError;
 /// ```
 #[derive(Debug)]
 pub struct NewFolder {
-    /// With links followed.
     target: PathBuf,
     made: TempDir,
 }
 
 impl NewFolder {
-    /// Begins a folder that will be at `path`, where there must be nothing yet or an empty folder.
-    ///
-    /// An empty folder is replaced, now by an empty one with its permissions, so that one that cannot be (a mount point) is told
-    /// before anything is computed.
+    /// Starts a folder that will be at `path`, where there must be nothing yet or an empty folder.
     ///
     /// # Errors
     ///
-    /// [`IoError::MissingFolder`] when the parent folder does not exist, [`IoError::Write`] when something is at `path`, or when
-    /// nothing may be written beside it.
+    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if there is something at `path`, if the parent folder does not
+    /// exist, or if it may not be written to.
     pub fn begin(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
         let failed = |e| IoError::write(path, e);
-        if fs::symlink_metadata(path).is_err() {
-            let parent = folder_of(path);
-            if !parent.is_dir() {
-                return Err(IoError::MissingFolder {
-                    path: path.to_owned(),
-                    folder: parent.to_owned(),
-                });
+        let target = destination(path)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".hicp-").suffix(".tmp");
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let made = builder.tempdir_in(folder_of(&target)).map_err(failed)?;
+        if let Ok(old) = fs::metadata(&target) {
+            if fs::read_dir(&target).map_err(failed)?.next().is_some() {
+                return Err(failed(io::ErrorKind::DirectoryNotEmpty.into()));
             }
-            return Ok(Self {
-                target: path.to_owned(),
-                made: beside(path).map_err(failed)?,
-            });
+            fs::set_permissions(made.path(), old.permissions()).map_err(failed)?;
         }
-        let target = fs::canonicalize(path).map_err(failed)?;
-        let permissions = fs::metadata(&target).map_err(failed)?.permissions();
-        let empty = || -> io::Result<TempDir> {
-            let made = beside(&target)?;
-            fs::set_permissions(made.path(), permissions.clone())?;
-            Ok(made)
-        };
-        // What is not empty, or no folder, is not replaced by renaming.
-        rename(empty().map_err(failed)?, &target).map_err(failed)?;
-        Ok(Self {
-            made: empty().map_err(failed)?,
-            target,
-        })
+        Ok(Self { target, made })
     }
 
-    /// Where to write what the folder shall hold.
+    /// Returns the folder to fill.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.made.path()
@@ -83,35 +66,23 @@ impl NewFolder {
     ///
     /// # Errors
     ///
-    /// [`IoError::Write`] when something has come to be at `path` meanwhile; what was made is removed.
+    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if something has appeared at the path meanwhile; the new folder
+    /// is removed then.
     pub fn finish(self) -> Result<(), IoError> {
-        rename(self.made, &self.target).map_err(|e| IoError::write(&self.target, e))
+        // Only Unix renames a folder over an empty one.
+        #[cfg(not(unix))]
+        let _ = fs::remove_dir(&self.target);
+        fs::rename(self.made.path(), &self.target).map_err(|e| IoError::write(&self.target, e))?;
+        // It is not temporary any more.
+        let _ = self.made.keep();
+        Ok(())
     }
-}
-
-fn beside(path: &Path) -> io::Result<TempDir> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".hicp-").suffix(".tmp");
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    builder.tempdir_in(folder_of(path))
-}
-
-fn rename(made: TempDir, target: &Path) -> io::Result<()> {
-    // Elsewhere a folder is not renamed over an empty one.
-    #[cfg(not(unix))]
-    if target.is_dir() {
-        fs::remove_dir(target)?;
-    }
-    fs::rename(made.path(), target)?;
-    // It is no temporary folder any more.
-    let _ = made.keep();
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::IoErrorKind;
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap();
@@ -161,15 +132,29 @@ mod tests {
         fs::write(&file, "the user's").unwrap();
         for path in [&full, &file] {
             let begun = NewFolder::begin(path);
-            assert!(matches!(begun, Err(IoError::Write { path: p, .. }) if p == *path));
+            assert!(
+                matches!(begun, Err(IoError { kind: IoErrorKind::Write, path: p, .. }) if p == *path)
+            );
         }
         let begun = NewFolder::begin(dir.path().join("no/where"));
-        assert!(matches!(begun, Err(IoError::MissingFolder { .. })));
+        assert!(matches!(
+            begun,
+            Err(IoError {
+                kind: IoErrorKind::Write,
+                ..
+            })
+        ));
         // Somebody else was faster.
         let late = NewFolder::begin(dir.path().join("late")).unwrap();
         fs::create_dir(dir.path().join("late")).unwrap();
         fs::write(dir.path().join("late/theirs"), "theirs").unwrap();
-        assert!(matches!(late.finish(), Err(IoError::Write { .. })));
+        assert!(matches!(
+            late.finish(),
+            Err(IoError {
+                kind: IoErrorKind::Write,
+                ..
+            })
+        ));
         assert_eq!(names(dir.path()), ["file", "full", "late"]);
         assert_eq!(names(&dir.path().join("late")), ["theirs"]);
         assert_eq!(fs::read(full.join("mine")).unwrap(), b"the user's");

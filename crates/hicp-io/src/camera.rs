@@ -1,21 +1,60 @@
 //! Cameras in JSON files.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use hicp_core::{CameraError, Matrix3, PinholeCamera};
+use hicp_core::{Matrix3, PinholeCamera};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
-use crate::camera_model::{CameraModel, camera_model};
-use crate::error::IoError;
-use crate::json::{Document, Node};
-use crate::limits::ReadLimits;
+use crate::camera_model::CameraModel;
+use crate::error::{IoError, IoErrorKind, Place};
+use crate::json::{self, ById, Numbers, Positive};
+use crate::limits::{Limit, ReadLimits};
+use crate::pose::Rotation;
+use crate::source::text_bytes;
 
-/// A camera file: the camera, and what its depth images count in where the file says so.
+/// A camera file: the camera, and the unit of its depth images if the file states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraFile {
     /// The camera.
     pub camera: PinholeCamera,
-    /// Millimetres per unit of its depth images.
+    /// Millimeters per unit of its depth images.
     pub depth_scale: Option<f64>,
+}
+
+/// All that the forms of a camera state.
+#[derive(Debug, Deserialize)]
+pub(crate) struct CameraRecord {
+    #[serde(rename = "cam_K")]
+    cam_k: Option<Numbers<9>>,
+    cam_model: Option<CameraModel>,
+    fx: Option<f64>,
+    fy: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    width: Option<u32>,
+    height: Option<u32>,
+    pub(crate) depth_scale: Option<Positive>,
+    #[serde(rename = "cam_R_w2c")]
+    pub(crate) rotation: Option<Rotation>,
+    #[serde(rename = "cam_t_w2c")]
+    pub(crate) translation_mm: Option<Numbers<3>>,
+}
+
+/// A calibration matrix in pixels, and the width and height of the images if stated.
+type Calibration = (Matrix3<f64>, Option<(u32, u32)>);
+
+impl CameraRecord {
+    /// Returns the calibration of `cam_K` or `cam_model`, if one of them is there.
+    pub(crate) fn calibration(&self) -> Result<Option<Calibration>, &'static str> {
+        match (&self.cam_k, &self.cam_model) {
+            (Some(_), Some(_)) => Err("`cam_K` and `cam_model`"),
+            (Some(Numbers(numbers)), None) => Ok(Some((Matrix3::from_row_slice(numbers), None))),
+            (None, Some(model)) => Ok(Some((model.matrix(), model.image_size()))),
+            (None, None) => Ok(None),
+        }
+    }
 }
 
 /// Reads a camera from a JSON file, for images of `image_size` (width, height).
@@ -31,8 +70,7 @@ pub struct CameraFile {
 ///
 /// # Errors
 ///
-/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::CameraSize`] naming both sizes,
-/// [`IoError::Camera`], or [`IoError::Limit`].
+/// [`IoError`] that names the key; of the kind [`IoErrorKind::CameraSize`] if the camera is for images of another size.
 pub fn read_camera_json(
     path: impl AsRef<Path>,
     image_size: (u32, u32),
@@ -51,126 +89,72 @@ impl ReadLimits {
         path: impl AsRef<Path>,
         image_size: (u32, u32),
     ) -> Result<CameraFile, IoError> {
-        camera_of(&Document::read_small(self, path.as_ref())?, image_size)
+        let path = path.as_ref();
+        let content = self.read(path, Limit::SmallJsonBytes)?;
+        let text = text_bytes(path, &content)?;
+        let keys: BTreeMap<String, IgnoredAny> = json::parse(path, text)?;
+        if keys.is_empty() || keys.keys().any(|key| key.parse::<u32>().is_err()) {
+            return camera_of(path, "$", &json::parse(path, text)?, image_size);
+        }
+        let ById(images) = json::parse(path, text)?;
+        match images.iter().next() {
+            Some((id, camera)) if images.len() == 1 => {
+                camera_of(path, &format!("$.{id}"), camera, image_size)
+            }
+            _ => {
+                let found = format!("cameras of {} images", images.len());
+                let place = Place::Field("$".to_owned());
+                Err(IoError::new(path, place, found, "a single camera"))
+            }
+        }
     }
 }
 
-fn camera_of(document: &Document, image_size: (u32, u32)) -> Result<CameraFile, IoError> {
-    let root = document.root();
-    let is_camera = |node: &Node<'_>| {
-        ["cam_K", "cam_model", "fx"]
-            .iter()
-            .any(|key| node.optional(key).is_some())
+fn camera_of(
+    path: &Path,
+    key: &str,
+    record: &CameraRecord,
+    (width, height): (u32, u32),
+) -> Result<CameraFile, IoError> {
+    let refuse = |name: &str, found: &str, expected: &str| {
+        IoError::new(path, Place::Field(format!("{key}{name}")), found, expected)
     };
-    let node = match root.numbered() {
-        Ok(images) if !is_camera(&root) && !images.is_empty() => {
-            let count = images.len();
-            match <[_; 1]>::try_from(images) {
-                Ok([(_, node)]) => node,
-                Err(_) => {
-                    let found = format!("cameras of {count} images");
-                    return Err(root.refuse_found(found, "a single camera"));
-                }
-            }
-        }
-        _ => root,
-    };
-    if !is_camera(&node) {
-        return Err(node.refuse(
-            "an object with the key `cam_K` or `cam_model`, or with `fx`, `fy`, `cx` and `cy`",
-        ));
+    let calibration = record.calibration();
+    let calibration = calibration.map_err(|both| refuse(".cam_model", both, "one of them"))?;
+    let size = record.width.zip(record.height);
+    let sizes = [size, calibration.and_then(|(_, size)| size)];
+    if let Some((w, h)) = sizes.into_iter().flatten().find(|s| *s != (width, height)) {
+        let found = format!("a camera for {w}x{h} images");
+        let error = refuse("", &found, &format!("one for {width}x{height}"));
+        return Err(error.with_kind(IoErrorKind::CameraSize));
     }
-    let (width, height) = image_size;
-    let matrix = node
-        .optional("cam_K")
-        .or_else(|| node.optional("cam_model"));
-    let states_size = ["width", "height"]
-        .iter()
-        .all(|key| node.optional(key).is_some());
-    if matrix.is_none() || states_size {
-        check_size(&node, image_size)?;
-    }
-    let camera = match matrix {
-        Some(place) => {
-            let stated = calibration(&node)?;
-            if let Some(found) = stated.image_size {
-                same_size(&place, found, image_size)?;
-            }
-            PinholeCamera::from_matrix(&stated.matrix, width, height)
-                .map_err(|source| camera_error(&place, source))?
+    let (name, camera) = match calibration {
+        Some((matrix, _)) => {
+            let name = record.cam_k.map_or(".cam_model", |_| ".cam_K");
+            (name, PinholeCamera::from_matrix(&matrix, width, height))
         }
         None => {
-            let value = |key: &str| node.get(key)?.number();
-            let (fx, fy, cx, cy) = (value("fx")?, value("fy")?, value("cx")?, value("cy")?);
-            PinholeCamera::new(fx, fy, cx, cy, width, height)
-                .map_err(|source| camera_error(&node, source))?
+            let intrinsics = [record.fx, record.fy, record.cx, record.cy];
+            let ([Some(fx), Some(fy), Some(cx), Some(cy)], Some(_)) = (intrinsics, size) else {
+                let expected = "the key `cam_K` or `cam_model`, or all of `fx`, `fy`, `cx`, `cy`, `width` and `height`";
+                return Err(refuse("", "an object without a camera", expected));
+            };
+            ("", PinholeCamera::new(fx, fy, cx, cy, width, height))
         }
     };
+    let camera = camera.map_err(|error| {
+        refuse(
+            name,
+            "numbers that are not a camera",
+            "those of a pinhole camera",
+        )
+        .with_source(error)
+    })?;
+    let depth_scale = record.depth_scale.map(|Positive(scale)| scale);
     Ok(CameraFile {
         camera,
-        depth_scale: depth_scale(&node)?,
+        depth_scale,
     })
-}
-
-/// Checks the size that a camera states.
-fn check_size(node: &Node<'_>, image_size: (u32, u32)) -> Result<(), IoError> {
-    let side = |key: &str| node.get(key)?.unsigned();
-    same_size(node, (side("width")?, side("height")?), image_size)
-}
-
-fn same_size(
-    node: &Node<'_>,
-    (found_width, found_height): (u32, u32),
-    (width, height): (u32, u32),
-) -> Result<(), IoError> {
-    if (found_width, found_height) == (width, height) {
-        return Ok(());
-    }
-    Err(IoError::CameraSize {
-        path: node.path().to_owned(),
-        found_width,
-        found_height,
-        expected_width: width,
-        expected_height: height,
-    })
-}
-
-/// Reads the calibration matrix of a camera, from `cam_K` or from a `cam_model` without distortion, and the size of its images
-/// where the latter states one.
-pub(crate) fn calibration(node: &Node<'_>) -> Result<CameraModel, IoError> {
-    match (node.optional("cam_K"), node.optional("cam_model")) {
-        (None, Some(model)) => camera_model(&model),
-        (Some(_), Some(model)) => {
-            let found = "`cam_K` and `cam_model`".to_owned();
-            Err(model.refuse_found(found, "one of them"))
-        }
-        _ => {
-            let numbers: [f64; 9] = node.get("cam_K")?.numbers()?;
-            Ok(CameraModel {
-                matrix: Matrix3::from_row_slice(&numbers),
-                image_size: None,
-            })
-        }
-    }
-}
-
-/// Reads `depth_scale`, millimetres per unit, where it is there.
-pub(crate) fn depth_scale(node: &Node<'_>) -> Result<Option<f64>, IoError> {
-    let Some(scale) = node.optional("depth_scale") else {
-        return Ok(None);
-    };
-    match scale.number()? {
-        value if value > 0.0 => Ok(Some(value)),
-        _ => Err(scale.refuse("a number above 0, in mm per unit")),
-    }
-}
-
-pub(crate) fn camera_error(node: &Node<'_>, source: CameraError) -> IoError {
-    IoError::Camera {
-        path: node.path().to_owned(),
-        key: node.key().to_owned(),
-        source,
-    }
 }
 
 #[cfg(test)]
@@ -227,10 +211,10 @@ mod tests {
         assert_eq!(camera(&single).unwrap().fy(), 600.0);
 
         let refused = |text: &str| match read(text) {
-            Err(IoError::JsonValue {
-                key,
+            Err(IoError {
                 found,
                 expected,
+                place: Some(Place::Field(key)),
                 ..
             }) => (key, found, expected),
             other => panic!("{other:?}"),
@@ -253,17 +237,18 @@ mod tests {
         );
         assert!(matches!(
             read(&MODEL.replace("640", "1408")),
-            Err(IoError::CameraSize {
-                found_width: 1408,
-                ..
-            })
+            Err(IoError { kind: IoErrorKind::CameraSize, found, .. })
+                if found == "a camera for 1408x480 images"
         ));
     }
 
     #[test]
     fn every_fault_is_named() {
         let key = |text: &str| match read(text) {
-            Err(IoError::JsonValue { key, .. } | IoError::Camera { key, .. }) => key,
+            Err(IoError {
+                place: Some(Place::Field(key)),
+                ..
+            }) => key,
             other => panic!("{other:?}"),
         };
         assert_eq!(key(&format!(r#"{{"1": {{{K}}}, "2": {{{K}}}}}"#)), "$");
@@ -285,11 +270,8 @@ mod tests {
         ] {
             assert!(matches!(
                 read(&text),
-                Err(IoError::CameraSize {
-                    found_width: 320,
-                    expected_width: 640,
-                    ..
-                })
+                Err(IoError { kind: IoErrorKind::CameraSize, found, expected, .. })
+                    if found == "a camera for 320x480 images" && expected == "one for 640x480"
             ));
         }
     }

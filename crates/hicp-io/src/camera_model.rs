@@ -1,56 +1,71 @@
 //! Camera models by name: BOP's `cam_model`, as HOT3D has it.
 
 use hicp_core::Matrix3;
+use serde::Deserialize;
 
-use crate::error::IoError;
-use crate::json::Node;
+use crate::error::quote;
 
-/// What a `cam_model` states.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A camera without distortion.
+#[derive(Debug, Deserialize)]
 pub(crate) struct CameraModel {
-    /// Calibration matrix, pixels.
-    pub(crate) matrix: Matrix3<f64>,
-    /// Width and height of its images, where stated.
-    pub(crate) image_size: Option<(u32, u32)>,
+    #[serde(rename = "projection_model_type")]
+    _name: Pinhole,
+    projection_params: Intrinsics,
+    image_width: Option<u32>,
+    image_height: Option<u32>,
 }
 
-/// Names of models without distortion, without the prefix that HOT3D gives them.
-const PINHOLES: [&str; 3] = ["PinholePlane", "PINHOLE", "LINEAR"];
-
-const EXPECTED: &str = "a model without distortion (PinholePlane, PINHOLE or LINEAR): depth images of other models must be undistorted first, and stated by `cam_K`";
-
-/// Reads `{"projection_model_type", "projection_params", "image_width", "image_height"}`; the size is optional, further keys are ignored.
-///
-/// The parameters of a pinhole are fx, fy, cx, cy, or f, cx, cy where both focal lengths are one.
-///
-/// # Errors
-///
-/// [`IoError::JsonValue`] naming the key; for a model with distortion it names the model.
-pub(crate) fn camera_model(node: &Node<'_>) -> Result<CameraModel, IoError> {
-    let kind = node.get("projection_model_type")?;
-    let Some(name) = kind.text() else {
-        return Err(kind.refuse("the name of a camera model"));
-    };
-    let short = name.strip_prefix("CameraModelType.").unwrap_or(name);
-    if !PINHOLES.contains(&short) {
-        return Err(kind.refuse_found(format!("the model {name:?}"), EXPECTED));
+impl CameraModel {
+    /// Returns the calibration matrix, pixels.
+    pub(crate) fn matrix(&self) -> Matrix3<f64> {
+        let Intrinsics([fx, fy, cx, cy]) = self.projection_params;
+        Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
     }
-    let parameters = node.get("projection_params")?;
-    let numbers = parameters.items()?;
-    let [fx, fy, cx, cy] = match numbers.len() {
-        4 => parameters.numbers()?,
-        3 => {
-            let [f, cx, cy] = parameters.numbers()?;
-            [f, f, cx, cy]
+
+    /// Returns the width and height of its images, if stated.
+    pub(crate) fn image_size(&self) -> Option<(u32, u32)> {
+        self.image_width.zip(self.image_height)
+    }
+}
+
+/// The name of a model without distortion.
+#[derive(Debug, Deserialize)]
+#[serde(try_from = "String")]
+struct Pinhole;
+
+impl TryFrom<String> for Pinhole {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        // HOT3D writes the prefix.
+        let short = name.strip_prefix("CameraModelType.").unwrap_or(&name);
+        if ["PinholePlane", "PINHOLE", "LINEAR"].contains(&short) {
+            return Ok(Self);
         }
-        count => {
-            let found = format!("{count} numbers");
-            return Err(parameters.refuse_found(found, "fx, fy, cx and cy, or f, cx and cy"));
+        Err(format!(
+            "the model {}, expected a model without distortion (PinholePlane, PINHOLE or LINEAR): depth images of other \
+             models must be undistorted first, and their camera stated by `cam_K`",
+            quote(&name)
+        ))
+    }
+}
+
+/// fx, fy, cx, cy; in files also f, cx, cy if both focal lengths are the same.
+#[derive(Debug, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+struct Intrinsics([f64; 4]);
+
+impl TryFrom<Vec<f64>> for Intrinsics {
+    type Error = String;
+
+    fn try_from(numbers: Vec<f64>) -> Result<Self, String> {
+        match numbers[..] {
+            [fx, fy, cx, cy] => Ok(Self([fx, fy, cx, cy])),
+            [f, cx, cy] => Ok(Self([f, f, cx, cy])),
+            _ => Err(format!(
+                "{} numbers, expected fx, fy, cx and cy, or f, cx and cy",
+                numbers.len()
+            )),
         }
-    };
-    let side = |key: &str| node.optional(key).map(|n| n.unsigned()).transpose();
-    Ok(CameraModel {
-        matrix: Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0),
-        image_size: side("image_width")?.zip(side("image_height")?),
-    })
+    }
 }

@@ -1,396 +1,324 @@
-//! JSON values that know their file and their path of keys, so that every refusal can name both.
+//! JSON files from and to values. Every refusal names the path of keys to the value.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::marker::PhantomData;
+use std::path::Path;
 
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
-use serde_json::{Map, Value};
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
+use serde_json::error::Category;
 
-use crate::error::{IoError, quote};
-use crate::limits::ReadLimits;
-use crate::source::{Limited, Source, text_bytes};
+use crate::atomic::write_atomically;
+use crate::error::{IoError, Place, quote};
+use crate::limits::{Limit, ReadLimits};
+use crate::source::text_bytes;
 
-/// A parsed JSON file.
-#[derive(Debug)]
-pub(crate) struct Document {
-    path: PathBuf,
-    value: Value,
+/// Most characters of a path of keys that a message shows.
+const SHOWN: usize = 200;
+
+/// Reads a JSON file. Numbers keep every digit of an `f64`; keys that the type does not have are ignored.
+pub(crate) fn read<T: DeserializeOwned>(
+    limits: &ReadLimits,
+    path: &Path,
+    limit: Limit,
+) -> Result<T, IoError> {
+    let content = limits.read(path, limit)?;
+    parse(path, text_bytes(path, &content)?)
 }
 
-impl Document {
-    /// Reads a JSON file whole, within limits. Numbers keep every digit of an `f64`.
-    pub(crate) fn read(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
-        Self::parse(path, Limited::JsonBytes, limits.max_json_bytes)
-    }
-
-    /// Reads a JSON file that states one thing.
-    pub(crate) fn read_small(limits: &ReadLimits, path: &Path) -> Result<Self, IoError> {
-        Self::parse(path, Limited::SmallJsonBytes, limits.max_small_json_bytes)
-    }
-
-    fn parse(path: &Path, what: Limited, limit: u64) -> Result<Self, IoError> {
-        let content = Source::open(path)?.read(what, limit)?;
-        let parsed = serde_json::from_slice::<Unambiguous>(text_bytes(path, &content)?);
-        let Unambiguous(value) = parsed.map_err(|error| IoError::JsonSyntax {
-            path: path.to_owned(),
-            line: error.line(),
-            column: error.column(),
-            source: error.into(),
-        })?;
-        Ok(Self {
-            path: path.to_owned(),
-            value,
-        })
-    }
-
-    pub(crate) fn root(&self) -> Node<'_> {
-        Node {
-            path: &self.path,
-            key: "$".to_owned(),
-            value: &self.value,
-        }
+/// Parses the text of a JSON file.
+pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, IoError> {
+    let mut json = serde_json::Deserializer::from_slice(text);
+    let value = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+        let key = error.path().to_string();
+        let root = match key.as_str() {
+            "." => return refusal(path, "$".to_owned(), error.into_inner()),
+            key if key.starts_with('[') => "$",
+            _ => "$.",
+        };
+        let key = key.escape_debug().take(SHOWN);
+        refusal(path, root.chars().chain(key).collect(), error.into_inner())
+    })?;
+    match json.end() {
+        Ok(()) => Ok(value),
+        Err(error) => Err(refusal(path, String::new(), error)),
     }
 }
 
-/// A value in which no object has a key twice, of which one would be lost.
-struct Unambiguous(Value);
+fn refusal(path: &Path, key: String, error: serde_json::Error) -> IoError {
+    if error.classify() != Category::Data {
+        let place = Place::Field(format!("line {}, column {}", error.line(), error.column()));
+        return IoError::new(path, place, "text that is not valid JSON", "JSON").with_source(error);
+    }
+    let text = error.to_string();
+    let text = text
+        .rsplit_once(" at line ")
+        .map_or(&*text, |(text, _)| text);
+    let (found, expected) = match text.split_once(", expected ") {
+        Some((found, expected)) => (plain(found), expected.to_owned()),
+        None => match text.split_once(" field ") {
+            Some(("missing", key)) => (
+                format!("no key {key}"),
+                format!("an object with the key {key}"),
+            ),
+            Some(("duplicate", key)) => (
+                format!("the key {key} twice in one object"),
+                "it once".to_owned(),
+            ),
+            _ => (text.to_owned(), "a usable value".to_owned()),
+        },
+    };
+    let expected = match &*expected {
+        "f64" => "a number",
+        "u32" => "an integer from 0 to 4294967295",
+        "a sequence" => "an array",
+        "a map" => "an object",
+        other => other,
+    };
+    IoError::new(path, Place::Field(key), found, expected)
+}
 
-impl<'de> Deserialize<'de> for Unambiguous {
+/// Returns what serde calls the found value in the words of JSON, shortened.
+fn plain(found: &str) -> String {
+    if let Some(length) = found.strip_prefix("invalid length ") {
+        return format!("an array of {length}");
+    }
+    let found = ["invalid type: ", "invalid value: "]
+        .iter()
+        .find_map(|prefix| found.strip_prefix(prefix))
+        .unwrap_or(found);
+    match found.split_once(' ') {
+        Some(("string", text)) => format!("the text {}", quote(text.trim_matches('"'))),
+        _ => match found {
+            "sequence" => "an array".to_owned(),
+            "map" => "an object".to_owned(),
+            _ => match found.split('`').nth(1) {
+                Some(number) if found.ends_with('`') => number.to_owned(),
+                _ => found.to_owned(),
+            },
+        },
+    }
+}
+
+/// N numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
+
+impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(ValueVisitor).map(Self)
-    }
-}
+        struct Items<const N: usize>;
+        impl<'de, const N: usize> Visitor<'de> for Items<N> {
+            type Value = Numbers<N>;
 
-struct ValueVisitor;
-
-impl<'de> Visitor<'de> for ValueVisitor {
-    type Value = Value;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a JSON value")
-    }
-
-    fn visit_unit<E>(self) -> Result<Value, E> {
-        Ok(Value::Null)
-    }
-
-    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_string<E>(self, value: String) -> Result<Value, E> {
-        Ok(value.into())
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
-        let mut values = Vec::new();
-        while let Some(Unambiguous(value)) = items.next_element()? {
-            values.push(value);
-        }
-        Ok(values.into())
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
-        let mut object = Map::new();
-        while let Some(key) = members.next_key::<String>()? {
-            if object.contains_key(&key) {
-                let key = quote(&key);
-                return Err(A::Error::custom(format!(
-                    "the key {key} twice in one object, expected it once"
-                )));
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "an array of {N} numbers")
             }
-            let Unambiguous(value) = members.next_value()?;
-            object.insert(key, value);
-        }
-        Ok(object.into())
-    }
-}
 
-/// A value of a document.
-#[derive(Clone, Debug)]
-pub(crate) struct Node<'a> {
-    path: &'a Path,
-    key: String,
-    value: &'a Value,
-}
-
-impl<'a> Node<'a> {
-    pub(crate) fn path(&self) -> &'a Path {
-        self.path
-    }
-
-    pub(crate) fn key(&self) -> &str {
-        &self.key
-    }
-
-    /// Returns the member `name` of an object, or `None` when it is not there or `null`.
-    pub(crate) fn optional(&self, name: &str) -> Option<Self> {
-        let value = self.value.get(name).filter(|value| !value.is_null())?;
-        Some(Self {
-            path: self.path,
-            key: format!("{}.{name}", self.key),
-            value,
-        })
-    }
-
-    pub(crate) fn get(&self, name: &str) -> Result<Self, IoError> {
-        self.optional(name).ok_or_else(|| {
-            let expected = format!("an object with the key `{name}`");
-            match self.value.get(name) {
-                Some(_) => self.refuse_found(format!("`{name}` that is null"), expected),
-                None => self.refuse(expected),
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
+                let mut numbers = Vec::new();
+                while let Some(number) = items.next_element()? {
+                    numbers.push(number);
+                }
+                let count = numbers.len();
+                let numbers = numbers.try_into().map(Numbers);
+                numbers.map_err(|_| A::Error::invalid_length(count, &self))
             }
-        })
-    }
-
-    /// Returns the members of an object whose keys are numbers, as BOP's are, in ascending order.
-    pub(crate) fn numbered(&self) -> Result<Vec<(u32, Self)>, IoError> {
-        let members = self
-            .value
-            .as_object()
-            .ok_or_else(|| self.refuse("an object whose keys are numbers"))?;
-        let mut numbered = Vec::with_capacity(members.len());
-        for (name, value) in members {
-            let number = name
-                .parse()
-                .map_err(|_| self.refuse_found(quote(name), "keys that are numbers"))?;
-            let key = format!("{}.{name}", self.key);
-            let path = self.path;
-            numbered.push((number, Self { path, key, value }));
         }
-        numbered.sort_by_key(|(number, _)| *number);
-        match numbered.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            Some([(number, _), (_, second)]) => Err(second.refuse_found(
-                format!("the number {number} a second time"),
-                "each number once",
-            )),
-            _ => Ok(numbered),
-        }
-    }
-
-    pub(crate) fn items(&self) -> Result<Vec<Self>, IoError> {
-        let items = self
-            .value
-            .as_array()
-            .ok_or_else(|| self.refuse("an array"))?;
-        Ok(items
-            .iter()
-            .enumerate()
-            .map(|(index, value)| Self {
-                path: self.path,
-                key: format!("{}[{index}]", self.key),
-                value,
-            })
-            .collect())
-    }
-
-    pub(crate) fn number(&self) -> Result<f64, IoError> {
-        self.value.as_f64().ok_or_else(|| self.refuse("a number"))
-    }
-
-    pub(crate) fn text(&self) -> Option<&'a str> {
-        self.value.as_str()
-    }
-
-    pub(crate) fn unsigned(&self) -> Result<u32, IoError> {
-        self.value
-            .as_u64()
-            .and_then(|value| u32::try_from(value).ok())
-            .ok_or_else(|| self.refuse("an integer from 0 to 4294967295"))
-    }
-
-    pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], IoError> {
-        let items = match self.value.as_array() {
-            Some(items) if items.len() == N => items,
-            _ => return Err(self.refuse(format!("an array of {N} numbers"))),
-        };
-        let mut numbers = [0.0; N];
-        for (index, (number, item)) in numbers.iter_mut().zip(items).enumerate() {
-            *number = item.as_f64().ok_or_else(|| IoError::JsonValue {
-                path: self.path.to_owned(),
-                key: format!("{}[{index}]", self.key),
-                found: describe(item),
-                expected: format!("a number, one of {N}"),
-            })?;
-        }
-        Ok(numbers)
-    }
-
-    /// Makes the error for a value that is not what was expected.
-    pub(crate) fn refuse(&self, expected: impl Into<String>) -> IoError {
-        self.refuse_found(describe(self.value), expected)
-    }
-
-    pub(crate) fn refuse_found(&self, found: String, expected: impl Into<String>) -> IoError {
-        IoError::JsonValue {
-            path: self.path.to_owned(),
-            key: self.key.clone(),
-            found,
-            expected: expected.into(),
-        }
+        deserializer.deserialize_seq(Items)
     }
 }
 
-/// Refuses to write a value of ours in which something is `null`: it was not a finite number.
-pub(crate) fn check_finite(value: &Value) -> io::Result<()> {
-    fn find(value: &Value, key: &mut String) -> bool {
-        let length = key.len();
-        let mut inside = |name: String, value| {
-            key.truncate(length);
-            key.push_str(&name);
-            find(value, key)
-        };
+/// Reads N numbers that may be absent.
+pub(crate) fn optional_numbers<'de, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Option<[f64; N]>, D::Error> {
+    Ok(Option::deserialize(deserializer)?.map(|Numbers(numbers)| numbers))
+}
+
+/// A number above 0.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "f64")]
+pub(crate) struct Positive(pub(crate) f64);
+
+impl TryFrom<f64> for Positive {
+    type Error = String;
+
+    fn try_from(value: f64) -> Result<Self, String> {
         match value {
-            Value::Null => true,
-            Value::Array(items) => {
-                let mut items = items.iter().enumerate();
-                items.any(|(index, item)| inside(format!("[{index}]"), item))
-            }
-            Value::Object(members) => {
-                let mut members = members.iter();
-                members.any(|(name, member)| inside(format!(".{name}"), member))
-            }
-            _ => false,
+            value if value > 0.0 => Ok(Self(value)),
+            _ => Err(format!("{value}, expected a number above 0, in mm")),
         }
     }
-    let mut key = "$".to_owned();
-    if find(value, &mut key) {
-        return Err(not_finite(&key));
-    }
-    Ok(())
 }
 
-/// The error for a number that no file can state.
+/// The members of an object whose keys are numbers, as BOP's are.
+#[derive(Debug)]
+pub(crate) struct ById<T>(pub(crate) BTreeMap<u32, T>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for ById<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Members<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Members<T> {
+            type Value = ById<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object whose keys are numbers")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<ById<T>, A::Error> {
+                let mut entries = BTreeMap::new();
+                while let Some(key) = members.next_key::<String>()? {
+                    let id: u32 = key.parse().map_err(|_| {
+                        A::Error::custom(format!(
+                            "the key {}, expected keys that are numbers",
+                            quote(&key)
+                        ))
+                    })?;
+                    if entries.insert(id, members.next_value()?).is_some() {
+                        return Err(A::Error::custom(format!(
+                            "the number {id} a second time, expected each number once"
+                        )));
+                    }
+                }
+                Ok(ById(entries))
+            }
+        }
+        deserializer.deserialize_map(Members(PhantomData))
+    }
+}
+
+/// Writes a JSON value on one line, or indented; refuses a value that contains `null`, which was not a finite number.
+pub(crate) fn write(path: &Path, value: &Value, indented: bool) -> Result<(), IoError> {
+    write_atomically(path, |file| {
+        if let Some(key) = null_in(value) {
+            return Err(not_finite(&format!("${key}")));
+        }
+        match indented {
+            true => writeln!(file, "{value:#}"),
+            false => writeln!(file, "{value}"),
+        }
+    })
+}
+
+/// Returns the path of keys to the first `null`.
+fn null_in(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => Some(String::new()),
+        Value::Array(items) => (items.iter().enumerate())
+            .find_map(|(index, item)| Some(format!("[{index}]{}", null_in(item)?))),
+        Value::Object(members) => {
+            (members.iter()).find_map(|(name, member)| Some(format!(".{name}{}", null_in(member)?)))
+        }
+        _ => None,
+    }
+}
+
+/// Returns the error for a number that no file can state.
 pub(crate) fn not_finite(place: &str) -> io::Error {
     let text = format!("{place} is not a finite number, expected one");
     io::Error::new(io::ErrorKind::InvalidInput, text)
-}
-
-fn describe(value: &Value) -> String {
-    match value {
-        Value::Null => "null".to_owned(),
-        Value::Bool(value) => value.to_string(),
-        Value::Number(number) => number.to_string(),
-        Value::String(text) => format!("the text {}", quote(text)),
-        Value::Array(items) => format!("an array of {}", items.len()),
-        Value::Object(members) if members.is_empty() => "an empty object".to_owned(),
-        Value::Object(members) => {
-            let mut names: Vec<String> = members.keys().take(12).map(|key| quote(key)).collect();
-            if members.len() > names.len() {
-                names.push("...".to_owned());
-            }
-            let names = names.join(", ");
-            let shown: String = names.chars().take(200).collect();
-            let rest = if shown.len() < names.len() { "..." } else { "" };
-            format!("an object with the keys {shown}{rest}")
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn document(text: &str) -> Result<Document, IoError> {
+    fn document<T: DeserializeOwned>(text: &str) -> Result<T, IoError> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         std::fs::write(&path, text).unwrap();
-        Document::read(&ReadLimits::DEFAULT, &path)
+        read(&ReadLimits::DEFAULT, &path, Limit::JsonBytes)
     }
 
     #[test]
     fn syntax_errors_name_line_and_column() {
-        for text in ["{\n \"a\": NaN}", "", "{\n", "[1,]", "1e999"] {
-            assert!(
-                matches!(document(text), Err(IoError::JsonSyntax { .. })),
-                "{text}"
-            );
+        for text in ["{\n \"a\": NaN}", "", "{\n", "[1,]", "1e999", "1 2"] {
+            let error = document::<Value>(text).unwrap_err();
+            assert!(error.found.contains("not valid JSON"), "{text}: {error}");
         }
-        match document("{\n \"a\": NaN}") {
-            Err(IoError::JsonSyntax { line, .. }) => assert_eq!(line, 2),
-            other => panic!("{other:?}"),
-        }
+        let error = document::<Numbers<2>>("[1, Infinity]").unwrap_err();
+        assert!(error.found.contains("not valid JSON"), "{error}");
+        let error = document::<Value>("{\n \"a\": NaN}").unwrap_err();
+        assert_eq!(
+            error.place,
+            Some(Place::Field("line 2, column 7".to_owned()))
+        );
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(expecting = "an object with an item")]
+    struct Item {
+        #[serde(rename = "R")]
+        r: Numbers<3>,
+        n: u32,
+        t: Option<Positive>,
     }
 
     #[test]
     fn what_is_there_twice_is_not_lost() {
-        for (text, at) in [
-            ("{\"a\": 1,\n \"a\": 2}", 2),
-            ("[\n{\"b\": {\"c\": 1}},\n{\"b\": {\"c\": 1, \"c\": 1}}]", 3),
-        ] {
-            match document(text) {
-                Err(IoError::JsonSyntax { line, source, .. }) => {
-                    assert_eq!(line, at);
-                    assert!(
-                        source.to_string().contains("twice in one object"),
-                        "{source}"
-                    );
-                }
-                other => panic!("{other:?}"),
-            }
-        }
-        let numbers = document("{\"2\": 1, \"1\": 0, \"000002\": 3}").unwrap();
-        let error = numbers.root().numbered().unwrap_err().to_string();
+        let twice = "[{\"n\": 1, \"R\": [1, 2, 3]},\n{\"n\": 1, \"n\": 1}]";
+        let error = document::<Vec<Item>>(twice).unwrap_err().to_string();
+        let expected = "$[1]: found the key `n` twice in one object, expected it once";
+        assert!(error.ends_with(expected), "{error}");
+        let twice = "{\"2\": 1, \"1\": 0, \"000002\": 3}";
+        let error = document::<ById<u32>>(twice).unwrap_err().to_string();
         assert!(error.contains("the number 2 a second time"), "{error}");
-        let all = document("{\"a\": [null, true, -1, 18446744073709551615, 0.1, \"\\u00e9\", {}]}");
-        let text = all.unwrap().value.to_string();
-        assert_eq!(
-            text,
-            "{\"a\":[null,true,-1,18446744073709551615,0.1,\"é\",{}]}"
-        );
     }
 
     #[test]
     fn refusals_name_the_key_the_value_and_what_was_expected() {
-        let document =
-            document("\u{feff}{\"a\": [{\"R\": [1, \"x\", 3], \"n\": -1, \"t\": 4}]}").unwrap();
-        let item = document.root().get("a").unwrap().items().unwrap().remove(0);
-        let message = |result: Result<(), IoError>| {
-            let text = result.unwrap_err().to_string();
-            text.split_once(", ").unwrap().1.to_owned()
-        };
-        let r = item.get("R").unwrap();
-        assert_eq!(
-            message(r.numbers::<3>().map(|_| ())),
-            "$.a[0].R[1]: found the text \"x\", expected a number, one of 3"
-        );
-        assert_eq!(
-            message(r.numbers::<9>().map(|_| ())),
-            "$.a[0].R: found an array of 3, expected an array of 9 numbers"
-        );
-        assert_eq!(
-            message(item.get("n").unwrap().unsigned().map(|_| ())),
-            "$.a[0].n: found -1, expected an integer from 0 to 4294967295"
-        );
-        assert_eq!(
-            message(item.get("t").unwrap().numbers::<3>().map(|_| ())),
-            "$.a[0].t: found 4, expected an array of 3 numbers"
-        );
+        let long = "x".repeat(500);
+        for (item, message) in [
+            (
+                "{\"n\": 1, \"R\": [1, \"x\", 3]}",
+                "$.7[0].R[1]: found the text \"x\", expected a number",
+            ),
+            (
+                "{\"n\": 1, \"R\": [1, 2]}",
+                "$.7[0].R: found an array of 2, expected an array of 3 numbers",
+            ),
+            (
+                "{\"n\": 1, \"R\": 4}",
+                "$.7[0].R: found 4, expected an array of 3 numbers",
+            ),
+            (
+                "{\"n\": -1}",
+                "$.7[0].n: found -1, expected an integer from 0 to 4294967295",
+            ),
+            (
+                "{\"n\": null}",
+                "$.7[0].n: found null, expected an integer from 0 to 4294967295",
+            ),
+            (
+                "{\"n\": 1}",
+                "$.7[0]: found no key `R`, expected an object with the key `R`",
+            ),
+            (
+                "{\"t\": 0}",
+                "$.7[0].t: found 0, expected a number above 0, in mm",
+            ),
+            ("3", "$.7[0]: found 3, expected an object with an item"),
+            (
+                &format!("{{\"n\": \"{long}\"}}"),
+                &format!("the text \"{}\"..., expected", &long[..60]),
+            ),
+        ] {
+            let text = format!("\u{feff}{{\"7\": [{item}]}}");
+            let error = document::<ById<Vec<Item>>>(&text).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
+        let ById(items) = document::<ById<Item>>("{\"1\": {\"R\": [1, 2, 3], \"n\": 5}}").unwrap();
+        assert_eq!((items[&1].r, items[&1].n), (Numbers([1.0, 2.0, 3.0]), 5));
+        assert!(items[&1].t.is_none());
+        let error = document::<ById<u32>>("{\"x\": 1}").unwrap_err();
+        assert_eq!(error.expected, "keys that are numbers");
+        let error = document::<ById<u32>>("[1]").unwrap_err().to_string();
         assert!(
-            message(item.get("z").map(|_| ())).ends_with("expected an object with the key `z`")
-        );
-        assert!(document.root().numbered().is_err());
-        assert_eq!(describe(&serde_json::json!({})), "an empty object");
-        assert_eq!(
-            describe(&serde_json::json!({"a": 1, "b": 2})),
-            "an object with the keys \"a\", \"b\""
+            error.ends_with("$: found an array, expected an object whose keys are numbers"),
+            "{error}"
         );
     }
 }

@@ -1,10 +1,10 @@
 //! Files in and out for Hybrid ICP: meshes, depth images, masks, cameras, poses, BOP datasets and result files.
 //!
-//! **Should you use this crate?** Use it to get the types of `hicp-core` out of the files that robots, scanners and benchmarks write, and back. It is
-//! no general mesh or image library: it keeps geometry and drops colours, materials and texture coordinates. Units end
-//! here: files may be in millimetres, everything handed out is in metres and seconds. Whatever a file holds, reading it
-//! returns a value or an [`IoError`] that names the file, the place in it, what was found and what was expected; it does
-//! not panic and does not allocate more than the size of the file justifies. Writers replace a file whole or leave it
+//! **Should you use this crate?** Use it to read the files that robots, scanners and benchmarks write into the types of `hicp-core`,
+//! and to write them. It is not a general mesh or image library: it keeps geometry and drops colors, materials and texture
+//! coordinates. Units end here: files may be in millimeters, every returned value is in meters and seconds. Whatever a file holds,
+//! a reader returns a value or an [`IoError`] that names the file, the place in it, what was found and what was expected. It does
+//! not panic, and it does not allocate more than the size of the file justifies. Writers replace a file whole or leave it
 //! untouched ([`write_atomically`]).
 //!
 //! ```
@@ -15,7 +15,7 @@
 //! # let (mesh_path, depth_path) = (dir.path().join("part.obj"), dir.path().join("depth.png"));
 //! std::fs::write(&mesh_path, "v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n")?;
 //! let mesh = read_mesh(&mesh_path, LengthUnit::Millimeters)?;
-//! assert!((mesh.area() - 0.005).abs() < 1e-9); // square metres
+//! assert!((mesh.area() - 0.005).abs() < 1e-9); // square meters
 //!
 //! let depth = DepthImage::from_meters(2, 1, vec![0.5, 0.0])?;
 //! write_depth_png(&depth_path, &depth, 0.1)?; // 0.1 mm per unit
@@ -38,7 +38,7 @@ mod atomic;
 mod atomic_folder;
 pub use atomic::{check_writable, destination, is_stream, write_atomically};
 pub use atomic_folder::NewFolder;
-pub use error::{IoError, Place};
+pub use error::{IoError, IoErrorKind, Place};
 
 mod row_log;
 pub use row_log::RowLog;

@@ -1,13 +1,17 @@
-//! How much a reader takes in before it refuses.
+//! How much a reader reads before it refuses a file.
 
-/// How much the readers of this crate take in before they refuse a file with [`IoError::Limit`](crate::IoError::Limit).
+use std::path::Path;
+
+use crate::error::{IoError, IoErrorKind, Place};
+
+/// Limits above which the readers of this crate refuse a file, with an [`IoError`] of the kind [`IoErrorKind::Limit`].
 ///
-/// The defaults are above what 6D pose refinement needs by two orders of magnitude, and low enough that a hostile or mistaken
-/// file is refused before it exhausts the memory of a usual machine. Raise a field where larger files are meant; every reader of
-/// this crate uses the defaults, and the methods of this struct are the same readers with limits of one's own.
+/// The defaults are two orders of magnitude above what 6D pose refinement needs. They are low enough that a hostile or
+/// mistaken file is refused before it exhausts the memory of a usual machine. Every reader is a method of this struct. The
+/// free functions of the same names use the defaults.
 ///
-/// What a file costs at most within the defaults: a mesh file is held once in memory, beside about 60 bytes per vertex and 40
-/// per triangle; an image takes four bytes per pixel beside its file; a JSON file about forty times its size.
+/// Memory at most within the defaults: a mesh file is held once, next to about 60 bytes per vertex and 40 per triangle; an
+/// image takes four bytes per pixel next to its file; a JSON file a few times its size.
 ///
 /// ```
 /// use hicp_io::{LengthUnit, ReadLimits};
@@ -30,18 +34,30 @@ pub struct ReadLimits {
     pub max_json_bytes: u64,
     /// Bytes of a JSON file that states one thing, such as a pose, a camera or the configuration of a study: 16 MiB.
     pub max_small_json_bytes: u64,
-    /// Vertices of a mesh or a point cloud: 10 million. `hicp_core::MAX_MESH_ELEMENTS` holds for meshes whatever stands here.
+    /// Vertices of a mesh or a point cloud: 10 million. `hicp_core::MAX_MESH_ELEMENTS` always limits meshes, too.
     pub max_vertices: u64,
-    /// Triangles of a mesh: 10 million, after polygons are cut. `hicp_core::MAX_MESH_ELEMENTS` holds whatever stands here.
+    /// Triangles of a mesh, after polygons are cut: 10 million. `hicp_core::MAX_MESH_ELEMENTS` always limits them, too.
     pub max_triangles: u64,
-    /// Pixels of an image: 2²⁵, four times those of a 4K camera. `hicp_core::MAX_IMAGE_SIDE` holds whatever stands here.
+    /// Pixels of an image: 2²⁵, four times those of a 4K camera. `hicp_core::MAX_IMAGE_SIDE` always limits them, too.
     pub max_pixels: u64,
     /// Rows of a result file or of a study: 10 million.
     pub max_rows: u64,
 }
 
+/// A field of [`ReadLimits`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Limit {
+    FileBytes,
+    JsonBytes,
+    SmallJsonBytes,
+    Vertices,
+    Triangles,
+    Pixels,
+    Rows,
+}
+
 impl ReadLimits {
-    /// The limits that the readers use which are not told others.
+    /// The default limits.
     pub const DEFAULT: Self = Self {
         max_file_bytes: 1 << 30,
         max_json_bytes: 1 << 28,
@@ -52,7 +68,7 @@ impl ReadLimits {
         max_rows: 10_000_000,
     };
 
-    /// No limits but those of `hicp-core` and of memory.
+    /// No limits except those of `hicp-core` and of memory.
     pub const NONE: Self = Self {
         max_file_bytes: u64::MAX,
         max_json_bytes: u64::MAX,
@@ -62,6 +78,44 @@ impl ReadLimits {
         max_pixels: u64::MAX,
         max_rows: u64::MAX,
     };
+
+    /// Refuses the rows of a table if there are more than `max_rows`; `line` is the line of the last row.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError`] that names the limit.
+    pub fn check_rows(&self, path: &Path, line: usize, rows: u64) -> Result<(), IoError> {
+        self.check(Limit::Rows, path, Place::Line(line), rows)
+    }
+
+    pub(crate) fn check(
+        &self,
+        limit: Limit,
+        path: &Path,
+        place: impl Into<Option<Place>>,
+        count: u64,
+    ) -> Result<(), IoError> {
+        let (what, field, most) = match limit {
+            Limit::FileBytes => ("bytes", "max_file_bytes", self.max_file_bytes),
+            Limit::JsonBytes => ("bytes", "max_json_bytes", self.max_json_bytes),
+            Limit::SmallJsonBytes => ("bytes", "max_small_json_bytes", self.max_small_json_bytes),
+            Limit::Vertices => ("vertices", "max_vertices", self.max_vertices),
+            Limit::Triangles => ("triangles", "max_triangles", self.max_triangles),
+            Limit::Pixels => ("pixels", "max_pixels", self.max_pixels),
+            Limit::Rows => ("rows", "max_rows", self.max_rows),
+        };
+        if count <= most {
+            return Ok(());
+        }
+        let option = field.replace('_', "-");
+        let expected = format!(
+            "at most {most} {what}: raise the limit (--{option} N, ReadLimits::{field}) if that is meant"
+        );
+        Err(
+            IoError::new(path, place, format!("{count} {what}"), expected)
+                .with_kind(IoErrorKind::Limit),
+        )
+    }
 }
 
 impl Default for ReadLimits {

@@ -8,14 +8,14 @@ use hicp_core::{Point3, UnitVector3, Vector3};
 use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
-use crate::mesh::{Reading, ply};
-use crate::source::read_bytes;
+use crate::mesh::ply;
+use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
 
-/// Points in metres, with normals where the file has them.
+/// Points in meters, with normals where the file has them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCloud {
-    /// Positions, metres.
+    /// Positions, meters.
     pub points: Vec<Point3<f32>>,
     /// One unit normal per point, or none at all.
     pub normals: Option<Vec<UnitVector3<f32>>>,
@@ -27,7 +27,7 @@ pub struct PointCloud {
 ///
 /// # Errors
 ///
-/// As [`crate::read_mesh`] for malformed files and positions, and [`IoError::Normal`] for a normal that has no direction.
+/// As [`crate::read_mesh`] for malformed files and positions, and for a normal without a direction.
 pub fn read_point_cloud_ply(
     path: impl AsRef<Path>,
     unit: LengthUnit,
@@ -35,47 +35,35 @@ pub fn read_point_cloud_ply(
     let path = path.as_ref();
     let limits = &ReadLimits::DEFAULT;
     let reading = Reading { path, unit, limits };
-    let vertices = ply::read_vertices(&reading, &read_bytes(path, limits.max_file_bytes)?)?;
-    let points = vertices
-        .iter()
-        .map(|vertex| Point3::from_slice(&vertex.value[..3]) / unit.units_per_meter())
-        .map(|point| point.cast::<f32>())
-        .collect();
+    let vertices = ply::read_vertices(&reading, &limits.read_bytes(path)?)?;
+    let position = |v: &[f64; 6]| Point3::from_slice(&v[..3]) / unit.units_per_meter();
+    let points = vertices.iter().map(|v| position(v).cast::<f32>()).collect();
     // A file states normals for all vertices or for none.
-    let without = |v: &ply::Vertex<6>| v.value[3..].iter().all(|x| x.is_nan());
-    if vertices.iter().all(without) {
+    if vertices.iter().all(|v| v[3..].iter().all(|x| x.is_nan())) {
         return Ok(PointCloud {
             points,
             normals: None,
         });
     }
-    let mut normals = Vec::with_capacity(vertices.len());
-    for (number, vertex) in vertices.iter().enumerate() {
-        let normal = Vector3::from_column_slice(&vertex.value[3..]).cast::<f32>();
-        match UnitVector3::try_new(normal, 1e-6) {
-            Some(unit) if unit.iter().all(|x| x.is_finite()) => normals.push(unit),
-            _ => {
-                return Err(IoError::Normal {
-                    path: path.to_owned(),
-                    vertex: number,
-                    x: normal.x,
-                    y: normal.y,
-                    z: normal.z,
-                });
-            }
-        }
-    }
-    Ok(PointCloud {
-        points,
-        normals: Some(normals),
-    })
+    let normal = |(number, vertex): (usize, &[f64; 6])| {
+        let normal = Vector3::from_column_slice(&vertex[3..]).cast::<f32>();
+        let unit = UnitVector3::try_new(normal, 1e-6).filter(|n| n.iter().all(|x| x.is_finite()));
+        unit.ok_or_else(|| {
+            let (x, y, z) = (normal.x, normal.y, normal.z);
+            let found = format!("the normal ({x}, {y}, {z}) of vertex {number}");
+            IoError::new(path, None, found, "finite numbers that are not all 0")
+        })
+    };
+    let normals = vertices.iter().enumerate().map(normal);
+    let normals = Some(normals.collect::<Result<_, _>>()?);
+    Ok(PointCloud { points, normals })
 }
 
-/// Writes a point cloud as binary little-endian PLY, in metres.
+/// Writes a point cloud as binary little-endian PLY, in meters.
 ///
 /// # Errors
 ///
-/// [`IoError::Count`] when there is not one normal per point; otherwise as [`write_atomically`].
+/// [`IoError`] if there is not one normal per point; otherwise as [`write_atomically`].
 pub fn write_point_cloud_ply(
     path: impl AsRef<Path>,
     points: &[Point3<f32>],
@@ -85,12 +73,9 @@ pub fn write_point_cloud_ply(
     if let Some(normals) = normals
         && normals.len() != points.len()
     {
-        return Err(IoError::Count {
-            path: path.to_owned(),
-            what: "normals",
-            found: normals.len(),
-            expected: points.len(),
-        });
+        let found = format!("{} normals", normals.len());
+        let expected = format!("{}, one per point", points.len());
+        return Err(IoError::new(path, None, found, expected));
     }
     write_atomically(path, |writer| {
         writeln!(
@@ -163,11 +148,8 @@ mod tests {
         let path = dir.path().join("a.ply");
         assert!(matches!(
             write_point_cloud_ply(&path, &[Point3::origin()], Some(&[])),
-            Err(IoError::Count {
-                found: 0,
-                expected: 1,
-                ..
-            })
+            Err(IoError { found, expected, .. })
+                if found == "0 normals" && expected == "1, one per point"
         ));
         for (names, body) in [
             ("x y z", "0 nan 0"),
@@ -183,10 +165,12 @@ mod tests {
                 "ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n{body}\n"
             );
             std::fs::write(&path, text).unwrap();
-            assert!(matches!(
-                read_point_cloud_ply(&path, LengthUnit::Meters),
-                Err(IoError::Line { .. } | IoError::Normal { .. })
-            ));
+            let error = read_point_cloud_ply(&path, LengthUnit::Meters).unwrap_err();
+            let expected = ["finite coordinates", "finite numbers", "as a number"];
+            assert!(
+                expected.iter().any(|text| error.expected.contains(text)),
+                "{error}"
+            );
         }
     }
 }

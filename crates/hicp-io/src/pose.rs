@@ -1,21 +1,23 @@
-//! Poses in BOP's form: nine numbers of a rotation, row-major, and a translation in millimetres.
+//! Poses in BOP's form: nine numbers of a rotation, row-major, and a translation in millimeters.
 
 use std::path::Path;
 
-use hicp_core::{Isometry3, Matrix3, RotationError, Translation3, rotation_from_matrix};
+use hicp_core::{
+    Isometry3, Matrix3, RotationError, Translation3, UnitQuaternion, rotation_from_matrix,
+};
+use serde::de::{Deserialize, Deserializer, Error};
 
-use crate::atomic::write_atomically;
 use crate::error::IoError;
-use crate::json::{Document, Node, check_finite};
-use crate::limits::ReadLimits;
+use crate::json::{self, Numbers};
+use crate::limits::{Limit, ReadLimits};
 
-/// Returns the pose of a row-major rotation and a translation in millimetres; the pose is in metres.
+/// Returns the pose of a row-major rotation and a translation in millimeters; the pose is in meters.
 ///
 /// The rotation returned is the one nearest to the nine numbers. A translation that is not finite is passed on.
 ///
 /// # Errors
 ///
-/// [`RotationError`] when the nine numbers are further from a rotation than rounding explains.
+/// [`RotationError`] if the nine numbers are further from a rotation than rounding explains.
 ///
 /// ```
 /// # fn main() -> Result<(), hicp_core::RotationError> {
@@ -28,11 +30,15 @@ pub fn pose_from_bop(
     translation_mm: &[f64; 3],
 ) -> Result<Isometry3<f64>, RotationError> {
     let rotation = rotation_from_matrix(&Matrix3::from_row_slice(rotation))?;
-    let [x, y, z] = translation_mm.map(|mm| mm / 1000.0);
-    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+    Ok(pose(rotation, translation_mm))
 }
 
-/// Returns the rotation of a pose, row-major, and its translation in millimetres; the pose is in metres.
+fn pose(rotation: UnitQuaternion<f64>, translation_mm: &[f64; 3]) -> Isometry3<f64> {
+    let [x, y, z] = translation_mm.map(|mm| mm / 1000.0);
+    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+}
+
+/// Returns the rotation of a pose, row-major, and its translation in millimeters; the pose is in meters.
 #[must_use]
 pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
     let matrix = pose.rotation.to_rotation_matrix().into_inner();
@@ -43,24 +49,59 @@ pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
     (rotation, [t.x, t.y, t.z])
 }
 
+/// A rotation of a JSON file, and the very numbers that state it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rotation {
+    numbers: [f64; 9],
+    nearest: UnitQuaternion<f64>,
+}
+
+impl Rotation {
+    /// Returns the pose with a translation in millimeters.
+    pub(crate) fn with_translation(&self, translation_mm: &Numbers<3>) -> Isometry3<f64> {
+        pose(self.nearest, &translation_mm.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for Rotation {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Numbers(numbers) = Numbers::deserialize(deserializer)?;
+        match rotation_from_matrix(&Matrix3::from_row_slice(&numbers)) {
+            Ok(nearest) => Ok(Self { numbers, nearest }),
+            Err(error) => {
+                let text = format!("numbers that are not a rotation: {error}");
+                Err(D::Error::custom(text))
+            }
+        }
+    }
+}
+
 /// A pose file: the pose, and the very numbers that state it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseFile {
-    /// The pose, metres; its rotation is the one nearest to the file's numbers.
+    /// The pose, meters; its rotation is the one nearest to the file's numbers.
     pub camera_from_object: Isometry3<f64>,
     /// `cam_R_m2c`, row-major, as in the file.
     pub rotation: [f64; 9],
-    /// `cam_t_m2c`, millimetres, as in the file.
+    /// `cam_t_m2c`, millimeters, as in the file.
     pub translation_mm: [f64; 3],
 }
 
-/// Reads a pose from a JSON file: an object with `cam_R_m2c` (9 numbers, row-major) and `cam_t_m2c` (3, millimetres).
+#[derive(serde::Deserialize)]
+struct PoseRecord {
+    #[serde(rename = "cam_R_m2c")]
+    rotation: Rotation,
+    #[serde(rename = "cam_t_m2c")]
+    translation_mm: Numbers<3>,
+}
+
+/// Reads a pose from a JSON file: an object with `cam_R_m2c` (9 numbers, row-major) and `cam_t_m2c` (3, millimeters).
 ///
 /// Other keys are ignored. As in BOP the pose is `camera_from_object`.
 ///
 /// # Errors
 ///
-/// [`IoError::JsonSyntax`], [`IoError::JsonValue`] naming the key, [`IoError::Rotation`], or [`IoError::Limit`].
+/// [`IoError`] that names the key.
 pub fn read_pose_json(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
     ReadLimits::DEFAULT.read_pose_json(path)
 }
@@ -72,50 +113,30 @@ impl ReadLimits {
     ///
     /// As [`read_pose_json`].
     pub fn read_pose_json(&self, path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
-        let document = Document::read_small(self, path.as_ref())?;
-        pose_of(&document.root(), "cam_R_m2c", "cam_t_m2c")
+        let record: PoseRecord = json::read(self, path.as_ref(), Limit::SmallJsonBytes)?;
+        Ok(PoseFile {
+            camera_from_object: record.rotation.with_translation(&record.translation_mm),
+            rotation: record.rotation.numbers,
+            translation_mm: record.translation_mm.0,
+        })
     }
 }
 
-/// Writes a pose (metres) as [`read_pose_json`] reads it, with every digit.
+/// Writes a pose (meters) as [`read_pose_json`] reads it, with every digit.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_pose_json(path: impl AsRef<Path>, pose: &Isometry3<f64>) -> Result<(), IoError> {
     let (rotation, translation) = pose_to_bop(pose);
     let value = serde_json::json!({ "cam_R_m2c": rotation, "cam_t_m2c": translation });
-    write_atomically(path, |writer| {
-        check_finite(&value)?;
-        writeln!(writer, "{value}")
-    })
-}
-
-/// Reads the pose stated by two members of a JSON object.
-pub(crate) fn pose_of(
-    node: &Node<'_>,
-    rotation: &str,
-    translation: &str,
-) -> Result<PoseFile, IoError> {
-    let place = node.get(rotation)?;
-    let rotation = place.numbers()?;
-    let translation_mm = node.get(translation)?.numbers()?;
-    let camera_from_object =
-        pose_from_bop(&rotation, &translation_mm).map_err(|source| IoError::Rotation {
-            path: place.path().to_owned(),
-            place: place.key().to_owned(),
-            source,
-        })?;
-    Ok(PoseFile {
-        camera_from_object,
-        rotation,
-        translation_mm,
-    })
+    json::write(path.as_ref(), &value, false)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
     use hicp_core::{Vector6, se3};
     use proptest::prelude::*;
 
@@ -179,22 +200,35 @@ mod tests {
             ("1", "[0,0,0]", "$.cam_R_m2c"),
             (r#"[1,0,0,0,"1",0,0,0,1]"#, "[0,0,0]", "$.cam_R_m2c[4]"),
             (good, "[0,0,0,1]", "$.cam_t_m2c"),
-            (good, "null", "$"),
+            (good, "null", "$.cam_t_m2c"),
         ] {
             match read(&format!(r#"{{"cam_R_m2c":{r},"cam_t_m2c":{t}}}"#)) {
-                Err(IoError::JsonValue { key: found, .. }) => assert_eq!(found, key),
+                Err(IoError {
+                    place: Some(Place::Field(found)),
+                    ..
+                }) => assert_eq!(found, key),
                 other => panic!("{other:?}"),
             }
         }
         let null = read(&format!(r#"{{"cam_R_m2c":{good},"cam_t_m2c":null}}"#));
         let text = null.unwrap_err().to_string();
-        assert!(text.contains("found `cam_t_m2c` that is null"), "{text}");
+        assert!(
+            text.contains("$.cam_t_m2c: found null, expected an array of 3 numbers"),
+            "{text}"
+        );
         let reflection = r#"{"cam_R_m2c":[1,0,0,0,1,0,0,0,-1],"cam_t_m2c":[0,0,0]}"#;
+        let text = read(reflection).unwrap_err().to_string();
+        assert!(
+            text.contains("$.cam_R_m2c: found numbers that are not a rotation"),
+            "{text}"
+        );
+        assert!(text.contains("determinant -1, expected 1"), "{text}");
         assert!(matches!(
-            read(reflection),
-            Err(IoError::Rotation { source: RotationError::Determinant { determinant, .. }, .. })
-                if determinant == -1.0
+            read("[1]"),
+            Err(IoError {
+                place: Some(Place::Field(_)),
+                ..
+            })
         ));
-        assert!(matches!(read("[1]"), Err(IoError::JsonValue { .. })));
     }
 }

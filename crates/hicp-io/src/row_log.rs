@@ -5,9 +5,9 @@ use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::error::{IoError, quote};
-use crate::limits::ReadLimits;
-use crate::source::{Limited, is_absent, kind_of};
+use crate::error::{IoError, Place, quote};
+use crate::limits::{Limit, ReadLimits};
+use crate::source::{check_regular, is_absent};
 
 /// A text file of rows that grows while a run works, so that a killed run can resume.
 ///
@@ -85,18 +85,13 @@ impl RowLog {
             .open(path)
             .map_err(failed)?;
         let metadata = file.metadata().map_err(failed)?;
-        if !metadata.is_file() {
-            return Err(IoError::NotAFile {
-                path: path.to_owned(),
-                found: kind_of(&metadata),
-            });
-        }
+        check_regular(path, &metadata)?;
         // Other errors mean that the file system does not support locks.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let text = "another run has it open, expected one run at a time";
             return Err(failed(io::Error::new(io::ErrorKind::ResourceBusy, text)));
         }
-        Limited::FileBytes.check(path, None, metadata.len(), limits.max_file_bytes)?;
+        limits.check(Limit::FileBytes, path, None, metadata.len())?;
         let mut content = Vec::new();
         file.read_to_end(&mut content)
             .map_err(|e| IoError::read(path, e))?;
@@ -188,7 +183,7 @@ fn other_header(path: &Path, content: &[u8], header: &str) -> IoError {
         "{} as in this run: use the same settings, or move the file away",
         quote(&header[start..])
     );
-    IoError::line(path, 1, &found[start..], expected)
+    IoError::new(path, Place::Line(1), quote(&found[start..]), expected)
 }
 
 #[cfg(test)]

@@ -1,16 +1,16 @@
 //! Whole files into memory, within limits.
 
 use std::fs::{File, Metadata};
-use std::io::{Read, Seek, SeekFrom};
+use std::io::Read;
 use std::path::Path;
 
-use crate::error::{END_OF_FILE, IoError, Place};
-use crate::limits::ReadLimits;
+use crate::error::{IoError, IoErrorKind, Place};
+use crate::limits::{Limit, ReadLimits};
 
-/// Returns whether nothing is at a path.
+/// Returns whether there is nothing at a path.
 ///
-/// What cannot be told counts as being there, so that reading it says why: a share that does not answer or a folder that may not be
-/// entered is no reason to go on as if a file had never been.
+/// If that cannot be determined (a share that does not answer, a folder that may not be entered), returns `false`, so that
+/// the later read reports the cause.
 ///
 /// # Examples
 ///
@@ -23,132 +23,81 @@ pub fn is_absent(path: impl AsRef<Path>) -> bool {
     matches!(path.as_ref().try_exists(), Ok(false))
 }
 
-/// What is looked at before a file is read whole.
+/// The number of bytes that [`read_head`] reads.
 const HEAD_BYTES: u64 = 1 << 16;
 
-/// An open regular file.
-#[derive(Debug)]
-pub(crate) struct Source<'a> {
-    path: &'a Path,
-    file: File,
-    opened: Metadata,
+/// Opens a regular file. Refuses anything else: opening a pipe would wait for its writer, and a device has no end.
+fn open(path: &Path) -> Result<(File, Metadata), IoError> {
+    let failed = |e| IoError::read(path, e);
+    check_regular(path, &std::fs::metadata(path).map_err(failed)?)?;
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    Ok((file, metadata))
 }
 
-impl<'a> Source<'a> {
-    /// Opens a regular file. Anything else is refused: opening a pipe would wait for its writer, and a device has no end.
-    pub(crate) fn open(path: &'a Path) -> Result<Self, IoError> {
-        let failed = |e| IoError::read(path, e);
-        let before = std::fs::metadata(path).map_err(failed)?;
-        if !before.is_file() {
-            return Err(IoError::NotAFile {
-                path: path.to_owned(),
-                found: kind_of(&before),
-            });
-        }
-        let file = File::open(path).map_err(failed)?;
-        let opened = file.metadata().map_err(failed)?;
-        Ok(Self { path, file, opened })
+/// Refuses what is not a regular file.
+pub(crate) fn check_regular(path: &Path, metadata: &Metadata) -> Result<(), IoError> {
+    if metadata.is_file() {
+        return Ok(());
     }
-
-    /// The size of the file when it was opened, bytes.
-    pub(crate) fn bytes(&self) -> u64 {
-        self.opened.len()
-    }
-
-    /// Reads the first bytes of the file: 64 KiB, or all of a smaller one.
-    pub(crate) fn head(&mut self) -> Result<Vec<u8>, IoError> {
-        let mut head = Vec::new();
-        (&mut self.file)
-            .take(HEAD_BYTES)
-            .read_to_end(&mut head)
-            .and_then(|_| self.file.seek(SeekFrom::Start(0)))
-            .map_err(|e| IoError::read(self.path, e))?;
-        Ok(head)
-    }
-
-    /// Reads the file from its start. A file that another program changes meanwhile is refused: it would be neither the old nor the new one.
-    pub(crate) fn read(mut self, what: Limited, limit: u64) -> Result<Vec<u8>, IoError> {
-        let expected = self.bytes();
-        what.check(self.path, None, expected, limit)?;
-        let mut content = Vec::with_capacity(usize::try_from(expected).unwrap_or(0));
-        // One byte more than there should be shows that the file grew.
-        (&mut self.file)
-            .take(expected.saturating_add(1))
-            .read_to_end(&mut content)
-            .map_err(|e| IoError::read(self.path, e))?;
-        let now = self
-            .file
-            .metadata()
-            .map_err(|e| IoError::read(self.path, e))?;
-        let written = |metadata: &Metadata| metadata.modified().ok();
-        let read = content.len() as u64;
-        let is_touched = now.len() != expected || written(&now) != written(&self.opened);
-        if read != expected && !is_touched {
-            // Files that the system makes up as they are read, such as those of /proc, have any size; those that change twice within a tick
-            // of the clock of the file system seem untouched.
-            return Err(IoError::Bytes {
-                path: self.path.to_owned(),
-                offset: read.min(expected),
-                found: if read < expected {
-                    END_OF_FILE.to_owned()
-                } else {
-                    "more bytes".to_owned()
-                },
-                expected: format!(
-                    "a file of {expected} bytes, the size that the file system tells, that stays as it is while it is read"
-                ),
-            });
-        }
-        if is_touched {
-            return Err(IoError::Changed {
-                path: self.path.to_owned(),
-                before: expected,
-                after: now.len(),
-            });
-        }
-        Ok(content)
-    }
+    let found = match metadata.is_dir() {
+        true => "a folder",
+        false => "a pipe, a socket or a device",
+    };
+    Err(IoError::new(path, None, found, "a regular file"))
 }
 
-/// Names what is there instead of a regular file.
-pub(crate) fn kind_of(metadata: &Metadata) -> &'static str {
-    if metadata.is_dir() {
-        return "a folder";
+/// Reads the first 64 KiB of a file, or all of a smaller one. Returns them with the size of the file in bytes.
+pub(crate) fn read_head(path: &Path) -> Result<(Vec<u8>, u64), IoError> {
+    let (file, metadata) = open(path)?;
+    let mut head = Vec::new();
+    match file.take(HEAD_BYTES).read_to_end(&mut head) {
+        Ok(_) => Ok((head, metadata.len())),
+        Err(error) => Err(IoError::read(path, error)),
     }
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::FileTypeExt;
-        let kind = metadata.file_type();
-        if kind.is_fifo() {
-            return "a pipe";
-        }
-        if kind.is_socket() {
-            return "a socket";
-        }
-        if kind.is_char_device() || kind.is_block_device() {
-            return "a device";
-        }
-    }
-    "no regular file"
-}
-
-/// Reads a regular file of at most `limit` bytes.
-pub(crate) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
-    Source::open(path)?.read(Limited::FileBytes, limit)
 }
 
 impl ReadLimits {
-    /// Reads a text file that nothing else here parses, of at most `max_file_bytes`; a byte order mark is dropped.
+    /// Reads a whole file. Refuses a file that another program changes meanwhile: it would be neither the old nor the new one.
+    pub(crate) fn read(&self, path: &Path, limit: Limit) -> Result<Vec<u8>, IoError> {
+        self.read_opened(path, limit, open(path)?)
+    }
+
+    fn read_opened(
+        &self,
+        path: &Path,
+        limit: Limit,
+        (mut file, opened): (File, Metadata),
+    ) -> Result<Vec<u8>, IoError> {
+        let failed = |e| IoError::read(path, e);
+        let size = opened.len();
+        self.check(limit, path, None, size)?;
+        let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
+        // One byte more than the size shows that the file grew.
+        let mut source = (&mut file).take(size.saturating_add(1));
+        source.read_to_end(&mut content).map_err(failed)?;
+        let now = file.metadata().map_err(failed)?;
+        // Files of /proc have any size. A change within a tick of the file system's clock keeps the time.
+        if content.len() as u64 != size || now.modified().ok() != opened.modified().ok() {
+            let found = format!("{} bytes, or as many written anew", now.len());
+            let expected = format!(
+                "the {size} bytes that it had when it was opened: a file that stays as it is while it is read"
+            );
+            return Err(IoError::new(path, None, found, expected));
+        }
+        Ok(content)
+    }
+
+    /// Reads a text file of at most `max_file_bytes` for a caller that parses it; drops a byte order mark.
     ///
     /// # Errors
     ///
-    /// [`IoError`] for what is no regular file, above the limit, changed while it was read or not UTF-8.
+    /// [`IoError`] if it is not a regular file, above the limit, changed while it was read, or not UTF-8.
     pub fn read_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
-        text(path.as_ref(), Limited::FileBytes, self.max_file_bytes)
+        self.text(path.as_ref(), Limit::FileBytes)
     }
 
-    /// Reads the text of a JSON file that states one thing and that the caller parses, of at most `max_small_json_bytes`; a byte order
-    /// mark is dropped.
+    /// Reads a JSON file of at most `max_small_json_bytes` for a caller that parses it; drops a byte order mark.
     ///
     /// # Errors
     ///
@@ -164,21 +113,19 @@ impl ReadLimits {
     /// let mut limits = hicp_io::ReadLimits::default();
     /// assert_eq!(limits.read_small_json_text(&path)?, "{\"bins\": 10}");
     /// limits.max_small_json_bytes = 11;
-    /// let told = limits.read_small_json_text(&path).unwrap_err().to_string();
-    /// assert!(told.contains("--max-small-json-bytes"));
+    /// let message = limits.read_small_json_text(&path).unwrap_err().to_string();
+    /// assert!(message.contains("--max-small-json-bytes"));
     /// # Ok(()) }
     /// ```
     pub fn read_small_json_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
-        let limit = self.max_small_json_bytes;
-        text(path.as_ref(), Limited::SmallJsonBytes, limit)
+        self.text(path.as_ref(), Limit::SmallJsonBytes)
     }
 
-    /// Reads a file that nothing else here parses as it is, of at most `max_file_bytes`: for one that a failing machine may have cut off
-    /// or filled with zeros, of which what is whole is to be found.
+    /// Reads a file of at most `max_file_bytes` as it is.
     ///
     /// # Errors
     ///
-    /// [`IoError`] for what is no regular file, above the limit or changed while it was read.
+    /// [`IoError`] if it is not a regular file, above the limit or changed while it was read.
     ///
     /// # Examples
     ///
@@ -193,83 +140,34 @@ impl ReadLimits {
     /// # Ok(()) }
     /// ```
     pub fn read_bytes(&self, path: impl AsRef<Path>) -> Result<Vec<u8>, IoError> {
-        read_bytes(path.as_ref(), self.max_file_bytes)
+        self.read(path.as_ref(), Limit::FileBytes)
     }
-}
 
-/// Reads a regular file of at most so many bytes as text.
-fn text(path: &Path, what: Limited, limit: u64) -> Result<String, IoError> {
-    let content = Source::open(path)?.read(what, limit)?;
-    match std::str::from_utf8(text_bytes(path, &content)?) {
-        Ok(text) => Ok(text.to_owned()),
-        Err(error) => Err(IoError::Bytes {
-            path: path.to_owned(),
-            offset: error.valid_up_to() as u64,
-            found: "a byte that is not UTF-8".to_owned(),
-            expected: "text in UTF-8".to_owned(),
-        }),
-    }
-}
-
-/// What a limit is about.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Limited {
-    FileBytes,
-    JsonBytes,
-    SmallJsonBytes,
-    Vertices,
-    Triangles,
-    Rows,
-}
-
-impl Limited {
-    /// Refuses a count above the limit.
-    pub(crate) fn check(
-        self,
-        path: &Path,
-        place: Option<Place>,
-        count: u64,
-        limit: u64,
-    ) -> Result<(), IoError> {
-        if count <= limit {
-            return Ok(());
-        }
-        let (what, field) = match self {
-            Self::FileBytes => ("bytes", "max_file_bytes"),
-            Self::JsonBytes => ("bytes", "max_json_bytes"),
-            Self::SmallJsonBytes => ("bytes", "max_small_json_bytes"),
-            Self::Vertices => ("vertices", "max_vertices"),
-            Self::Triangles => ("triangles", "max_triangles"),
-            Self::Rows => ("rows", "max_rows"),
-        };
-        Err(IoError::Limit {
-            path: path.to_owned(),
-            place,
-            what,
-            count,
-            limit,
-            field,
+    fn text(&self, path: &Path, limit: Limit) -> Result<String, IoError> {
+        let content = self.read(path, limit)?;
+        let text = String::from_utf8(text_bytes(path, &content)?.to_owned());
+        text.map_err(|error| {
+            let place = Place::Byte(error.utf8_error().valid_up_to() as u64);
+            IoError::new(path, place, "a byte that is not UTF-8", "text in UTF-8")
         })
     }
 }
 
 /// Returns the bytes after a UTF-8 byte order mark, if there is one; refuses UTF-16 and UTF-32.
 pub(crate) fn text_bytes<'a>(path: &Path, content: &'a [u8]) -> Result<&'a [u8], IoError> {
-    let found = match content {
+    let encoding = match content {
         [0xef, 0xbb, 0xbf, rest @ ..] => return Ok(rest),
         [0, 0, 0xfe, 0xff, ..] => "UTF-32 BE",
         [0xff, 0xfe, 0, 0, ..] => "UTF-32 LE",
         [0xfe, 0xff, ..] => "UTF-16 BE",
         [0xff, 0xfe, ..] => "UTF-16 LE",
-        // Without a mark: text of these formats begins with two ASCII characters.
+        // Without a mark: text of these formats starts with two ASCII characters.
         [0, first, 0, second, ..] if first.is_ascii_graphic() && *second != 0 => "UTF-16 BE",
         [first, 0, second, 0, ..] if first.is_ascii_graphic() && *second != 0 => "UTF-16 LE",
         _ => return Ok(content),
     };
-    Err(IoError::Encoding {
-        path: path.to_owned(),
-        found,
-    })
+    let found = format!("text encoded as {encoding}");
+    Err(IoError::new(path, Place::Byte(0), found, "UTF-8").with_kind(IoErrorKind::Encoding))
 }
 
 #[cfg(test)]
@@ -282,10 +180,9 @@ mod tests {
         let path = dir.path().join("huge.obj");
         let file = File::create(&path).unwrap();
         file.set_len(1 << 40).unwrap();
-        assert!(matches!(
-            read_bytes(&path, 1 << 30),
-            Err(IoError::Limit { count, .. }) if count == 1 << 40
-        ));
+        let error = ReadLimits::DEFAULT.read_bytes(&path).unwrap_err();
+        assert_eq!(error.kind, IoErrorKind::Limit);
+        assert_eq!(error.found, "1099511627776 bytes");
     }
 
     #[test]
@@ -301,38 +198,28 @@ mod tests {
         ];
         for (name, change) in changes {
             std::fs::write(&path, "v 0 0 0\n").unwrap();
-            let mut source = Source::open(&path).unwrap();
-            assert_eq!(source.head().unwrap(), b"v 0 0 0\n");
+            let (head, bytes) = read_head(&path).unwrap();
+            assert_eq!((head.as_slice(), bytes), (&b"v 0 0 0\n"[..], 8));
+            let opened = open(&path).unwrap();
             let mut file = std::fs::OpenOptions::new()
                 .append(true)
                 .open(&path)
                 .unwrap();
             change(&mut file);
-            match source.read(Limited::FileBytes, 100) {
-                Err(IoError::Changed { before, after, .. }) => {
-                    assert_eq!(before, 8, "{name}");
-                    assert_ne!(after, 8, "{name}");
-                }
-                other => panic!("{name}: {other:?}"),
-            }
+            let read = ReadLimits::DEFAULT.read_opened(&path, Limit::FileBytes, opened);
+            let error = read.unwrap_err();
+            assert!(!error.found.starts_with("8 bytes"), "{name}: {error}");
+            assert!(error.expected.starts_with("the 8 bytes"), "{name}: {error}");
         }
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_of_another_size_than_it_states_is_refused_in_true_words() {
-        match read_bytes(Path::new("/proc/self/status"), 100) {
-            Err(IoError::Bytes {
-                offset: 0,
-                found,
-                expected,
-                ..
-            }) => {
-                assert_eq!(found, "more bytes");
-                assert!(expected.starts_with("a file of 0 bytes"), "{expected}");
-            }
-            other => panic!("{other:?}"),
-        }
+    fn a_file_of_another_size_than_it_states_is_refused() {
+        let error = ReadLimits::DEFAULT
+            .read_bytes("/proc/self/status")
+            .unwrap_err();
+        assert!(error.expected.starts_with("the 0 bytes"), "{error}");
     }
 
     #[test]
@@ -351,7 +238,7 @@ mod tests {
         ] {
             assert!(matches!(
                 text_bytes(path, bytes),
-                Err(IoError::Encoding { found, .. }) if found == name
+                Err(IoError { kind: IoErrorKind::Encoding, found, .. }) if found.ends_with(name)
             ));
         }
     }

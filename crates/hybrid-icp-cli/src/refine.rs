@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_io::{CameraFile, IoError, LengthUnit, PoseFile};
+use hicp_io::{CameraFile, IoErrorKind, LengthUnit, PoseFile};
 use hybrid_icp::{DepthImage, Mask, Model, Observation, PinholeCamera};
 
 use crate::choice::PipelineArguments;
@@ -253,14 +253,10 @@ fn read_camera(arguments: &Inputs) -> anyhow::Result<(CameraFile, f64)> {
         );
     }
     let camera_file = match limits().read_camera_json(&arguments.camera, size) {
-        Err(IoError::CameraSize {
-            path,
-            found_width,
-            found_height,
-            ..
-        }) => bail!(
-            "{} is a camera for {found_width}x{found_height} images but {depth} is {}x{}, expected the same size",
-            path.display(),
+        Err(error) if error.kind == IoErrorKind::CameraSize => bail!(
+            "{}: found {}, but {depth} is {}x{}, expected the same size",
+            error.path.display(),
+            error.found,
             size.0,
             size.1
         ),

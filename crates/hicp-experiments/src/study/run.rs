@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use hicp_io::{IoError, ReadLimits, RowLog, is_absent, write_atomically};
+use hicp_io::{IoErrorKind, ReadLimits, RowLog, is_absent, write_atomically};
 
 use super::design::Design;
 use super::fields::Fields;
@@ -136,7 +136,7 @@ fn open<D: Design>(
     let (header, rows_per_case) = (header(D::COLUMNS), config.layout().rows_per_case());
     let resumed = RowLog::resume(&path, header.trim_end(), rows_per_case, &options.limits);
     let (log, cases) = resumed.map_err(|error| match options.limits.read_text(&path) {
-        Err(encoding @ IoError::Encoding { .. }) => encoding,
+        Err(encoding) if encoding.kind == IoErrorKind::Encoding => encoding,
         _ => error,
     })?;
     let text = header + &cases.join("\n");

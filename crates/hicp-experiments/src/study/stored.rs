@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hicp_io::{IoError, Place, ReadLimits};
+use hicp_io::ReadLimits;
 
 use super::design::Design;
 use super::fields::Fields;
@@ -104,16 +104,7 @@ pub(crate) fn each_row<D: Design>(
             )
         })?;
         let line = record.position().map_or(1, csv::Position::line);
-        if rows > limits.max_rows {
-            return Err(ExperimentError::Io(IoError::Limit {
-                path: path.to_owned(),
-                place: usize::try_from(line).ok().map(Place::Line),
-                what: "rows",
-                count: rows,
-                limit: limits.max_rows,
-                field: "max_rows",
-            }));
-        }
+        limits.check_rows(path, usize::try_from(line).unwrap_or(usize::MAX), rows)?;
         let row = Row::parse(D::COLUMNS, &record).map_err(|what| wrong(line, what))?;
         let place = places.take(&row).map_err(|what| wrong(line, what))?;
         each(row, place).map_err(|what| wrong(line, what))?;

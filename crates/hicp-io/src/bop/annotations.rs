@@ -1,49 +1,101 @@
-//! What the JSON files of a scene state, by image.
+//! The content of a scene's JSON files, by image.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use hicp_core::{CameraError, Isometry3, Matrix3, PinholeCamera};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
-use crate::camera::{calibration, depth_scale};
+use crate::camera::CameraRecord;
 use crate::error::IoError;
-use crate::json::{Document, Node};
-use crate::limits::ReadLimits;
-use crate::pose::pose_of;
+use crate::json::{self, ById, Numbers, Positive, optional_numbers};
+use crate::limits::{Limit, ReadLimits};
+use crate::pose::Rotation;
 use crate::source::is_absent;
 
 /// The camera of an image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(try_from = "CameraRecord")]
 pub struct SceneCamera {
-    /// Calibration matrix K, pixels; pixel centres at integers.
+    /// Calibration matrix K, pixels; pixel centers at integers.
     pub matrix: Matrix3<f64>,
-    /// Width and height of its images, where stated: a `cam_model` may, a `cam_K` does not.
+    /// Width and height of its images, if stated: a `cam_model` may, a `cam_K` does not.
     pub image_size: Option<(u32, u32)>,
-    /// Millimetres per unit of the depth image, where stated.
+    /// Millimeters per unit of the depth image, if stated.
     pub depth_scale: Option<f64>,
-    /// Pose of the world in the camera frame, metres, where stated.
+    /// Pose of the world in the camera frame, meters, if stated.
     pub camera_from_world: Option<Isometry3<f64>>,
 }
 
+impl TryFrom<CameraRecord> for SceneCamera {
+    type Error = String;
+
+    fn try_from(record: CameraRecord) -> Result<Self, String> {
+        let calibration = record.calibration();
+        let calibration = calibration.map_err(|both| format!("{both}, expected one of them"))?;
+        let (matrix, image_size) = calibration
+            .ok_or("no key `cam_K`, expected an object with the key `cam_K` or `cam_model`")?;
+        let camera_from_world = match (&record.rotation, &record.translation_mm) {
+            (None, None) => None,
+            (Some(rotation), Some(translation)) => Some(rotation.with_translation(translation)),
+            _ => return Err("half a pose, expected `cam_R_w2c` and `cam_t_w2c`".to_owned()),
+        };
+        let depth_scale = record.depth_scale.map(|Positive(scale)| scale);
+        Ok(Self {
+            matrix,
+            image_size,
+            depth_scale,
+            camera_from_world,
+        })
+    }
+}
+
 /// The true pose of an object instance in an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(from = "TruthRecord")]
 pub struct GroundTruth {
     /// The object.
     pub obj_id: u32,
-    /// Its pose, metres.
+    /// Its pose, meters.
     pub camera_from_object: Isometry3<f64>,
 }
 
-/// What is known of the visibility of an instance. Boxes are x, y, width, height in pixels, −1 where nothing is seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Deserialize)]
+struct TruthRecord {
+    obj_id: u32,
+    #[serde(rename = "cam_R_m2c")]
+    rotation: Rotation,
+    #[serde(rename = "cam_t_m2c")]
+    translation_mm: Numbers<3>,
+}
+
+impl From<TruthRecord> for GroundTruth {
+    fn from(record: TruthRecord) -> Self {
+        Self {
+            obj_id: record.obj_id,
+            camera_from_object: record.rotation.with_translation(&record.translation_mm),
+        }
+    }
+}
+
+/// The visibility of an instance. Boxes are x, y, width, height in pixels, −1 if nothing is seen.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct GroundTruthInfo {
     /// Visible part of the silhouette, 0 to 1.
+    #[serde(rename = "visib_fract", skip_serializing_if = "Option::is_none")]
     pub visible_fraction: Option<f64>,
     /// Box of the whole silhouette.
+    #[serde(rename = "bbox_obj", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "optional_numbers")]
     pub bbox_object: Option<[f64; 4]>,
     /// Box of the visible part.
+    #[serde(rename = "bbox_visib", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "optional_numbers")]
     pub bbox_visible: Option<[f64; 4]>,
     /// Pixels of the visible part.
+    #[serde(rename = "px_count_visib", skip_serializing_if = "Option::is_none")]
     pub visible_pixels: Option<u32>,
 }
 
@@ -58,93 +110,14 @@ impl SceneCamera {
     }
 }
 
-/// Reads a `scene_camera.json`.
-pub(super) fn read_cameras(
+/// Reads a file of values by image, or returns `None` if there is no file.
+pub(super) fn by_image<T: DeserializeOwned>(
     limits: &ReadLimits,
     path: &Path,
-) -> Result<BTreeMap<u32, SceneCamera>, IoError> {
-    by_image(limits, path, scene_camera)
-}
-
-/// Instances by image, in the order of the file.
-type Instances<T> = BTreeMap<u32, Vec<T>>;
-
-/// Reads a `scene_gt.json`, or returns `None` when there is none.
-pub(super) fn read_ground_truth(
-    limits: &ReadLimits,
-    path: &Path,
-) -> Result<Option<Instances<GroundTruth>>, IoError> {
-    instances(limits, path, ground_truth)
-}
-
-/// Reads a `scene_gt_info.json`, or returns `None` when there is none.
-pub(super) fn read_info(
-    limits: &ReadLimits,
-    path: &Path,
-) -> Result<Option<Instances<GroundTruthInfo>>, IoError> {
-    instances(limits, path, ground_truth_info)
-}
-
-fn by_image<T>(
-    limits: &ReadLimits,
-    path: &Path,
-    read: impl Fn(&Node<'_>) -> Result<T, IoError>,
-) -> Result<BTreeMap<u32, T>, IoError> {
-    Document::read(limits, path)?
-        .root()
-        .numbered()?
-        .into_iter()
-        .map(|(im_id, node)| Ok((im_id, read(&node)?)))
-        .collect()
-}
-
-/// Reads a list per image, or `None` when there is no such file.
-fn instances<T>(
-    limits: &ReadLimits,
-    path: &Path,
-    read: impl Fn(&Node<'_>) -> Result<T, IoError>,
-) -> Result<Option<Instances<T>>, IoError> {
+) -> Result<Option<BTreeMap<u32, T>>, IoError> {
     if is_absent(path) {
         return Ok(None);
     }
-    by_image(limits, path, |node| {
-        node.items()?.iter().map(&read).collect()
-    })
-    .map(Some)
-}
-
-fn scene_camera(node: &Node<'_>) -> Result<SceneCamera, IoError> {
-    // Half a pose is damage: reading it says what is missing.
-    let has_pose = ["cam_R_w2c", "cam_t_w2c"]
-        .iter()
-        .any(|key| node.optional(key).is_some());
-    let calibration = calibration(node)?;
-    Ok(SceneCamera {
-        matrix: calibration.matrix,
-        image_size: calibration.image_size,
-        depth_scale: depth_scale(node)?,
-        camera_from_world: has_pose
-            .then(|| pose_of(node, "cam_R_w2c", "cam_t_w2c"))
-            .transpose()?
-            .map(|pose| pose.camera_from_object),
-    })
-}
-
-fn ground_truth(node: &Node<'_>) -> Result<GroundTruth, IoError> {
-    Ok(GroundTruth {
-        obj_id: node.get("obj_id")?.unsigned()?,
-        camera_from_object: pose_of(node, "cam_R_m2c", "cam_t_m2c")?.camera_from_object,
-    })
-}
-
-fn ground_truth_info(node: &Node<'_>) -> Result<GroundTruthInfo, IoError> {
-    let optional = |key: &str| node.optional(key);
-    Ok(GroundTruthInfo {
-        visible_fraction: optional("visib_fract").map(|n| n.number()).transpose()?,
-        bbox_object: optional("bbox_obj").map(|n| n.numbers()).transpose()?,
-        bbox_visible: optional("bbox_visib").map(|n| n.numbers()).transpose()?,
-        visible_pixels: optional("px_count_visib")
-            .map(|n| n.unsigned())
-            .transpose()?,
-    })
+    let ById(values) = json::read(limits, path, Limit::JsonBytes)?;
+    Ok(Some(values))
 }

@@ -38,14 +38,14 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when the folder does not exist.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the folder does not exist.
     pub fn open(root: impl AsRef<Path>) -> Result<Self, IoError> {
         let root = root.as_ref().to_owned();
         if root.is_dir() {
             let limits = ReadLimits::DEFAULT;
             Ok(Self { root, limits })
         } else {
-            Err(missing(root, "dataset folder"))
+            Err(IoError::missing(root, "dataset folder"))
         }
     }
 
@@ -66,7 +66,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is neither.
     pub fn models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models", "models_eval"])
     }
@@ -75,7 +75,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is neither.
     pub fn eval_models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models_eval", "models"])
     }
@@ -85,7 +85,7 @@ impl Dataset {
             .map(|name| self.root.join(name))
             .into_iter()
             .find(|dir| !is_absent(dir))
-            .ok_or_else(|| missing(self.root.join("models"), "folder of models"))
+            .ok_or_else(|| IoError::missing(self.root.join("models"), "folder of models"))
     }
 
     /// Returns the path of the mesh of an object, `models/obj_000001.ply` for object 1, whether or not it exists.
@@ -137,7 +137,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when the split does not exist, [`IoError::Read`] when its folder cannot be listed.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the split does not exist, [`IoErrorKind::Read`](crate::IoErrorKind::Read) when its folder cannot be listed.
     pub fn scene_ids(&self, split: &str) -> Result<Vec<u32>, IoError> {
         let dir = self.split_dir(split)?;
         let entries = std::fs::read_dir(&dir).map_err(|e| IoError::read(&dir, e))?;
@@ -159,7 +159,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when the split or the scene does not exist, otherwise as [`Scene::open`].
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the split or the scene does not exist, otherwise as [`Scene::open`].
     pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
         let folder = self.split_dir(split)?.join(format!("{scene_id:06}"));
         Scene::open_within(self.limits, folder)
@@ -168,19 +168,16 @@ impl Dataset {
     fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {
         let dir = self.root.join(split);
         if is_absent(&dir) {
-            return Err(missing(dir, "split"));
+            return Err(IoError::missing(dir, "split"));
         }
         Ok(dir)
     }
 }
 
-pub(super) fn missing(path: PathBuf, what: &'static str) -> IoError {
-    IoError::Missing { path, what }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::IoErrorKind;
     use std::fs;
 
     #[test]
@@ -188,23 +185,35 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         assert!(matches!(
             Dataset::open(dir.path().join("no")),
-            Err(IoError::Missing {
-                what: "dataset folder",
+            Err(IoError { kind: IoErrorKind::Missing, expected, .. }) if expected == "dataset folder"
+        ));
+        let dataset = Dataset::open(dir.path()).unwrap();
+        assert!(matches!(
+            dataset.models_dir(),
+            Err(IoError {
+                kind: IoErrorKind::Missing,
                 ..
             })
         ));
-        let dataset = Dataset::open(dir.path()).unwrap();
-        assert!(matches!(dataset.models_dir(), Err(IoError::Missing { .. })));
         assert!(matches!(
             dataset.scene_ids("test"),
-            Err(IoError::Missing { .. })
+            Err(IoError {
+                kind: IoErrorKind::Missing,
+                ..
+            })
         ));
-        assert!(matches!(dataset.read_targets(), Err(IoError::Read { .. })));
+        assert!(matches!(
+            dataset.read_targets(),
+            Err(IoError {
+                kind: IoErrorKind::Read,
+                ..
+            })
+        ));
         fs::create_dir(dir.path().join("test")).unwrap();
         assert!(dataset.scene_ids("test").unwrap().is_empty());
         assert!(matches!(
             dataset.scene("test", 3),
-            Err(IoError::Missing { what: "scene", .. })
+            Err(IoError { kind: IoErrorKind::Missing, expected, .. }) if expected == "scene"
         ));
     }
 

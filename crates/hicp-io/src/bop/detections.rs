@@ -1,14 +1,17 @@
-//! What a detector found, in COCO's form.
+//! Objects that a detector found, in COCO's form.
 
 use std::path::Path;
 
+use serde::{Deserialize, Deserializer};
+
 use super::rle::Rle;
 use crate::error::IoError;
-use crate::json::{Document, Node};
-use crate::limits::ReadLimits;
+use crate::json::{self, optional_numbers};
+use crate::limits::{Limit, ReadLimits};
 
 /// An object instance found in an image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(expecting = "an object with a detection")]
 pub struct Detection {
     /// The scene.
     pub scene_id: u32,
@@ -19,22 +22,28 @@ pub struct Detection {
     /// Confidence; higher is better.
     pub score: f64,
     /// Box in pixels: x, y, width, height.
+    #[serde(default, deserialize_with = "optional_numbers")]
     pub bbox: Option<[f64; 4]>,
     /// Mask, still coded: decode it with [`Rle::to_mask`].
     pub segmentation: Option<Rle>,
-    /// Seconds spent on the image, where known.
+    /// Seconds spent on the image, if known.
+    #[serde(rename = "time", default, deserialize_with = "known_time")]
     pub time_s: Option<f64>,
+}
+
+/// BOP writes −1 for an unknown time.
+fn known_time<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let time = Option::deserialize(deserializer)?;
+    Ok(time.filter(|seconds| *seconds >= 0.0))
 }
 
 /// Reads the detections of a BOP dataset from a JSON array, in the file's order.
 ///
-/// Segmentations are run-length codes, as lists of runs or compressed. Cost: the file's JSON tree is held in memory
-/// while it is converted, several times the size of the file.
+/// Segmentations are run-length codes, as lists of runs or compressed. Polygons are not supported.
 ///
 /// # Errors
 ///
-/// What [`IoError`] says of JSON files, and [`IoError::Segmentation`] for a code that does not fit its image. Polygons
-/// are not supported.
+/// [`IoError`] that names the key, also for a run-length code that does not fit its image.
 pub fn read_detections(path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
     ReadLimits::DEFAULT.read_detections(path)
 }
@@ -46,63 +55,14 @@ impl ReadLimits {
     ///
     /// As [`read_detections`].
     pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
-        read_within(self, path.as_ref())
+        json::read(self, path.as_ref(), Limit::JsonBytes)
     }
-}
-
-fn read_within(limits: &ReadLimits, path: &Path) -> Result<Vec<Detection>, IoError> {
-    Document::read(limits, path)?
-        .root()
-        .items()?
-        .iter()
-        .map(detection)
-        .collect()
-}
-
-fn detection(node: &Node<'_>) -> Result<Detection, IoError> {
-    let time = node.optional("time").map(|n| n.number()).transpose()?;
-    Ok(Detection {
-        scene_id: node.get("scene_id")?.unsigned()?,
-        image_id: node.get("image_id")?.unsigned()?,
-        category_id: node.get("category_id")?.unsigned()?,
-        score: node.get("score")?.number()?,
-        bbox: node.optional("bbox").map(|n| n.numbers()).transpose()?,
-        segmentation: node
-            .optional("segmentation")
-            .map(|n| segmentation(&n))
-            .transpose()?,
-        time_s: time.filter(|seconds| *seconds >= 0.0),
-    })
-}
-
-fn segmentation(node: &Node<'_>) -> Result<Rle, IoError> {
-    let (Some(size), Some(counts)) = (node.optional("size"), node.optional("counts")) else {
-        return Err(node.refuse("a run-length code with `size` and `counts`"));
-    };
-    let [height, width] = match size.items()?.as_slice() {
-        [height, width] => [height.unsigned()?, width.unsigned()?],
-        _ => return Err(size.refuse("an array of height and width")),
-    };
-    let rle = if let Some(text) = counts.text() {
-        Rle::from_compressed(width, height, text)
-    } else {
-        let runs = counts
-            .items()
-            .map_err(|_| counts.refuse("an array of run lengths, or their compressed text"))?;
-        let runs = runs.iter().map(Node::unsigned).collect::<Result<_, _>>()?;
-        Rle::from_counts(width, height, runs)
-    };
-    rle.map_err(|source| IoError::Segmentation {
-        path: node.path().to_owned(),
-        key: node.key().to_owned(),
-        source,
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bop::RleError;
+    use crate::error::Place;
 
     fn read(segmentation: &str) -> Result<Vec<Detection>, IoError> {
         let dir = tempfile::tempdir().unwrap();
@@ -131,27 +91,26 @@ mod tests {
 
     #[test]
     fn faults_are_named() {
-        assert!(matches!(
-            read(r#"{"size": [3, 2], "counts": [4, 5]}"#),
-            Err(IoError::Segmentation { key, source: RleError::Coverage { found: 9, expected: 6, .. }, .. })
-                if key == "$[0].segmentation"
-        ));
-        for (text, place) in [
-            ("[[1, 2, 3, 4]]", "$[0].segmentation"),
-            (r#"{"size": [3], "counts": [6]}"#, "$[0].segmentation.size"),
-            (
-                r#"{"size": [3, 2], "counts": 6}"#,
-                "$[0].segmentation.counts",
-            ),
-            (
-                r#"{"size": [3, 2], "counts": [7, -1]}"#,
-                "$[0].segmentation.counts[1]",
-            ),
+        let error = read(r#"{"size": [3, 2], "counts": [4, 5]}"#).unwrap_err();
+        assert_eq!(
+            error.place,
+            Some(Place::Field("$[0].segmentation".to_owned()))
+        );
+        assert!(error.found.contains("runs cover 9 pixels"), "{error}");
+        assert_eq!(error.expected, "6 for 2x3");
+        for (text, found) in [
+            ("[[1, 2, 3, 4]]", "another kind of segmentation"),
+            (r#"{"size": [3], "counts": [6]}"#, "an array of 1"),
+            (r#"{"size": [3, 2, 1], "counts": [6]}"#, "an array of 3"),
+            (r#"{"size": [3, 2], "counts": 6}"#, "6"),
+            (r#"{"size": [3, 2], "counts": [7, -1]}"#, "-1"),
         ] {
-            match read(text) {
-                Err(IoError::JsonValue { key, .. }) => assert_eq!(key, place),
-                other => panic!("{other:?}"),
-            }
+            let error = read(text).unwrap_err();
+            assert_eq!(
+                error.place,
+                Some(Place::Field("$[0].segmentation".to_owned()))
+            );
+            assert_eq!(error.found, found, "{error}");
         }
     }
 }

@@ -3,29 +3,107 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hicp_core::{
-    Isometry3, MAX_SYMMETRY_MOTIONS, Point3, Symmetries, SymmetryAxis, SymmetryError, Vector3,
-};
+use hicp_core::{Isometry3, MAX_SYMMETRY_MOTIONS, Point3, Symmetries, SymmetryAxis, Vector3};
+use serde::Deserialize;
 
 use crate::error::IoError;
-use crate::json::{Document, Node};
-use crate::limits::ReadLimits;
+use crate::json::{self, ById, Numbers, Positive};
+use crate::limits::{Limit, ReadLimits};
 use crate::pose::pose_from_bop;
 
 /// What a dataset states about an object besides its mesh.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(try_from = "Record")]
 pub struct ModelInfo {
-    /// Largest distance between two of its vertices, metres.
+    /// Largest distance between two of its vertices, meters.
     pub diameter_m: f64,
-    /// Its symmetries, metres.
+    /// Its symmetries, meters.
     pub symmetries: Symmetries,
+}
+
+#[derive(Deserialize)]
+struct Record {
+    diameter: Positive,
+    symmetries_discrete: Option<Vec<Motion>>,
+    symmetries_continuous: Option<Vec<Axis>>,
+}
+
+impl TryFrom<Record> for ModelInfo {
+    type Error = String;
+
+    fn try_from(record: Record) -> Result<Self, String> {
+        let discrete = record.symmetries_discrete.unwrap_or_default();
+        let continuous = record.symmetries_continuous.unwrap_or_default();
+        let symmetries = Symmetries {
+            discrete: discrete.into_iter().map(|Motion(motion)| motion).collect(),
+            continuous: continuous.into_iter().map(|Axis(axis)| axis).collect(),
+        };
+        // They are expanded when errors are measured: lists of ten thousand each would be terabytes.
+        let motions = symmetries.n_motions();
+        if motions > MAX_SYMMETRY_MOTIONS {
+            return Err(format!(
+                "{} discrete and {} continuous symmetries, which make {motions} motions, expected at most {MAX_SYMMETRY_MOTIONS}",
+                symmetries.discrete.len(),
+                symmetries.continuous.len()
+            ));
+        }
+        let diameter_m = record.diameter.0 / 1000.0;
+        Ok(Self {
+            diameter_m,
+            symmetries,
+        })
+    }
+}
+
+/// A rigid motion; in JSON a row-major 4×4 matrix in millimeters.
+#[derive(Deserialize)]
+#[serde(try_from = "Numbers<16>")]
+struct Motion(Isometry3<f64>);
+
+impl TryFrom<Numbers<16>> for Motion {
+    type Error = String;
+
+    fn try_from(Numbers(m): Numbers<16>) -> Result<Self, String> {
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            let row = &m[12..];
+            return Err(format!(
+                "a matrix with the last row {row:?}, expected the last row 0, 0, 0, 1 of a rigid motion"
+            ));
+        }
+        let rotation = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
+        let motion = pose_from_bop(&rotation, &[m[3], m[7], m[11]]);
+        motion
+            .map(Self)
+            .map_err(|e| format!("numbers that are not a rotation: {e}"))
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(try_from = "AxisRecord")]
+struct Axis(SymmetryAxis);
+
+#[derive(Deserialize)]
+struct AxisRecord {
+    axis: Numbers<3>,
+    offset: Numbers<3>,
+}
+
+impl TryFrom<AxisRecord> for Axis {
+    type Error = String;
+
+    fn try_from(record: AxisRecord) -> Result<Self, String> {
+        let (axis, offset) = (Vector3::from(record.axis.0), Point3::from(record.offset.0));
+        let axis = SymmetryAxis::new(axis, offset / 1000.0);
+        axis.map(Self)
+            .map_err(|e| format!("numbers that are not a symmetry: {e}"))
+    }
 }
 
 /// Reads a `models_info.json`: diameters and symmetries by object id.
 ///
 /// # Errors
 ///
-/// What [`IoError`] says of JSON files, [`IoError::Rotation`] and [`IoError::Symmetry`] for symmetries that are none.
+/// [`IoError`] that names the key, also for symmetries that are not rigid motions.
 pub fn read_models_info(path: impl AsRef<Path>) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
     ReadLimits::DEFAULT.read_models_info(path)
 }
@@ -40,83 +118,15 @@ impl ReadLimits {
         &self,
         path: impl AsRef<Path>,
     ) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
-        Document::read(self, path.as_ref())?
-            .root()
-            .numbered()?
-            .into_iter()
-            .map(|(obj_id, node)| Ok((obj_id, model_info(&node)?)))
-            .collect()
+        let ById(infos) = json::read(self, path.as_ref(), Limit::JsonBytes)?;
+        Ok(infos)
     }
-}
-
-fn model_info(node: &Node<'_>) -> Result<ModelInfo, IoError> {
-    let diameter = node.get("diameter")?;
-    let diameter_mm = diameter.number()?;
-    if diameter_mm <= 0.0 {
-        return Err(diameter.refuse("a number above 0, in mm"));
-    }
-    let list = |key: &str| {
-        node.optional(key)
-            .map_or(Ok(Vec::new()), |node| node.items())
-    };
-    let info = ModelInfo {
-        diameter_m: diameter_mm / 1000.0,
-        symmetries: Symmetries {
-            discrete: list("symmetries_discrete")?
-                .iter()
-                .map(discrete)
-                .collect::<Result<_, _>>()?,
-            continuous: list("symmetries_continuous")?
-                .iter()
-                .map(continuous)
-                .collect::<Result<_, _>>()?,
-        },
-    };
-    // They are expanded when errors are measured: lists of ten thousand each would be terabytes.
-    let motions = info.symmetries.n_motions();
-    if motions > MAX_SYMMETRY_MOTIONS {
-        return Err(node.refuse_found(
-            format!(
-                "{} discrete and {} continuous symmetries, which make {motions} motions",
-                info.symmetries.discrete.len(),
-                info.symmetries.continuous.len()
-            ),
-            format!("at most {MAX_SYMMETRY_MOTIONS}"),
-        ));
-    }
-    Ok(info)
-}
-
-/// A rigid motion as a row-major 4×4 matrix in millimetres.
-fn discrete(node: &Node<'_>) -> Result<Isometry3<f64>, IoError> {
-    let m: [f64; 16] = node.numbers()?;
-    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(node.refuse_found(
-            format!("a matrix with the last row {:?}", &m[12..]),
-            "the last row 0, 0, 0, 1 of a rigid motion",
-        ));
-    }
-    let rotation = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-    pose_from_bop(&rotation, &[m[3], m[7], m[11]]).map_err(|source| IoError::Rotation {
-        path: node.path().to_owned(),
-        place: node.key().to_owned(),
-        source,
-    })
-}
-
-fn continuous(node: &Node<'_>) -> Result<SymmetryAxis, IoError> {
-    let axis = Vector3::from(node.get("axis")?.numbers::<3>()?);
-    let offset = Point3::from(node.get("offset")?.numbers::<3>()?);
-    SymmetryAxis::new(axis, offset / 1000.0).map_err(|source: SymmetryError| IoError::Symmetry {
-        path: node.path().to_owned(),
-        key: node.key().to_owned(),
-        source,
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
 
     fn read(text: &str) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
         let dir = tempfile::tempdir().unwrap();
@@ -152,11 +162,12 @@ mod tests {
         let model = |rest: &str| read(&format!(r#"{{"3": {{"diameter": 1{rest}}}}}"#));
         assert!(matches!(
             model(r#", "symmetries_continuous": [{"axis": [0,0,0], "offset": [0,0,0]}]"#),
-            Err(IoError::Symmetry { key, .. }) if key == "$.3.symmetries_continuous[0]"
+            Err(IoError { place: Some(Place::Field(key)), .. }) if key == "$.3.symmetries_continuous[0]"
         ));
         assert!(matches!(
             model(r#", "symmetries_discrete": [[2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]"#),
-            Err(IoError::Rotation { place, .. }) if place == "$.3.symmetries_discrete[0]"
+            Err(IoError { place: Some(Place::Field(key)), found, .. })
+                if key == "$.3.symmetries_discrete[0]" && found.contains("not a rotation")
         ));
         for bad in [
             r#", "symmetries_discrete": [[1,0,0,0, 0,1,0,0, 0,0,1,0]]"#,
@@ -165,7 +176,13 @@ mod tests {
             r#", "symmetries_continuous": [{"axis": [0,0,1]}]"#,
         ] {
             assert!(
-                matches!(model(bad), Err(IoError::JsonValue { .. })),
+                matches!(
+                    model(bad),
+                    Err(IoError {
+                        place: Some(Place::Field(_)),
+                        ..
+                    })
+                ),
                 "{bad}"
             );
         }
@@ -188,7 +205,16 @@ mod tests {
             r#"{"3": {"diameter": 0}}"#,
             r#"{"x": {"diameter": 1}}"#,
         ] {
-            assert!(matches!(read(bad), Err(IoError::JsonValue { .. })), "{bad}");
+            assert!(
+                matches!(
+                    read(bad),
+                    Err(IoError {
+                        place: Some(Place::Field(_)),
+                        ..
+                    })
+                ),
+                "{bad}"
+            );
         }
     }
 }

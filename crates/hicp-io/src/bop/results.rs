@@ -1,81 +1,16 @@
 //! Result files: estimated poses as comma-separated values.
 
-use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use csv::StringRecord;
-use hicp_core::Isometry3;
 
-use super::result_cells::{COLUMNS, Cells, csv_error, find_columns, line_of};
+use super::result_row::{COLUMNS, ResultRow};
 use crate::atomic::write_atomically;
-use crate::error::{IoError, Place};
+use crate::error::{IoError, Place, quote};
 use crate::json::not_finite;
 use crate::limits::ReadLimits;
-use crate::pose::pose_to_bop;
-use crate::source::{Limited, read_bytes, text_bytes};
-
-/// One estimate: an object in an image, and where it is.
-///
-/// The numbers of the pose are kept as they stood in the file, so that a row whose pose is not replaced is written back
-/// with the same numbers, although its rotation may be orthogonal only up to rounding.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ResultRow {
-    /// The scene.
-    pub scene_id: u32,
-    /// The image.
-    pub im_id: u32,
-    /// The object.
-    pub obj_id: u32,
-    /// Confidence; higher is better.
-    pub score: f64,
-    /// Seconds spent on all estimates of the image, where known.
-    pub time_s: Option<f64>,
-    pub(super) rotation: [f64; 9],
-    pub(super) translation_mm: [f64; 3],
-    pub(super) camera_from_object: Isometry3<f64>,
-}
-
-impl ResultRow {
-    /// Makes a row with score 1 and unknown time; the pose is in metres.
-    #[must_use]
-    pub fn new(scene_id: u32, im_id: u32, obj_id: u32, camera_from_object: Isometry3<f64>) -> Self {
-        let (rotation, translation_mm) = pose_to_bop(&camera_from_object);
-        Self {
-            scene_id,
-            im_id,
-            obj_id,
-            score: 1.0,
-            time_s: None,
-            rotation,
-            translation_mm,
-            camera_from_object,
-        }
-    }
-
-    /// The estimate, metres; its rotation is the one nearest to the file's numbers.
-    #[must_use]
-    pub fn camera_from_object(&self) -> Isometry3<f64> {
-        self.camera_from_object
-    }
-
-    /// Replaces the estimate; metres.
-    pub fn set_camera_from_object(&mut self, camera_from_object: Isometry3<f64>) {
-        (self.rotation, self.translation_mm) = pose_to_bop(&camera_from_object);
-        self.camera_from_object = camera_from_object;
-    }
-
-    /// The rotation as it is written, row-major.
-    #[must_use]
-    pub fn rotation(&self) -> &[f64; 9] {
-        &self.rotation
-    }
-
-    /// The translation as it is written, millimetres.
-    #[must_use]
-    pub fn translation_mm(&self) -> &[f64; 3] {
-        &self.translation_mm
-    }
-}
+use crate::pose::pose_from_bop;
+use crate::source::text_bytes;
 
 /// Reads a result file, in its order.
 ///
@@ -85,8 +20,7 @@ impl ResultRow {
 ///
 /// # Errors
 ///
-/// [`IoError::CsvHeader`], [`IoError::CsvFields`], [`IoError::CsvValue`] naming line and column, [`IoError::Rotation`],
-/// [`IoError::Read`].
+/// [`IoError`] that names line and column.
 pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
     ReadLimits::DEFAULT.read_results(path)
 }
@@ -95,9 +29,9 @@ pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
 ///
 /// # Errors
 ///
-/// As [`read_results`], but for [`IoError::Read`].
+/// As [`read_results`].
 pub fn results_from_csv(content: &[u8], path: &Path) -> Result<Vec<ResultRow>, IoError> {
-    parse_within(&ReadLimits::DEFAULT, content, path)
+    Table::new(path, content)?.rows(&ReadLimits::DEFAULT)
 }
 
 impl ReadLimits {
@@ -108,58 +42,7 @@ impl ReadLimits {
     /// As [`read_results`].
     pub fn read_results(&self, path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
         let path = path.as_ref();
-        parse_within(self, &read_bytes(path, self.max_file_bytes)?, path)
-    }
-}
-
-fn parse_within(
-    limits: &ReadLimits,
-    content: &[u8],
-    path: &Path,
-) -> Result<Vec<ResultRow>, IoError> {
-    let text = text_bytes(path, content)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(text);
-    let mut rows = Vec::new();
-    let mut columns = None;
-    for record in reader.records() {
-        let record = record.map_err(|error| csv_error(path, text, error))?;
-        if record.iter().all(str::is_empty) {
-            continue;
-        }
-        match &columns {
-            None => columns = Some((find_columns(path, &record)?, record.len())),
-            Some((columns, count)) => {
-                if record.len() != *count {
-                    return Err(IoError::CsvFields {
-                        path: path.to_owned(),
-                        line: line_of(text, record.position()),
-                        found: record.len(),
-                        expected: *count,
-                    });
-                }
-                let cells = Cells {
-                    path,
-                    text,
-                    record: &record,
-                    columns,
-                };
-                rows.push(cells.row()?);
-                let count = rows.len() as u64;
-                if count > limits.max_rows {
-                    let line = usize::try_from(line_of(text, record.position()));
-                    let place = Place::Line(line.unwrap_or(usize::MAX));
-                    Limited::Rows.check(path, Some(place), count, limits.max_rows)?;
-                }
-            }
-        }
-    }
-    match columns {
-        Some(_) => Ok(rows),
-        None => find_columns(path, &StringRecord::new()).map(|_| rows),
+        Table::new(path, &self.read_bytes(path)?)?.rows(self)
     }
 }
 
@@ -167,13 +50,22 @@ fn parse_within(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite, which no reader would take.
+/// As [`write_atomically`]; also if a number is not finite, which the source names.
 pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), IoError> {
     write_atomically(path, |writer| {
         writeln!(writer, "{}", ResultRow::header())?;
         for (number, row) in (1_usize..).zip(rows) {
-            if let Some(field) = row.not_finite() {
-                return Err(not_finite(&format!("{field} of row {number}")));
+            let numbers: [(&str, &[f64]); 4] = [
+                ("score", &[row.score]),
+                ("R", &row.rotation),
+                ("t", &row.translation_mm),
+                ("time", row.time_s.as_slice()),
+            ];
+            if let Some((name, _)) = numbers
+                .iter()
+                .find(|(_, n)| !n.iter().all(|x| x.is_finite()))
+            {
+                return Err(not_finite(&format!("{name} of row {number}")));
             }
             writeln!(writer, "{row}")?;
         }
@@ -181,45 +73,141 @@ pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), I
     })
 }
 
-impl ResultRow {
-    /// The first line of a result file, without its end.
-    #[must_use]
-    pub fn header() -> String {
-        COLUMNS.join(",")
+/// The text of a result file.
+struct Table<'a> {
+    path: &'a Path,
+    text: &'a [u8],
+}
+
+impl<'a> Table<'a> {
+    fn new(path: &'a Path, content: &'a [u8]) -> Result<Self, IoError> {
+        let text = text_bytes(path, content)?;
+        Ok(Self { path, text })
     }
 
-    /// The column of a number that is not finite.
-    fn not_finite(&self) -> Option<&'static str> {
-        let fields = [
-            ("score", std::slice::from_ref(&self.score)),
-            ("R", &self.rotation),
-            ("t", &self.translation_mm),
-            ("time", self.time_s.as_slice()),
-        ];
-        let mut fields = fields.into_iter();
-        fields.find_map(|(name, numbers)| numbers.iter().any(|x| !x.is_finite()).then_some(name))
+    fn rows(&self, limits: &ReadLimits) -> Result<Vec<ResultRow>, IoError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .has_headers(false)
+            .from_reader(self.text);
+        let mut rows = Vec::new();
+        let mut header = None;
+        for record in reader.records() {
+            // Rows of any length and bytes in memory leave one possible error.
+            let record = record.map_err(|error| {
+                let line = self.line_of(error.position());
+                self.refuse(
+                    line,
+                    "bytes that are not UTF-8",
+                    "comma-separated values in UTF-8",
+                )
+            })?;
+            if record.iter().all(str::is_empty) {
+                continue;
+            }
+            let line = || self.line_of(record.position());
+            let Some((columns, fields)) = &header else {
+                header = Some((self.columns(&record)?, record.len()));
+                continue;
+            };
+            if record.len() != *fields {
+                let found = format!("{} fields", record.len());
+                return Err(self.refuse(line(), found, format!("{fields} as in the header")));
+            }
+            rows.push(self.row(&record, columns)?);
+            if rows.len() as u64 > limits.max_rows {
+                limits.check_rows(self.path, line(), rows.len() as u64)?;
+            }
+        }
+        if header.is_none() {
+            self.columns(&StringRecord::new())?;
+        }
+        Ok(rows)
+    }
+
+    /// Returns the index of each of [`COLUMNS`].
+    fn columns(&self, header: &StringRecord) -> Result<[usize; 7], IoError> {
+        let mut columns = [0; 7];
+        for (column, (name, _)) in columns.iter_mut().zip(COLUMNS) {
+            *column = header
+                .iter()
+                .position(|found| found == name)
+                .unwrap_or_default();
+            let times = header.iter().filter(|found| *found == name).count();
+            if times != 1 {
+                let text = quote(&header.iter().collect::<Vec<_>>().join(","));
+                let found =
+                    format!("a header in which column {name:?} appears {times} times: {text}");
+                return Err(self.refuse(1, found, "it once"));
+            }
+        }
+        Ok(columns)
+    }
+
+    fn row(&self, record: &StringRecord, columns: &[usize; 7]) -> Result<ResultRow, IoError> {
+        let cell = |column: usize| record.get(columns[column]).unwrap_or_default();
+        let refuse = |column: usize| {
+            let (name, expected) = COLUMNS[column];
+            let line = self.line_of(record.position());
+            let place = Place::Field(format!("line {line}, column {name:?}"));
+            IoError::new(self.path, place, quote(cell(column)), expected)
+        };
+        let integer = |column| cell(column).parse().map_err(|_| refuse(column));
+        let number = |column| {
+            numbers(cell(column))
+                .map(|[x]| x)
+                .ok_or_else(|| refuse(column))
+        };
+        let rotation = numbers(cell(4)).ok_or_else(|| refuse(4))?;
+        let translation_mm = numbers(cell(5)).ok_or_else(|| refuse(5))?;
+        let camera_from_object = pose_from_bop(&rotation, &translation_mm)
+            .map_err(|error| refuse(4).with_source(error))?;
+        let time = number(6)?;
+        Ok(ResultRow {
+            scene_id: integer(0)?,
+            im_id: integer(1)?,
+            obj_id: integer(2)?,
+            score: number(3)?,
+            time_s: (time >= 0.0).then_some(time),
+            rotation,
+            translation_mm,
+            camera_from_object,
+        })
+    }
+
+    fn refuse(
+        &self,
+        line: usize,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> IoError {
+        IoError::new(self.path, Place::Line(line), found, expected)
+    }
+
+    /// Returns the line of a record, from 1. The position of the reader is in front of the blank lines before the record.
+    fn line_of(&self, position: Option<&csv::Position>) -> usize {
+        let start = position.map_or(0, |position| position.byte());
+        let (before, rest) = self.text.split_at(usize::try_from(start).unwrap_or(0));
+        let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+        let end_of_line = if self.text.contains(&b'\n') {
+            b'\n'
+        } else {
+            b'\r'
+        };
+        1 + before
+            .iter()
+            .chain(blank)
+            .filter(|byte| **byte == end_of_line)
+            .count()
     }
 }
 
-/// The row's line in a result file, without its end.
-impl fmt::Display for ResultRow {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{},{},{},{},",
-            self.scene_id, self.im_id, self.obj_id, self.score
-        )?;
-        write_numbers(f, &self.rotation)?;
-        f.write_char(',')?;
-        write_numbers(f, &self.translation_mm)?;
-        write!(f, ",{}", self.time_s.unwrap_or(-1.0))
-    }
-}
-
-fn write_numbers(f: &mut fmt::Formatter<'_>, numbers: &[f64]) -> fmt::Result {
-    for (index, number) in numbers.iter().enumerate() {
-        let separator = if index == 0 { "" } else { " " };
-        write!(f, "{separator}{number}")?;
-    }
-    Ok(())
+/// Parses N finite numbers separated by spaces.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers = text
+        .split_whitespace()
+        .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
+    let numbers: Option<Vec<f64>> = numbers.collect();
+    numbers?.try_into().ok()
 }

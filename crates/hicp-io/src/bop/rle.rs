@@ -1,6 +1,8 @@
 //! Run-length codes of masks, as in COCO.
 
 use hicp_core::Mask;
+use serde::de::{Deserialize, Deserializer, Error as _};
+use serde_json::Value;
 use thiserror::Error;
 
 use crate::image::MAX_IMAGE_PIXELS;
@@ -59,7 +61,9 @@ pub enum RleError {
         found: char,
     },
     /// A compressed number that is negative, too large, or cut off.
-    #[error("run {index} of the compressed code is negative, too large or cut off")]
+    #[error(
+        "run {index} of the compressed code is negative, too large or cut off, expected a number of pixels"
+    )]
     Number {
         /// Index of the run.
         index: usize,
@@ -226,6 +230,26 @@ impl Rle {
             }
         }
         text
+    }
+}
+
+impl<'de> Deserialize<'de> for Rle {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let code = Value::deserialize(deserializer)?;
+        let (Some(size), Some(counts)) = (code.get("size"), code.get("counts")) else {
+            let text =
+                "another kind of segmentation, expected a run-length code with `size` and `counts`";
+            return Err(D::Error::custom(text));
+        };
+        let [height, width] = Deserialize::deserialize(size).map_err(D::Error::custom)?;
+        let rle = match counts {
+            Value::String(text) => Self::from_compressed(width, height, text),
+            counts => {
+                let runs = Deserialize::deserialize(counts).map_err(D::Error::custom)?;
+                Self::from_counts(width, height, runs)
+            }
+        };
+        rle.map_err(|error| D::Error::custom(format!("a code that is not a mask: {error}")))
     }
 }
 

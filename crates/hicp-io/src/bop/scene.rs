@@ -5,11 +5,8 @@ use std::path::{Path, PathBuf};
 
 use hicp_core::{DepthImage, Isometry3, Mask};
 
-use super::annotations::{
-    GroundTruth, GroundTruthInfo, SceneCamera, read_cameras, read_ground_truth, read_info,
-};
-use super::dataset::missing;
-use crate::error::IoError;
+use super::annotations::{GroundTruth, GroundTruthInfo, SceneCamera, by_image};
+use crate::error::{IoError, Place};
 use crate::limits::ReadLimits;
 use crate::source::is_absent;
 
@@ -28,7 +25,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] without the folder or its cameras, otherwise what [`IoError`] says of JSON files.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) without the folder or its cameras, otherwise [`IoError`] that names the key.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
         Self::open_within(ReadLimits::DEFAULT, dir)
     }
@@ -41,16 +38,14 @@ impl Scene {
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         if is_absent(&dir) {
-            return Err(missing(dir, "scene"));
+            return Err(IoError::missing(dir, "scene"));
         }
         let cameras = dir.join("scene_camera.json");
-        if is_absent(&cameras) {
-            return Err(missing(cameras, "file of cameras"));
-        }
         Ok(Self {
-            cameras: read_cameras(&limits, &cameras)?,
-            ground_truth: read_ground_truth(&limits, &dir.join("scene_gt.json"))?,
-            info: read_info(&limits, &dir.join("scene_gt_info.json"))?,
+            cameras: by_image(&limits, &cameras)?
+                .ok_or_else(|| IoError::missing(cameras, "file of cameras"))?,
+            ground_truth: by_image(&limits, &dir.join("scene_gt.json"))?,
+            info: by_image(&limits, &dir.join("scene_gt_info.json"))?,
             dir,
             limits,
         })
@@ -78,28 +73,33 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError::JsonValue`] when `scene_camera.json` does not have the image.
+    /// [`IoError`] when `scene_camera.json` does not have the image.
     pub fn camera(&self, im_id: u32) -> Result<&SceneCamera, IoError> {
-        self.cameras.get(&im_id).ok_or_else(|| IoError::JsonValue {
-            path: self.dir.join("scene_camera.json"),
-            key: "$".to_owned(),
-            found: format!("{} images", self.cameras.len()),
-            expected: format!("image {im_id} among them"),
+        self.cameras.get(&im_id).ok_or_else(|| {
+            let found = format!("{} images", self.cameras.len());
+            self.camera_error("$", &found, &format!("image {im_id} among them"))
         })
+    }
+
+    fn camera_error(&self, key: &str, found: &str, expected: &str) -> IoError {
+        let path = self.dir.join("scene_camera.json");
+        IoError::new(path, Place::Field(key.to_owned()), found, expected)
     }
 
     /// Returns the pose of the world in the camera frame of an image, metres: by these the motion of the camera is known.
     ///
     /// # Errors
     ///
-    /// As [`Scene::camera`]; [`IoError::JsonValue`] when the file does not state the pose.
+    /// As [`Scene::camera`]; [`IoError`] when the file does not state the pose.
     pub fn camera_from_world(&self, im_id: u32) -> Result<Isometry3<f64>, IoError> {
         let stated = self.camera(im_id)?.camera_from_world;
-        stated.ok_or_else(|| IoError::JsonValue {
-            path: self.dir.join("scene_camera.json"),
-            key: format!("$.{im_id}"),
-            found: "no `cam_R_w2c` and no `cam_t_w2c`".to_owned(),
-            expected: "both, to know how the camera moved".to_owned(),
+        stated.ok_or_else(|| {
+            let found = "no `cam_R_w2c` and no `cam_t_w2c`";
+            self.camera_error(
+                &format!("$.{im_id}"),
+                found,
+                "both, to know how the camera moved",
+            )
         })
     }
 
@@ -119,7 +119,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when there is none, [`IoError::Extension`] when it is a TIFF file, which is not supported.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is none, [`IoError`] when it is a TIFF file, which is not supported.
     pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
         let png = self.dir.join(format!("depth/{im_id:06}.png"));
         if !is_absent(&png) {
@@ -128,33 +128,25 @@ impl Scene {
         for extension in ["tif", "tiff"] {
             let path = png.with_extension(extension);
             if !is_absent(&path) {
-                return Err(IoError::Extension {
-                    path,
-                    found: extension.to_owned(),
-                    expected: ".png",
-                });
+                let found = format!("a file with the extension {extension:?}");
+                return Err(IoError::new(path, None, found, ".png"));
             }
         }
-        Err(missing(png, "depth image"))
+        Err(IoError::missing(png, "depth image"))
     }
 
     /// Reads the depth image of an image, metres.
     ///
     /// # Errors
     ///
-    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`](crate::read_depth_png); [`IoError::JsonValue`] when the camera states
+    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`](crate::read_depth_png); [`IoError`] when the camera states
     /// no `depth_scale`.
     pub fn read_depth(&self, im_id: u32) -> Result<DepthImage, IoError> {
         let path = self.depth_path(im_id)?;
-        let scale = self
-            .camera(im_id)?
-            .depth_scale
-            .ok_or_else(|| IoError::JsonValue {
-                path: self.dir.join("scene_camera.json"),
-                key: format!("$.{im_id}"),
-                found: "no `depth_scale`".to_owned(),
-                expected: "one, to read depth images".to_owned(),
-            })?;
+        let scale = self.camera(im_id)?.depth_scale.ok_or_else(|| {
+            let expected = "one, to read depth images";
+            self.camera_error(&format!("$.{im_id}"), "no `depth_scale`", expected)
+        })?;
         self.limits.read_depth_png(path, scale)
     }
 
@@ -187,11 +179,11 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError::Missing`] when there is none, otherwise as [`read_mask_png`](crate::read_mask_png).
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is none, otherwise as [`read_mask_png`](crate::read_mask_png).
     pub fn read_visible_mask(&self, im_id: u32, instance: usize) -> Result<Mask, IoError> {
         let path = self.visible_mask_path(im_id, instance);
         if is_absent(&path) {
-            return Err(missing(path, "mask"));
+            return Err(IoError::missing(path, "mask"));
         }
         self.limits.read_mask_png(path)
     }
@@ -200,6 +192,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::IoErrorKind;
     use std::fs;
 
     const CAMERA: &str = r#"{"10": {"cam_K": [600,0,1,0,600,1,0,0,1], "depth_scale": 0.5,
@@ -227,15 +220,30 @@ mod tests {
         assert_eq!(scene.camera(2).unwrap().camera_from_world, None);
         assert_eq!(scene.camera_from_world(10).unwrap().translation.z, 1.0);
         assert!(
-            matches!(scene.camera_from_world(2), Err(IoError::JsonValue { key, .. }) if key == "$.2")
+            matches!(scene.camera_from_world(2), Err(IoError { place: Some(Place::Field(key)), .. }) if key == "$.2")
         );
-        assert!(matches!(scene.camera(3), Err(IoError::JsonValue { .. })));
+        assert!(matches!(
+            scene.camera(3),
+            Err(IoError {
+                place: Some(Place::Field(_)),
+                ..
+            })
+        ));
         assert!(scene.ground_truth(2).is_none() && scene.ground_truth_info(2).is_none());
         assert!(scene.color_path(2).is_none());
-        assert!(matches!(scene.read_depth(2), Err(IoError::Missing { .. })));
+        assert!(matches!(
+            scene.read_depth(2),
+            Err(IoError {
+                kind: IoErrorKind::Missing,
+                ..
+            })
+        ));
         assert!(matches!(
             scene.read_visible_mask(2, 0),
-            Err(IoError::Missing { .. })
+            Err(IoError {
+                kind: IoErrorKind::Missing,
+                ..
+            })
         ));
     }
 
@@ -261,9 +269,11 @@ mod tests {
         let scene = scene.unwrap();
         assert!(matches!(
             scene.read_depth(10),
-            Err(IoError::Extension { found, .. }) if found == "tif"
+            Err(IoError { found, .. }) if found.contains("\"tif\"")
         ));
-        assert!(matches!(scene.read_depth(2), Err(IoError::JsonValue { key, .. }) if key == "$.2"));
+        assert!(
+            matches!(scene.read_depth(2), Err(IoError { place: Some(Place::Field(key)), .. }) if key == "$.2")
+        );
         assert!(scene.color_path(2).unwrap().ends_with("gray/000002.jpg"));
     }
 
@@ -280,13 +290,13 @@ mod tests {
             ("gray/000002.png/file", ""),
         ]);
         let opened = opened.unwrap();
-        let folder = |error: IoError| matches!(error, IoError::NotAFile { .. });
+        let folder = |error: IoError| error.found == "a folder";
         assert!(folder(opened.read_depth(2).unwrap_err()));
         assert!(folder(opened.read_visible_mask(2, 0).unwrap_err()));
         assert!(opened.color_path(2).unwrap().ends_with("gray/000002.png"));
         assert!(matches!(
             opened.read_depth(10),
-            Err(IoError::Extension { .. })
+            Err(IoError { found, .. }) if found.contains("\"tiff\"")
         ));
         for name in ["scene_gt.json", "scene_gt_info.json"] {
             let path = dir.path().join(name);
@@ -297,7 +307,13 @@ mod tests {
         let file = dir.path().join("scene_camera.json");
         let inside_a_file = Scene::open(&file).unwrap_err();
         assert!(
-            matches!(inside_a_file, IoError::Read { .. }),
+            matches!(
+                inside_a_file,
+                IoError {
+                    kind: IoErrorKind::Read,
+                    ..
+                }
+            ),
             "{inside_a_file}"
         );
     }
@@ -312,7 +328,13 @@ mod tests {
         assert!(Scene::open(dir.path()).unwrap().ground_truth(2).is_none());
         fs::remove_file(&path).unwrap();
         symlink(&path, &path).unwrap();
-        assert!(matches!(Scene::open(dir.path()), Err(IoError::Read { .. })));
+        assert!(matches!(
+            Scene::open(dir.path()),
+            Err(IoError {
+                kind: IoErrorKind::Read,
+                ..
+            })
+        ));
     }
 
     #[test]
@@ -342,7 +364,10 @@ mod tests {
             let bad = good.replace(from, to);
             let (_dir, opened) = scene(&[("scene_camera.json", CAMERA), ("scene_gt.json", &bad)]);
             match opened {
-                Err(IoError::JsonValue { key: found, .. }) => assert_eq!(found, key),
+                Err(IoError {
+                    place: Some(Place::Field(found)),
+                    ..
+                }) => assert_eq!(found, key),
                 other => panic!("{other:?}"),
             }
         }

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::IoError;
-use crate::json::Document;
-use crate::limits::ReadLimits;
+use crate::json;
+use crate::limits::{Limit, ReadLimits};
 
 /// Instances of one object in one image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
+#[serde(expecting = "an object with a target")]
 pub struct Target {
     /// The scene.
     pub scene_id: u32,
@@ -23,7 +26,7 @@ pub struct Target {
 ///
 /// # Errors
 ///
-/// What [`IoError`] says of JSON files. Targets of the later detection tasks, which state no objects, are refused.
+/// [`IoError`] that names the key. Targets of the later detection tasks, which state no objects, are refused.
 pub fn read_targets(path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
     ReadLimits::DEFAULT.read_targets(path)
 }
@@ -35,27 +38,14 @@ impl ReadLimits {
     ///
     /// As [`read_targets`].
     pub fn read_targets(&self, path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
-        targets_of(&Document::read(self, path.as_ref())?)
+        json::read(self, path.as_ref(), Limit::JsonBytes)
     }
-}
-
-fn targets_of(document: &Document) -> Result<Vec<Target>, IoError> {
-    let mut targets = Vec::new();
-    for node in document.root().items()? {
-        let value = |key: &str| node.get(key)?.unsigned();
-        targets.push(Target {
-            scene_id: value("scene_id")?,
-            im_id: value("im_id")?,
-            obj_id: value("obj_id")?,
-            inst_count: value("inst_count")?,
-        });
-    }
-    Ok(targets)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
 
     #[test]
     fn targets_are_read_and_those_without_object_refused() {
@@ -76,7 +66,7 @@ mod tests {
         std::fs::write(&path, r#"[{"im_id": 3, "scene_id": 48}]"#).unwrap();
         assert!(matches!(
             read_targets(&path),
-            Err(IoError::JsonValue { key, expected, .. }) if key == "$[0]" && expected.contains("obj_id")
+            Err(IoError { expected, place: Some(Place::Field(key)), .. }) if key == "$[0]" && expected.contains("obj_id")
         ));
     }
 }

@@ -9,17 +9,16 @@ use serde_json::{Map, Value, json};
 use super::annotations::{GroundTruth, GroundTruthInfo, SceneCamera};
 use super::models_info::ModelInfo;
 use super::targets::Target;
-use crate::atomic::write_atomically;
 use crate::error::IoError;
-use crate::json::check_finite;
+use crate::json;
 use crate::pose::pose_to_bop;
 
-/// Writes a `scene_camera.json`: the cameras of a scene by image. Millimetres; every number is read back exactly but for the
+/// Writes a `scene_camera.json`: the cameras of a scene by image. Millimeters; every number is read back exactly but for the
 /// conversion of lengths.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_scene_camera(
     path: impl AsRef<Path>,
     cameras: &BTreeMap<u32, SceneCamera>,
@@ -43,7 +42,7 @@ pub fn write_scene_camera(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_scene_gt(
     path: impl AsRef<Path>,
     truths: &BTreeMap<u32, Vec<GroundTruth>>,
@@ -61,32 +60,19 @@ pub fn write_scene_gt(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_scene_gt_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, Vec<GroundTruthInfo>>,
 ) -> Result<(), IoError> {
-    write_by_id(path.as_ref(), infos, |instances| {
-        let one = |info: &GroundTruthInfo| {
-            let known = [
-                ("visib_fract", info.visible_fraction.map(|x| json!(x))),
-                ("bbox_obj", info.bbox_object.map(|x| json!(x))),
-                ("bbox_visib", info.bbox_visible.map(|x| json!(x))),
-                ("px_count_visib", info.visible_pixels.map(|x| json!(x))),
-            ];
-            let stated = known.into_iter();
-            let stated = stated.filter_map(|(key, value)| Some((key.to_owned(), value?)));
-            Value::Object(stated.collect())
-        };
-        instances.iter().map(one).collect()
-    })
+    write_by_id(path.as_ref(), infos, |instances| json!(instances))
 }
 
 /// Writes a `models_info.json`: diameters and symmetries by object id.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_models_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, ModelInfo>,
@@ -113,20 +99,12 @@ pub fn write_models_info(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`], and [`IoError::Write`] naming a number that is not finite.
+/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
 pub fn write_targets(path: impl AsRef<Path>, targets: &[Target]) -> Result<(), IoError> {
-    let one = |target: &Target| {
-        json!({
-            "scene_id": target.scene_id,
-            "im_id": target.im_id,
-            "obj_id": target.obj_id,
-            "inst_count": target.inst_count,
-        })
-    };
-    write_value(path.as_ref(), &targets.iter().map(one).collect())
+    json::write(path.as_ref(), &json!(targets), true)
 }
 
-/// A rigid motion as a row-major 4×4 matrix in millimetres.
+/// A rigid motion as a row-major 4×4 matrix in millimeters.
 fn matrix(motion: &Isometry3<f64>) -> Value {
     let (r, t) = pose_to_bop(motion);
     json!([
@@ -141,14 +119,7 @@ fn write_by_id<T>(
 ) -> Result<(), IoError> {
     let entries = entries.iter();
     let object: Map<String, Value> = entries.map(|(id, x)| (id.to_string(), value(x))).collect();
-    write_value(path, &Value::Object(object))
-}
-
-fn write_value(path: &Path, value: &Value) -> Result<(), IoError> {
-    write_atomically(path, |file| {
-        check_finite(value)?;
-        writeln!(file, "{value:#}")
-    })
+    json::write(path, &Value::Object(object), true)
 }
 
 #[cfg(test)]

@@ -15,10 +15,10 @@ use crate::limits::ReadLimits;
 ///
 /// # Errors
 ///
-/// [`IoError::DepthScale`] for a scale that is not finite and positive, [`IoError::PixelType`] for anything but 16-bit
-/// gray, [`IoError::ImageTooLarge`] for a side above `hicp_core::MAX_IMAGE_SIDE` or more than
-/// [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating; [`ReadLimits::read_depth_png`] raises it), [`IoError::Promise`] for a header whose image the
-/// file is too small to hold, and [`IoError::Png`] or [`IoError::Read`] for the rest.
+/// [`IoError`] for a scale that is not finite and positive, for anything but 16-bit gray, for a side above
+/// `hicp_core::MAX_IMAGE_SIDE` or more than [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating;
+/// [`ReadLimits::read_depth_png`] raises it), for a header whose image the file is too small to hold, and for a file that
+/// cannot be read or decoded.
 pub fn read_depth_png(
     path: impl AsRef<Path>,
     millimeters_per_unit: f64,
@@ -32,6 +32,7 @@ impl ReadLimits {
     /// # Errors
     ///
     /// As [`read_depth_png`].
+    #[allow(clippy::cast_possible_truncation, reason = "depths are rounded to f32")]
     pub fn read_depth_png(
         &self,
         path: impl AsRef<Path>,
@@ -39,25 +40,14 @@ impl ReadLimits {
     ) -> Result<DepthImage, IoError> {
         let path = path.as_ref();
         check_scale(path, millimeters_per_unit)?;
-        let accept = |color, depth| match (color, depth) {
-            (ColorType::Grayscale, BitDepth::Sixteen) => Ok(()),
-            _ => Err("16-bit gray"),
+        let image = pixels::read(self, path, Transformations::IDENTITY, true)?;
+        let to_meters = |bytes: &[u8]| {
+            let units = u16::from_be_bytes([bytes[0], bytes[1]]);
+            (f64::from(units) * millimeters_per_unit / 1000.0) as f32
         };
-        let image = pixels::read(self, path, Transformations::IDENTITY, accept)?;
-        let meters = image
-            .bytes
-            .chunks_exact(2)
-            .map(|bytes| {
-                let units = u16::from_be_bytes([bytes[0], bytes[1]]);
-                narrow(f64::from(units) * millimeters_per_unit / 1000.0)
-            })
-            .collect();
-        DepthImage::from_meters(image.width, image.height, meters).map_err(|source| {
-            IoError::Image {
-                path: path.to_owned(),
-                source,
-            }
-        })
+        let meters = image.bytes.chunks_exact(2).map(to_meters).collect();
+        let depth = DepthImage::from_meters(image.width, image.height, meters);
+        depth.map_err(|error| IoError::unusable(path, "depth image", error))
     }
 }
 
@@ -67,8 +57,13 @@ impl ReadLimits {
 ///
 /// # Errors
 ///
-/// [`IoError::DepthScale`] for a scale that is not finite and positive, [`IoError::DepthRange`] for a depth above
-/// 65535 units, otherwise as [`write_atomically`](crate::write_atomically).
+/// [`IoError`] for a scale that is not finite and positive, and for a depth above 65535 units; otherwise as
+/// [`write_atomically`](crate::write_atomically).
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the range is checked"
+)]
 pub fn write_depth_png(
     path: impl AsRef<Path>,
     depth: &DepthImage,
@@ -77,56 +72,38 @@ pub fn write_depth_png(
     let path = path.as_ref();
     check_scale(path, millimeters_per_unit)?;
     let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
-    let mut pixels = depth.pixels().iter();
-    for v in 0..depth.height() {
-        for (u, &meters) in (0..depth.width()).zip(&mut pixels) {
-            let units = (f64::from(meters) * 1000.0 / millimeters_per_unit).round();
-            let Some(units) = to_u16(units) else {
-                return Err(IoError::DepthRange {
-                    path: path.to_owned(),
-                    u,
-                    v,
-                    meters,
-                    limit: f64::from(u16::MAX) * millimeters_per_unit / 1000.0,
-                });
-            };
-            bytes.extend(units.to_be_bytes());
+    for (index, &meters) in depth.pixels().iter().enumerate() {
+        let units = (f64::from(meters) * 1000.0 / millimeters_per_unit).round();
+        if !(0.0..=f64::from(u16::MAX)).contains(&units) {
+            let width = depth.width() as usize;
+            let found = format!(
+                "a depth of {meters} m at pixel ({}, {})",
+                index % width,
+                index / width
+            );
+            let limit = f64::from(u16::MAX) * millimeters_per_unit / 1000.0;
+            let expected = format!("at most {limit} m at this scale");
+            return Err(IoError::new(path, None, found, expected));
         }
+        bytes.extend((units as u16).to_be_bytes());
     }
     let size = (depth.width(), depth.height());
-    pixels::write(
-        path,
-        size,
-        (ColorType::Grayscale, BitDepth::Sixteen),
-        &bytes,
-    )
+    let kind = (ColorType::Grayscale, BitDepth::Sixteen);
+    pixels::write(path, size, kind, &bytes)
 }
 
 fn check_scale(path: &Path, value: f64) -> Result<(), IoError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(IoError::DepthScale {
-        path: path.to_owned(),
-        value,
-    })
-}
-
-#[allow(clippy::cast_possible_truncation)]
-fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn to_u16(value: f64) -> Option<u16> {
-    (0.0..=f64::from(u16::MAX))
-        .contains(&value)
-        .then_some(value as u16)
+    let found = format!("a depth scale of {value} mm per unit");
+    Err(IoError::new(path, None, found, "a finite number above 0"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
     use proptest::prelude::*;
 
     proptest! {
@@ -162,7 +139,7 @@ mod tests {
         ] {
             pixels::write(&path, (1, 1), kind, &vec![1; bytes]).unwrap();
             match read_depth_png(&path, 1.0) {
-                Err(IoError::PixelType { found, .. }) => assert_eq!(found, name),
+                Err(IoError { found, .. }) => assert_eq!(found, format!("{name} pixels")),
                 other => panic!("{other:?}"),
             }
         }
@@ -176,16 +153,16 @@ mod tests {
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(
                 write_depth_png(&path, &depth, scale),
-                Err(IoError::DepthScale { .. })
+                Err(IoError { found, .. }) if found.starts_with("a depth scale of")
             ));
             assert!(matches!(
                 read_depth_png(&path, scale),
-                Err(IoError::DepthScale { .. })
+                Err(IoError { found, .. }) if found.starts_with("a depth scale of")
             ));
         }
         assert!(matches!(
             write_depth_png(&path, &depth, 1.0),
-            Err(IoError::DepthRange { u: 1, v: 0, .. })
+            Err(IoError { found, .. }) if found == "a depth of 70 m at pixel (1, 0)"
         ));
         assert!(!path.exists());
         write_depth_png(&path, &depth, 10.0).unwrap();
@@ -203,14 +180,14 @@ mod tests {
         for length in [0, 7, 20, 40, whole.len() / 2] {
             std::fs::write(&path, &whole[..length]).unwrap();
             assert!(
-                matches!(read_depth_png(&path, 1.0), Err(IoError::Png { .. })),
+                matches!(read_depth_png(&path, 1.0), Err(IoError { expected, .. }) if expected == "a PNG image"),
                 "{length}"
             );
         }
         std::fs::write(&path, "P5 64 64 65535").unwrap();
         assert!(matches!(
             read_depth_png(&path, 1.0),
-            Err(IoError::Png { .. })
+            Err(IoError { expected, .. }) if expected == "a PNG image"
         ));
     }
 
@@ -233,11 +210,16 @@ mod tests {
         for (width, height) in [(40_000, 1), (20_000, 20_000), (0x7fff_ffff, 0x7fff_ffff)] {
             assert!(matches!(
                 announce(width, height),
-                Err(IoError::ImageTooLarge { .. })
+                Err(IoError { place: Some(Place::Byte(16)), found, .. })
+                if found == format!("{width}x{height} pixels")
             ));
         }
-        assert!(matches!(announce(4096, 8192), Err(IoError::Promise { .. })));
-        assert!(matches!(announce(2, 2), Err(IoError::Png { .. })));
+        assert!(
+            matches!(announce(4096, 8192), Err(IoError { found, .. }) if found.contains("promises"))
+        );
+        assert!(
+            matches!(announce(2, 2), Err(IoError { expected, .. }) if expected == "a PNG image")
+        );
     }
 
     fn crc32(bytes: &[u8]) -> u32 {

@@ -9,13 +9,13 @@ use super::pixels;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 
-/// Reads a mask from a PNG file of any pixel type: a pixel belongs to the object when a gray or colour sample is not 0.
+/// Reads a mask from a PNG file of any pixel type: a pixel belongs to the object if a gray or color sample is not 0.
 ///
-/// Palette images count by colour, so that black is background whatever its index; transparency does not count.
+/// Palette images count by color, so that black is background whatever its index; transparency does not count.
 ///
 /// # Errors
 ///
-/// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
+/// As [`read_depth_png`](crate::read_depth_png), except for those about scale and pixel type.
 pub fn read_mask_png(path: impl AsRef<Path>) -> Result<Mask, IoError> {
     ReadLimits::DEFAULT.read_mask_png(path)
 }
@@ -28,26 +28,15 @@ impl ReadLimits {
     /// As [`read_mask_png`].
     pub fn read_mask_png(&self, path: impl AsRef<Path>) -> Result<Mask, IoError> {
         let path = path.as_ref();
-        let image = pixels::read(self, path, Transformations::EXPAND, |_, _| Ok(()))?;
-        let sample_bytes = if image.depth == BitDepth::Sixteen {
-            2
-        } else {
-            1
-        };
+        let image = pixels::read(self, path, Transformations::EXPAND, false)?;
+        let sample_bytes = 1 + usize::from(image.depth == BitDepth::Sixteen);
         let samples = image.color.samples();
-        let opaque = match image.color {
-            ColorType::GrayscaleAlpha | ColorType::Rgba => samples - 1,
-            _ => samples,
-        };
-        let mask = image
-            .bytes
-            .chunks_exact(samples * sample_bytes)
-            .map(|pixel| pixel[..opaque * sample_bytes].iter().any(|byte| *byte != 0))
-            .collect();
-        Mask::new(image.width, image.height, mask).map_err(|source| IoError::Image {
-            path: path.to_owned(),
-            source,
-        })
+        let has_alpha = matches!(image.color, ColorType::GrayscaleAlpha | ColorType::Rgba);
+        let opaque = (samples - usize::from(has_alpha)) * sample_bytes;
+        let pixels = image.bytes.chunks_exact(samples * sample_bytes);
+        let mask = pixels.map(|pixel| pixel[..opaque].iter().any(|byte| *byte != 0));
+        let mask = Mask::new(image.width, image.height, mask.collect());
+        mask.map_err(|error| IoError::unusable(path, "mask", error))
     }
 }
 
@@ -60,15 +49,11 @@ pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError
     let bytes: Vec<u8> = mask
         .pixels()
         .iter()
-        .map(|set| if *set { 255 } else { 0 })
+        .map(|set| u8::from(*set) * 255)
         .collect();
     let size = (mask.width(), mask.height());
-    pixels::write(
-        path.as_ref(),
-        size,
-        (ColorType::Grayscale, BitDepth::Eight),
-        &bytes,
-    )
+    let kind = (ColorType::Grayscale, BitDepth::Eight);
+    pixels::write(path.as_ref(), size, kind, &bytes)
 }
 
 #[cfg(test)]

@@ -8,16 +8,16 @@ use png::{BitDepth, ColorType, DecodingError, Transformations};
 
 use crate::atomic::write_atomically;
 use crate::error::{IoError, Place};
-use crate::limits::ReadLimits;
-use crate::source::{Source, read_bytes};
+use crate::limits::{Limit, ReadLimits};
+use crate::source::read_head;
 
-/// Largest number of pixels of an image that is read unless told otherwise: 2²⁵, four times those of a 4K camera.
+/// Largest number of pixels of an image by default: 2²⁵, four times those of a 4K camera.
 pub const MAX_IMAGE_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
 
-/// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image it announces.
+/// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image of its header.
 const MAX_COMPRESSION: u64 = 1032;
 
-/// The pixels of an image as the decoder hands them out: rows without padding, samples of 16 bits big-endian.
+/// The pixels of an image as the decoder returns them: rows without padding, samples of 16 bits big-endian.
 pub(super) struct Pixels {
     pub(super) width: u32,
     pub(super) height: u32,
@@ -26,18 +26,16 @@ pub(super) struct Pixels {
     pub(super) bytes: Vec<u8>,
 }
 
-/// Decodes a PNG file.
-///
-/// `accept` sees the pixel type of the header, before anything is allocated; it says what it expects when it refuses.
+/// Decodes a PNG file, of 16-bit gray only if `only_depth` is set.
 pub(super) fn read(
     limits: &ReadLimits,
     path: &Path,
     transformations: Transformations,
-    accept: impl FnOnce(ColorType, BitDepth) -> Result<(), &'static str>,
+    only_depth: bool,
 ) -> Result<Pixels, IoError> {
-    let content = read_bytes(path, limits.max_file_bytes)?;
+    let content = limits.read_bytes(path)?;
     let available = content.len() as u64;
-    // Its own limit is on what it holds beside the image; this crate's, below, on the image.
+    // The decoder's own limit concerns what it holds next to the image; the limit of this crate, below, concerns the image.
     let mut decoder = png::Decoder::new(Cursor::new(content));
     decoder.set_transformations(transformations);
     decoder.set_ignore_text_chunk(true);
@@ -47,63 +45,51 @@ pub(super) fn read(
     let header = decoder.read_header_info().map_err(failed)?;
     let (width, height) = header.size();
     let indexed = header.color_type == ColorType::Indexed;
-    accept(header.color_type, header.bit_depth).map_err(|expected| IoError::PixelType {
-        path: path.to_owned(),
-        found: describe(header.color_type, header.bit_depth),
-        expected,
-    })?;
+    if only_depth
+        && (header.color_type, header.bit_depth) != (ColorType::Grayscale, BitDepth::Sixteen)
+    {
+        let found = describe(header.color_type, header.bit_depth);
+        return Err(IoError::new(path, None, found, "16-bit gray pixels"));
+    }
     let count = u64::from(width) * u64::from(height);
-    if width.max(height) > MAX_IMAGE_SIDE || count > limits.max_pixels {
-        return Err(IoError::ImageTooLarge {
-            path: path.to_owned(),
-            width,
-            height,
-            max_side: MAX_IMAGE_SIDE,
-            max_pixels: limits.max_pixels,
-        });
+    let found = format!("{width}x{height} pixels");
+    if width.max(height) > MAX_IMAGE_SIDE {
+        let expected = format!("sides of 1 to {MAX_IMAGE_SIDE}");
+        return Err(IoError::new(path, Place::Byte(16), found, expected));
     }
+    let within = limits.check(Limit::Pixels, path, Place::Byte(16), count);
+    within.map_err(|mut error| {
+        error.found = found;
+        error
+    })?;
     let needed = (header.raw_bytes() as u64) / MAX_COMPRESSION;
-    if needed > available {
-        return Err(IoError::Promise {
-            path: path.to_owned(),
-            place: Place::Byte(16),
-            what: "pixels".to_owned(),
-            count,
-            needed,
-            available,
-        });
-    }
+    IoError::check_promise(path, Place::Byte(16), (count, "pixels"), needed, available)?;
 
     let mut reader = decoder.read_info().map_err(failed)?;
-    // The decoder takes a palette on trust, and panics over one that is cut short or has more opacities than colours.
+    // The decoder does not check the palette. It panics if it is cut short, or has more opacities than colors.
     if let Some(palette) = &reader.info().palette {
         let opacities = reader.info().trns.as_ref().map_or(0, |trns| trns.len());
         if palette.len() % 3 != 0 || (indexed && opacities > palette.len() / 3) {
-            return Err(IoError::PixelType {
-                path: path.to_owned(),
-                found: format!(
-                    "palette ({} bytes of colours, {opacities} opacities)",
-                    palette.len()
-                ),
-                expected: "three bytes per colour, and at most one opacity for each",
-            });
+            let bytes = palette.len();
+            let found = format!("a palette of {bytes} bytes of colors and {opacities} opacities");
+            let expected = "three bytes per color, and at most one opacity for each";
+            return Err(IoError::new(path, None, found, expected));
         }
     }
-    let size = reader
-        .output_buffer_size()
-        .ok_or(DecodingError::LimitsExceeded)
-        .map_err(failed)?;
+    let size = reader.output_buffer_size();
+    let size = size.ok_or(DecodingError::LimitsExceeded).map_err(failed)?;
     let mut bytes = Vec::new();
     let reserved = bytes.try_reserve_exact(size);
     reserved.map_err(|_| IoError::read(path, io::ErrorKind::OutOfMemory.into()))?;
     bytes.resize(size, 0);
     let frame = reader.next_frame(&mut bytes).map_err(failed)?;
     bytes.truncate(frame.buffer_size());
+    let (color, depth) = (frame.color_type, frame.bit_depth);
     Ok(Pixels {
         width,
         height,
-        color: frame.color_type,
-        depth: frame.bit_depth,
+        color,
+        depth,
         bytes,
     })
 }
@@ -112,14 +98,15 @@ pub(super) fn read(
 ///
 /// # Errors
 ///
-/// [`IoError::Read`], or [`IoError::Png`] when the file does not begin as a PNG image.
+/// [`IoError`] if the file cannot be read, or does not start as a PNG image.
 pub fn read_png_size(path: impl AsRef<Path>) -> Result<(u32, u32), IoError> {
     let path = path.as_ref();
-    let mut decoder = png::Decoder::new(Cursor::new(Source::open(path)?.head()?));
-    match decoder.read_header_info() {
-        Ok(header) => Ok(header.size()),
-        Err(error) => Err(failed(path, error)),
-    }
+    let (head, _) = read_head(path)?;
+    let mut decoder = png::Decoder::new(Cursor::new(head));
+    let header = decoder
+        .read_header_info()
+        .map_err(|error| failed(path, error))?;
+    Ok(header.size())
 }
 
 /// Encodes pixels of one kind as a PNG file, atomically. Samples of 16 bits are big-endian.
@@ -140,15 +127,8 @@ pub(super) fn write(
 }
 
 fn failed(path: &Path, error: DecodingError) -> IoError {
-    match error {
-        DecodingError::IoError(source) if source.kind() != io::ErrorKind::UnexpectedEof => {
-            IoError::read(path, source)
-        }
-        other => IoError::Png {
-            path: path.to_owned(),
-            source: other.into(),
-        },
-    }
+    let found = "data that are not a complete PNG image";
+    IoError::new(path, None, found, "a PNG image").with_source(error)
 }
 
 fn describe(color: ColorType, depth: BitDepth) -> String {
@@ -159,5 +139,5 @@ fn describe(color: ColorType, depth: BitDepth) -> String {
         ColorType::GrayscaleAlpha => "gray + alpha",
         ColorType::Rgba => "RGBA",
     };
-    format!("{}-bit {color}", depth as u8)
+    format!("{}-bit {color} pixels", depth as u8)
 }

@@ -1,4 +1,4 @@
-//! Colour images in PNG files: for pictures of results, nothing computes with them.
+//! Color images in PNG files: for pictures of results, nothing computes with them.
 
 use std::path::Path;
 
@@ -14,39 +14,23 @@ use crate::limits::ReadLimits;
 ///
 /// # Errors
 ///
-/// As [`read_depth_png`](crate::read_depth_png), save for those about scale and pixel type.
+/// As [`read_depth_png`](crate::read_depth_png), except for those about scale and pixel type.
 pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
-    let image = pixels::read(
-        &ReadLimits::DEFAULT,
-        path.as_ref(),
-        transformations,
-        |_, _| Ok(()),
-    )?;
+    let image = pixels::read(&ReadLimits::DEFAULT, path.as_ref(), transformations, false)?;
+    let pixels = image.bytes.chunks_exact(image.color.samples());
     let bytes = match image.color {
-        ColorType::Rgb => image.bytes,
-        ColorType::Rgba => drop_alpha(&image.bytes),
-        _ => image
-            .bytes
-            .chunks_exact(image.color.samples())
-            .flat_map(|pixel| [pixel[0]; 3])
-            .collect(),
+        ColorType::Rgb | ColorType::Rgba => pixels.flat_map(|p| [p[0], p[1], p[2]]).collect(),
+        _ => pixels.flat_map(|pixel| [pixel[0]; 3]).collect(),
     };
     Ok((image.width, image.height, bytes))
-}
-
-fn drop_alpha(bytes: &[u8]) -> Vec<u8> {
-    bytes
-        .chunks_exact(4)
-        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
-        .collect()
 }
 
 /// Writes 8-bit RGB pixels (3 · `width` · `height` bytes, row-major) as a PNG file.
 ///
 /// # Errors
 ///
-/// [`IoError::Count`] when the number of bytes does not fit the size, otherwise as
+/// [`IoError`] if the number of bytes does not fit the size, otherwise as
 /// [`write_atomically`](crate::write_atomically).
 pub fn write_rgb_png(
     path: impl AsRef<Path>,
@@ -55,23 +39,16 @@ pub fn write_rgb_png(
     rgb: &[u8],
 ) -> Result<(), IoError> {
     let path = path.as_ref();
-    let expected = (width as usize)
-        .saturating_mul(height as usize)
-        .saturating_mul(3);
-    if rgb.len() != expected {
-        return Err(IoError::Count {
-            path: path.to_owned(),
-            what: "bytes",
-            found: rgb.len(),
-            expected,
-        });
+    let expected = 3 * u128::from(width) * u128::from(height);
+    if rgb.len() as u128 != expected {
+        let (found, expected) = (
+            format!("{} bytes of pixels", rgb.len()),
+            expected.to_string(),
+        );
+        return Err(IoError::new(path, None, found, expected));
     }
-    pixels::write(
-        path,
-        (width, height),
-        (ColorType::Rgb, BitDepth::Eight),
-        rgb,
-    )
+    let kind = (ColorType::Rgb, BitDepth::Eight);
+    pixels::write(path, (width, height), kind, rgb)
 }
 
 #[cfg(test)]
@@ -87,11 +64,8 @@ mod tests {
         assert_eq!(read_rgb_png(&path).unwrap(), (4, 3, rgb.clone()));
         assert!(matches!(
             write_rgb_png(&path, 4, 4, &rgb),
-            Err(IoError::Count {
-                found: 36,
-                expected: 48,
-                ..
-            })
+            Err(IoError { found, expected, .. })
+            if found == "36 bytes of pixels" && expected == "48"
         ));
     }
 

@@ -1,4 +1,4 @@
-//! Lines of text files, however each of them ends.
+//! Lines of text files, whatever ends each of them.
 
 /// The lines of a text, without what ends them: a line feed, a carriage return, or both in this order.
 ///
@@ -6,11 +6,36 @@
 #[derive(Clone, Debug)]
 pub(super) struct Lines<'a> {
     rest: &'a [u8],
+    taken: usize,
 }
 
 impl<'a> Lines<'a> {
     pub(super) fn new(text: &'a [u8]) -> Self {
-        Self { rest: text }
+        Self::after(0, text)
+    }
+
+    /// The lines of a text that follows so many other lines of its file.
+    pub(super) fn after(taken: usize, rest: &'a [u8]) -> Self {
+        Self { rest, taken }
+    }
+
+    /// Returns the number of the last line taken, from 1.
+    pub(super) fn number(&self) -> usize {
+        self.taken.max(1)
+    }
+
+    /// Returns the bytes that are left.
+    pub(super) fn left(&self) -> u64 {
+        self.rest.len() as u64
+    }
+
+    /// Returns the next line that is not blank, without what follows a `#`.
+    pub(super) fn next_without_comment(&mut self) -> Option<String> {
+        self.find_map(|line| {
+            let line = String::from_utf8_lossy(line);
+            let line = line.split('#').next().unwrap_or_default().trim();
+            (!line.is_empty()).then(|| line.to_owned())
+        })
     }
 }
 
@@ -21,6 +46,7 @@ impl<'a> Iterator for Lines<'a> {
         if self.rest.is_empty() {
             return None;
         }
+        self.taken += 1;
         let ends = |byte: &u8| matches!(byte, b'\n' | b'\r');
         let end = self.rest.iter().position(ends).unwrap_or(self.rest.len());
         let (line, rest) = self.rest.split_at(end);

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh};
+use hicp_core::TriMesh;
 
-use crate::error::{END_OF_FILE, IoError, Place};
+use crate::error::IoError;
 use crate::limits::ReadLimits;
-use crate::source::{Limited, Source};
+use crate::source::read_head;
 use crate::unit::LengthUnit;
 
 mod lines;
@@ -14,24 +14,24 @@ mod obj;
 mod off;
 pub(crate) mod ply;
 mod polygon;
+pub(crate) mod raw;
 mod stl;
 mod weld;
 mod write;
 
+use raw::{RawMesh, Reading};
 pub use write::{write_obj, write_ply};
-
-const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 
 /// Reads a triangle mesh; the extension tells the format, in either case: `.obj`, `.off`, `.ply` or `.stl`.
 ///
-/// Only geometry is read: materials, colours, normals and texture coordinates are skipped, lines and points too, and all
+/// Only geometry is read: materials, colors, normals and texture coordinates are skipped, lines and points too, and all
 /// objects and groups of a file make one mesh. Polygons are triangulated, concave ones by ear clipping. Coordinates are
 /// multiplied by `unit` in `f64` (STL files hold `f32`) and only then rounded to `f32`. The vertices of STL files are
 /// welded where their positions are equal; in OBJ files vertices that no face uses are dropped.
 ///
 /// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood; of a vertex the first three
 ///   numbers are read.
-/// - OFF: text with or without normals and colours, comments, counts on the first line or the second.
+/// - OFF: text with or without normals and colors, comments, counts on the first line or the second.
 /// - PLY: ASCII and binary of either byte order, any numeric types of coordinates, integer ones of faces, which stand in `vertex_indices` or `vertex_index`.
 /// - STL: ASCII with any number of solids, and binary, also where the header starts with `solid`.
 ///
@@ -40,11 +40,11 @@ const SUPPORTED: &str = ".obj, .off, .ply or .stl";
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the file and where in it the trouble is: what is no regular file, or above a limit, an unknown
+/// [`IoError`] that names the file and the place of the fault: what is not a regular file, or above a limit, an unknown
 /// extension, text that is not UTF-8, a malformed or truncated file, a header that promises more than the file holds, a face
 /// whose vertex is not there, a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`, concave polygons
-/// that take more than a fraction of a second to cut (of some ten thousand corners), a file without faces, and, as
-/// [`IoError::Mesh`], whatever else [`TriMesh::new`] refuses.
+/// that take more than a fraction of a second to cut (of some ten thousand corners), a file without faces, and whatever else
+/// [`TriMesh::new`] refuses.
 pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
     ReadLimits::DEFAULT.read_mesh(path, unit)
 }
@@ -59,19 +59,17 @@ impl ReadLimits {
         let path = path.as_ref();
         let extension = path
             .extension()
-            .map(|extension| extension.to_string_lossy().to_lowercase())
-            .unwrap_or_default();
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
         let (check_head, parse): (CheckHead, Parse) = match extension.as_str() {
             "obj" => (|_, _, _| Ok(()), obj::parse),
             "off" => (|_, _, _| Ok(()), off::parse),
             "ply" => (ply::check_head, ply::parse_mesh),
             "stl" => (stl::check_head, stl::parse),
             _ => {
-                return Err(IoError::Extension {
-                    path: path.to_owned(),
-                    found: extension,
-                    expected: SUPPORTED,
-                });
+                let found = format!("a file with the extension {extension:?}");
+                return Err(IoError::new(path, None, found, ".obj, .off, .ply or .stl"));
             }
         };
         let reading = Reading {
@@ -79,131 +77,21 @@ impl ReadLimits {
             unit,
             limits: self,
         };
-        let mut source = Source::open(path)?;
         // Counts are refused by the first bytes, before a large file is read for nothing.
-        check_head(&reading, &source.head()?, source.bytes())?;
-        let content = source.read(Limited::FileBytes, self.max_file_bytes)?;
-        parse(&reading, content)?.finish(&reading)
+        let (head, bytes) = read_head(path)?;
+        check_head(&reading, &head, bytes)?;
+        parse(&reading, self.read_bytes(path)?)?.finish(&reading)
     }
 }
 
 type CheckHead = fn(&Reading<'_>, &[u8], u64) -> Result<(), IoError>;
 type Parse = fn(&Reading<'_>, Vec<u8>) -> Result<RawMesh, IoError>;
 
-/// What a parser is told beside the bytes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Reading<'a> {
-    pub(crate) path: &'a Path,
-    pub(crate) unit: LengthUnit,
-    pub(crate) limits: &'a ReadLimits,
-}
-
-impl Reading<'_> {
-    pub(crate) fn check_vertices(&self, place: Place, count: usize) -> Result<(), IoError> {
-        let limit = self.limits.max_vertices;
-        Limited::Vertices.check(self.path, Some(place), count as u64, limit)
-    }
-
-    pub(crate) fn check_triangles(&self, place: Place, count: usize) -> Result<(), IoError> {
-        let limit = self.limits.max_triangles;
-        Limited::Triangles.check(self.path, Some(place), count as u64, limit)
-    }
-
-    /// Says what is wrong with a position in the units of the file: what was expected.
-    pub(crate) fn fault(&self, position: &[f64]) -> Option<String> {
-        let most = f64::from(MAX_COORDINATE_METERS) * self.unit.units_per_meter();
-        // Rounding to `f32` must not carry it over the limit, which is below 2^24 and so exact.
-        if position.iter().all(|x| x.abs() <= most) {
-            return None;
-        }
-        Some(format!(
-            "finite coordinates within \u{b1}{MAX_COORDINATE_METERS} m (in {})",
-            self.unit
-        ))
-    }
-
-    pub(crate) fn check_position(&self, place: Place, position: &[f64]) -> Result<(), IoError> {
-        match self.fault(position) {
-            None => Ok(()),
-            Some(expected) => {
-                let found = format!("the position {position:?}");
-                Err(IoError::unquoted(self.path, place, found, expected))
-            }
-        }
-    }
-}
-
-/// A mesh in the units of its file.
-#[derive(Debug)]
-struct RawMesh {
-    vertices: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
-    /// Where faces are missed when there are none: the end of the file, or what says that there are none.
-    end: Place,
-    /// What stands there.
-    found: String,
-    /// What cutting polygons may still cost.
-    clipping_budget: u64,
-}
-
-impl RawMesh {
-    fn new(end: Place) -> Self {
-        Self {
-            vertices: Vec::new(),
-            triangles: Vec::new(),
-            end,
-            found: END_OF_FILE.to_owned(),
-            clipping_budget: polygon::CLIPPING_BUDGET,
-        }
-    }
-
-    /// Adds a face. Its corners must be vertices that are there.
-    fn add_face(
-        &mut self,
-        reading: &Reading<'_>,
-        place: Place,
-        corners: &[u32],
-    ) -> Result<(), IoError> {
-        let more = corners.len().saturating_sub(2);
-        reading.check_triangles(place, self.triangles.len() + more)?;
-        let budget = &mut self.clipping_budget;
-        if polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget) {
-            return Ok(());
-        }
-        Err(IoError::unquoted(
-            reading.path,
-            place,
-            format!("a concave polygon of {} corners", corners.len()),
-            format!(
-                "one that is cut into triangles within {} steps, together with those before it: cut it beforehand",
-                polygon::CLIPPING_BUDGET
-            ),
-        ))
-    }
-
-    fn finish(self, reading: &Reading<'_>) -> Result<TriMesh, IoError> {
-        let path = reading.path;
-        let scale = reading.unit.units_per_meter();
-        let vertices = self
-            .vertices
-            .iter()
-            .map(|p| (p / scale).cast::<f32>())
-            .collect();
-        TriMesh::new(vertices, self.triangles).map_err(|error| match error {
-            MeshError::NoTriangles { .. } => IoError::at(
-                path,
-                self.end,
-                &self.found,
-                "a face of three corners or more",
-            ),
-            error => IoError::mesh(path, error),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
+    use hicp_core::Point3;
 
     /// What the parsers' own tests read with.
     pub(super) fn reading(name: &str) -> Reading<'_> {
@@ -218,9 +106,12 @@ mod tests {
     fn other_extensions_are_refused_by_name() {
         for (name, extension) in [("mesh.GLTF", "gltf"), ("mesh.ply.gz", "gz"), ("mesh", "")] {
             match read_mesh(name, LengthUnit::Meters) {
-                Err(IoError::Extension {
+                Err(IoError {
                     found, expected, ..
-                }) => assert_eq!((found.as_str(), expected), (extension, SUPPORTED)),
+                }) => {
+                    assert_eq!(found, format!("a file with the extension {extension:?}"));
+                    assert_eq!(expected, ".obj, .off, .ply or .stl");
+                }
                 other => panic!("{other:?}"),
             }
         }
@@ -256,7 +147,14 @@ mod tests {
             let concave = mesh.add_face(&reading, Place::Line(8), &[0, 1, 2, 3]);
             match (spent, concave) {
                 (false, Ok(())) => {}
-                (true, Err(IoError::Line { line, found, .. })) => {
+                (
+                    true,
+                    Err(IoError {
+                        found,
+                        place: Some(Place::Line(line)),
+                        ..
+                    }),
+                ) => {
                     assert_eq!(
                         (line, found.as_str()),
                         (8, "a concave polygon of 4 corners")

@@ -1,102 +1,99 @@
-//! Wavefront OBJ, read with `tobj`.
+//! Wavefront OBJ, parsed by `tobj`.
 //!
-//! The reader gets the two records that make a mesh, `v` and `f`, in a plain form: it neither joins continued lines nor
-//! forgives broken colours, and it says what is wrong but not where. Handing it one record per line tells the line.
-
-use std::io::{self, BufRead, Read};
+//! The text is decoded for it: continued lines are joined, and only the records of a mesh get through, on their own lines and
+//! without what it does not forgive (broken colors of vertices, normals that are not there). So its lines are those of the file.
 
 use hicp_core::Point3;
+use tobj::{LoadError, LoadOptions};
 
 use super::lines::Lines;
-use super::{RawMesh, Reading};
-use crate::error::{IoError, Place};
+use super::raw::{RawMesh, Reading, position};
+use crate::error::{IoError, Place, quote};
+use crate::limits::Limit;
 use crate::source::text_bytes;
 
 /// Parses an OBJ file. Vertices that no face uses are dropped.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
     let records = Records::of(reading, text_bytes(reading.path, &content)?)?;
     drop(content);
-    records.check_positions(reading)?;
-    let options = tobj::LoadOptions {
+    let options = LoadOptions {
         ignore_points: true,
         ignore_lines: true,
         ..Default::default()
     };
-    let mut reader = CountingReader {
-        rest: records.text.as_bytes(),
-        lines: 0,
-    };
-    // Materials are never asked for: no `mtllib` gets through.
-    let models = tobj::load_obj_buf(&mut reader, &options, |_| Err(tobj::LoadError::ReadError))
-        .map_err(|error| {
-            let at_fault = match error {
-                tobj::LoadError::FaceVertexOutOfBounds => records.first_missing_vertex(),
-                _ => reader.lines.saturating_sub(1),
-            };
-            records.error(reading, at_fault, error)
-        })?
-        .0;
+    let mut rest = records.text.as_bytes();
+    // No `mtllib` gets through.
+    let models = tobj::load_obj_buf(&mut rest, &options, |_| Err(LoadError::ReadError));
+    let models = models.map_err(|error| {
+        let parsed = &records.text[..records.text.len() - rest.len()];
+        records.refuse(reading, parsed.lines().count(), error)
+    })?;
 
-    let end = Place::Line(records.end.max(1));
-    let mut mesh = RawMesh::new(end);
-    // As many faces come back, in their order.
-    let mut places = records.into_face_lines().into_iter().map(Place::Line);
-    let mut place = || places.next().unwrap_or(end);
-    for tobj::Model { mesh: part, .. } in models {
-        // One model comes back, as no record that starts another gets through.
-        mesh.vertices.extend(
-            part.positions
-                .chunks_exact(3)
-                .map(|p| Point3::new(p[0], p[1], p[2])),
-        );
-        if part.face_arities.is_empty() {
-            for corners in part.indices.chunks_exact(3) {
-                mesh.add_face(reading, place(), corners)?;
-            }
-        } else {
-            let mut rest = part.indices.as_slice();
-            for arity in part.face_arities {
-                let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
-                mesh.add_face(reading, place(), corners)?;
-                rest = others;
-            }
+    let end = Place::Line(records.text.lines().count().max(1));
+    let mut mesh = RawMesh::new(end.clone());
+    let fits = |p: &Point3<f64>| {
+        reading
+            .check_position(end.clone(), p.coords.as_slice())
+            .is_ok()
+    };
+    // As many faces come back, in their order. One model comes back, as no record that starts another gets through.
+    let mut lines = records.faces.iter();
+    for tobj::Model { mesh: part, .. } in models.0 {
+        let positions = part.positions.chunks_exact(3);
+        mesh.vertices
+            .extend(positions.map(|p| Point3::new(p[0], p[1], p[2])));
+        // The line of a vertex is sought only if one does not fit. Vertices that no face uses do not come back.
+        if mesh.vertices.len() < records.vertices || !mesh.vertices.iter().all(fits) {
+            records.check_positions(reading)?;
+        }
+        let triangles = part.indices.len() / 3;
+        let arities = match part.face_arities.is_empty() {
+            true => vec![3; triangles],
+            false => part.face_arities,
+        };
+        let mut rest = part.indices.as_slice();
+        for arity in arities {
+            let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
+            let place = lines
+                .next()
+                .map_or(end.clone(), |line| Place::Line(*line as usize));
+            mesh.add_face(reading, place, corners)?;
+            rest = others;
         }
     }
     Ok(mesh)
 }
 
-/// The `v` and `f` records of a file, one per line, and the lines they come from.
+/// The `v` and `f` records of a file, each on its last line, and blank lines for all others.
 #[derive(Debug, Default)]
 struct Records {
     text: String,
-    lines: Vec<u32>,
     vertices: usize,
     triangles: usize,
-    /// The last line.
-    end: usize,
+    /// The lines of the faces.
+    faces: Vec<u32>,
 }
 
 impl Records {
     fn of(reading: &Reading<'_>, content: &[u8]) -> Result<Self, IoError> {
         let mut records = Self::default();
-        let mut pending = String::new();
-        for (number, line) in (1_u32..).zip(Lines::new(content)) {
-            records.end = number as usize;
+        let mut joined = String::new();
+        let mut lines = Lines::new(content).peekable();
+        let mut number = 0;
+        while let Some(line) = lines.next() {
+            number += 1;
             let line = String::from_utf8_lossy(line);
             let line = line.split('#').next().unwrap_or_default().trim();
-            if let Some(start) = line.strip_suffix('\\') {
-                pending.push_str(start);
-                pending.push(' ');
-            } else if pending.is_empty() {
-                records.add(reading, line, number)?;
+            joined.push_str(line.strip_suffix('\\').unwrap_or(line));
+            // The last line may promise another that does not come.
+            if line.ends_with('\\') && lines.peek().is_some() {
+                joined.push(' ');
             } else {
-                pending.push_str(line);
-                records.add(reading, &std::mem::take(&mut pending), number)?;
+                records.add(reading, &joined, number)?;
+                joined.clear();
             }
+            records.text.push('\n');
         }
-        // The last line may promise another that does not come.
-        let end = u32::try_from(records.end).unwrap_or(u32::MAX);
-        records.add(reading, &pending, end)?;
         Ok(records)
     }
 
@@ -106,123 +103,87 @@ impl Records {
         match words.next() {
             Some("v") => {
                 self.vertices += 1;
-                reading.check_vertices(place, self.vertices)?;
+                reading.check(Limit::Vertices, place, self.vertices)?;
                 self.text.push('v');
-                // A colour, or a fourth number: a weight, which is for rational curves and not for faces, or a confidence.
+                // A color, or a fourth number: a weight, which is for rational curves and not for faces, or a confidence.
                 for word in words.take(3) {
                     self.text.push(' ');
                     self.text.push_str(word);
                 }
             }
-            // Fewer corners make no face: they are not kept, for any number of such records would pass the limit.
-            Some("f") if words.clone().count() >= 3 => {
-                self.text.push('f');
+            // Fewer corners make no face: they are dropped, because any number of such records would pass the limit.
+            Some("f") if words.clone().nth(2).is_some() => {
                 self.triangles += words.clone().count() - 2;
-                reading.check_triangles(place, self.triangles)?;
+                reading.check(Limit::Triangles, place, self.triangles)?;
+                self.faces.push(number);
+                self.text.push('f');
                 for word in words {
                     let position = word.split('/').next().filter(|index| !index.is_empty());
                     self.text.push(' ');
                     self.text.push_str(position.unwrap_or(word));
                 }
             }
-            _ => return Ok(()),
+            _ => {}
         }
-        self.text.push('\n');
-        self.lines.push(number);
         Ok(())
     }
 
-    /// Refuses vertices whose coordinates no mesh can have; what is no number at all is told by the reader.
+    /// Refuses the first vertex whose coordinates no mesh can have.
     fn check_positions(&self, reading: &Reading<'_>) -> Result<(), IoError> {
-        for (record, line) in self.text.lines().zip(&self.lines) {
-            let mut words = record.split(' ');
-            if words.next() != Some("v") {
-                continue;
-            }
-            let mut numbers = words.map_while(|word| word.parse::<f64>().ok());
-            let position = [numbers.next(), numbers.next(), numbers.next()];
-            if let [Some(x), Some(y), Some(z)] = position {
-                reading.check_position(Place::Line(*line as usize), &[x, y, z])?;
+        for (line, record) in (1..).zip(self.text.lines()) {
+            if let Some(position) = record
+                .strip_prefix('v')
+                .and_then(|v| position(v.split_whitespace()))
+            {
+                reading.check_position(Place::Line(line), &position)?;
             }
         }
         Ok(())
     }
 
-    /// Returns the record of the first face that names a vertex that is not there.
-    fn first_missing_vertex(&self) -> usize {
-        let is_vertex = |record: &str| record.starts_with('v');
-        let vertices = self.text.lines().filter(|record| is_vertex(record)).count();
-        let mut seen = 0;
-        for (record, line) in self.text.lines().enumerate() {
-            if is_vertex(line) {
-                seen += 1;
-                continue;
+    fn refuse(&self, reading: &Reading<'_>, line: usize, error: LoadError) -> IoError {
+        let (line, expected) = match error {
+            LoadError::PositionParseError => (line, "`v` and three numbers".to_owned()),
+            LoadError::FaceParseError => (line, "`f` and vertex indices".to_owned()),
+            LoadError::FaceVertexOutOfBounds => {
+                let expected = format!(
+                    "vertex indices from 1 to {}, or negative ones that count back no further than the first vertex",
+                    self.vertices
+                );
+                (self.first_missing_vertex(), expected)
             }
-            let valid = |word: &str| match word.parse::<i64>() {
-                Ok(index) if index < 0 => index.unsigned_abs() <= seen,
-                Ok(index) => (1..=vertices).contains(&usize::try_from(index).unwrap_or(0)),
-                Err(_) => false,
-            };
-            if !line.split_whitespace().skip(1).all(valid) {
-                return record;
-            }
-        }
-        0
-    }
-
-    /// The line of every face.
-    fn into_face_lines(self) -> Vec<usize> {
-        let records = self.text.lines().zip(self.lines);
-        let faces = records.filter(|(record, _)| record.starts_with('f'));
-        faces.map(|(_, line)| line as usize).collect()
-    }
-
-    fn error(&self, reading: &Reading<'_>, record: usize, error: tobj::LoadError) -> IoError {
-        use tobj::LoadError as E;
-        let vertices = self.vertices;
-        let expected = match error {
-            E::PositionParseError => "`v` and three numbers".to_owned(),
-            E::FaceParseError => "`f` and vertex indices".to_owned(),
-            E::FaceVertexOutOfBounds => format!(
-                "vertex indices from 1 to {vertices}, or negative ones that count back no further than the first vertex"
-            ),
-            other => format!("a readable record ({other})"),
+            other => (line, format!("a readable record ({other})")),
         };
-        let line = self.lines.get(record).copied().unwrap_or(1);
-        let found = self.text.lines().nth(record).unwrap_or_default();
-        IoError::line(reading.path, line as usize, found, expected)
-    }
-}
-
-/// Counts the lines taken from it.
-struct CountingReader<'a> {
-    rest: &'a [u8],
-    lines: usize,
-}
-
-impl Read for CountingReader<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = (&mut self.rest).read(buffer)?;
-        self.lines += buffer[..count].iter().filter(|b| **b == b'\n').count();
-        Ok(count)
-    }
-}
-
-impl BufRead for CountingReader<'_> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        Ok(self.rest)
+        let found = self
+            .text
+            .lines()
+            .nth(line.saturating_sub(1))
+            .unwrap_or_default();
+        reading.refuse(Place::Line(line), quote(found), expected)
     }
 
-    fn consume(&mut self, amount: usize) {
-        let (taken, rest) = self.rest.split_at(amount);
-        self.lines += taken.iter().filter(|b| **b == b'\n').count();
-        self.rest = rest;
+    /// Returns the line of the first face that names a vertex that is not there.
+    fn first_missing_vertex(&self) -> usize {
+        let mut seen = 0;
+        let is_missing = |word: &str, seen: usize| match word.parse::<isize>() {
+            Ok(index) if index < 0 => index.unsigned_abs() > seen,
+            Ok(index) => index == 0 || index.unsigned_abs() > self.vertices,
+            Err(_) => true,
+        };
+        let mut lines = (1..).zip(self.text.lines());
+        let line = lines.find(|(_, record)| {
+            seen += usize::from(record.starts_with('v'));
+            let face = record.strip_prefix('f').unwrap_or_default();
+            face.split_whitespace().any(|word| is_missing(word, seen))
+        });
+        line.map_or(1, |(line, _)| line)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::IoErrorKind;
     use crate::mesh::tests::reading;
 
     fn read(text: &str) -> Result<RawMesh, IoError> {
@@ -262,7 +223,11 @@ mod tests {
             ("f 1 2 -9223372036854775808", 6),
         ] {
             match read(&format!("{head}{record}\nf 1 2 3\n")) {
-                Err(IoError::Line { line, found, .. }) => {
+                Err(IoError {
+                    found,
+                    place: Some(Place::Line(line)),
+                    ..
+                }) => {
                     assert_eq!((line, found), (at, format!("{record:?}")));
                 }
                 other => panic!("{record}: {other:?}"),
@@ -275,7 +240,13 @@ mod tests {
         for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0"] {
             let text = format!("v 0 0 0\n{record}\nv 0 1 0\nf 1 2 3\n");
             assert!(
-                matches!(read(&text), Err(IoError::Line { line: 2, .. })),
+                matches!(
+                    read(&text),
+                    Err(IoError {
+                        place: Some(Place::Line(2)),
+                        ..
+                    })
+                ),
                 "{record}"
             );
         }
@@ -288,7 +259,11 @@ mod tests {
         assert!(read("v 0 0 0\nf 1 \\").unwrap().triangles.is_empty());
         assert!(read("\\").unwrap().triangles.is_empty());
         match read("v 0 0 0\nv 1 \\\n0 x \\") {
-            Err(IoError::Line { line, found, .. }) => {
+            Err(IoError {
+                found,
+                place: Some(Place::Line(line)),
+                ..
+            }) => {
                 assert_eq!((line, found.as_str()), (3, "\"v 1 0 x\""));
             }
             other => panic!("{other:?}"),
@@ -311,9 +286,10 @@ mod tests {
     fn faces_of_fewer_than_three_corners_are_not_kept() {
         let text = format!("v 0 0 0\n{}f 1 1 1\nf\n", "f 9 9\nf\n".repeat(100));
         let records = Records::of(&reading("a.obj"), text.as_bytes()).unwrap();
-        assert_eq!(records.text, "v 0 0 0\nf 1 1 1\n");
-        assert_eq!((records.triangles, records.end), (1, 203));
-        assert_eq!(records.into_face_lines(), [202]);
+        let kept: Vec<&str> = records.text.split_whitespace().collect();
+        assert_eq!(kept, ["v", "0", "0", "0", "f", "1", "1", "1"]);
+        assert_eq!((records.triangles, records.text.lines().count()), (1, 203));
+        assert_eq!(records.faces, [202]);
     }
 
     #[test]
@@ -330,11 +306,8 @@ mod tests {
         assert!(parse(&reading, text.into()).is_ok());
         assert!(matches!(
             parse(&reading, format!("{text}f 1 1\nf 1 1 1\n").into()),
-            Err(IoError::Limit {
-                place: Some(Place::Line(5)),
-                count: 4,
-                ..
-            })
+            Err(IoError { kind: IoErrorKind::Limit, place: Some(Place::Line(5)), found, .. })
+            if found == "4 triangles"
         ));
     }
 }

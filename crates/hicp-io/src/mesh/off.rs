@@ -2,161 +2,100 @@
 
 use hicp_core::Point3;
 
-use super::{RawMesh, Reading, lines};
-use crate::error::{END_OF_FILE, IoError, Place};
+use super::lines::Lines;
+use super::raw::{RawMesh, Reading, position};
+use crate::error::{END_OF_FILE, IoError, Place, quote};
+use crate::limits::Limit;
 use crate::source::text_bytes;
 
-/// Parses an OFF file. What follows three coordinates, or the corners of a face, is a normal or a colour and skipped.
+/// Parses an OFF file. What follows three coordinates, or the corners of a face, is a normal or a color and skipped.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let path = reading.path;
-    let text = text_bytes(path, &content)?;
-    let mut lines = Lines::new(text);
-    let (counts, line) = read_counts(reading, &mut lines)?;
-    let [vertices, faces] = counts.map(|count| usize::try_from(count).unwrap_or(usize::MAX));
-    reading.check_vertices(lines.place(), vertices)?;
-    reading.check_triangles(lines.place(), faces)?;
+    let mut lines = Lines::new(text_bytes(reading.path, &content)?);
+    let (line, vertices, faces) = parse_counts(reading, &mut lines)?;
+    let place = Place::Line(lines.number());
+    reading.check(Limit::Vertices, place.clone(), vertices)?;
+    reading.check(Limit::Triangles, place.clone(), faces)?;
 
-    let mut mesh = RawMesh::new(lines.place());
-    mesh.found = line;
+    let mut mesh = RawMesh::new(place);
+    mesh.found = quote(&line);
     mesh.vertices.reserve_exact(vertices);
-    for number in 0..vertices {
-        let expected = || format!("three coordinates of vertex {number} of {vertices}");
-        let line = lines
-            .next()
-            .ok_or_else(|| lines.ended(reading, expected()))?;
-        let mut numbers = line.split_whitespace().map_while(|word| word.parse().ok());
-        let position = [numbers.next(), numbers.next(), numbers.next()];
-        let [Some(x), Some(y), Some(z)] = position else {
-            return Err(lines.error(reading, &line, expected()));
+    for vertex in 0..vertices {
+        let expected = || format!("three coordinates of vertex {vertex} of {vertices}");
+        let line = next(reading, &mut lines, expected)?;
+        let place = Place::Line(lines.number());
+        let Some(position) = position(line.split_whitespace()) else {
+            return Err(reading.refuse(place, quote(&line), expected()));
         };
-        reading.check_position(lines.place(), &[x, y, z])?;
-        mesh.vertices.push(Point3::new(x, y, z));
+        reading.check_position(place, &position)?;
+        mesh.vertices.push(Point3::from(position));
     }
     let mut corners = Vec::new();
     for face in 0..faces {
         let expected =
             || format!("the number of corners of face {face} of {faces} and as many vertices");
-        let line = lines
-            .next()
-            .ok_or_else(|| lines.ended(reading, expected()))?;
-        let mut words = line.split_whitespace();
-        let count: Option<usize> = words.next().and_then(|word| word.parse().ok());
-        let wrong = || lines.error(reading, &line, expected());
-        let count = count.ok_or_else(wrong)?;
+        let line = next(reading, &mut lines, expected)?;
+        let place = Place::Line(lines.number());
+        let mut words = line
+            .split_whitespace()
+            .map_while(|word| word.parse::<i64>().ok());
+        let count = words.next().and_then(|count| usize::try_from(count).ok());
         corners.clear();
-        for word in words.take(count) {
-            let index: i64 = word.parse().map_err(|_| wrong())?;
-            match u32::try_from(index) {
-                Ok(corner) if (corner as usize) < vertices => corners.push(corner),
-                _ => {
-                    return Err(IoError::FaceIndex {
-                        path: path.to_owned(),
-                        place: lines.place(),
-                        face,
-                        index,
-                        vertices,
-                    });
-                }
-            }
+        for index in words.take(count.unwrap_or(0)) {
+            corners.push(reading.corner(place.clone(), face, index as f64, vertices)?);
         }
-        if corners.len() != count {
-            return Err(wrong());
+        if count != Some(corners.len()) {
+            return Err(reading.refuse(place, quote(&line), expected()));
         }
-        mesh.add_face(reading, lines.place(), &corners)?;
-        (mesh.end, mesh.found) = (lines.place(), line);
+        mesh.add_face(reading, place.clone(), &corners)?;
+        (mesh.end, mesh.found) = (place, quote(&line));
     }
     Ok(mesh)
 }
 
-/// Reads the keyword, the counts of vertices and faces and the line that tells them, and refuses what the rest of the file
-/// cannot hold.
-fn read_counts(
+/// Parses the keyword and the line with the numbers of vertices and faces; refuses what the rest of the file cannot hold.
+fn parse_counts(
     reading: &Reading<'_>,
     lines: &mut Lines<'_>,
-) -> Result<([u64; 2], String), IoError> {
-    let keyword = "`OFF`, with `ST`, `C` and `N` in this order before it or not";
-    let mut line = lines.next().ok_or_else(|| lines.ended(reading, keyword))?;
-    // Texture coordinates, colours and normals of the vertices, which stand behind their positions.
-    let mut rest = line.as_str();
-    for letters in ["ST", "C", "N"] {
-        rest = rest.strip_prefix(letters).unwrap_or(rest);
-    }
-    let Some(rest) = rest.strip_prefix("OFF").map(str::trim) else {
-        return Err(lines.error(reading, &line, keyword));
+) -> Result<(String, usize, usize), IoError> {
+    let keyword = || "`OFF`, with `ST`, `C` and `N` in this order before it or not".to_owned();
+    let line = next(reading, lines, keyword)?;
+    // Texture coordinates, colors and normals of the vertices, which stand behind their positions.
+    let rest = line.strip_prefix("ST").unwrap_or(&line);
+    let rest = rest.strip_prefix('C').unwrap_or(rest);
+    let Some(rest) = rest.strip_prefix('N').unwrap_or(rest).strip_prefix("OFF") else {
+        let place = Place::Line(lines.number());
+        return Err(reading.refuse(place, quote(&line), keyword()));
     };
-    let expected = "the numbers of vertices, faces and edges";
-    line = match rest {
-        "" => lines.next().ok_or_else(|| lines.ended(reading, expected))?,
+    let expected = || "the numbers of vertices, faces and edges".to_owned();
+    let line = match rest.trim() {
+        "" => next(reading, lines, expected)?,
         // Some files have the counts behind the keyword, even without a space.
-        rest => rest.to_owned(),
+        counts => counts.to_owned(),
     };
-    let numbers: Option<Vec<u64>> = line
+    let place = Place::Line(lines.number());
+    let counts: Option<Vec<usize>> = line
         .split_whitespace()
         .map(|word| word.parse().ok())
         .collect();
-    let Some(&([vertices, faces] | [vertices, faces, _])) = numbers.as_deref() else {
-        return Err(lines.error(reading, &line, expected));
+    let Some(&([vertices, faces] | [vertices, faces, _])) = counts.as_deref() else {
+        return Err(reading.refuse(place, quote(&line), expected()));
     };
-    let available = lines.left() as u64;
-    // A vertex takes three digits with a separator each, a face at least one.
-    for (what, count, bytes) in [("vertices", vertices, 6_u64), ("faces", faces, 2)] {
-        let needed = bytes.saturating_mul(count);
-        if needed > available {
-            return Err(IoError::Promise {
-                path: reading.path.to_owned(),
-                place: lines.place(),
-                what: what.to_owned(),
-                count,
-                needed,
-                available,
-            });
-        }
+    // The last line may have no end. A vertex takes three digits with a separator each, a face at least one.
+    let left = lines.left() + 1;
+    for (what, count, bytes) in [("vertices", vertices as u64, 6), ("faces", faces as u64, 2)] {
+        let needed = count.saturating_mul(bytes);
+        IoError::check_promise(reading.path, place.clone(), (count, what), needed, left)?;
     }
-    Ok(([vertices, faces], line))
+    Ok((line, vertices, faces))
 }
 
-/// The lines that say something, without comments.
-struct Lines<'a> {
-    rest: lines::Lines<'a>,
-    number: usize,
-}
-
-impl<'a> Lines<'a> {
-    fn new(content: &'a [u8]) -> Self {
-        Self {
-            rest: lines::Lines::new(content),
-            number: 0,
-        }
-    }
-
-    fn next(&mut self) -> Option<String> {
-        for line in self.rest.by_ref() {
-            self.number += 1;
-            let line = String::from_utf8_lossy(line);
-            let line = line.split('#').next().unwrap_or_default().trim();
-            if !line.is_empty() {
-                return Some(line.to_owned());
-            }
-        }
-        None
-    }
-
-    /// Bytes of the lines that are left, with one for the end of each.
-    fn left(&self) -> usize {
-        self.rest.clone().map(|line| line.len() + 1).sum()
-    }
-
-    fn place(&self) -> Place {
-        Place::Line(self.number.max(1))
-    }
-
-    fn ended(&self, reading: &Reading<'_>, expected: impl Into<String>) -> IoError {
-        IoError::at(reading.path, self.place(), END_OF_FILE, expected)
-    }
-
-    fn error(&self, reading: &Reading<'_>, found: &str, expected: impl Into<String>) -> IoError {
-        IoError::at(reading.path, self.place(), found, expected)
-    }
+fn next(
+    reading: &Reading<'_>,
+    lines: &mut Lines<'_>,
+    expected: impl Fn() -> String,
+) -> Result<String, IoError> {
+    let line = lines.next_without_comment();
+    line.ok_or_else(|| reading.refuse(Place::Line(lines.number()), END_OF_FILE, expected()))
 }
 
 #[cfg(test)]
@@ -216,10 +155,10 @@ mod tests {
             ("OFF\n1 1 0\n0 0 0\n2 0 0\nmore", 4, "\"2 0 0\""),
         ] {
             match read(text).unwrap().finish(&reading("a.off")) {
-                Err(IoError::Line {
-                    line,
+                Err(IoError {
                     found,
                     expected,
+                    place: Some(Place::Line(line)),
                     ..
                 }) => {
                     assert_eq!((line, found.as_str()), (at, what));
@@ -248,26 +187,24 @@ mod tests {
             ("OFF\n2 1 0\n0 0 0\n#  x x x x\n", 4),
         ] {
             match read(text) {
-                Err(IoError::Line { line, .. }) => assert_eq!(line, at, "{text:?}"),
+                Err(IoError {
+                    place: Some(Place::Line(line)),
+                    ..
+                }) => assert_eq!(line, at, "{text:?}"),
                 other => panic!("{text:?}: {other:?}"),
             }
         }
         for index in ["1", "-1"] {
             assert!(matches!(
                 read(&format!("OFF\n1 1 0\n0 0 0\n3 0 0 {index}")),
-                Err(IoError::FaceIndex {
-                    place: Place::Line(4),
-                    ..
-                })
+                Err(IoError { place: Some(Place::Line(4)), found, .. })
+                if found == format!("vertex {index} in face 0")
             ));
         }
         for counts in ["353535235358 6 0", "4 18446744073709551615 0"] {
             assert!(matches!(
                 read(&format!("OFF\n{counts}\n{BODY}")),
-                Err(IoError::Promise {
-                    place: Place::Line(2),
-                    ..
-                })
+                Err(IoError { place: Some(Place::Line(2)), found, .. }) if found.contains("promises")
             ));
         }
     }

@@ -1,40 +1,35 @@
 //! STL, ASCII and binary.
 //!
-//! Read here because readers at hand stop at the first `endsolid`, refuse `solid` without a name and facet normals that are
-//! not finite, take binary files for text by the first word of their header, and do not say where a file is broken; all of
+//! Parsed here because other readers stop at the first `endsolid`, refuse `solid` without a name and facet normals that are
+//! not finite, take binary files for text by the first word of their header, and do not say where a file is broken. All of
 //! these occur in files that people have. Normals are not read: the winding says the same.
 
-use std::path::Path;
-
-use hicp_core::Point3;
-
 use super::lines::Lines;
+use super::raw::{RawMesh, Reading};
 use super::weld::Welder;
-use super::{RawMesh, Reading};
-use crate::error::{END_OF_FILE, IoError, Place};
+use crate::error::{END_OF_FILE, IoError, Place, quote};
+use crate::limits::Limit;
 use crate::source::text_bytes;
 
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 /// Where a binary file says how many triangles it has.
 const COUNT: Place = Place::Byte(80);
+/// What is expected where a file is neither text nor binary.
+const START: &str = "`solid`, or a binary header of 84 bytes";
 
-/// Refuses a binary file by its header, when it has the triangles that it promises and they are too many.
+/// Refuses a binary file by its header, if it has the triangles that it promises and they are too many.
 pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
     match triangle_count(head) {
-        Some(count) if fits(binary_bytes(count), bytes) => {
-            reading.check_triangles(COUNT, count as usize)
-        }
+        Some(count) if fits(count, bytes) => reading.check(Limit::Triangles, COUNT, count as usize),
         _ => Ok(()),
     }
 }
 
 /// Parses an STL file; vertices at the same position become one.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    // By size first: any 80 bytes may begin a binary file, `solid` and what looks like UTF-16 among them.
-    let is_binary = triangle_count(&content)
-        .is_some_and(|count| fits(binary_bytes(count), content.len() as u64));
-    if is_binary {
+    // By size first: any 80 bytes may start a binary file, `solid` and what looks like UTF-16 among them.
+    if triangle_count(&content).is_some_and(|count| fits(count, content.len() as u64)) {
         return parse_binary(reading, &content);
     }
     let text = text_bytes(reading.path, &content)?;
@@ -65,65 +60,47 @@ fn triangle_count(content: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.try_into().ok()?))
 }
 
-fn binary_bytes(count: u32) -> u64 {
-    HEADER_BYTES as u64 + u64::from(count) * TRIANGLE_BYTES as u64
-}
-
-/// Says whether a file has the bytes that a binary one takes: a few bytes of padding are harmless, another triangle is not.
-fn fits(needed: u64, bytes: u64) -> bool {
+/// Returns whether a file has the bytes of a binary one: a few bytes of padding are harmless, another triangle is not.
+fn fits(count: u32, bytes: u64) -> bool {
+    let needed = HEADER_BYTES as u64 + u64::from(count) * TRIANGLE_BYTES as u64;
     (needed..needed + TRIANGLE_BYTES as u64).contains(&bytes)
 }
 
 fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
-    let end = Place::Byte(content.len() as u64);
     let Some(count) = triangle_count(content) else {
-        return Err(IoError::at(
-            reading.path,
-            end,
-            END_OF_FILE,
-            "`solid`, or a binary header of 84 bytes",
-        ));
+        let end = Place::Byte(content.len() as u64);
+        return Err(reading.refuse(end, END_OF_FILE, START));
     };
     let body = &content[HEADER_BYTES..];
-    let needed = u64::from(count) * TRIANGLE_BYTES as u64;
-    if needed > body.len() as u64 {
-        return Err(IoError::Promise {
-            path: reading.path.to_owned(),
-            place: COUNT,
-            what: "triangles".to_owned(),
-            count: u64::from(count),
-            needed,
-            available: body.len() as u64,
-        });
-    }
+    let (needed, left) = (u64::from(count) * TRIANGLE_BYTES as u64, body.len() as u64);
+    IoError::check_promise(
+        reading.path,
+        COUNT,
+        (count.into(), "triangles"),
+        needed,
+        left,
+    )?;
     let there = body.len() / TRIANGLE_BYTES;
+    let found = format!("a count of {count} triangles");
     if there > count as usize {
-        return Err(IoError::at(
-            reading.path,
-            COUNT,
-            &format!("a count of {count} triangles"),
-            format!("{there}, which the file has bytes for"),
-        ));
+        let expected = format!("{there}, which the file has bytes for");
+        return Err(reading.refuse(COUNT, found, expected));
     }
-    reading.check_triangles(COUNT, there)?;
+    reading.check(Limit::Triangles, COUNT, there)?;
     let mut mesh = RawMesh::new(COUNT);
-    mesh.found = format!("a count of {count} triangles");
+    mesh.found = found;
     mesh.triangles.reserve_exact(there);
     let mut welder = Welder::default();
     for (number, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
-        let start = HEADER_BYTES + number * TRIANGLE_BYTES;
         let mut corners = [0; 3];
         // The normal comes first.
-        for (corner, index) in corners.iter_mut().enumerate() {
-            let at = 12 * (corner + 1);
-            let mut position = [0.0; 3];
-            for (value, bytes) in position.iter_mut().zip(triangle[at..].chunks_exact(4)) {
-                *value = f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
-            }
-            let place = Place::Byte((start + at) as u64);
-            reading.check_position(place, &position)?;
-            *index = welder.index(position, &mut mesh.vertices);
-            reading.check_vertices(place, mesh.vertices.len())?;
+        for (corner, index) in (1..).zip(&mut corners) {
+            let position = [0, 4, 8].map(|axis| {
+                let bytes = &triangle[12 * corner + axis..];
+                f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+            });
+            let place = Place::Byte((HEADER_BYTES + number * TRIANGLE_BYTES + 12 * corner) as u64);
+            *index = welder.add(reading, place, position, &mut mesh.vertices)?;
         }
         mesh.triangles.push(corners);
     }
@@ -131,87 +108,90 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
 }
 
 fn parse_ascii(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
-    let path = reading.path;
-    let mut words = Words::new(content);
+    let mut words = Words::new(reading, content);
     let mut mesh = RawMesh::new(Place::Line(1));
     let mut welder = Welder::default();
-    words.expect(path, "solid", "`solid`, or a binary header of 84 bytes")?;
+    words.expect("solid", START)?;
     words.skip_name();
     // Without its last line a file may have lost any number of facets.
     let mut open = true;
     while let Some(word) = words.next() {
         if word.is("facet") {
             open = true;
-            let corners = parse_facet(reading, &mut words, &mut mesh.vertices, &mut welder)?;
+            let corners = parse_facet(&mut words, &mut mesh, &mut welder)?;
             mesh.triangles.push(corners);
-            reading.check_triangles(Place::Line(word.line), mesh.triangles.len())?;
+            reading.check(
+                Limit::Triangles,
+                Place::Line(word.line),
+                mesh.triangles.len(),
+            )?;
         } else if word.is("solid") || word.is("endsolid") {
             open = word.is("solid");
             words.skip_name();
         } else {
-            return Err(word.error(path, "`facet`, `endsolid` or `solid`"));
+            return Err(words.refuse(Some(word), "`facet`, `endsolid` or `solid`"));
         }
     }
     if open {
-        return Err(words.ended(path, "`endsolid`"));
+        return Err(words.refuse(None, "`endsolid`"));
     }
-    mesh.end = Place::Line(words.line());
+    mesh.end = Place::Line(words.lines.number());
     Ok(mesh)
 }
 
-/// Reads what follows `facet`.
+/// Parses what follows `facet`.
 fn parse_facet(
-    reading: &Reading<'_>,
     words: &mut Words<'_>,
-    vertices: &mut Vec<Point3<f64>>,
+    mesh: &mut RawMesh,
     welder: &mut Welder,
 ) -> Result<[u32; 3], IoError> {
-    let path = reading.path;
     let normal = "`normal` and three components";
-    words.expect(path, "normal", normal)?;
+    words.expect("normal", normal)?;
     for _ in 0..3 {
         // Some programs write what C prints for a normal without a direction: any word will do, but the next keyword.
-        let component = words.next().ok_or_else(|| words.ended(path, normal))?;
-        if component.is("outer") {
-            return Err(component.error(path, normal));
+        match words.next() {
+            Some(component) if !component.is("outer") => {}
+            other => return Err(words.refuse(other, normal)),
         }
     }
-    words.expect(path, "outer", "`outer loop`")?;
-    words.expect(path, "loop", "`outer loop`")?;
+    words.expect("outer", "`outer loop`")?;
+    words.expect("loop", "`outer loop`")?;
     let mut corners = [0; 3];
     for (index, which) in corners.iter_mut().zip(["first", "second", "third"]) {
         let expected = format!("the {which} `vertex` of three and its three numbers");
-        let word = words.expect(path, "vertex", &expected)?;
+        let word = words.expect("vertex", &expected)?;
         let mut position = [0.0; 3];
         for value in &mut position {
             let number = words.next().and_then(|word| word.number());
-            *value = number.ok_or_else(|| word.error(path, expected.as_str()))?;
+            *value = number.ok_or_else(|| words.refuse(Some(word), &expected))?;
         }
-        let place = Place::Line(word.line);
-        reading.check_position(place, &position)?;
-        *index = welder.index(position, vertices);
-        reading.check_vertices(place, vertices.len())?;
+        *index = welder.add(
+            words.reading,
+            Place::Line(word.line),
+            position,
+            &mut mesh.vertices,
+        )?;
     }
-    words.expect(path, "endloop", "`endloop` after three vertices")?;
-    words.expect(path, "endfacet", "`endfacet`")?;
+    words.expect("endloop", "`endloop` after three vertices")?;
+    words.expect("endfacet", "`endfacet`")?;
     Ok(corners)
 }
 
 /// The words of a text: to this format a line end is a space like any other, but behind a name.
 #[derive(Clone, Debug)]
 struct Words<'a> {
+    reading: &'a Reading<'a>,
     lines: Lines<'a>,
-    /// Lines taken.
-    taken: usize,
-    /// What is left of the last of them.
+    /// What is left of the last line taken.
     rest: &'a [u8],
 }
 
 impl<'a> Words<'a> {
-    fn new(content: &'a [u8]) -> Self {
+    fn new(reading: &'a Reading<'a>, content: &'a [u8]) -> Self {
+        let lines = Lines::new(content);
         Self {
-            lines: Lines::new(content),
-            taken: 0,
+            reading,
+            lines,
             rest: &[],
         }
     }
@@ -222,7 +202,6 @@ impl<'a> Words<'a> {
                 return Some(word);
             }
             self.rest = self.lines.next()?;
-            self.taken += 1;
         }
     }
 
@@ -235,7 +214,7 @@ impl<'a> Words<'a> {
         Some(Word {
             text,
             from,
-            line: self.taken,
+            line: self.lines.number(),
         })
     }
 
@@ -243,32 +222,29 @@ impl<'a> Words<'a> {
     fn skip_name(&mut self) {
         let mut ahead = self.clone();
         while let Some(word) = ahead.next_of_line() {
-            let is_facet = || {
-                let next = ahead.clone().next_of_line();
-                word.is("facet") && next.is_some_and(|next| next.is("normal"))
-            };
-            if word.is("endsolid") || is_facet() {
+            let next = ahead.clone().next_of_line();
+            let is_facet = word.is("facet") && next.is_some_and(|next| next.is("normal"));
+            if word.is("endsolid") || is_facet {
                 return;
             }
-            *self = ahead.clone();
+            self.rest = ahead.rest;
         }
     }
 
-    fn expect(&mut self, path: &Path, keyword: &str, expected: &str) -> Result<Word<'a>, IoError> {
+    fn expect(&mut self, keyword: &str, expected: &str) -> Result<Word<'a>, IoError> {
         match self.next() {
             Some(word) if word.is(keyword) => Ok(word),
-            Some(word) => Err(word.error(path, expected)),
-            None => Err(self.ended(path, expected)),
+            other => Err(self.refuse(other, expected)),
         }
     }
 
-    /// The line of the last word.
-    fn line(&self) -> usize {
-        self.taken.max(1)
-    }
-
-    fn ended(&self, path: &Path, expected: &str) -> IoError {
-        IoError::line(path, self.line(), END_OF_FILE, expected)
+    /// Returns the error for a word, or for the end of the file.
+    fn refuse(&self, found: Option<Word<'_>>, expected: &str) -> IoError {
+        let (line, found) = match found {
+            Some(word) => (word.line, quote(&String::from_utf8_lossy(word.from))),
+            None => (self.lines.number(), END_OF_FILE.to_owned()),
+        };
+        self.reading.refuse(Place::Line(line), found, expected)
     }
 }
 
@@ -288,18 +264,9 @@ impl Word<'_> {
     fn number(&self) -> Option<f64> {
         std::str::from_utf8(self.text).ok()?.parse().ok()
     }
-
-    fn error(&self, path: &Path, expected: &str) -> IoError {
-        IoError::line(
-            path,
-            self.line,
-            &String::from_utf8_lossy(self.from),
-            expected,
-        )
-    }
 }
 
-/// What the C library takes for white space, line ends aside.
+/// White space of the C library, except for line ends.
 fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
 }
@@ -307,6 +274,7 @@ fn is_space(byte: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::IoErrorKind;
 
     use crate::mesh::tests::reading;
 
@@ -350,10 +318,18 @@ mod tests {
         let mut truncated = binary(b"solid", 2, 2);
         truncated.pop();
         for content in [truncated, binary(b"x", u32::MAX, 1), binary(b"solid", 3, 2)] {
-            assert!(matches!(read(&content), Err(IoError::Promise { .. })));
+            assert!(
+                matches!(read(&content), Err(IoError { found, .. }) if found.contains("promises"))
+            );
         }
         for content in [&b""[..], b"a\x01c", &[0; 83]] {
-            assert!(matches!(read(content), Err(IoError::Bytes { .. })));
+            assert!(matches!(
+                read(content),
+                Err(IoError {
+                    place: Some(Place::Byte(_)),
+                    ..
+                })
+            ));
         }
     }
 
@@ -373,17 +349,20 @@ mod tests {
         let text = "\u{feff}solid".encode_utf16().flat_map(u16::to_le_bytes);
         assert!(matches!(
             parse(&reading("a.stl"), text.collect()),
-            Err(IoError::Encoding { .. })
+            Err(IoError {
+                kind: IoErrorKind::Encoding,
+                ..
+            })
         ));
     }
 
     #[test]
     fn a_count_of_0_is_told_where_it_stands() {
         match read(&binary(b"x", 0, 0)).unwrap().finish(&reading("a.stl")) {
-            Err(IoError::Bytes {
-                offset: 80,
+            Err(IoError {
                 found,
                 expected,
+                place: Some(Place::Byte(80)),
                 ..
             }) => {
                 assert_eq!(found, "a count of 0 triangles");
@@ -407,10 +386,10 @@ mod tests {
             (&html, 1, &format!("{:?}...", &html[..60])),
         ] {
             match read(text.as_bytes()) {
-                Err(IoError::Line {
-                    line,
+                Err(IoError {
                     found,
                     expected,
+                    place: Some(Place::Line(line)),
                     ..
                 }) => {
                     assert_eq!((line, found.as_str()), (at, what));
@@ -431,7 +410,10 @@ mod tests {
             (far, 146),
         ] {
             match read(&content) {
-                Err(IoError::Bytes { offset, .. }) => assert_eq!(offset, at),
+                Err(IoError {
+                    place: Some(Place::Byte(offset)),
+                    ..
+                }) => assert_eq!(offset, at),
                 other => panic!("{other:?}"),
             }
         }
@@ -519,7 +501,10 @@ mod tests {
         ] {
             let text = format!("solid x\n{FACET}endsolid x\n").replacen(from, to, 1);
             match read(text.as_bytes()) {
-                Err(IoError::Line { line, .. }) => assert_eq!(line, at, "{to}"),
+                Err(IoError {
+                    place: Some(Place::Line(line)),
+                    ..
+                }) => assert_eq!(line, at, "{to}"),
                 other => panic!("{to}: {other:?}"),
             }
         }

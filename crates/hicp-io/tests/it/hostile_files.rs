@@ -4,7 +4,9 @@ use std::error::Error;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use hicp_io::{IoError, LengthUnit, Place, ReadLimits, read_depth_png, read_mesh, read_pose_json};
+use hicp_io::{
+    IoError, IoErrorKind, LengthUnit, Place, ReadLimits, read_depth_png, read_mesh, read_pose_json,
+};
 
 struct Folder(tempfile::TempDir);
 
@@ -410,7 +412,10 @@ fn a_file_that_changes_all_the_time_is_read_as_it_was_or_refused() {
     for result in results {
         match result {
             Ok(mesh) => assert!(mesh.triangles().len() <= 4000),
-            Err(IoError::Changed { .. } | IoError::Line { .. }) => refused += 1,
+            Err(IoError {
+                place: Some(Place::Line(_)),
+                ..
+            }) => refused += 1,
             Err(error) => {
                 let text = told(&error);
                 assert!(text.contains("stays as it is while it is read"), "{text}");
@@ -437,7 +442,12 @@ fn fifty_million_triangles_are_refused_by_their_header() {
     header.extend(count.to_le_bytes());
     let path = sparse(&folder, "a.stl", &header, 84 + 50 * u64::from(count));
     match read_mesh(&path, LengthUnit::Meters) {
-        Err(error @ IoError::Limit { .. }) => {
+        Err(
+            error @ IoError {
+                kind: IoErrorKind::Limit,
+                ..
+            },
+        ) => {
             let text = told(&error);
             for part in [
                 "a.stl, byte 80",
@@ -460,11 +470,8 @@ fn fifty_million_triangles_are_refused_by_their_header() {
     );
     assert!(matches!(
         read_mesh(&path, LengthUnit::Meters),
-        Err(IoError::Limit {
-            place: Some(Place::Line(3)),
-            count: 25_000_000,
-            ..
-        })
+        Err(IoError { kind: IoErrorKind::Limit, place: Some(Place::Line(3)), found, .. })
+            if found == "25000000 vertices"
     ));
     // The text formats do not say first how much is to come, so their size is limited.
     let path = sparse(&folder, "a.obj", SQUARE.as_bytes(), 2 << 30);
@@ -522,7 +529,14 @@ fn limits_can_be_set() {
             ),
         ] {
             match read(tight) {
-                Err(IoError::Limit { field, .. }) => assert_eq!(field, named, "{}", path.display()),
+                Err(
+                    error @ IoError {
+                        kind: IoErrorKind::Limit,
+                        ..
+                    },
+                ) => {
+                    assert!(error.expected.contains(named), "{error}");
+                }
                 other => panic!("{}: {other:?}", path.display()),
             }
         }
@@ -553,10 +567,7 @@ fn limits_can_be_set() {
     };
     assert!(matches!(
         limits.read_detections(&path),
-        Err(IoError::Limit {
-            field: "max_json_bytes",
-            ..
-        })
+        Err(IoError { kind: IoErrorKind::Limit, expected, .. }) if expected.contains("max_json_bytes")
     ));
 }
 

@@ -1,16 +1,17 @@
 //! Numbers that no file can state are refused by those who write, not left for those who read.
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::path::Path;
 
 use hicp_core::{Isometry3, Matrix3};
 use hicp_io::bop::{ResultRow, SceneCamera, write_results, write_scene_camera};
-use hicp_io::{IoError, write_pose_json};
+use hicp_io::{IoError, IoErrorKind, write_pose_json};
 
 fn refused(path: &Path, written: Result<(), IoError>, place: &str) {
     match written {
-        Err(IoError::Write { source, .. }) => {
-            let text = source.to_string();
+        Err(error) if error.kind == IoErrorKind::Write => {
+            let text = error.source().unwrap().to_string();
             assert!(
                 text.starts_with(place) && text.contains("not a finite number"),
                 "{text}"

@@ -329,7 +329,7 @@ fn damaged_files_are_reported_and_the_rest_is_judged() {
         (
             depth,
             std::fs::read(eight_bit).unwrap(),
-            &["000040.png has 8-bit", "expected 16-bit"],
+            &["000040.png: found 8-bit", "expected 16-bit"],
             7,
         ),
         // A number for a list.

@@ -130,7 +130,7 @@ fn images_name_the_file_and_what_it_should_be() {
 
     hicp_io::write_mask_png(&other, &Mask::full(320, 240)).unwrap();
     with(&depth, std::fs::read(&other).unwrap(), || {
-        let parts = ["000003/depth/000000.png has 8-bit", "expected 16-bit"];
+        let parts = ["000003/depth/000000.png: found 8-bit", "expected 16-bit"];
         all_fail(&world, &[REFINE, EVAL, SHOW], &parts);
     });
 

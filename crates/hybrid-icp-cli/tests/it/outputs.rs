@@ -12,17 +12,13 @@ use hicp_io::bop::write_results;
 #[cfg(target_os = "linux")]
 use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
 
-/// Runs the program with its standard output, or its standard error, in a file; returns what it said on the other one.
+/// Runs the program with its standard output in a file; returns its standard error.
 #[cfg(target_os = "linux")]
 #[track_caller]
-fn redirected(folder: &Path, words: &str, file: File, is_error: bool) -> Run {
+fn redirected(folder: &Path, words: &str, file: File) -> Run {
     let mut command = program(folder);
     command.args(words.split(' '));
-    let output = if is_error {
-        command.stderr(file).output().unwrap()
-    } else {
-        command.stdout(file).output().unwrap()
-    };
+    let output = command.stdout(file).output().unwrap();
     Run {
         code: output.status.code().unwrap(),
         out: String::from_utf8(output.stdout).unwrap(),
@@ -34,90 +30,80 @@ fn redirected(folder: &Path, words: &str, file: File, is_error: bool) -> Run {
 const REFINE: &str = "refine --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 --mask mask.png \
                       --camera camera.json --init init.json --output";
 
-/// `>> log` adds to the log, whichever of its names the output has.
+/// `--output - >> log` adds to the log.
 #[cfg(target_os = "linux")]
 #[test]
-fn redirected_streams_are_added_to() {
+fn the_standard_output_is_added_to() {
     let scene = Scene::new();
     let folder = scene.folder.path();
-    symlink("/dev/stdout", scene.path("link")).unwrap();
-    for (name, is_error) in [
-        ("/dev/stdout", false),
-        ("/dev/fd/1", false),
-        ("/proc/self/fd/1", false),
-        ("link", false),
-        ("/dev/stderr", true),
-    ] {
-        scene.write("log", "precious\n");
-        let inode = std::fs::metadata(scene.path("log")).unwrap().ino();
-        let log = File::options().append(true).open(scene.path("log"));
-        redirected(folder, &format!("{REFINE} {name}"), log.unwrap(), is_error).exits(0);
-        let text = read_to_string(scene.path("log")).unwrap();
-        let added = text.strip_prefix("precious\n").unwrap();
-        // What the program says on the stream comes after it and not over it.
-        let end = added.rfind('}').unwrap() + 1;
-        serde_json::from_str::<Value>(&added[..end]).unwrap();
-        assert_eq!(added[end..].contains("MVE"), !is_error, "{name}: {added}");
-        let after = std::fs::metadata(scene.path("log")).unwrap().ino();
-        assert_eq!(after, inode, "{name}: replaced");
-    }
+    scene.write("log", "precious\n");
+    let inode = std::fs::metadata(scene.path("log")).unwrap().ino();
+    let log = File::options().append(true).open(scene.path("log"));
+    redirected(folder, &format!("{REFINE} -"), log.unwrap()).exits(0);
+    let text = read_to_string(scene.path("log")).unwrap();
+    let added = text.strip_prefix("precious\n").unwrap();
+    // What the program says on the stream comes after the result and not over it.
+    let end = added.rfind('}').unwrap() + 1;
+    serde_json::from_str::<Value>(&added[..end]).unwrap();
+    assert!(added[end..].contains("MVE"), "{added}");
+    let after = std::fs::metadata(scene.path("log")).unwrap().ino();
+    assert_eq!(after, inode, "replaced");
     // Not opened for appending, as by `> log`: the position is the stream's own.
     let log = File::create(scene.path("log")).unwrap();
-    redirected(folder, &format!("{REFINE} /dev/stdout"), log, false).exits(0);
+    redirected(folder, &format!("{REFINE} -"), log).exits(0);
     let text = read_to_string(scene.path("log")).unwrap();
     let end = text.rfind('}').unwrap() + 1;
     serde_json::from_str::<Value>(&text[..end]).unwrap();
     assert!(text[end..].contains("MVE"), "{text}");
-    // Another descriptor, which a shell has opened.
-    scene.write("log", "precious\n");
-    let shell = format!("exec \"$0\" {REFINE} /dev/fd/3 3>>log");
-    let mut command = std::process::Command::new("sh");
-    command.args(["-c", &shell, env!("CARGO_BIN_EXE_hybrid-icp")]);
-    let output = command.current_dir(folder).output().unwrap();
-    assert!(output.status.success());
-    let text = read_to_string(scene.path("log")).unwrap();
-    serde_json::from_str::<Value>(text.strip_prefix("precious\n").unwrap()).unwrap();
     assert!(!names(folder).iter().any(|name| name.ends_with(".tmp")));
+}
+
+/// The other names of a redirected stream are refused: replacing its file would lose what a shell writes to it.
+#[cfg(target_os = "linux")]
+#[test]
+fn files_behind_streams_are_not_replaced() {
+    let scene = Scene::new();
+    for name in ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
+        scene.write("log", "precious\n");
+        let log = File::options().append(true).open(scene.path("log"));
+        redirected(
+            scene.folder.path(),
+            &format!("{REFINE} {name}"),
+            log.unwrap(),
+        )
+        .exits(1)
+        .complains(&[&format!("cannot write {name}"), "- for the standard output"]);
+        assert_eq!(read_to_string(scene.path("log")).unwrap(), "precious\n");
+    }
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn redirected_streams_of_the_commands_over_datasets() {
+fn the_standard_output_of_the_commands_over_datasets() {
     let world = World::new();
     let folder = world.folder.path();
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     let add_to = |name: &str, words: &str| {
         let file = File::options().append(true).open(world.path(name));
-        redirected(folder, words, file.unwrap(), false)
+        redirected(folder, words, file.unwrap())
     };
     std::fs::write(world.path("log"), "precious\n").unwrap();
-    add_to(
-        "log",
-        "bop eval --dataset . --results in.csv --json /dev/stdout",
-    )
-    .exits(0);
+    let words = "bop eval --dataset . --results in.csv --json -";
+    add_to("log", words).exits(0);
     let text = read_to_string(world.path("log")).unwrap();
     assert!(text.starts_with("precious\n{"), "{text}");
 
-    // There is no journal beside a stream, so that whatever has its name is nobody's concern.
-    symlink("/dev/stdout", world.path("link")).unwrap();
-    std::fs::write(world.path("link.journal"), "my notes").unwrap();
+    // There is no journal next to a stream.
+    std::fs::write(world.path("-.journal"), "my notes").unwrap();
     std::fs::write(world.path("log"), "").unwrap();
     let refine = "bop refine --dataset . --results in.csv --no-time --output";
-    add_to("log", &format!("{refine} link")).exits(0);
+    add_to("log", &format!("{refine} -")).exits(0);
     run(folder, format!("{refine} out.csv").split(' ')).exits(0);
     let rows = read_to_string(world.path("out.csv")).unwrap();
     let text = read_to_string(world.path("log")).unwrap();
     assert!(text.starts_with(&rows), "{text}");
-    let notes = std::fs::read(world.path("link.journal")).unwrap();
+    let notes = std::fs::read(world.path("-.journal")).unwrap();
     assert_eq!(notes, b"my notes");
-
-    // In place is to replace the input; a stream would add to it.
-    let input = std::fs::read(world.path("in.csv")).unwrap();
-    add_to("in.csv", &format!("{refine} /dev/stdout"))
-        .exits(1)
-        .complains(&["--output and --results both name /dev/stdout"]);
-    assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), input);
 }
 
 /// Every file below a folder with what it holds.
@@ -347,23 +333,4 @@ fn rows_that_are_left_out_are_not_lost_in_place() {
     let rows = hicp_io::bop::read_results(world.path("in.csv")).unwrap();
     assert_eq!(rows.len(), 10);
     assert_ne!(std::fs::read(world.path("in.csv")).unwrap(), before);
-}
-
-/// Links to a file that is still to be made lead to that file.
-#[test]
-fn outputs_that_meet_behind_links_are_refused() {
-    let mut scene = Scene::new().with("--trace", "target.json");
-    std::fs::create_dir(scene.path("below")).unwrap();
-    symlink("target.json", scene.path("link")).unwrap();
-    symlink("../link", scene.path("below/link")).unwrap();
-    for output in ["link", "below/link", "below/../link"] {
-        scene = scene.with("--output", output);
-        let told = scene.run().exits(1);
-        let both = "--trace and --output both name target.json, expected different files";
-        assert_eq!(told.complains(&[both]).out, "");
-        assert!(!scene.path("target.json").exists());
-    }
-    // A link to another file is another file.
-    symlink("other.json", scene.path("third")).unwrap();
-    scene.with("--output", "third").run().exits(0);
 }

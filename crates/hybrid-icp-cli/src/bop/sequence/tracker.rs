@@ -1,8 +1,8 @@
 //! Following an object from image to image.
 
 use hicp_bop::chain;
-use hicp_io::IoError;
 use hicp_io::bop::Scene;
+use hicp_io::{IoError, IoErrorKind};
 use hybrid_icp::fusion::CameraMotion;
 use hybrid_icp::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, SequentialEstimator, Warning,
@@ -91,7 +91,7 @@ impl<'a> Tracker<'a> {
         for (instance, _) in instances.filter(|(_, truth)| truth.obj_id == self.object) {
             let mask = match self.scene.read_visible_mask(im_id, instance) {
                 Ok(mask) => mask,
-                Err(IoError::Missing { .. }) => continue,
+                Err(error) if error.kind == IoErrorKind::Missing => continue,
                 Err(error) => return Err(self.complain_of(&error)),
             };
             why = NO_OVERLAP;
@@ -113,7 +113,7 @@ impl<'a> Tracker<'a> {
     fn read(&mut self, im_id: u32) -> Result<(PinholeCamera, DepthImage), &'static str> {
         let depth = match self.scene.read_depth(im_id) {
             Ok(depth) => depth,
-            Err(IoError::Missing { .. }) => return Err(NO_IMAGE),
+            Err(error) if error.kind == IoErrorKind::Missing => return Err(NO_IMAGE),
             Err(error) => return Err(self.complain_of(&error)),
         };
         let camera = match self.scene.camera(im_id) {

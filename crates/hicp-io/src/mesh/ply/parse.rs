@@ -1,0 +1,363 @@
+//! PLY files into meshes and point clouds.
+
+use hicp_core::Point3;
+
+use super::header::{Element, Header, Property, VERTEX_NAMES};
+use super::rows::Rows;
+use crate::error::{IoError, Place, quote};
+use crate::limits::Limit;
+use crate::mesh::raw::{RawMesh, Reading};
+
+/// Refuses a file by its header, if it may have the elements that it promises and they are too many.
+///
+/// A header that is longer than the head, or broken, is left to the parser.
+pub(crate) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
+    match Header::parse(reading.path, head, bytes) {
+        Ok(header) => check_counts(reading, &header),
+        Err(_) => Ok(()),
+    }
+}
+
+fn check_counts(reading: &Reading<'_>, header: &Header) -> Result<(), IoError> {
+    for (name, limit) in [("vertex", Limit::Vertices), ("face", Limit::Triangles)] {
+        if let Some(element) = header.element(name) {
+            reading.check(limit, Place::Line(element.line), element.count)?;
+        }
+    }
+    Ok(())
+}
+
+/// Parses the vertices and faces of a PLY file.
+pub(crate) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+    let header = Header::parse(reading.path, &content, content.len() as u64)?;
+    check_counts(reading, &header)?;
+    if let Some(Element {
+        line, count: 1.., ..
+    }) = header.element("tristrips")
+    {
+        return Err(reading.refuse(Place::Line(*line), "triangle strips", "an element `face`"));
+    }
+    let vertex_line = vertices_of(reading, &header)?.line;
+    let mut mesh = without_faces(&header);
+    let mut rows = Rows::new(&content, &header);
+    // Faces may come before the vertices that they name.
+    let mut early = None;
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => {
+                let vertices = &mut mesh.vertices;
+                let take = |[x, y, z]: [f64; 3]| vertices.push(Point3::new(x, y, z));
+                read_points(reading, &mut rows, element, take)?;
+            }
+            "face" if element.line > vertex_line => {
+                read_faces(reading, &mut rows, element, &mut mesh)?;
+            }
+            name => {
+                if name == "face" {
+                    early = Some((rows.clone(), element));
+                }
+                rows.read(reading, element, |_| false, |_, _| Ok(()))?;
+            }
+        }
+    }
+    if let Some((mut rows, element)) = early {
+        read_faces(reading, &mut rows, element, &mut mesh)?;
+    }
+    Ok(mesh)
+}
+
+/// Parses the vertices of a PLY file: x, y, z and the normal nx, ny, nz; NaN where the file says nothing.
+pub(crate) fn read_vertices(
+    reading: &Reading<'_>,
+    content: &[u8],
+) -> Result<Vec<[f64; 6]>, IoError> {
+    let header = Header::parse(reading.path, content, content.len() as u64)?;
+    check_counts(reading, &header)?;
+    let vertex_line = vertices_of(reading, &header)?.line;
+    let mut vertices = Vec::new();
+    let mut rows = Rows::new(content, &header);
+    for element in &header.elements {
+        if element.line == vertex_line {
+            read_points(reading, &mut rows, element, |vertex| vertices.push(vertex))?;
+        } else {
+            rows.read(reading, element, |_| false, |_, _| Ok(()))?;
+        }
+    }
+    Ok(vertices)
+}
+
+fn vertices_of<'a>(reading: &Reading<'_>, header: &'a Header) -> Result<&'a Element, IoError> {
+    let place = Place::Line(header.lines);
+    let missing = || reading.refuse(place, header.names(), "an element `vertex`");
+    let element = header.element("vertex").ok_or_else(missing)?;
+    element.require(
+        reading.path,
+        &["x", "y", "z"],
+        "properties `x`, `y` and `z`",
+    )?;
+    Ok(element)
+}
+
+/// Creates a mesh that knows why it has no faces.
+fn without_faces(header: &Header) -> RawMesh {
+    let mut mesh = RawMesh::new(Place::Line(header.lines));
+    mesh.found = header.names();
+    mesh.expected = "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh";
+    if let Some(Element { line, count, .. }) = header.element("face") {
+        (mesh.end, mesh.found) = (Place::Line(*line), quote(&format!("element face {count}")));
+        mesh.expected = match count {
+            0 => "a face of three corners or more: vertices alone are a point cloud, no mesh",
+            _ => "a face of three corners or more among them",
+        };
+    }
+    mesh
+}
+
+/// Reads the first N of [`VERTEX_NAMES`] of every vertex.
+fn read_points<const N: usize>(
+    reading: &Reading<'_>,
+    rows: &mut Rows<'_>,
+    element: &Element,
+    mut take: impl FnMut([f64; N]),
+) -> Result<(), IoError> {
+    let index_of = |property: &Property| {
+        let name = element.read_name(property);
+        VERTEX_NAMES[..N]
+            .iter()
+            .position(|known| name == Some(known))
+    };
+    let indices: Vec<usize> = element.properties.iter().filter_map(index_of).collect();
+    let is_kept = |property: &Property| index_of(property).is_some();
+    rows.read(reading, element, is_kept, |place, numbers| {
+        let mut vertex = [f64::NAN; N];
+        for (index, number) in indices.iter().zip(numbers) {
+            vertex[*index] = *number;
+        }
+        reading.check_position(place, &vertex[..3])?;
+        take(vertex);
+        Ok(())
+    })
+}
+
+fn read_faces(
+    reading: &Reading<'_>,
+    rows: &mut Rows<'_>,
+    element: &Element,
+    mesh: &mut RawMesh,
+) -> Result<(), IoError> {
+    let needed = "a list property `vertex_indices` or `vertex_index`";
+    element.require(reading.path, &["vertex_indices"], needed)?;
+    let (mut face, mut corners) = (0, Vec::new());
+    let is_kept = |property: &Property| element.read_name(property).is_some();
+    rows.read(reading, element, is_kept, |place, indices| {
+        corners.clear();
+        for index in indices {
+            corners.push(reading.corner(place.clone(), face, *index, mesh.vertices.len())?);
+        }
+        face += 1;
+        mesh.add_face(reading, place, &corners)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::reading;
+
+    fn mesh(content: &[u8]) -> Result<RawMesh, IoError> {
+        parse_mesh(&reading("a.ply"), content.to_vec())
+    }
+
+    const CORNERS: [[f32; 3]; 4] = [
+        [0.0, 0.0, 0.5],
+        [1.0, 0.0, 0.5],
+        [1.0, 1.0, 0.5],
+        [0.0, 1.0, 0.5],
+    ];
+
+    #[test]
+    fn every_encoding_and_type_gives_the_same_mesh() {
+        for encoding in ["binary_little_endian", "binary_big_endian"] {
+            for coordinate in ["float", "float64"] {
+                for count in ["uchar", "ushort", "int"] {
+                    let mut content = format!(
+                        "ply\r\nformat {encoding} 1.0\r\ncomment M\u{fc}ller\r\nelement vertex 4\r\n\
+                         property uchar red\r\nproperty {coordinate} x\r\nproperty {coordinate} y\r\n\
+                         property {coordinate} z\r\nelement odd 2\r\nproperty list uchar short things\r\n\
+                         element face 1\r\nproperty list {count} uint vertex_index\r\nproperty float scalar_C2C[<0.1]\r\n\
+                         end_header\r\n"
+                    )
+                    .into_bytes();
+                    let little = encoding == "binary_little_endian";
+                    let mut put = |bytes: &[u8]| {
+                        let mut bytes = bytes.to_vec();
+                        if !little {
+                            bytes.reverse();
+                        }
+                        content.extend(bytes);
+                    };
+                    for corner in CORNERS {
+                        put(&[10]);
+                        for value in corner {
+                            match coordinate {
+                                "float" => put(&value.to_le_bytes()),
+                                _ => put(&f64::from(value).to_le_bytes()),
+                            }
+                        }
+                    }
+                    put(&[2]);
+                    put(&7_i16.to_le_bytes());
+                    put(&8_i16.to_le_bytes());
+                    put(&[0]);
+                    match count {
+                        "uchar" => put(&[4]),
+                        "ushort" => put(&4_u16.to_le_bytes()),
+                        _ => put(&4_i32.to_le_bytes()),
+                    }
+                    for index in 0..4_u32 {
+                        put(&index.to_le_bytes());
+                    }
+                    put(&1.0_f32.to_le_bytes());
+                    let mesh = mesh(&content).unwrap();
+                    assert_eq!(mesh.vertices, CORNERS.map(|c| Point3::from(c).cast()));
+                    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+
+                    content.pop();
+                    assert!(matches!(
+                        self::mesh(&content),
+                        Err(IoError {
+                            place: Some(Place::Byte(_) | Place::Line(_)),
+                            ..
+                        })
+                    ));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_negative_list_count_and_a_huge_one_are_refused() {
+        for count in [-1_i32, i32::MAX] {
+            let mut content = b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\n\
+                property float y\nproperty float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n"
+                .to_vec();
+            content.extend(count.to_le_bytes());
+            assert!(
+                matches!(
+                    mesh(&content),
+                    Err(IoError {
+                        place: Some(Place::Byte(_)),
+                        ..
+                    })
+                ),
+                "{count}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_face_that_names_a_missing_vertex_is_named() {
+        for index in ["4", "-1"] {
+            let content = format!(
+                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 2\nproperty list uchar int vertex_indices\nend_header\n\
+                 0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n4 0 1 2 {index}\n"
+            );
+            match mesh(content.as_bytes()) {
+                Err(IoError { found, .. }) => {
+                    assert_eq!(found, format!("vertex {index} in face 1"));
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn strips_are_refused_by_name() {
+        let content = b"ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n3 0 1 2\n";
+        assert_eq!(mesh(content).unwrap_err().found, "triangle strips");
+    }
+
+    #[test]
+    fn names_that_are_there_twice_shift_nothing() {
+        for names in [
+            ["quality", "quality"],
+            ["s(1)", "s[1]"],
+            ["h\u{f6}he", "h\u{e4}he"],
+        ] {
+            let mut content = format!(
+                "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                 property float z\nproperty float {}\nproperty float {}\nelement face 1\n\
+                 property list uchar uchar vertex_index\nend_header\n",
+                names[0], names[1]
+            )
+            .into_bytes();
+            for [x, y, z] in CORNERS {
+                for value in [x, y, z, 0.25, 0.75] {
+                    content.extend(value.to_le_bytes());
+                }
+            }
+            content.extend([4, 0, 1, 2, 3]);
+            let mesh = mesh(&content).unwrap();
+            assert_eq!(mesh.vertices, CORNERS.map(|c| Point3::from(c).cast()));
+            assert_eq!(mesh.triangles.len(), 2);
+        }
+    }
+
+    #[test]
+    fn bytes_are_counted_from_the_mark() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n\
+            property uchar z\nelement face 2\nproperty list uchar uchar vertex_index\nend_header\n";
+        for mark in ["", "\u{feff}"] {
+            let mut content = format!("{mark}{text}").into_bytes();
+            let faces = content.len() as u64 + 3;
+            content.extend([1, 2, 3, 3, 0, 0, 0, 3, 0, 0, 0]);
+            assert_eq!(mesh(&content).unwrap().vertices, [Point3::new(1., 2., 3.)]);
+            content.pop();
+            match mesh(&content) {
+                Err(IoError {
+                    place: Some(Place::Byte(offset)),
+                    ..
+                }) => assert_eq!(offset, faces + 4),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_triangles_is_told_so_by_its_header() {
+        for (elements, rows, at, found) in [
+            ("", "", 7, "the elements [\"vertex\"]"),
+            (
+                "element Face 0\n",
+                "",
+                8,
+                "the elements [\"vertex\", \"Face\"]",
+            ),
+            ("element face 0\n", "", 7, "\"element face 0\""),
+            (
+                "element face 1\nproperty list uchar int vertex_index\n",
+                "2 0 0\n",
+                7,
+                "\"element face 1\"",
+            ),
+        ] {
+            let content = format!(
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                 {elements}end_header\n0 0 0\n{rows}"
+            );
+            let mesh = mesh(content.as_bytes());
+            let mesh = mesh.and_then(|mesh| mesh.finish(&reading("a.ply")));
+            let error = mesh.unwrap_err().to_string();
+            assert!(
+                error.contains(&format!("line {at}: found {found}, ")),
+                "{error}"
+            );
+            assert_eq!(
+                error.contains("a point cloud, no mesh"),
+                rows.is_empty(),
+                "{error}"
+            );
+        }
+    }
+}
