@@ -89,6 +89,13 @@ impl<'a> Judge<'a> {
         &self.analysis.variants()[variant]
     }
 
+    /// Returns the variants whose names start with a prefix.
+    pub(crate) fn family(self, prefix: &str) -> Vec<usize> {
+        let mut all: Vec<usize> = (0..self.analysis.variants().len()).collect();
+        all.retain(|v| self.name(*v).starts_with(prefix));
+        all
+    }
+
     /// Returns a claim with its verdict.
     #[allow(clippy::unnecessary_wraps, reason = "the last line of every test")]
     pub(crate) fn claim(

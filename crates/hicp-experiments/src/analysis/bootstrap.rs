@@ -5,29 +5,13 @@ use std::collections::{BTreeMap, HashMap};
 use hicp_sim::stream;
 use rand::RngExt;
 
+use super::cell::Cell;
 use super::interval::{Interval, never_seen, quantile};
-use super::metric::{ADD_SHARE, Metric};
+use super::metric::Metric;
 use crate::study::{Design, Group, Measured, StudyOf};
 
 /// Number of bootstrap samples.
 pub const REPLICATES: usize = 2000;
-
-/// Figures of a variant in a group, without intervals.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
-    /// Number of rows.
-    pub count: usize,
-    /// Mean VSD of the initial poses.
-    pub vsd_initial: f64,
-    /// Median ADD(-S), millimeters.
-    pub add_median_mm: f64,
-    /// Share of rows whose ADD(-S) is below [`ADD_SHARE`] of the diameter.
-    pub add_success: f64,
-    /// Mean number of iterations, or of estimates along a trajectory.
-    pub steps: f64,
-    /// Standard deviation of the processor time, milliseconds; `None` without times.
-    pub cpu_deviation_ms: Option<f64>,
-}
 
 /// A case of an object, with what was measured at every level by every variant.
 #[derive(Debug)]
@@ -193,32 +177,9 @@ impl Analysis {
         let units = self.units.iter();
         let rows = units.flat_map(|unit| {
             let figures = self.figures(unit, group, variant);
-            figures.map(|measured| (unit.object, measured))
+            figures.map(|measured| (self.diameters_mm[unit.object], measured))
         });
-        let rows: Vec<(usize, &Measured)> = rows.collect();
-        let count = rows.len() as f64;
-        let mean = |value: &dyn Fn(usize, &Measured) -> f64| {
-            let sum: f64 = rows.iter().map(|(object, m)| value(*object, m)).sum();
-            sum / count
-        };
-        let mut errors: Vec<f64> = rows.iter().map(|(_, m)| m.add_final_mm).collect();
-        errors.sort_by(f64::total_cmp);
-        let times: Option<Vec<f64>> = rows.iter().map(|(_, m)| m.cpu_ms).collect();
-        Some(Cell {
-            count: rows.len(),
-            vsd_initial: mean(&|_, m| m.vsd_initial),
-            add_median_mm: quantile(&errors, 0.5)?,
-            add_success: mean(&|object, m| {
-                let limit = ADD_SHARE * self.diameters_mm[object];
-                f64::from(u8::from(m.add_final_mm < limit))
-            }),
-            steps: mean(&|_, m| m.steps as f64),
-            cpu_deviation_ms: times.map(|times| {
-                let mean = times.iter().sum::<f64>() / count;
-                let squares: f64 = times.iter().map(|t| (t - mean).powi(2)).sum();
-                (squares / (count - 1.0).max(1.0)).sqrt()
-            }),
-        })
+        Cell::of(&rows.collect::<Vec<_>>())
     }
 
     /// Returns the number of cases of which a variant has rows in a group.

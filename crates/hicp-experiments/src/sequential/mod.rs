@@ -7,8 +7,10 @@ mod design;
 mod report;
 mod rule;
 mod runner;
+mod step;
 mod trajectory;
 
 pub use config::{TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
 pub use rule::FusionRule;
-pub use runner::{TrajectoryStep, watch_trajectories};
+pub use runner::watch_trajectories;
+pub use step::TrajectoryStep;

@@ -5,11 +5,12 @@ use std::ops::Range;
 
 use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera};
 use hicp_sim::{CaseConfig, CaseMaker, InitialPose, stream};
-use hybrid_icp::fusion::{CameraMotion, FusionError, LastEstimate, PoseEstimate, SymmetryAware};
-use hybrid_icp::{SequentialEstimator, SequentialEvent, SequentialStep, render_depth_image};
+use hybrid_icp::fusion::{CameraMotion, PoseEstimate};
+use hybrid_icp::{SequentialEstimator, SequentialEvent, render_depth_image};
 
 use super::config::{TrajectoryClock, TrajectoryConfig};
 use super::rule::FusionRule;
+use super::step::{TrajectoryStep, nearest_truth};
 use super::trajectory::Trajectory;
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
@@ -45,39 +46,6 @@ struct Traveler {
     estimator: SequentialEstimator,
     method: usize,
     n_estimates: usize,
-}
-
-/// The result of a method for one image of a trajectory.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct TrajectoryStep<'a> {
-    /// The object.
-    pub object: &'a Subject,
-    /// Index of the trajectory among those of its object.
-    pub trajectory: u64,
-    /// Name of the underlying pipeline.
-    pub underlying: &'a str,
-    /// Name of the method.
-    pub method: &'a str,
-    /// Index of the image.
-    pub image: u64,
-    /// The true pose in the frame of this image; one of them, if the object has symmetries.
-    pub camera_from_object: Isometry3<f64>,
-    /// The registered model: a reconstruction.
-    pub believed: &'a Model,
-    /// The result.
-    pub step: &'a SequentialStep,
-}
-
-impl TrajectoryStep<'_> {
-    /// Returns the true pose nearest to a pose, of those that look the same.
-    ///
-    /// # Errors
-    ///
-    /// [`FusionError`] when the object's size is out of range.
-    pub fn nearest_truth(&self, pose: &Isometry3<f64>) -> Result<Isometry3<f64>, FusionError> {
-        nearest_truth(&self.object.model, &self.camera_from_object, pose)
-    }
 }
 
 /// Travels trajectories of every object and calls `watch` with each step of every pipeline and
@@ -291,16 +259,4 @@ impl<'a> TrajectoryRunner<'a> {
         }
         Ok(measured)
     }
-}
-
-/// Returns the true pose nearest to a pose, of those that look the same.
-fn nearest_truth(
-    model: &Model,
-    truth: &Isometry3<f64>,
-    pose: &Isometry3<f64>,
-) -> Result<Isometry3<f64>, FusionError> {
-    let (center, radius) = (model.center(), model.radius());
-    let inner = LastEstimate::default();
-    let symmetric = SymmetryAware::new(inner, model.symmetries().clone(), center, radius)?;
-    Ok(symmetric.representative(truth, pose))
 }

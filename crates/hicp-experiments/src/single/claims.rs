@@ -2,22 +2,10 @@
 
 use super::aims::aims;
 use super::experiment::Experiment;
+use super::table_one::{projective_fastest, table_order};
 use crate::analysis::{Analysis, FAILURE_VSD, Interval, Metric};
 use crate::claims::{Claim, ClaimVerdict, Evidence, Judge, listed};
 use crate::study::{HIGH, LOW, NOISY};
-
-/// The order of Table I, fastest first: means and standard deviations of the times, seconds.
-pub const TABLE_I: [(&str, f64, f64); 9] = [
-    ("projective-point-to-plane", 0.061, 0.023),
-    ("projective-point-to-point", 0.085, 0.038),
-    ("projective-cascade-plane-point", 0.094, 0.035),
-    ("projective-cascade-point-plane", 0.101, 0.040),
-    ("nn-point-to-point", 0.401, 0.516),
-    ("hybrid", 0.542, 0.436),
-    ("nn-point-to-plane", 0.786, 3.535),
-    ("nn-cascade-plane-point", 0.879, 3.713),
-    ("nn-cascade-point-plane", 1.090, 3.869),
-];
 
 const HYBRID: &str = "hybrid";
 const NN: &str = "nn-point-to-point";
@@ -38,7 +26,8 @@ pub fn claims(experiment: Experiment, analysis: &Analysis) -> Vec<Claim> {
             let judge = judge("§VI-B.2");
             let mut found = of_noise(judge, "depth noise", "1 to 5 % depth noise");
             found.extend(
-                family(judge, "")
+                judge
+                    .family("")
                     .iter()
                     .map(|v| improves_with_little_noise(judge, *v)),
             );
@@ -78,13 +67,6 @@ fn of_noise(judge: Judge<'_>, noise: &str, over: &str) -> Vec<Option<Claim>> {
     ]
 }
 
-/// Returns the variants whose names start with a prefix.
-fn family(judge: Judge<'_>, prefix: &str) -> Vec<usize> {
-    let mut all: Vec<usize> = (0..judge.analysis.variants().len()).collect();
-    all.retain(|v| judge.name(*v).starts_with(prefix));
-    all
-}
-
 /// Returns the variant with the lowest mean in a group, with that mean.
 fn lowest(judge: Judge<'_>, group: usize, among: &[usize]) -> Option<(usize, Interval)> {
     let means = among
@@ -109,7 +91,7 @@ fn lower_than_each(
 
 fn hybrid_lowest(judge: Judge<'_>, group: Option<usize>, over: &str) -> Option<Claim> {
     let hybrid = judge.analysis.variant(HYBRID)?;
-    let mut others = family(judge, "");
+    let mut others = judge.family("");
     others.retain(|v| *v != hybrid);
     let text = format!("hybrid has a lower mean VSD than each other variant over {over}");
     lower_than_each(judge, text, group?, (hybrid, &others))
@@ -120,7 +102,7 @@ fn lowest_everywhere(judge: Judge<'_>, along: &str) -> Option<Claim> {
     let (mut first, mut tied, mut behind) = (0, Vec::new(), Vec::new());
     let groups = judge.analysis.groups().iter().enumerate();
     for (group, described) in groups.filter(|(_, group)| group.single) {
-        let Some((best, mean)) = lowest(judge, group, &family(judge, "")) else {
+        let Some((best, mean)) = lowest(judge, group, &judge.family("")) else {
             continue;
         };
         let ours = judge.vsd(group, hybrid)?.estimate;
@@ -158,17 +140,17 @@ fn hybrid_beats_cascade(judge: Judge<'_>) -> Option<Claim> {
 
 fn projective_best_low(judge: Judge<'_>) -> Option<Claim> {
     let low = judge.analysis.group(LOW)?;
-    let (best, mean) = lowest(judge, low, &family(judge, "projective-"))?;
+    let (best, mean) = lowest(judge, low, &judge.family("projective-"))?;
     let text = format!(
         "at low initial VSD (below 0.3) a projective variant is best among those with a fixed association (here {}, {mean})",
         judge.name(best)
     );
-    lower_than_each(judge, text, low, (best, &family(judge, "nn-")))
+    lower_than_each(judge, text, low, (best, &judge.family("nn-")))
 }
 
 fn nn_best_high(judge: Judge<'_>) -> Option<Claim> {
     let (high, nn) = (judge.analysis.group(HIGH)?, judge.analysis.variant(NN)?);
-    let mut fixed = family(judge, "");
+    let mut fixed = judge.family("");
     fixed.retain(|v| *v != nn && judge.name(*v) != HYBRID);
     let text = format!(
         "at high initial VSD (0.7 and above) {NN} ({}) is best among those with a fixed association",
@@ -180,7 +162,7 @@ fn nn_best_high(judge: Judge<'_>) -> Option<Claim> {
 fn fails_high(judge: Judge<'_>, prefix: &str, kind: &str) -> Option<Claim> {
     let high = judge.analysis.group(HIGH)?;
     let (mut missing, mut figures) = (Vec::new(), Vec::new());
-    for variant in family(judge, prefix) {
+    for variant in judge.family(prefix) {
         let Some(mean) = judge.vsd(high, variant) else {
             continue;
         };
@@ -199,7 +181,7 @@ fn nn_cascades(judge: Judge<'_>) -> Option<Claim> {
     let (all, nn) = (judge.analysis.overall(), judge.analysis.variant(NN)?);
     let label = |v: usize| format!("{} − {NN}: ", judge.name(v));
     let difference = |v: &usize| Some((label(*v), judge.difference(all, *v, nn)?));
-    let cascades = family(judge, "nn-cascade-");
+    let cascades = judge.family("nn-cascade-");
     let no_better = |differences: &[Interval]| {
         let holds = differences.iter().all(|i| i.estimate >= 0.0);
         ClaimVerdict::of(holds, differences.iter().any(|i| i.high < 0.0))
@@ -216,7 +198,7 @@ fn nn_cascades(judge: Judge<'_>) -> Option<Claim> {
 fn less_susceptible(judge: Judge<'_>, noise: &str) -> Option<Claim> {
     let (none, noisy) = (0, judge.analysis.group(NOISY)?);
     let rise = |prefix: &str, factor: f64| {
-        let family = family(judge, prefix);
+        let family = judge.family(prefix);
         let share = factor / family.len() as f64;
         let terms = |v: &usize| [(noisy, *v, share), (none, *v, -share)];
         let terms: Vec<(usize, usize, f64)> = family.iter().flat_map(terms).collect();
@@ -244,58 +226,6 @@ fn improves_with_little_noise(judge: Judge<'_>, variant: usize) -> Option<Claim>
     let change = judge.analysis.contrast(Metric::Vsd, &terms)?;
     let text = format!("{name} improves from 0 % to 1 % depth noise");
     judge.decide(text, ClaimVerdict::negative, vec![(String::new(), change)])
-}
-
-/// Returns the difference of the mean times of two variants.
-fn time(judge: Judge<'_>, a: usize, b: usize) -> Option<Interval> {
-    let all = judge.analysis.overall();
-    judge.analysis.difference(Metric::CpuMs, all, a, b)
-}
-
-fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
-    let projective = family(judge, "projective-");
-    let mut slow = family(judge, "");
-    slow.retain(|v| !projective.contains(v));
-    let pairs = projective
-        .iter()
-        .flat_map(|p| slow.iter().map(|s| (*p, *s)));
-    let contrasts: Vec<Interval> = pairs.filter_map(|(p, s)| time(judge, p, s)).collect();
-    let nearest = contrasts
-        .iter()
-        .max_by(|a, b| a.estimate.total_cmp(&b.estimate))?;
-    judge.claim(
-        "every projective variant is faster than hybrid and than every variant with nearest neighbours",
-        ClaimVerdict::negative(&contrasts),
-        format!("the nearest pair differs by {nearest:+} ms"),
-    )
-}
-
-fn table_order(judge: Judge<'_>) -> Option<Claim> {
-    let all = judge.analysis.overall();
-    let order = TABLE_I.iter().map(|row| judge.analysis.variant(row.0));
-    let order: Vec<usize> = order.collect::<Option<_>>()?;
-    let pairs = order.windows(2).map(|pair| time(judge, pair[0], pair[1]));
-    let pairs: Vec<Interval> = pairs.collect::<Option<_>>()?;
-    let mean = |v| Some(judge.analysis.mean(Metric::CpuMs, all, v)?.estimate);
-    let unit = mean(judge.analysis.variant(NN)?)?;
-    // The places in Table I and the ratios, fastest here first.
-    let ratios = order.iter().filter_map(|v| Some((mean(*v)? / unit, *v)));
-    let mut ranked: Vec<(usize, (f64, usize))> = ratios.enumerate().collect();
-    ranked.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
-    let later = |(i, one): (usize, &(usize, _))| {
-        let others = ranked[i..].iter();
-        others.filter(|later| later.0 > one.0).count()
-    };
-    let agreeing: usize = ranked.iter().enumerate().map(later).sum();
-    let ranked = ranked
-        .iter()
-        .map(|(_, (ratio, v))| format!("{} {ratio:.2}", judge.name(*v)));
-    let ranked = ranked.collect::<Vec<_>>().join(", ");
-    judge.claim(
-        "the order of Table I, every neighbouring pair of it",
-        ClaimVerdict::negative(&pairs),
-        format!("{agreeing} of 36 pairs are in the paper's order; fastest first, time in units of {NN}: {ranked}"),
-    )
 }
 
 fn alpha(judge: Judge<'_>) -> Option<Claim> {

@@ -2,12 +2,16 @@
 
 mod aims;
 mod claims;
+mod condition;
 mod config;
 mod design;
 mod experiment;
 mod report;
 mod runner;
+mod table_one;
 
-pub use claims::{TABLE_I, claims};
+pub use claims::claims;
+pub use condition::{Condition, MaskFault};
 pub use config::Config;
-pub use experiment::{Condition, Experiment, MaskFault};
+pub use experiment::Experiment;
+pub use table_one::TABLE_I;

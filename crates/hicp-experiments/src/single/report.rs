@@ -1,8 +1,9 @@
 //! The report of studies of single images, with figures like the paper's Figure 6.
 
-use super::claims::{TABLE_I, claims};
+use super::claims::claims;
 use super::config::Config;
 use super::experiment::Experiment;
+use super::table_one::TABLE_I;
 use crate::analysis::{Analysis, Interval, Metric, REPLICATES};
 use crate::claims::Claim;
 use crate::report::{

@@ -9,8 +9,8 @@ use hicp_sim::{
 };
 use hybrid_icp::{BoxedStage, Rasterizer, Session, Workspace};
 
+use super::condition::{Condition, MaskFault};
 use super::config::Config;
-use super::experiment::{Condition, MaskFault};
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
 use crate::study::{Measured, Models, Outcome};

@@ -1,0 +1,52 @@
+//! A step along a trajectory, for those who watch it.
+
+use hicp_core::{Isometry3, Model};
+use hybrid_icp::SequentialStep;
+use hybrid_icp::fusion::{FusionError, LastEstimate, SymmetryAware};
+
+use crate::subject::Subject;
+
+/// The result of a method for one image of a trajectory.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct TrajectoryStep<'a> {
+    /// The object.
+    pub object: &'a Subject,
+    /// Index of the trajectory among those of its object.
+    pub trajectory: u64,
+    /// Name of the underlying pipeline.
+    pub underlying: &'a str,
+    /// Name of the method.
+    pub method: &'a str,
+    /// Index of the image.
+    pub image: u64,
+    /// The true pose in the frame of this image; one of them, if the object has symmetries.
+    pub camera_from_object: Isometry3<f64>,
+    /// The registered model: a reconstruction.
+    pub believed: &'a Model,
+    /// The result.
+    pub step: &'a SequentialStep,
+}
+
+impl TrajectoryStep<'_> {
+    /// Returns the true pose nearest to a pose, of those that look the same.
+    ///
+    /// # Errors
+    ///
+    /// [`FusionError`] when the object's size is out of range.
+    pub fn nearest_truth(&self, pose: &Isometry3<f64>) -> Result<Isometry3<f64>, FusionError> {
+        nearest_truth(&self.object.model, &self.camera_from_object, pose)
+    }
+}
+
+/// Returns the true pose nearest to a pose, of those that look the same.
+pub(super) fn nearest_truth(
+    model: &Model,
+    truth: &Isometry3<f64>,
+    pose: &Isometry3<f64>,
+) -> Result<Isometry3<f64>, FusionError> {
+    let (center, radius) = (model.center(), model.radius());
+    let inner = LastEstimate::default();
+    let symmetric = SymmetryAware::new(inner, model.symmetries().clone(), center, radius)?;
+    Ok(symmetric.representative(truth, pose))
+}
