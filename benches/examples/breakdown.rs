@@ -97,6 +97,10 @@ impl<T: DataAssociation> DataAssociation for Timed<T> {
 }
 
 impl<T: Minimize> Minimize for Timed<T> {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.0)
+    }
+
     fn system(
         &mut self,
         iteration: &Iteration<'_>,

@@ -2,7 +2,6 @@
 
 use hicp_core::{Correspondences, Iteration};
 
-use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 use crate::system::degeneracy::Degeneracy;
 use crate::system::normal_equations::NormalEquations;
@@ -32,19 +31,8 @@ impl<M: Default> Default for Conditioned<M> {
 }
 
 impl<M: Minimize> Minimize for Conditioned<M> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
-    }
-
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(iteration, pairs)
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn system(
@@ -54,13 +42,6 @@ impl<M: Minimize> Minimize for Conditioned<M> {
     ) -> Option<NormalEquations> {
         let system = self.metric.system(iteration, pairs)?;
         Some(system.with_policy(self.policy, self.threshold))
-    }
-
-    fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
-        Some(Step {
-            increment: self.system(iteration, pairs)?.solve()?,
-            mean_loss: self.mean_loss(iteration, pairs)?,
-        })
     }
 
     fn label(&self) -> &'static str {

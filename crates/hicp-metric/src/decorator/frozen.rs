@@ -38,19 +38,8 @@ pub struct Frozen<M> {
 }
 
 impl<M: Minimize> Minimize for Frozen<M> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
-    }
-
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(iteration, pairs)
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn system(

@@ -5,7 +5,6 @@ use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 use crate::decorator::moved::{compose, move_sources};
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
-use crate::system::normal_equations::NormalEquations;
 
 /// Iterates Gauss–Newton over one set of pairs: the sources are moved by the increment so far and linearised anew.
 ///
@@ -45,27 +44,8 @@ impl<M: Default> Default for GaussNewton<M> {
 }
 
 impl<M: Minimize> Minimize for GaussNewton<M> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
-    }
-
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(iteration, pairs)
-    }
-
-    fn system(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-    ) -> Option<NormalEquations> {
-        self.metric.system(iteration, pairs)
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {

@@ -7,7 +7,6 @@ use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 use crate::decorator::moved::{compose, move_sources};
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
-use crate::system::normal_equations::NormalEquations;
 
 /// How much the damping grows when a step is rejected and shrinks when one is accepted.
 const FACTOR: f64 = 10.0;
@@ -60,27 +59,8 @@ impl<M: Default> Default for LevenbergMarquardt<M> {
 }
 
 impl<M: Minimize> Minimize for LevenbergMarquardt<M> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
-    }
-
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.metric.mean_loss(iteration, pairs)
-    }
-
-    fn system(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-    ) -> Option<NormalEquations> {
-        self.metric.system(iteration, pairs)
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {

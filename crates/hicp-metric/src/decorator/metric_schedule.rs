@@ -4,7 +4,6 @@ use hicp_core::{Correspondences, Iteration};
 
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
-use crate::system::normal_equations::NormalEquations;
 
 /// One metric per iteration: the k-th in the k-th iteration of a stage, and the last from then on.
 ///
@@ -23,40 +22,17 @@ impl<M> MetricSchedule<M> {
     pub fn new(metrics: Vec<M>) -> Self {
         Self { metrics }
     }
-
-    fn current(&mut self, iteration: &Iteration<'_>) -> Option<&mut M> {
-        let last = self.metrics.len().saturating_sub(1);
-        self.metrics.get_mut(iteration.index.min(last))
-    }
 }
 
 impl<M: Minimize> Minimize for MetricSchedule<M> {
-    fn system(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-    ) -> Option<NormalEquations> {
-        self.current(iteration)?.system(iteration, pairs)
-    }
-
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.current(iteration)?.mean_loss(iteration, pairs)
-    }
-
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        if let Some(metric) = self.current(iteration) {
-            metric.add_squared_errors(iteration, pairs, factor, errors);
-        }
+    fn inner(&mut self, iteration: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        let last = self.metrics.len().saturating_sub(1);
+        let metric = self.metrics.get_mut(iteration.index.min(last))?;
+        Some(metric)
     }
 
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
-        self.current(iteration)?.minimize(iteration, pairs)
+        self.inner(iteration)?.minimize(iteration, pairs)
     }
 
     fn label(&self) -> &'static str {

@@ -109,15 +109,8 @@ impl<M> PosePrior<M> {
 }
 
 impl<M: Minimize> Minimize for PosePrior<M> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {

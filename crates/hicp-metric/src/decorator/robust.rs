@@ -137,15 +137,8 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
 }
 
 impl<M: Minimize, K: RobustKernel> Minimize for Robust<M, K> {
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        self.metric
-            .add_squared_errors(iteration, pairs, factor, errors);
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
     }
 
     fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {

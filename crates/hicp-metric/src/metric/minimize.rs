@@ -8,8 +8,7 @@ use crate::system::normal_equations::NormalEquations;
 /// Minimizes over the pairs of one iteration: every [`ErrorMetric`], and the decorators around one.
 ///
 /// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs rather than on one of them. It
-/// implements this trait by calling the same methods of what it wraps, and gets the Gauss–Newton step from the provided
-/// [`Minimize::minimize`].
+/// names what it wraps in [`Minimize::inner`] and overrides the methods that it changes; the others forward.
 ///
 /// Pure: `&mut self` is scratch, and equal iterations and pairs give equal results. A metric that depends on the pose finds
 /// it in [`Correspondences::camera_from_object`]; what changes with the iteration or the stage's start is in [`Iteration`].
@@ -19,17 +18,24 @@ use crate::system::normal_equations::NormalEquations;
     note = "`Icp::metric` accepts an `ErrorMetric`, a decorator such as `Robust<M>` around one, or a `Box<dyn Minimize>`"
 )]
 pub trait Minimize {
+    /// Returns what this decorates in an iteration: the provided methods forward to it. `None` if it decorates nothing.
+    fn inner(&mut self, iteration: &Iteration<'_>) -> Option<&mut dyn Minimize>;
+
     /// Returns all pairs linearized: what one Gauss–Newton step solves, and what information, covariance and observability
     /// at that pose are read from. `None` without weight or with points that are not finite.
     fn system(
         &mut self,
         iteration: &Iteration<'_>,
         pairs: &Correspondences,
-    ) -> Option<NormalEquations>;
+    ) -> Option<NormalEquations> {
+        self.inner(iteration)?.system(iteration, pairs)
+    }
 
     /// Returns the weighted mean of the errors at the pose that the pairs were made at; m². `None` without weight or with
     /// numbers that are not finite.
-    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64>;
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        self.inner(iteration)?.mean_loss(iteration, pairs)
+    }
 
     /// Adds `factor` times the squared error of each pair, without its weight, to `errors`, one number per pair; m².
     fn add_squared_errors(
@@ -38,7 +44,11 @@ pub trait Minimize {
         pairs: &Correspondences,
         factor: f64,
         errors: &mut [f64],
-    );
+    ) {
+        if let Some(inner) = self.inner(iteration) {
+            inner.add_squared_errors(iteration, pairs, factor, errors);
+        }
+    }
 
     /// Takes one step of minimization over all pairs.
     ///
@@ -56,6 +66,10 @@ pub trait Minimize {
 }
 
 impl<M: ErrorMetric + ?Sized> Minimize for M {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        None
+    }
+
     fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
         self.linearize_all(pairs)
     }
@@ -89,6 +103,10 @@ impl<M: ErrorMetric + ?Sized> Minimize for M {
 macro_rules! forward {
     ($($pointer:ty),+) => {$(
         impl Minimize for $pointer {
+            fn inner(&mut self, iteration: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+                (**self).inner(iteration)
+            }
+
             fn system(
                 &mut self,
                 iteration: &Iteration<'_>,

@@ -31,13 +31,7 @@ impl PlaneToPoint {
 impl ErrorMetric for PlaneToPoint {
     #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        let row = Self::row(pair);
-        system.add_row(
-            &row.point,
-            &row.direction,
-            row.residual,
-            f64::from(pair.weight),
-        );
+        Self::row(pair).add_to(system, pair);
     }
 
     #[inline]

@@ -29,13 +29,7 @@ impl PointToPlane {
 impl ErrorMetric for PointToPlane {
     #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
-        let row = Self::row(pair);
-        system.add_row(
-            &row.point,
-            &row.direction,
-            row.residual,
-            f64::from(pair.weight),
-        );
+        Self::row(pair).add_to(system, pair);
     }
 
     #[inline]

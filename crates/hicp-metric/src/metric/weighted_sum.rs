@@ -74,6 +74,10 @@ terms!(A, B);
 terms!(A, B, C);
 
 impl<T: Terms> Minimize for WeightedSum<T> {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        None
+    }
+
     fn system(
         &mut self,
         iteration: &Iteration<'_>,

@@ -19,6 +19,15 @@ pub(crate) struct Row {
     pub(crate) residual: f64,
 }
 
+impl Row {
+    /// Adds the row with the weight of its pair.
+    #[inline(always)]
+    pub(crate) fn add_to(&self, system: &mut NormalEquations, pair: &Pair) {
+        let weight = f64::from(pair.weight);
+        system.add_row(&self.point, &self.direction, self.residual, weight);
+    }
+}
+
 /// Returns what [`crate::ErrorMetric::linearize_all`] provides for a metric of one row per pair, up to rounding, in half the time: rows
 /// lie across the lanes of vectors instead of along them.
 pub(crate) fn system_of_rows(

@@ -126,6 +126,10 @@ struct Scripted {
 }
 
 impl Minimize for Scripted {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        None
+    }
+
     fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.asked.push(*pairs.camera_from_object());
         if self.losses.len() > 1 {
@@ -137,15 +141,6 @@ impl Minimize for Scripted {
 
     fn system(&mut self, _: &Iteration<'_>, _: &Correspondences) -> Option<NormalEquations> {
         Some(self.system)
-    }
-
-    fn add_squared_errors(
-        &mut self,
-        _: &Iteration<'_>,
-        _: &Correspondences,
-        _: f64,
-        _: &mut [f64],
-    ) {
     }
 
     fn label(&self) -> &'static str {

@@ -7,7 +7,8 @@ use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3};
 use hicp_metric::Minimize;
 use hicp_metric::{
-    ErrorMetric, Generalized, Kernel, PointToPlane, PointToPoint, Robust, Scale, Symmetric,
+    ErrorMetric, Generalized, Kernel, PointToPlane, PointToPoint, Robust, RobustKernel, Scale,
+    Symmetric,
 };
 
 const KERNELS: [Kernel; 7] = [
@@ -376,4 +377,41 @@ fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
         Scale::default(),
     );
     assert_eq!(inside.minimize(&Iteration::default(), &pairs), expected);
+}
+
+/// Student's t with ν degrees of freedom, which does not ship.
+#[derive(Clone, Copy)]
+struct StudentT(f64);
+
+impl RobustKernel for StudentT {
+    fn weight(&self, x: f64) -> f64 {
+        self.0 / (self.0 + x * x)
+    }
+
+    fn loss(&self, x: f64) -> f64 {
+        0.5 * self.0 * (x * x / self.0).ln_1p()
+    }
+}
+
+/// Cauchy's kernel is Student's with c² degrees of freedom, so a custom kernel takes the steps of a shipped one.
+#[test]
+fn a_custom_kernel_takes_the_steps_of_its_definition() {
+    let mut numbers = Numbers(91);
+    let pairs = messy(&mut numbers, 80);
+    let c = 2.0;
+    let scale = Scale::Mad { floor_meters: 1e-3 };
+    let first = Iteration::default();
+    let mut own = Robust::new(PointToPlane, StudentT(c * c), scale);
+    let mut shipped = Robust::new(PointToPlane, Kernel::Cauchy(c), scale);
+    let (own, shipped) = (
+        own.minimize(&first, &pairs),
+        shipped.minimize(&first, &pairs),
+    );
+    let (own, shipped) = (own.unwrap(), shipped.unwrap());
+    let (angle, distance) = hicp_core::se3::pose_distance(&own.increment, &shipped.increment);
+    // Weights are rounded to f32, and 4/(4 + x²) rounds differently from 1/(1 + (x/2)²).
+    assert!(angle < 1e-6 && distance < 1e-6, "{angle} {distance}");
+    assert!((own.mean_loss - shipped.mean_loss).abs() < 1e-12 * shipped.mean_loss);
+    let plain = PointToPlane.step(&pairs).unwrap();
+    assert!(hicp_core::se3::pose_distance(&plain.increment, &own.increment).0 > 1e-4);
 }

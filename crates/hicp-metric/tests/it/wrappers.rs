@@ -23,6 +23,10 @@ struct Spy<M> {
 }
 
 impl<M: Minimize> Minimize for Spy<M> {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.metric)
+    }
+
     fn system(
         &mut self,
         iteration: &Iteration<'_>,

@@ -123,6 +123,10 @@ fn metrics() {
 struct Stateful(u32);
 
 impl Minimize for Stateful {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        None
+    }
+
     fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
         PointToPlane.linearize_all(pairs)
     }
