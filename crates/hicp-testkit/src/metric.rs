@@ -51,13 +51,13 @@ impl Default for MetricLaws {
 ///
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
-    check_minimize(&make, laws);
     if laws.rows {
         let subject = Subject::new::<T>(Some(make().name()));
         for set in good_pairs() {
             rows(&subject, &set.label, &make(), &set.pairs);
         }
     }
+    check_minimize(make, laws);
 }
 
 /// Checks a [`Minimize`], for example a decorator around a metric; `make` creates a fresh one.

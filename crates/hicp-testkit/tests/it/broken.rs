@@ -154,7 +154,7 @@ impl Minimize for Stateful {
 #[test]
 fn a_decorator_that_remembers_its_calls() {
     caught("pure", || {
-        check_minimize(|| Stateful(0), MetricLaws::default())
+        check_minimize(|| Stateful(0), MetricLaws::default());
     });
 }
 
