@@ -1,4 +1,5 @@
-//! Error metrics: the trait [`ErrorMetric`], the metrics, and the decorators that make them robust, constrain them or iterate them.
+//! Error metrics: the traits [`ErrorMetric`] (of one pair) and [`Minimize`] (of all pairs), the metrics, and the decorators
+//! that make them robust, constrain them or iterate them.
 //!
 //! **Should you use this crate?** To write a metric of your own, or to align pairs that you already have. To refine poses,
 //! use `hybrid-icp`.
@@ -13,7 +14,7 @@
 //!     .into_iter()
 //!     .map(|(x, y, z)| Pair::new(0, surfel(x, y, z), 0, surfel(x + 0.5, y, z)))
 //!     .collect();
-//! let step = PointToPoint.minimize(&Iteration::default(), &pairs).ok_or("undetermined").unwrap();
+//! let step = PointToPoint.step(&pairs).ok_or("undetermined").unwrap();
 //! assert!((step.increment.translation.vector - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-6);
 //! assert!((step.mean_loss - 0.25).abs() < 1e-6);
 //! ```
@@ -21,7 +22,7 @@
 //! **Metrics**: [`PointToPoint`], [`PointToPlane`], [`PlaneToPoint`] (the model's normals), [`Symmetric`] (both normals, exact in
 //! one step), [`Generalized`] (both normals, tangential offsets count a little), [`WeightedSum`] of several.
 //!
-//! **Decorators**, each a metric again: [`Robust`] (a [`Kernel`] against outliers), [`PosePrior`], [`Conditioned`] (a policy for
+//! **Decorators**, each a [`Minimize`] again: [`Robust`] (a [`Kernel`] against outliers), [`PosePrior`], [`Conditioned`] (a policy for
 //! [`Degeneracy`]), [`Frozen`] (degrees of freedom held), [`GaussNewton`] and [`LevenbergMarquardt`] (iterations over fixed
 //! pairs), [`MetricSchedule`] (one metric per iteration). From the inside out, that is the order in which they make sense: a kernel weighs data and not the prior, and a
 //! solver heeds what was held:
@@ -40,7 +41,7 @@
 //! # let _ = metric;
 //! ```
 //!
-//! **What the pairs determine** is read from [`ErrorMetric::system`]: [`NormalEquations::observability`],
+//! **What the pairs determine** is read from [`Minimize::system`]: [`NormalEquations::observability`],
 //! [`NormalEquations::information`] and [`NormalEquations::covariance`].
 
 mod decorator;
