@@ -133,6 +133,11 @@ impl RenderedView {
 /// - Equal inputs give equal bits, whatever was rendered before.
 ///
 /// `Rasterizer` in `hicp-raster` is the implementation to use.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a renderer",
+    label = "this must implement `Renderer`",
+    note = "`Workspace::new` and `Refiner::with_renderer` accept a `Renderer`, such as `Rasterizer`"
+)]
 pub trait Renderer {
     /// Renders `mesh` at `camera_from_object` into `view`.
     fn render(

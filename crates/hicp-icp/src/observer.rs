@@ -7,6 +7,11 @@ use hicp_core::Isometry3;
 use crate::outcome::{Evaluation, Outcome};
 
 /// Sees a run from outside. Called per iteration, never per point; all methods do nothing unless overridden.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an observer",
+    label = "this must implement `Observer`",
+    note = "`Session::new` and `refine_observed` accept `&mut` of an `Observer`; `&mut ()` observes nothing"
+)]
 pub trait Observer {
     /// An iteration evaluated a pose. `Break` ends the stage there, with [`crate::Termination::Stopped`], unless a stop rule
     /// rejects the pose; composed stages go on with what follows, and meet the same answer.
