@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use hicp_io::bop::{Detection, Rle};
-use hicp_io::{IoError, is_absent};
+use hicp_io::bop::Detection;
+use hicp_io::is_absent;
 use hybrid_icp::{Isometry3, Mask, Model, Observation, Refiner};
 
 use crate::assignment::assign_masks;
 use crate::box_mask::BoxMask;
 use crate::fault::{Fault, FaultKind};
+use crate::mask_file::Source;
 use crate::row_status::RowStatus;
 use crate::scenes::Image;
 
@@ -33,14 +34,6 @@ struct Candidate<'a> {
     obj_id: u32,
     source: Source<'a>,
     seen: Seen,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Source<'a> {
-    /// The visible mask of an instance, by its index in the ground truth.
-    Instance(usize),
-    /// A detection's run-length code.
-    Code(&'a Rle),
 }
 
 /// What is known of a mask.
@@ -215,7 +208,7 @@ impl<'a> BopImage<'a> {
             if self.held.saturating_add(self.n_pixels()) > self.memory {
                 self.release();
             }
-            let seen = match self.mask_of(self.masks[index].source) {
+            let seen = match self.masks[index].source.read(&self.image) {
                 Ok(mask) => {
                     self.held += self.n_pixels();
                     Seen::Read(mask)
@@ -232,38 +225,6 @@ impl<'a> BopImage<'a> {
             Seen::Unusable(status) => Err(*status),
             _ => Ok(()),
         }
-    }
-
-    fn mask_of(&self, source: Source<'_>) -> Result<Mask, Fault> {
-        let Image { scene, im_id, .. } = &self.image;
-        let depth = &self.image.depth;
-        let expected = (depth.width(), depth.height());
-        let (found, name) = match source {
-            Source::Instance(instance) => {
-                let mask = scene.read_visible_mask(*im_id, instance);
-                let mask = mask.map_err(|e| of_mask(&e))?;
-                let found = (mask.width(), mask.height());
-                if found == expected {
-                    return Ok(mask);
-                }
-                let path = scene.visible_mask_path(*im_id, instance);
-                (found, path.display().to_string())
-            }
-            Source::Code(code) => {
-                let found = (code.width(), code.height());
-                if found == expected {
-                    return Ok(code.to_mask());
-                }
-                let name = format!("a segmentation of image {im_id} in --detections");
-                (found, name)
-            }
-        };
-        let path = scene.depth_path(*im_id);
-        let path = path.map_or_else(|e| e.to_string(), |path| path.display().to_string());
-        Err(Fault::damaged(format!(
-            "{name} is {}x{} pixels but {path} is {}x{}, expected the same size",
-            found.0, found.1, expected.0, expected.1,
-        )))
     }
 
     /// Returns how many pixels of each mask the model covers at a pose.
@@ -295,16 +256,6 @@ impl<'a> BopImage<'a> {
             })
             .collect()
     }
-}
-
-/// What an error while reading a mask says. An instance whose mask is not there is one without a mask.
-fn of_mask(error: &IoError) -> Fault {
-    let fault = Fault::of(error);
-    let kind = match fault.kind {
-        FaultKind::Missing => FaultKind::MissingMask,
-        other => other,
-    };
-    Fault { kind, ..fault }
 }
 
 /// Why nothing is known of the instances of an image, in the words of what else is missing.

@@ -3,9 +3,10 @@
 use std::error::Error;
 
 use hicp_io::{IoError, IoErrorKind};
+use serde::{Deserialize, Serialize};
 
 /// What is the matter with a part of a dataset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FaultKind {
     /// It is not there, which is no fault of the dataset: parts of one are often all that one has.
     Missing,
@@ -16,7 +17,7 @@ pub enum FaultKind {
 }
 
 /// Why something of a dataset cannot be used; it costs the rows that need it, and no others.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
     /// What is the matter with it.
     pub kind: FaultKind,

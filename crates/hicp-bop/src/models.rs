@@ -93,28 +93,16 @@ impl Models {
     }
 }
 
-impl Extend<(u32, Result<Option<Model>, IoError>)> for Models {
-    fn extend<T: IntoIterator<Item = (u32, Result<Option<Model>, IoError>)>>(&mut self, read: T) {
-        for (id, model) in read {
-            match model {
-                Ok(Some(model)) => {
-                    self.by_id.insert(id, model);
-                }
-                Ok(None) => {
-                    self.missing.insert(id);
-                }
-                Err(error) => {
-                    self.broken.insert(id, chain(&error));
-                }
-            }
-        }
-    }
-}
-
 impl FromIterator<(u32, Result<Option<Model>, IoError>)> for Models {
     fn from_iter<T: IntoIterator<Item = (u32, Result<Option<Model>, IoError>)>>(read: T) -> Self {
         let mut models = Self::default();
-        models.extend(read);
+        for (id, model) in read {
+            match model {
+                Ok(Some(model)) => models.by_id.extend([(id, model)]),
+                Ok(None) => models.missing.extend([id]),
+                Err(error) => models.broken.extend([(id, chain(&error))]),
+            }
+        }
         models
     }
 }

@@ -1,19 +1,21 @@
 //! What a refinement of rows returns, and how it is entered into the file's rows.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Flatness, Isometry3, Warning, warnings_of_result};
+use hybrid_icp::{Flatness, Isometry3, UnitQuaternion, Warning, warnings_of_result};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::fault::Fault;
 use crate::row_status::RowStatus;
 
-/// What became of a row.
-#[derive(Clone, Debug, PartialEq)]
+/// The result of a row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowResult {
     /// Its place among the rows that were given.
     pub index: usize,
-    /// What became of it.
+    /// Its status.
     pub status: RowStatus,
-    /// `camera_from_object`, metres, where it is another than the row's.
+    /// `camera_from_object` in meters, if it differs from the row's.
+    #[serde(serialize_with = "write_pose", deserialize_with = "read_pose")]
     pub pose: Option<Isometry3<f64>>,
     /// MVE of the row's pose and of the result's; `None` if it did not get as far as the pipeline.
     pub mve: Option<(f64, f64)>,
@@ -45,7 +47,7 @@ impl RowResult {
 }
 
 /// All rows of an image.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameResult {
     /// One per row, in the order of the rows.
     pub rows: Vec<RowResult>,
@@ -96,4 +98,20 @@ impl FrameResult {
             }
         }
     }
+}
+
+/// Translation and quaternion (i, j, k, w) of a pose.
+type PoseParts = ([f64; 3], [f64; 4]);
+
+fn write_pose<S: Serializer>(pose: &Option<Isometry3<f64>>, to: S) -> Result<S::Ok, S::Error> {
+    let parts: Option<PoseParts> =
+        pose.map(|pose| (pose.translation.vector.into(), pose.rotation.coords.into()));
+    parts.serialize(to)
+}
+
+fn read_pose<'a, D: Deserializer<'a>>(from: D) -> Result<Option<Isometry3<f64>>, D::Error> {
+    let parts = Option::<PoseParts>::deserialize(from)?;
+    // Normalizing the quaternion again would change its last bits.
+    let rotation = |q: [f64; 4]| UnitQuaternion::new_unchecked(q.into());
+    Ok(parts.map(|(t, q)| Isometry3::from_parts(t.into(), rotation(q))))
 }

@@ -1,35 +1,37 @@
-//! What becomes of a row.
+//! The status of a row after a refinement.
 
 use std::fmt;
 
 use hybrid_icp::Termination;
+use serde::{Deserialize, Serialize};
 
 use crate::fault::{Fault, FaultKind};
 
-/// What became of a row of a result file. All but [`RowStatus::Refined`] leave the row's pose as it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// The status of a row of a result file. All but [`RowStatus::Refined`] leave the row's pose as it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 #[non_exhaustive]
 pub enum RowStatus {
-    /// Its pose is a new one.
+    /// The row has a new pose.
     Refined,
-    /// The dataset has no model of its object.
+    /// The dataset has no model of the row's object.
     MissingModel,
-    /// The dataset does not have its image, or no depth of it.
+    /// The dataset does not have the row's image, or no depth of it.
     MissingFrame,
-    /// Its object has no mask in its image.
+    /// The object has no mask in the image.
     NoMask,
-    /// The model at its pose covers no pixel of a mask of its object.
+    /// The model at the row's pose covers no pixel of a mask of its object.
     NoOverlap,
-    /// Nothing was measured in the box about its pose ([`crate::MaskSource::Box`]).
+    /// Nothing was measured in the box around the row's pose ([`crate::MaskSource::Box`]).
     NothingMeasured,
-    /// A file that it needs is damaged.
+    /// A file that the row needs is damaged.
     Damaged,
-    /// The pipeline kept the initial pose, and this is why.
+    /// The pipeline kept the initial pose for this reason.
     Kept(Termination),
 }
 
 impl RowStatus {
-    /// Returns the status that is written so by its `Display`, or `None` for any other text.
+    /// Returns the status that `Display` writes as `text`, or `None` for any other text.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let statuses = [
@@ -46,51 +48,53 @@ impl RowStatus {
         all.find(|status| status.to_string() == text)
     }
 
-    /// Order in which statuses are told, and of two reasons why a row has no mask the one that says more.
-    fn rank(self) -> u8 {
+    /// Returns the rank in summaries, and the text. Of two reasons why a row has no mask, the higher rank says more.
+    fn parts(self) -> (u8, &'static str) {
         match self {
-            Self::Refined => 0,
-            Self::MissingModel => 1,
-            Self::MissingFrame => 2,
-            Self::NoMask => 3,
-            Self::NoOverlap => 4,
-            Self::NothingMeasured => 5,
-            Self::Damaged => 6,
-            Self::Kept(_) => 7,
+            Self::Refined => (0, "refined"),
+            Self::MissingModel => (1, "kept: missing model"),
+            Self::MissingFrame => (2, "kept: missing frame"),
+            Self::NoMask => (3, "kept: no mask of the object"),
+            Self::NoOverlap => (4, "kept: no overlap with a mask of the object"),
+            Self::NothingMeasured => (5, "kept: nothing measured about the pose"),
+            Self::Damaged => (6, "kept: damaged file"),
+            Self::Kept(reason) => (7, reason.explain()),
         }
     }
 }
 
 impl fmt::Display for RowStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = match self {
-            Self::Refined => "refined",
-            Self::MissingModel => "kept: missing model",
-            Self::MissingFrame => "kept: missing frame",
-            Self::NoMask => "kept: no mask of the object",
-            Self::NoOverlap => "kept: no overlap with a mask of the object",
-            Self::NothingMeasured => "kept: nothing measured about the pose",
-            Self::Damaged => "kept: damaged file",
-            Self::Kept(reason) => return write!(f, "kept by the pipeline: {}", reason.explain()),
-        };
-        f.write_str(text)
+        if matches!(self, Self::Kept(_)) {
+            f.write_str("kept by the pipeline: ")?;
+        }
+        f.write_str(self.parts().1)
     }
 }
 
 impl Ord for RowStatus {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let reason = |status: &Self| match status {
-            Self::Kept(reason) => reason.explain(),
-            _ => "",
-        };
-        let ranks = self.rank().cmp(&other.rank());
-        ranks.then_with(|| reason(self).cmp(reason(other)))
+        self.parts().cmp(&other.parts())
     }
 }
 
 impl PartialOrd for RowStatus {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
+    }
+}
+
+impl From<RowStatus> for String {
+    fn from(status: RowStatus) -> Self {
+        status.to_string()
+    }
+}
+
+impl TryFrom<String> for RowStatus {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        Self::parse(&text).ok_or_else(|| format!("{text:?} is not the status of a row"))
     }
 }
 

@@ -116,3 +116,22 @@ impl Scenes {
         })
     }
 }
+
+/// Visible part from which the BOP benchmark requests an instance.
+pub const MIN_VISIBLE_FRACTION: f64 = 0.1;
+
+/// Returns the objects in an image that are visible enough to be targets, an entry per instance.
+///
+/// An instance without a stated visibility counts as visible.
+#[must_use]
+pub fn visible_objects(scene: &Scene, im_id: u32) -> Vec<u32> {
+    let infos = scene.ground_truth_info(im_id).unwrap_or_default();
+    let is_visible = |index: usize| {
+        let stated = infos.get(index).and_then(|info| info.visible_fraction);
+        stated.is_none_or(|fraction| fraction >= MIN_VISIBLE_FRACTION)
+    };
+    let truths = scene.ground_truth(im_id).unwrap_or_default();
+    let visible = truths.iter().enumerate();
+    let visible = visible.filter(|(index, _)| is_visible(*index));
+    visible.map(|(_, truth)| truth.obj_id).collect()
+}

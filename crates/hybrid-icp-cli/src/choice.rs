@@ -1,11 +1,12 @@
-//! Which pipeline runs.
+//! The choice of a pipeline.
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::limits::pipeline_limits;
 use clap::Args;
 use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
+
+use crate::limits::pipeline_limits;
 
 /// The options that choose a pipeline.
 #[derive(Clone, Debug, Args)]
@@ -22,7 +23,19 @@ pub(crate) struct PipelineArguments {
     overrides: Vec<String>,
 }
 
-/// What `--pipeline` names.
+impl PipelineArguments {
+    /// Returns the pipeline file, which no output may replace.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        self.pipeline.file()
+    }
+
+    /// Reads the file, applies the overrides, and makes sure that the pipeline builds.
+    pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
+        self.pipeline.choose(&self.overrides)
+    }
+}
+
+/// A pipeline as the command line names it.
 #[derive(Clone, Debug)]
 pub(crate) enum Source {
     Preset(Preset),
@@ -33,31 +46,15 @@ impl FromStr for Source {
     type Err = UnknownPreset;
 
     fn from_str(text: &str) -> Result<Self, UnknownPreset> {
-        if text.ends_with(".toml") {
-            Ok(Self::File(text.into()))
-        } else {
-            text.parse().map(Self::Preset)
+        match text.ends_with(".toml") {
+            true => Ok(Self::File(text.into())),
+            false => text.parse().map(Self::Preset),
         }
     }
 }
 
-/// A pipeline that is known to build: makes any number of refiners, one per thread.
-#[derive(Clone, Debug)]
-pub(crate) struct Pipeline {
-    name: String,
-    made_of: MadeOf,
-    toml: String,
-    overrides: Vec<String>,
-}
-
-#[derive(Clone, Debug)]
-enum MadeOf {
-    Preset(Preset),
-    File(PipelineFile),
-}
-
 impl Source {
-    /// The file, where it is one.
+    /// Returns the file, if it is one.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
         match self {
             Self::File(path) => Some(path),
@@ -65,114 +62,96 @@ impl Source {
         }
     }
 
-    /// A name for files: the preset's, or the file's without folder and ending.
+    /// Returns a name for files: the preset's, or the file's without folder and ending.
     pub(crate) fn short_name(&self) -> String {
         match self {
             Self::Preset(preset) => preset.name().to_owned(),
-            Self::File(path) => path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            Self::File(path) => {
+                let stem = path.file_stem().unwrap_or_default();
+                stem.to_string_lossy().into_owned()
+            }
+        }
+    }
+
+    /// Reads the file, applies overrides, and makes sure that the pipeline builds.
+    pub(crate) fn choose(&self, overrides: &[String]) -> anyhow::Result<Pipeline> {
+        match self {
+            Self::Preset(preset) => {
+                let toml = preset.toml().to_owned();
+                let mut pipeline = Pipeline::parse(preset.name(), toml, overrides)?;
+                pipeline.preset = overrides.is_empty().then_some(*preset);
+                Ok(pipeline)
+            }
+            Self::File(path) => {
+                let toml = PipelineFile::read_text(path)?;
+                Pipeline::parse(&path.display().to_string(), toml, overrides)
+            }
         }
     }
 }
 
-impl PipelineArguments {
-    /// A pipeline without overrides.
-    pub(crate) fn plain(pipeline: Source) -> Self {
-        Self {
-            pipeline,
-            overrides: Vec::new(),
-        }
-    }
-
-    /// The pipeline file, so that no output overwrites it.
-    pub(crate) fn file(&self) -> Option<&PathBuf> {
-        self.pipeline.file()
-    }
-
-    /// Reads the file, applies the overrides, and makes sure that the pipeline builds.
-    pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
-        match &self.pipeline {
-            Source::Preset(preset) if self.overrides.is_empty() => Ok(Pipeline {
-                name: preset.name().to_owned(),
-                made_of: MadeOf::Preset(*preset),
-                toml: preset.toml().to_owned(),
-                overrides: Vec::new(),
-            }),
-            Source::Preset(preset) => {
-                Pipeline::parse(preset.name(), preset.toml().to_owned(), &self.overrides)
-            }
-            Source::File(path) => {
-                let name = path.display().to_string();
-                let toml = PipelineFile::read_text(path)?;
-                Pipeline::parse(&name, toml, &self.overrides)
-            }
-        }
-    }
+/// A pipeline that is known to build. Creates any number of refiners, one per thread.
+#[derive(Clone, Debug)]
+pub(crate) struct Pipeline {
+    name: String,
+    toml: String,
+    overrides: Vec<String>,
+    file: PipelineFile,
+    preset: Option<Preset>,
 }
 
 impl Pipeline {
-    /// Parses a pipeline, applies the overrides, and makes sure that it builds; `origin` is what messages call it.
+    /// Parses a pipeline, applies overrides, and makes sure that it builds; messages call it `origin`.
     pub(crate) fn parse(origin: &str, toml: String, overrides: &[String]) -> anyhow::Result<Self> {
         let mut file = PipelineFile::parse(&toml, origin)?;
+        let mut name = origin.to_owned();
         for assignment in overrides {
             file.set(assignment)?;
+            name = format!("{name} {assignment}");
         }
         file.build_within(&pipeline_limits())?;
-        let name = std::iter::once(origin.to_owned())
-            .chain(overrides.iter().cloned())
-            .collect::<Vec<_>>()
-            .join(" ");
         Ok(Self {
             name,
-            made_of: MadeOf::File(file),
             toml,
             overrides: overrides.to_vec(),
+            file,
+            preset: None,
         })
     }
 
-    /// The text that it was made from, before the overrides.
+    /// Returns the text that it was parsed from, before the overrides.
     pub(crate) fn toml(&self) -> &str {
         &self.toml
     }
 
-    /// The preset, where it is one as it is.
+    /// Returns the preset, if it is one without overrides.
     pub(crate) fn preset(&self) -> Option<Preset> {
-        match self.made_of {
-            MadeOf::Preset(preset) => Some(preset),
-            MadeOf::File(_) => None,
-        }
+        self.preset
     }
 
-    /// The overrides, in order.
+    /// Returns the overrides, in order.
     pub(crate) fn overrides(&self) -> &[String] {
         &self.overrides
     }
 
-    /// Name in reports: that of the preset or file, and the overrides.
+    /// Returns the name for reports: that of the preset or file, and the overrides.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Makes a refiner.
+    /// Creates a refiner.
     pub(crate) fn refiner(&self) -> Refiner {
-        match &self.made_of {
-            MadeOf::Preset(preset) => Refiner::preset(*preset),
-            MadeOf::File(_) => Refiner::boxed(self.stage()),
-        }
+        let boxed = || Refiner::boxed(self.stage());
+        self.preset.map_or_else(boxed, Refiner::preset)
     }
 
-    /// Makes the stage alone.
+    /// Creates the stage alone.
     pub(crate) fn stage(&self) -> BoxedStage {
-        match &self.made_of {
-            MadeOf::Preset(preset) => preset.build(),
-            MadeOf::File(file) => match file.build_within(&pipeline_limits()) {
-                Ok(stage) => stage,
-                // It was built once, and building is pure.
-                Err(error) => unreachable!("{error}"),
-            },
+        match (self.preset, self.file.build_within(&pipeline_limits())) {
+            (Some(preset), _) => preset.build(),
+            (None, Ok(stage)) => stage,
+            // It was built before, and building is pure.
+            (None, Err(error)) => unreachable!("{error}"),
         }
     }
 }

@@ -1,6 +1,5 @@
 //! `hybrid-icp demo`.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -15,10 +14,10 @@ use hybrid_icp::{
 };
 
 use crate::choice::PipelineArguments;
-use crate::overlay::{AFTER, BEFORE, Picture};
-use crate::report;
-use crate::terminal::{say, warn};
-use crate::{outputs, warnings};
+use crate::outputs::Files;
+use crate::picture::{AFTER, BEFORE, Picture};
+use crate::refine::{report, warnings};
+use crate::terminal::{say, table, warn};
 
 /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
 ///
@@ -62,7 +61,8 @@ fn percent(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    outputs::check(&[("--picture", &arguments.picture)], &[], &[])?;
+    let files = Files::default().writes("--picture", [&arguments.picture]);
+    files.check()?;
     let pipeline = arguments.pipeline.choose()?;
     let mut rng = rng(arguments.seed);
     let model = arguments.object.model()?;
@@ -92,8 +92,33 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
     let pose = refined.outcome.camera_from_object;
 
-    let mut text = format!(
-        "{}: {} triangles, {:.0} mm, seen at {:.2} m on {} pixels, depth noise {} %\npipeline {}, seed {}\n\n",
+    let mut vsd = |pose: &Isometry3<f64>| {
+        let problem = Problem::new(&model, &observation);
+        let mut context = refiner.workspace_mut().context(&problem);
+        Vsd::new(truth).score(&mut context, pose)
+    };
+    let heads = ["", "rotation error", "translation error", "MVE", "VSD"];
+    let mut errors = vec![heads.map(str::to_owned)];
+    for (when, pose, mve) in [
+        ("before", &init, refined.mve_initial),
+        ("after", &pose, refined.mve),
+    ] {
+        let (angle, distance) = se3::pose_distance(pose, &truth);
+        errors.push([
+            when.to_owned(),
+            format!("{:.3} deg", angle.to_degrees()),
+            format!("{:.3} mm", distance * 1e3),
+            format!("{mve:.3}"),
+            format!("{:.3}", vsd(pose)),
+        ]);
+    }
+    picture.outline(&mut refiner, &model, &observation, &init, BEFORE);
+    picture.outline(&mut refiner, &model, &observation, &pose, AFTER);
+    picture.write(&arguments.picture)?;
+
+    let reason = warnings::reason(&refined, &model, &observation, &init);
+    say(format_args!(
+        "{}: {} triangles, {:.0} mm, seen at {:.2} m on {} pixels, depth noise {} %\npipeline {}, seed {}\n",
         arguments.object.name(),
         model.mesh().triangles().len(),
         model.diameter() * 1e3,
@@ -102,45 +127,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         arguments.noise,
         pipeline.name(),
         arguments.seed,
-    );
-    let mut vsd = |pose: &Isometry3<f64>| {
-        let problem = Problem::new(&model, &observation);
-        let mut context = refiner.workspace_mut().context(&problem);
-        Vsd::new(truth).score(&mut context, pose)
-    };
-    // Writing to a string cannot fail.
-    let _ = writeln!(
-        text,
-        "{:<8} {:>15} {:>17} {:>7} {:>7}",
-        "", "rotation error", "translation error", "MVE", "VSD"
-    );
-    for (when, pose, mve) in [
-        ("before", &init, refined.mve_initial),
-        ("after", &pose, refined.mve),
-    ] {
-        let (angle, distance) = se3::pose_distance(pose, &truth);
-        let _ = writeln!(
-            text,
-            "{when:<8} {:>11.3} deg {:>14.3} mm {mve:>7.3} {:>7.3}",
-            angle.to_degrees(),
-            distance * 1e3,
-            vsd(pose),
-        );
-    }
-
-    picture.outline(&mut refiner, &model, &observation, &init, BEFORE);
-    picture.outline(&mut refiner, &model, &observation, &pose, AFTER);
-    picture.write(&arguments.picture)?;
-
-    let reason = warnings::reason(&refined, &model, &observation, &init);
-    let _ = writeln!(text, "\n{}", report::trace_table(&trace.stages));
-    let _ = writeln!(text, "{}", report::summary(&refined, &reason));
-    let _ = writeln!(
-        text,
-        "{time_ms:.1} ms from depth image to pose, on one core"
-    );
+    ))?;
+    say(table(&errors, 1))?;
+    say(format_args!("\n{}\n", report::trace_table(&trace.stages)))?;
+    say(report::summary(&refined, &reason))?;
     say(format_args!(
-        "{text}{}: the model's outline before (orange) and after (blue)",
+        "{time_ms:.1} ms from depth image to pose, on one core\n{}: the model's outline before (orange) and after (blue)",
         arguments.picture.display()
     ))?;
     warnings::about_result(&refined).iter().for_each(warn);

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::limits::limits;
 use crate::terminal::say;
 
-/// Say what a mesh file holds as it is read here: counts, size, whether it is closed, and what looks wrong.
+/// Describe a mesh file as it is read here: counts, size, whether it is closed, and warnings.
 ///
 /// Polygons are counted as the triangles they are cut into. With --json the keys are triangles, vertices, diameter_m, closed,
 /// warnings (a list of sentences, empty when nothing looks wrong) and more of the kind.
@@ -33,10 +33,10 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Diameters that an object to be grasped or looked at may have, metres.
+/// Plausible diameters of an object in meters.
 const PLAUSIBLE_METERS: std::ops::RangeInclusive<f64> = 0.005..=5.0;
 
-/// Steps of the coordinates that are too coarse, as a share of the diameter.
+/// Share of the diameter from which steps of the coordinates are too coarse.
 const COARSE: f64 = 1e-4;
 
 #[derive(Debug, Serialize)]
@@ -51,7 +51,7 @@ struct Report {
     warnings: Vec<String>,
     bounding_box_m: [[f32; 3]; 2],
     area_m2: f64,
-    /// `outward`, `inward`, or `unknown` where the mesh does not tell.
+    /// `outward`, `inward`, or `unknown` if the mesh does not show it.
     facing: &'static str,
     consistently_wound: bool,
     components: usize,
@@ -60,7 +60,7 @@ struct Report {
     degenerate_triangles: usize,
     duplicate_triangles: usize,
     unused_vertices: usize,
-    /// The unit that would give the mesh the size of an object, where that of the command line does not.
+    /// The unit that would give the mesh the size of an object, if that of the command line does not.
     suspected_unit: Option<String>,
 }
 
@@ -116,20 +116,17 @@ impl Report {
         report
     }
 
-    /// What looks wrong, in sentences.
+    /// Returns warnings as sentences.
     fn warnings(&self, survey: &MeshSurvey, step: f64) -> Vec<String> {
         let mut warnings = Vec::new();
-        let diameter = self.diameter_m;
+        let (diameter, unit) = (self.diameter_m, &self.unit);
+        let (least, most) = (*PLAUSIBLE_METERS.start(), *PLAUSIBLE_METERS.end());
         if !PLAUSIBLE_METERS.contains(&diameter) {
-            let hint = match &self.suspected_unit {
-                Some(unit) => format!("; in {unit} it would be an object's size"),
-                None => String::new(),
-            };
+            let suspected = self.suspected_unit.as_ref();
+            let hint = suspected.map(|unit| format!("; in {unit} it would be an object's size"));
+            let hint = hint.unwrap_or_default();
             warnings.push(format!(
-                "the diameter is {diameter:.4e} m in {}, expected {} to {} m{hint}",
-                self.unit,
-                PLAUSIBLE_METERS.start(),
-                PLAUSIBLE_METERS.end()
+                "the diameter is {diameter:.4e} m in {unit}, expected {least} to {most} m{hint}"
             ));
         }
         if step > COARSE * diameter {
@@ -137,53 +134,46 @@ impl Report {
                 "the coordinates are so far from the origin that they are rounded to steps of {step:.1e} m: move the mesh to its origin"
             ));
         }
+        let wound =
+            "edges have triangles that are wound against each other: normals cannot be trusted";
+        let open = "edges have one triangle only: the surface is open";
         let counts = [
-            (
-                survey.boundary_edges,
-                "edges have one triangle only: the surface is open",
-            ),
+            (survey.boundary_edges, open),
             (
                 survey.non_manifold_edges,
                 "edges have more than two triangles",
             ),
-            (
-                survey.misoriented_edges,
-                "edges have triangles that are wound against each other: normals cannot be trusted",
-            ),
+            (survey.misoriented_edges, wound),
             (survey.degenerate_triangles, "triangles have no area"),
             (survey.duplicate_triangles, "triangles repeat another"),
             (survey.unused_vertices, "vertices belong to no triangle"),
         ];
-        let told = counts.iter().filter(|(count, _)| *count > 0);
-        warnings.extend(told.map(|(count, what)| format!("{count} {what}")));
+        let found = counts.iter().filter(|(count, _)| *count > 0);
+        warnings.extend(found.map(|(count, what)| format!("{count} {what}")));
         if self.facing == "inward" {
-            warnings.push(
-                "the triangles are wound clockwise seen from outside: normals point inward"
-                    .to_owned(),
-            );
+            let text = "the triangles are wound clockwise seen from outside: normals point inward";
+            warnings.push(text.to_owned());
         }
         warnings
     }
 
     fn text(&self) -> String {
-        let [low, high] = self.bounding_box_m;
-        let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let Self {
+            file,
+            triangles,
+            vertices,
+            components,
+            facing,
+            diameter_m,
+            area_m2,
+            bounding_box_m: [[left, top, near], [right, bottom, far]],
+            ..
+        } = self;
         let closed = if self.closed { "closed" } else { "open" };
+        let [x, y, z] = [right - left, bottom - top, far - near];
         let mut text = format!(
-            "{}: {} triangles, {} vertices, {} parts, {closed}, facing {}\n  diameter {:.6} m, box {:.6} x {:.6} x {:.6} m from ({}, {}, {}), area {:.6} m2",
-            self.file,
-            self.triangles,
-            self.vertices,
-            self.components,
-            self.facing,
-            self.diameter_m,
-            sides[0],
-            sides[1],
-            sides[2],
-            low[0],
-            low[1],
-            low[2],
-            self.area_m2,
+            "{file}: {triangles} triangles, {vertices} vertices, {components} parts, {closed}, facing {facing}\n  \
+             diameter {diameter_m:.6} m, box {x:.6} x {y:.6} x {z:.6} m from ({left}, {top}, {near}), area {area_m2:.6} m2"
         );
         for warning in &self.warnings {
             text.push_str("\n  warning: ");
@@ -193,7 +183,7 @@ impl Report {
     }
 }
 
-/// Returns the one other unit in which a mesh of an implausible size would be an object.
+/// Returns another unit in which a mesh of an implausible size would be an object.
 fn suspected_unit(diameter_m: f64, unit: LengthUnit) -> Option<LengthUnit> {
     if PLAUSIBLE_METERS.contains(&diameter_m) {
         return None;

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the program ends within a second, with what is done saved.
+//! Ctrl-C and SIGTERM: the program ends within a second and keeps the results so far.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,16 +14,16 @@ use signal_hook::flag;
 
 use crate::terminal::{complain, warn};
 
-/// Exit code of a program that was interrupted, as shells have it for Ctrl-C.
+/// Exit code of an interrupted program, as in shells.
 pub(crate) const EXIT_CODE: u8 = 130;
 
-/// How long a command that saves its work has to come to an end of its own.
+/// Time for a command that saves its work to end by itself.
 const GRACE: Duration = Duration::from_millis(700);
 
-/// How often the flag is looked at.
+/// Time between two checks of the flag.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// For how long the program tries to remove what is unfinished, and how long it waits in between.
+/// Time for removing an unfinished folder, and between two attempts.
 const REMOVAL: Duration = Duration::from_millis(700);
 const BETWEEN_REMOVALS: Duration = Duration::from_millis(2);
 
@@ -31,11 +31,10 @@ static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static SAVING: AtomicBool = AtomicBool::new(false);
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Listens from now on.
+/// Starts to handle signals.
 ///
-/// The first signal asks commands that save their work to stop, and ends the program when they take too long; what they have
-/// put on the disk until then is whole. Other commands end at once: they write nothing before they are done. A second signal
-/// ends the program where it stands.
+/// The first signal stops commands that save their work, and ends the program if they take too long. Other commands end at
+/// once, because they write nothing before they are done. A second signal ends the program immediately.
 pub(crate) fn listen() {
     for signal in [SIGINT, SIGTERM] {
         let asked = &*ASKED;
@@ -48,8 +47,8 @@ pub(crate) fn listen() {
             ));
         }
     }
-    // A file beyond the limit of this user is then an error of the write, which is told, and not the end of the program with a
-    // temporary file left behind.
+    // A file beyond the user's limit is then a write error. By default, the signal would end the program and leave a temporary
+    // file behind.
     #[cfg(unix)]
     if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
         warn(format_args!("signal {SIGXFSZ} ends the program: {error}"));
@@ -74,12 +73,12 @@ pub(crate) fn listen() {
     });
 }
 
-/// Says that what the command does from now on looks at [`asked`] and can be resumed.
+/// Declares that the command checks [`asked`] from now on, and that its work can be resumed.
 pub(crate) fn can_resume() {
     SAVING.store(true, Ordering::Relaxed);
 }
 
-/// Removes a folder that others may be writing into: they fail as soon as what they write into is gone.
+/// Removes a folder while other threads may write into it. They fail as soon as the folder is missing.
 fn remove(folder: &Path) {
     let start = Instant::now();
     while std::fs::remove_dir_all(folder).is_err() && folder.exists() && start.elapsed() < REMOVAL {
@@ -87,7 +86,7 @@ fn remove(folder: &Path) {
     }
 }
 
-/// Begins a folder that is removed when somebody asks the program to stop. After somebody has, there is none.
+/// Creates a folder that is removed if the program is interrupted. Fails after an interrupt.
 pub(crate) fn begin_folder(path: &Path) -> anyhow::Result<NewFolder> {
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     if asked() {
@@ -98,7 +97,7 @@ pub(crate) fn begin_folder(path: &Path) -> anyhow::Result<NewFolder> {
     Ok(folder)
 }
 
-/// Puts a folder in its place, unless it is being removed: then not even a part of it gets there.
+/// Moves a folder to its place. Fails if an interrupt is removing it.
 pub(crate) fn finish_folder(folder: NewFolder) -> anyhow::Result<()> {
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     if unfinished.take().is_none() {
@@ -107,15 +106,16 @@ pub(crate) fn finish_folder(folder: NewFolder) -> anyhow::Result<()> {
     Ok(folder.finish()?)
 }
 
-/// Waits for the end of a program that was asked to stop and saves nothing: what failed since then may well have failed because
-/// what is unfinished is being removed, and says nothing to anybody.
+/// Waits for the end of an interrupted program that saves nothing.
+///
+/// Its errors are not worth reporting: they may come from the removal of an unfinished folder.
 pub(crate) fn end_unless_saving() {
     while asked() && !SAVING.load(Ordering::Relaxed) {
         std::thread::park();
     }
 }
 
-/// Whether somebody asked the program to stop.
+/// Returns whether the program was interrupted.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }

@@ -4,24 +4,19 @@
 
 mod bop;
 mod choice;
-mod contour;
 mod demo;
 mod experiment;
 mod inspect;
 mod interrupt;
 mod limits;
 mod objects;
+mod options;
 mod outputs;
-mod overlay;
+mod picture;
 mod pipelines;
+mod pose_json;
 mod refine;
-mod replay;
-mod report;
-mod sequential;
 mod terminal;
-mod text;
-mod trace_lines;
-mod warnings;
 
 use std::process::ExitCode;
 
@@ -55,7 +50,7 @@ Examples:
   hybrid-icp objects --out objects
   hybrid-icp experiment init-noise --poses 30
 
-`hybrid-icp help refine` tells all about a command.
+Run `hybrid-icp help refine` for the details of a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong, 130
 interrupted (Ctrl-C or SIGTERM: within a second; bop refine and experiment keep
 what is done for --resume).";
@@ -64,7 +59,7 @@ what is done for --resume).";
 enum Command {
     Demo(demo::Arguments),
     Refine(refine::Arguments),
-    Replay(replay::Arguments),
+    Replay(refine::replay::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(bop::Command),
@@ -82,7 +77,7 @@ fn main() -> ExitCode {
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
-        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Replay(arguments) => refine::replay::run(&arguments),
         Command::Bop(command) => bop::run(&command),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),

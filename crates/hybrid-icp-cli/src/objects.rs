@@ -1,26 +1,26 @@
 //! `hybrid-icp objects`.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
-use hicp_io::{LengthUnit, write_atomically, write_obj, write_ply, write_rgb_png};
+use hicp_io::{LengthUnit, write_atomically, write_obj, write_ply};
 use hicp_sim::{Household, Proportions};
 use hybrid_icp::{
     Isometry3, Model, PinholeCamera, Rasterizer, RenderedView, Renderer, UnitQuaternion, Vector3,
 };
 
-use crate::overlay::{Picture, Rgb};
+use crate::picture::Picture;
 use crate::terminal::say;
 
-/// Write the twenty procedural household objects as meshes in metres, with a contact sheet to look at them.
+/// Write the twenty procedural household objects as meshes in meters, with a contact sheet.
 ///
 /// Writes one mesh per object, `contact_sheet.png` (tuning objects in the upper two rows, test objects in the lower two) and
 /// `objects.csv`, which names them in the order of the sheet, with their sizes and symmetries.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The folder to write to; made when it is not there. Files of the same names are replaced.
+    /// The folder to write to, which is created if it does not exist. Files of the same names are replaced.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The format of the meshes.
@@ -41,9 +41,9 @@ enum Format {
 
 /// Side of a cell of the contact sheet, pixels.
 const CELL: u32 = 240;
-/// Cells in a row.
+/// Cells of the contact sheet.
 const COLUMNS: u32 = 5;
-const BACKGROUND: Rgb = [255, 255, 255];
+const ROWS: u32 = 4;
 /// Yellow, as CAD models are in the paper's pictures.
 const SURFACE: [f64; 3] = [240.0, 200.0, 90.0];
 
@@ -56,59 +56,53 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .seed
         .map_or_else(Proportions::default, Proportions::from_seed);
     let objects = || Household::TUNING.into_iter().chain(Household::TEST);
-    let rows = u32::try_from(objects().count())
-        .unwrap_or(0)
-        .div_ceil(COLUMNS);
-    let (width, height) = (COLUMNS * CELL, rows * CELL);
+    let (width, height) = (COLUMNS * CELL, ROWS * CELL);
     let mut sheet = Picture {
         width,
         height,
-        rgb: BACKGROUND.repeat(width as usize * height as usize),
+        rgb: vec![255; 3 * width as usize * height as usize],
     };
     let mut table = String::from(
         "row,column,object,set,file,triangles,diameter_mm,discrete_symmetries,continuous_symmetries\n",
     );
     for (object, cell) in objects().zip(0..) {
         let model = object.model_with(proportions)?;
+        let (name, mesh, unit) = (object.name(), model.mesh(), LengthUnit::Meters);
         let file = match arguments.format {
-            Format::Ply => format!("{}.ply", object.name()),
-            Format::Obj => format!("{}.obj", object.name()),
+            Format::Ply => format!("{name}.ply"),
+            Format::Obj => format!("{name}.obj"),
         };
         match arguments.format {
-            Format::Ply => write_ply(folder.join(&file), model.mesh(), LengthUnit::Meters)?,
-            Format::Obj => write_obj(folder.join(&file), model.mesh(), LengthUnit::Meters)?,
+            Format::Ply => write_ply(folder.join(&file), mesh, unit)?,
+            Format::Obj => write_obj(folder.join(&file), mesh, unit)?,
         }
         let (row, column) = (cell / COLUMNS, cell % COLUMNS);
         shade(&mut sheet, &model, column * CELL, row * CELL)?;
-        let set = if Household::TUNING.contains(&object) {
-            "tuning"
-        } else {
-            "test"
+        let set = match Household::TUNING.contains(&object) {
+            true => "tuning",
+            false => "test",
         };
         // Writing to a string cannot fail.
         let _ = writeln!(
             table,
-            "{},{},{},{set},{file},{},{:.1},{},{}",
+            "{},{},{name},{set},{file},{},{:.1},{},{}",
             row + 1,
             column + 1,
-            object.name(),
-            model.mesh().triangles().len(),
+            mesh.triangles().len(),
             model.diameter() * 1e3,
             model.symmetries().discrete.len(),
             model.symmetries().continuous.len(),
         );
     }
-    write_rgb_png(folder.join("contact_sheet.png"), width, height, &sheet.rgb)?;
-    write_table(&folder.join("objects.csv"), &table)?;
+    sheet.write(&folder.join("contact_sheet.png"))?;
+    write_atomically(folder.join("objects.csv"), |file| {
+        file.write_all(table.as_bytes())
+    })?;
     say(format_args!(
         "{}: {} meshes, contact_sheet.png, and objects.csv, which names them",
         folder.display(),
         objects().count()
     ))
-}
-
-fn write_table(path: &Path, table: &str) -> Result<(), hicp_io::IoError> {
-    write_atomically(path, |writer| writer.write_all(table.as_bytes()))
 }
 
 /// Draws a model into the cell whose upper left corner is given, seen from above and aside, as large as fits.
@@ -140,10 +134,8 @@ fn shade(sheet: &mut Picture, model: &Model, left: u32, top: u32) -> anyhow::Res
                 continue;
             };
             let lit = surfel.normal.cast::<f64>().dot(&light).max(0.0);
-            let pixel = 3 * ((top + v) as usize * sheet.width as usize + (left + u) as usize);
-            for (channel, full) in sheet.rgb[pixel..pixel + 3].iter_mut().zip(SURFACE) {
-                *channel = (full * (0.3 + 0.7 * lit)) as u8;
-            }
+            let color = SURFACE.map(|full| (full * (0.3 + 0.7 * lit)) as u8);
+            sheet.mix(((left + u).into(), (top + v).into()), color, 1.0);
         }
     }
     Ok(())

@@ -1,110 +1,129 @@
-//! Checks of the files to be written, before anything is computed.
+//! Checks the files of a command before anything is computed.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
-/// A file that the command line names, with the option that names it.
-pub(crate) type Named<'a> = (&'static str, &'a Path);
+/// The files that a command reads and writes, with the options that name them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Files<'a> {
+    read: Vec<(&'static str, &'a Path)>,
+    written: Vec<(&'static str, &'a Path)>,
+}
 
-/// Checks that every output can be written, and that none takes the place of an input or of another output.
-///
-/// `in_place` lists pairs of options that may name the same file, because the output has the form of the input. What is written to
-/// a stream is added to what is there: several may share one, and none takes the place of its input.
-pub(crate) fn check(
-    outputs: &[Named<'_>],
-    inputs: &[Named<'_>],
-    in_place: &[(&str, &str)],
-) -> anyhow::Result<()> {
-    for (index, (option, path)) in outputs.iter().enumerate() {
-        hicp_io::check_writable(path)?;
-        let is_stream = hicp_io::is_stream(path);
-        let earlier = outputs[..index].iter();
-        let earlier = earlier.filter(|(_, other)| !(is_stream && hicp_io::is_stream(other)));
-        for (other, other_path) in earlier.chain(inputs) {
-            let is_in_place = !is_stream && in_place.contains(&(option, other));
-            if same_file(path, other_path) && !is_in_place {
+impl<'a> Files<'a> {
+    /// Adds inputs.
+    pub(crate) fn reads(
+        mut self,
+        option: &'static str,
+        paths: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Self {
+        let paths = paths.into_iter();
+        self.read.extend(paths.map(|path| (option, path.as_path())));
+        self
+    }
+
+    /// Adds outputs.
+    pub(crate) fn writes(
+        mut self,
+        option: &'static str,
+        paths: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Self {
+        let paths = paths.into_iter();
+        self.written
+            .extend(paths.map(|path| (option, path.as_path())));
+        self
+    }
+
+    /// Checks that every output can be written, and that none replaces an input or another output.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        self.check_in_place("", "")
+    }
+
+    /// Checks the files, of which the output of one option may replace the input of another.
+    pub(crate) fn check_in_place(&self, output: &str, input: &str) -> anyhow::Result<()> {
+        for (index, (option, path)) in self.written.iter().enumerate() {
+            hicp_io::check_writable(path)?;
+            for (other, other_path) in self.written[..index].iter().chain(&self.read) {
+                if (*option, *other) != (output, input) && same_file(path, other_path) {
+                    bail!(
+                        "{option} and {other} both name {}, expected different files: it would be overwritten",
+                        path.display()
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that no output replaces a file of a dataset: a model, a file of a scene, or an annotation of the whole.
+    ///
+    /// Result files inside the dataset's folder may be replaced, and so may the inputs that [`Files::check_in_place`]
+    /// allows. Links in either path are followed. Journals are refused elsewhere if they are not journals.
+    pub(crate) fn spare_dataset(&self, root: &Path, split: &str) -> anyhow::Result<()> {
+        let replaces_input = |path: &Path| self.read.iter().any(|(_, read)| same_file(path, read));
+        let mut parts = None;
+        for (option, path) in &self.written {
+            if !path.exists() || is_journal(path) || replaces_input(path) {
+                continue;
+            }
+            let parts = parts.get_or_insert_with(|| parts_of(root, split));
+            if places(path).iter().any(|place| parts.contains(place)) {
                 bail!(
-                    "{option} and {other} both name {}, expected different files: it would be overwritten",
-                    path.display()
+                    "{option} names {}, which is there and belongs to the dataset {} (its scenes, models or targets): \
+                     it would be overwritten, expected another file",
+                    path.display(),
+                    root.display()
                 );
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
-/// Checks that no output takes the place of a file of a dataset.
-///
-/// Those are what is in its folders of models and in those of its splits, also of others than `split`, and beside these its cameras,
-/// its description and its targets. A path may name them in any way, by links or `..`. What is not there yet takes no place.
-pub(crate) fn check_dataset(
-    outputs: &[Named<'_>],
-    (dataset, split): (&Path, &str),
-) -> anyhow::Result<()> {
-    let existing = outputs.iter().filter(|(_, path)| path.exists());
-    let existing: Vec<_> = existing.collect();
-    if existing.is_empty() {
-        return Ok(());
-    }
-    let parts = parts_of(dataset, split);
-    for (option, path) in existing {
-        let part = places(path).into_iter().find_map(|p| parts.get(&p));
-        if let Some(part) = part {
-            bail!(
-                "{option} names {}, which is there and belongs to the dataset {} ({part}): it would be overwritten, expected a file of its own",
-                path.display(),
-                dataset.display()
-            );
-        }
-    }
-    Ok(())
+/// Returns the journal of an output, a file next to it; `None` for outputs that are not files.
+pub(crate) fn journal_of(output: &Path) -> Option<PathBuf> {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".journal");
+    (!hicp_io::is_stream(output)).then(|| name.into())
 }
 
-/// The folders and files of a dataset, with links followed, and what each holds.
-fn parts_of(dataset: &Path, split: &str) -> BTreeMap<PathBuf, &'static str> {
-    let root = dataset.canonicalize().ok();
-    let mut parts = BTreeMap::new();
-    let mut add = |path: &Path, what| {
-        let real = path.canonicalize().ok();
-        // A split may be the dataset's folder itself: not everything there is its.
-        let real = real.filter(|real| !root.as_ref().is_some_and(|root| root.starts_with(real)));
-        if let Some(real) = real {
-            parts.insert(real, what);
+fn is_journal(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end == "journal")
+}
+
+/// Returns whether two paths lead to the same file, which need not exist yet.
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
+    let destinations = (hicp_io::destination(a), hicp_io::destination(b));
+    // A stream can be written to any number of times.
+    !hicp_io::is_stream(a) && matches!(destinations, (Ok(a), Ok(b)) if a == b)
+}
+
+/// Returns the folders and files that a dataset consists of, with links followed.
+fn parts_of(root: &Path, split: &str) -> BTreeSet<PathBuf> {
+    let mut parts = Vec::new();
+    for folder in entries(root).into_iter().chain([root.join(split)]) {
+        let mut within = entries(&folder);
+        within.retain(|path| is_model(path) || is_scene(path));
+        if is_annotation(&folder) || !within.is_empty() {
+            parts.push(folder);
         }
-    };
-    let mut folders = entries(dataset);
-    folders.push(dataset.join(split));
-    for path in folders {
-        if is_annotation(&path) {
-            add(&path, "a file beside its folders");
-        }
-        let is_split = path == dataset.join(split);
-        let within = entries(&path);
-        // What is in the folder may be links that lead out of it.
-        let models = within.iter().filter(|entry| is_model(entry));
-        let scenes = within.iter().filter(|entry| is_scene(entry));
-        for (what, found, is_named) in [
-            ("its models", models.collect::<Vec<_>>(), false),
-            ("its scenes", scenes.collect(), is_split),
-        ] {
-            if is_named || !found.is_empty() {
-                add(&path, what);
-            }
-            found.into_iter().for_each(|entry| add(entry, what));
-        }
+        parts.append(&mut within);
     }
+    let mut parts: BTreeSet<PathBuf> = parts.iter().flat_map(|p| p.canonicalize()).collect();
+    // With the split `.` the root holds scenes, but it holds result files as well.
+    let root = root.canonicalize().unwrap_or_default();
+    parts.retain(|part| !root.starts_with(part));
     parts
 }
 
-/// What is in a folder; nothing where it cannot be listed.
+/// Returns what a folder holds; nothing if it cannot be listed.
 fn entries(folder: &Path) -> Vec<PathBuf> {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     listed.map(|entry| entry.path()).collect()
 }
 
-/// The name of a file, for comparisons.
 fn name_of(path: &Path) -> std::borrow::Cow<'_, str> {
     path.file_name().unwrap_or_default().to_string_lossy()
 }
@@ -116,13 +135,11 @@ fn is_model(path: &Path) -> bool {
 
 fn is_scene(path: &Path) -> bool {
     let is_annotation = |name: &str| name.starts_with("scene_") && name.ends_with(".json");
-    name_of(path).parse::<u32>().is_ok()
-        && entries(path)
-            .iter()
-            .any(|file| is_annotation(&name_of(file)))
+    let holds = |is: &dyn Fn(&str) -> bool| entries(path).iter().any(|file| is(&name_of(file)));
+    name_of(path).parse::<u32>().is_ok() && holds(&is_annotation)
 }
 
-/// Whether a file in the dataset's folder is one of those that come with it. Results are often written there.
+/// Returns whether a file next to the dataset's folders comes with the dataset.
 fn is_annotation(path: &Path) -> bool {
     let name = name_of(path);
     let is_json = name.ends_with(".json");
@@ -130,25 +147,12 @@ fn is_annotation(path: &Path) -> bool {
         || (is_json && (name.starts_with("camera") || name.contains("_targets")))
 }
 
-/// Where a path leads and the folders that this is in, and the folders that it leads through.
+/// Returns the file that a path leads to, the folders that hold it, and the folders that the path passes.
 fn places(path: &Path) -> Vec<PathBuf> {
-    let mut places = Vec::new();
-    for folder in path.ancestors() {
-        places.extend(folder.canonicalize());
-        // Whatever comes before has been left again.
-        if folder.ends_with("..") {
-            break;
-        }
-    }
-    let real = path.canonicalize().unwrap_or_default();
+    // A path leaves again whatever comes before `..`.
+    let passed = path.ancestors().take_while(|path| !path.ends_with(".."));
+    let mut places: Vec<PathBuf> = passed.flat_map(|path| path.canonicalize()).collect();
+    let real = places.first().cloned().unwrap_or_default();
     places.extend(real.ancestors().map(Path::to_owned));
     places
-}
-
-/// Whether two paths lead to the same file, which may still have to be made.
-pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    // Devices take anything any number of times.
-    let is_device = a.metadata().is_ok_and(|found| !found.is_file());
-    let destinations = (hicp_io::destination(a), hicp_io::destination(b));
-    !is_device && matches!(destinations, (Ok(a), Ok(b)) if a == b)
 }

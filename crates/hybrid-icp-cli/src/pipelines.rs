@@ -1,25 +1,23 @@
 //! `hybrid-icp pipelines`.
 
-use std::fmt::Write as _;
-
 use clap::Args;
 use hybrid_icp::Preset;
 use hybrid_icp::pipeline::Catalog;
 
-use crate::terminal::say;
+use crate::terminal::{say, table};
 
 /// List the pipelines by name, show one as a file, or list the parts that files are made of.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Print this pipeline as a TOML file: a place to start one's own from.
+    /// Print this pipeline as a TOML file: a start for your own.
     #[arg(long, value_name = "NAME")]
     show: Option<Preset>,
-    /// Print the catalogue of parts, with their parameters, as Markdown.
+    /// Print the catalog of parts, with their parameters, as Markdown.
     #[arg(long, conflicts_with = "show")]
     parts: bool,
 }
 
-/// Prints what was asked for.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(preset) = arguments.show {
         return say(preset.toml());
@@ -27,15 +25,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.parts {
         return say(Catalog::built_in().page());
     }
-    let mut text = String::new();
-    let width = Preset::ALL
-        .iter()
-        .map(|p| p.name().len())
-        .max()
-        .unwrap_or(0);
-    for preset in Preset::ALL {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{preset:width$}  {}", preset.summary());
-    }
-    say(text.trim_end())
+    let rows = Preset::ALL.iter();
+    let rows = rows.map(|preset| [preset.name().to_owned(), preset.summary().to_owned()]);
+    say(table(&rows.collect::<Vec<_>>(), 2))
 }

@@ -4,8 +4,11 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
 use anyhow::Context as _;
+use indicatif::{ProgressBar, ProgressStyle};
 
-/// Prints a line to standard output. A reader that went away (`| head -1`) has what it wanted: that is no error.
+/// Prints a line to standard output.
+///
+/// A closed pipe (`| head -1`) is not an error: the reader has what it needs.
 pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -16,7 +19,7 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a warning to standard error; there is nowhere to report that this failed.
+/// Prints a warning to standard error. A failure to print cannot be reported anywhere.
 pub(crate) fn warn(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
 }
@@ -24,4 +27,34 @@ pub(crate) fn warn(text: impl Display) {
 /// Prints an error to standard error.
 pub(crate) fn complain(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "error: {text}");
+}
+
+/// Returns a progress bar, which is invisible if standard error is not a terminal.
+pub(crate) fn progress_bar(length: usize, unit: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length as u64);
+    let template = format!("{{msg}} {{bar:40}} {{pos}}/{{len}} {unit}, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Formats rows of cells in columns, the first `left` columns aligned left and the others right.
+pub(crate) fn table<R: AsRef<[String]>>(rows: &[R], left: usize) -> String {
+    let mut widths: Vec<usize> = Vec::new();
+    for row in rows.iter().map(AsRef::as_ref) {
+        widths.resize(widths.len().max(row.len()), 0);
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    let line = |row: &R| {
+        let cells = widths.iter().zip(row.as_ref()).enumerate();
+        let cells = cells.map(|(column, (&width, cell))| match column < left {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -10,6 +10,7 @@ const FINEST: f64 = 1e-3;
 ///
 /// Nothing is refused for it. Lengths are meters.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Warning {
     /// The object is too small or too large for a depth camera: probably a wrong unit of the mesh.

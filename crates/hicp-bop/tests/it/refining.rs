@@ -18,8 +18,8 @@ use hybrid_icp::{
     render_depth_image,
 };
 
-const KEY: (u32, u32) = (1, 4);
-const BLOCK: u32 = 5;
+pub(crate) const KEY: (u32, u32) = (1, 4);
+pub(crate) const BLOCK: u32 = 5;
 
 /// A block of 6 × 8 × 10 cm.
 fn block() -> TriMesh {
@@ -45,11 +45,11 @@ fn camera() -> PinholeCamera {
     PinholeCamera::new(200.0, 200.0, 79.5, 59.5, 160, 120).unwrap()
 }
 
-fn truth() -> Isometry3<f64> {
+pub(crate) fn truth() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.02, -0.01, 0.5), Vector3::new(0.5, 0.9, 0.3))
 }
 
-fn estimate() -> Isometry3<f64> {
+pub(crate) fn estimate() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.004, -0.003, 0.004), Vector3::zeros()) * truth()
 }
 
@@ -64,7 +64,7 @@ fn mask() -> Mask {
 }
 
 /// A dataset with one image of the block.
-fn dataset(dir: &Path) -> Dataset {
+pub(crate) fn dataset(dir: &Path) -> Dataset {
     let scene = dir.join("test/000001");
     for folder in ["depth", "mask_visib"] {
         std::fs::create_dir_all(scene.join(folder)).unwrap();
@@ -105,7 +105,7 @@ fn image(dataset: &Dataset) -> Image {
     Scenes::new(dataset, "test", 1).read(KEY).unwrap()
 }
 
-fn models(dataset: &Dataset, objects: &[u32]) -> Models {
+pub(crate) fn models(dataset: &Dataset, objects: &[u32]) -> Models {
     let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
     Models::read(&folder, &objects.iter().copied().collect::<BTreeSet<u32>>())
 }

@@ -14,28 +14,23 @@ use crate::limits::limits;
 /// Reads the models of some objects from a folder, on all threads.
 pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoError> {
     let folder = ModelFolder::open_within(limits(), dir)?;
-    let objects: Vec<u32> = objects.iter().copied().collect();
-    let read: Vec<_> = objects
-        .par_iter()
-        .map(|id| (*id, folder.read(*id)))
-        .collect();
-    Ok(read.into_iter().collect())
+    let read = objects.par_iter().map(|id| (*id, folder.read(*id)));
+    Ok(read.collect::<Vec<_>>().into_iter().collect())
 }
 
-/// Tells of which objects the folder's `models_info.json` states another diameter than the mesh has, on all threads.
-pub(crate) fn diameter_warnings(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
-    let models: Vec<_> = models.by_id.iter().collect();
-    let doubted = models
-        .par_iter()
-        .filter_map(|(id, model)| Some((**id, diameter_warning(**id, model, dir)?)));
-    doubted.collect()
+/// Returns messages about the objects whose stated diameter differs from that of the mesh, on all threads.
+pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
+    let models = models.by_id.par_iter();
+    let wrong = models.filter_map(|(id, model)| Some((*id, wrong_diameter(*id, model, dir)?)));
+    wrong.collect()
 }
 
-/// Tells if the folder's `models_info.json` states another diameter of an object than its mesh has: masks, pairs, the MVE and recalls are
-/// judged by it, and all of them go on working with a wrong one.
-pub(crate) fn diameter_warning(obj_id: u32, model: &Model, dir: &Path) -> Option<String> {
+/// Returns a message if the folder's `models_info.json` states another diameter of an object than its mesh has.
+///
+/// Masks, pairs, the MVE and recalls depend on the diameter, and none of them fails if it is wrong.
+pub(crate) fn wrong_diameter(obj_id: u32, model: &Model, dir: &Path) -> Option<String> {
     let info = dir.join("models_info.json");
-    // Without the file the mesh's own diameter was taken.
+    // Without the file, the diameter is that of the mesh.
     if hicp_io::is_absent(&info) {
         return None;
     }
@@ -46,13 +41,18 @@ pub(crate) fn diameter_warning(obj_id: u32, model: &Model, dir: &Path) -> Option
     ))
 }
 
-/// Tells which objects a folder has no model of, and where the first was looked for.
-pub(crate) fn tell_missing(models: &Models, dir: &Path) -> Option<String> {
+/// Returns a message about the objects without a model in a folder, with the path where the first was expected.
+pub(crate) fn missing(models: &Models, dir: &Path) -> Option<String> {
     let first = Dataset::model_path_in(dir, *models.missing.first()?);
-    let ids: Vec<String> = models.missing.iter().map(u32::to_string).collect();
     Some(format!(
         "the dataset has no model of object {}, expected {}",
-        ids.join(", "),
+        ids(&models.missing),
         first.display()
     ))
+}
+
+/// Lists ids, separated by commas.
+pub(crate) fn ids<'a>(ids: impl IntoIterator<Item = &'a u32>) -> String {
+    let ids: Vec<String> = ids.into_iter().map(u32::to_string).collect();
+    ids.join(", ")
 }

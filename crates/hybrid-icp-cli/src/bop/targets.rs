@@ -1,22 +1,19 @@
-//! What an evaluation asks for.
+//! The targets of an evaluation.
 
 use std::path::Path;
 
 use anyhow::bail;
-use hicp_bop::Targets;
+use hicp_bop::{MIN_VISIBLE_FRACTION, Targets, visible_objects};
 use hicp_io::IoError;
 use hicp_io::bop::{Dataset, Target};
 
 use crate::limits::limits;
 use crate::terminal::warn;
 
-/// Name of the benchmark's own file.
+/// Name of the benchmark's file.
 const TARGETS_FILE: &str = "test_targets_bop19.json";
 
-/// Visible fraction from which on the benchmark asks for an instance.
-const MIN_VISIBLE_FRACTION: f64 = 0.1;
-
-/// Reads the targets from the file given, else from the dataset's, else takes every instance that is visible enough.
+/// Reads the targets from `given`, or from the dataset's file. Without both, every visible instance is a target.
 pub(crate) fn choose(
     dataset: &Dataset,
     split: &str,
@@ -66,14 +63,9 @@ fn of_ground_truth(dataset: &Dataset, split: &str) -> Result<Targets, IoError> {
     for scene_id in dataset.scene_ids(split)? {
         let scene = dataset.scene(split, scene_id)?;
         for im_id in scene.image_ids() {
-            let infos = scene.ground_truth_info(im_id).unwrap_or_default();
-            let truths = scene.ground_truth(im_id).unwrap_or_default();
-            for (index, truth) in truths.iter().enumerate() {
-                let visible = infos.get(index).and_then(|info| info.visible_fraction);
-                if visible.is_none_or(|fraction| fraction >= MIN_VISIBLE_FRACTION) {
-                    let of_frame = targets.entry((scene_id, im_id)).or_default();
-                    *of_frame.entry(truth.obj_id).or_default() += 1;
-                }
+            for obj_id in visible_objects(&scene, im_id) {
+                let of_image = targets.entry((scene_id, im_id)).or_default();
+                *of_image.entry(obj_id).or_default() += 1;
             }
         }
     }

@@ -551,7 +551,7 @@ fn scores_are_held_against_correctness() {
     line(0.9, 0.9);
     for part in [
         "20 estimates, 10 correct, ROC area 0.900",
-        "0.9-1.0        10",
+        "0.9-1.0         10",
     ] {
         assert!(run.out.contains(part), "no {part:?} in {}", run.out);
     }

@@ -88,7 +88,7 @@ fn cameras() {
             "camera.json",
             "depth_scale",
             "--depth-scale",
-            "millimetres per unit",
+            "millimeters per unit",
         ],
     );
 }

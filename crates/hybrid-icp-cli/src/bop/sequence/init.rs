@@ -1,4 +1,4 @@
-//! The pose to start from.
+//! The initial pose of a sequence.
 
 use std::path::Path;
 

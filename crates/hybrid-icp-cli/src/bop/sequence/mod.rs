@@ -2,36 +2,37 @@
 
 mod camera_path;
 mod init;
-mod lines;
+mod line;
 mod tracker;
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, Error, bail};
 use clap::{Arg, Args, ValueEnum};
-use hicp_bop::ModelFolder;
-use hicp_io::bop::{Dataset, ResultRow, Scene, write_results};
+use hicp_bop::Scenes;
+use hicp_io::bop::{ResultRow, Scene, write_results};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
 use hybrid_icp::{Calibration, Isometry3, Model, SequentialEstimator, Warning};
 
-use self::camera_path::CameraPath;
-use self::lines::Line;
+use self::camera_path::camera_path;
+use self::line::Line;
 use self::tracker::Tracker;
-use super::refine_warnings::Kind;
-use super::{median, models, progress_bar};
+use super::advice::advice;
+use super::options::DatasetOptions;
+use super::statistics::median;
+use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
-use crate::limits::limits;
-use crate::outputs;
-use crate::terminal::{complain, say, warn};
+use crate::outputs::Files;
+use crate::terminal::{progress_bar, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
-/// Images are taken by ascending id. How the camera moved between them comes from cam_R_w2c and cam_t_w2c of
+/// Images are read by ascending id. The motion of the camera between them comes from cam_R_w2c and cam_t_w2c of
 /// scene_camera.json, so the object must stand still in the world. Each image is registered from the pose fused so far, moved
-/// with the camera, in the visible mask (mask_visib) of the instance of the object that the model overlaps most at that pose. Where
-/// an image has no such mask the pose is moved with the camera alone, and the line says so.
+/// with the camera, in the visible mask (mask_visib) of the instance of the object that the model overlaps most at that pose. If
+/// an image has no such mask, the pose moves with the camera alone, and the line says so.
 ///
 /// The output has a line of JSON for every image: the fused pose (cam_R_m2c, cam_t_m2c in mm) with its 6x6 covariance (m and
 /// rad; translation first, left perturbation in the camera frame), under "single" the pose from this image alone with its MVE,
@@ -40,12 +41,8 @@ use crate::terminal::{complain, say, warn};
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 #[command(mut_arg("pipeline", follows))]
 pub(crate) struct Arguments {
-    /// The dataset's folder, with models/ and the split's folder.
-    #[arg(long, value_name = "DIR")]
-    dataset: PathBuf,
-    /// The split's folder: test, test_primesense, train_pbr, …
-    #[arg(long, value_name = "NAME", default_value = "test")]
-    split: String,
+    #[command(flatten)]
+    dataset: DatasetOptions,
     /// The scene.
     #[arg(long, value_name = "ID")]
     scene: u32,
@@ -87,7 +84,7 @@ fn follows(pipeline: Arg) -> Arg {
 enum Uncertainty {
     /// The registration's own covariance, calibrated, with a gate on the Mahalanobis distance.
     Registration,
-    /// The MVE alone, as in the paper, about the object's centre.
+    /// The MVE alone, as in the paper, about the object's center.
     Mve,
 }
 
@@ -98,88 +95,93 @@ hybrid-icp bop sequence --dataset <DIR> [--split <NAME>] --scene <ID>
 const EXAMPLE: &str = "\
 Example:
   hybrid-icp bop generate --scenes 1 --images 20 --trajectory --out synthetic
-  hybrid-icp bop sequence --dataset synthetic --scene 1 --object 3 \\
+  hybrid-icp bop sequence --dataset synthetic --scene 1 --object 2 \\
       --init synthetic/initial_synthetic-test.csv --output fused.jsonl
 
-Exit codes: 0 done, with the images that had no estimate in the summary; 1 a
+Exit codes: 0 done, with the images without an estimate in the summary; 1 a
 file is missing or damaged (lines are still written where that came up on the
 way); 2 the command line is wrong.";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.check_outputs()?;
+    arguments.check_files()?;
     let pipeline = arguments.pipeline.choose()?;
-    let dataset = Dataset::open(&arguments.dataset)?.with_limits(limits());
-    let scene = dataset.scene(&arguments.split, arguments.scene)?;
-    let path = CameraPath::of(&scene, arguments.first)?;
-    check_object(&scene, &path, arguments.object)?;
+    let dataset = arguments.dataset.open()?;
+    let scenes = Scenes::new(&dataset, &arguments.dataset.split, 1);
+    let (scene_id, object) = (arguments.scene, arguments.object);
+    let scene = scenes
+        .get(scene_id)
+        .map_err(|fault| Error::msg(fault.text))?;
+    let path = camera_path(&scene, arguments.first)?;
+    check_object(&scene, &path, object)?;
     let models_dir = dataset.models_dir()?;
-    let model = read_model(&models_dir, arguments.object)?;
-    let place = (arguments.scene, path.first(), arguments.object);
-    let init = init::read(&arguments.init, place)?;
+    let models = models::read(&models_dir, &BTreeSet::from([object]))?;
+    let model = models.by_id.get(&object).ok_or_else(|| {
+        let broken = models.broken.get(&object).cloned();
+        let cause = broken.or_else(|| models::missing(&models, &models_dir));
+        Error::msg(cause.unwrap_or_default())
+    })?;
+    let init = init::read(&arguments.init, (scene_id, path[0].0, object))?;
     let estimator = arguments
-        .estimator(&pipeline, &model, &init)
+        .estimator(&pipeline, model, &init)
         .with_context(|| format!("cannot start from the pose in {}", arguments.init.display()))?;
 
     let start = Instant::now();
     let progress = progress_bar(path.len(), "images");
-    let mut tracker = Tracker::new(&scene, &model, arguments.object, estimator);
+    let mut tracker = Tracker::new(&scenes, (scene_id, object), model, estimator);
     let mut lines = Vec::with_capacity(path.len());
-    for (im_id, motion) in path.motions() {
-        lines.push(tracker.image(im_id, &motion));
+    for (im_id, motion) in &path {
+        lines.push(tracker.image(*im_id, motion));
         progress.inc(1);
     }
     progress.finish_and_clear();
     arguments.write(&lines)?;
 
-    let method = arguments.fuser;
-    say(format!(
-        "{}: {} images of scene {}, object {}, {method} over {} in {:.1} s{}",
-        arguments.output.display(),
+    let (output, method) = (arguments.output.display(), arguments.fuser);
+    say(format_args!(
+        "{output}: {} images of scene {scene_id}, object {object}, {method} over {} in {:.1} s{}",
         lines.len(),
-        arguments.scene,
-        arguments.object,
         pipeline.name(),
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     ))?;
-    let diameter = models::diameter_warning(arguments.object, &model, &models_dir);
-    if let Some(text) = &diameter {
-        warn(text);
-    }
-    for (im_id, warning) in tracker.warnings() {
+    let diameter = models::wrong_diameter(object, model, &models_dir);
+    diameter.iter().for_each(warn);
+    let (im_id, warnings) = tracker.warnings.unwrap_or_default();
+    for warning in warnings {
         // One warning about the same number is enough.
         if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
-            warn(arguments.in_words(im_id, warning, &models_dir));
+            let advice = advice(&warning, "--init").unwrap_or_else(|| match warning {
+                Warning::BehindCamera { .. } => format!("check {}", arguments.init.display()),
+                _ => format!("check that {} is in mm", models_dir.display()),
+            });
+            warn(format_args!(
+                "object {object} in image {im_id} of scene {scene_id}: {warning}: {advice}"
+            ));
         }
     }
-    if !lines.iter().any(|line| line.what.is_accepted()) {
+    if !lines.iter().any(|line| line.outcome == "accepted") {
         warn(format_args!(
-            "{}: none of its {} images was accepted: its poses are not to be trusted",
-            arguments.output.display(),
+            "{output}: none of its {} images was accepted: its poses are not to be trusted",
             lines.len()
         ));
     }
-    let damaged = tracker.into_damaged();
-    damaged.iter().for_each(complain);
-    if !damaged.is_empty() {
-        bail!(
-            "{} files could not be used; {} has their images without an estimate",
-            damaged.len(),
-            arguments.output.display()
-        );
+    let damaged = faults::report(tracker.faults.iter(), [].iter());
+    if damaged > 0 {
+        bail!("{damaged} files could not be used; {output} has their images without an estimate");
     }
     Ok(())
 }
 
 impl Arguments {
-    fn check_outputs(&self) -> anyhow::Result<()> {
-        let mut written = vec![("--output", self.output.as_path())];
-        written.extend(self.results.as_deref().map(|p| ("--results", p)));
-        let mut read = vec![("--init", self.init.as_path())];
-        read.extend(self.pipeline.file().map(|p| ("--pipeline", p.as_path())));
-        outputs::check(&written, &read, &[])?;
-        outputs::check_dataset(&written, (&self.dataset, &self.split))
+    fn check_files(&self) -> anyhow::Result<()> {
+        let files = Files::default()
+            .reads("--init", [&self.init])
+            .reads("--pipeline", self.pipeline.file())
+            .writes("--output", [&self.output])
+            .writes("--results", &self.results);
+        files.check()?;
+        files.spare_dataset(&self.dataset.root, &self.dataset.split)
     }
 
     fn estimator(
@@ -192,23 +194,11 @@ impl Arguments {
         match self.uncertainty {
             Uncertainty::Mve => SequentialEstimator::for_object(stage, method, model, init),
             Uncertainty::Registration => {
-                let calibration = pipeline
-                    .preset()
-                    .map_or(Calibration::HYBRID, Calibration::of);
+                let preset = pipeline.preset();
+                let calibration = preset.map_or(Calibration::HYBRID, Calibration::of);
                 SequentialEstimator::calibrated(stage, method, &calibration, model, init)
             }
         }
-    }
-
-    /// What looks wrong about the inputs, and where to look for the cause.
-    fn in_words(&self, im_id: u32, warning: &Warning, models_dir: &Path) -> String {
-        let advice = match (Kind::of(warning), warning) {
-            (Some(kind), _) => kind.advice("--init"),
-            (None, Warning::BehindCamera { .. }) => format!("check {}", self.init.display()),
-            (None, _) => format!("check that {} is in mm", models_dir.display()),
-        };
-        let (scene, object) = (self.scene, self.object);
-        format!("object {object} in image {im_id} of scene {scene}: {warning}: {advice}")
     }
 
     fn write(&self, lines: &[Line]) -> anyhow::Result<()> {
@@ -226,76 +216,50 @@ impl Arguments {
     }
 }
 
-/// Makes sure that the ground truth, by which masks are chosen, has the object in some image.
-fn check_object(scene: &Scene, path: &CameraPath, object: u32) -> anyhow::Result<()> {
+/// Checks that the ground truth, which chooses the masks, has the object in some image.
+fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> anyhow::Result<()> {
     let file = scene.dir().join("scene_gt.json");
-    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
-    for im_id in path.image_ids() {
-        for truth in scene.ground_truth(im_id).unwrap_or_default() {
-            *counts.entry(truth.obj_id).or_default() += 1;
-        }
-    }
-    if counts.contains_key(&object) {
+    let truths = path
+        .iter()
+        .filter_map(|(im_id, _)| scene.ground_truth(*im_id));
+    let found: BTreeSet<u32> = truths.flatten().map(|truth| truth.obj_id).collect();
+    if found.contains(&object) {
         return Ok(());
     }
     if hicp_io::is_absent(&file) {
         bail!(
-            "{} does not exist, expected one: it says which mask is whose",
+            "{} does not exist, expected one: it assigns masks to objects",
             file.display()
         );
     }
-    let found: Vec<String> = counts.keys().map(u32::to_string).collect();
     bail!(
         "--object {object} is in no image, expected one of the objects in {}: {}",
         file.display(),
-        found.join(", ")
+        models::ids(&found)
     )
 }
 
-/// Reads the object's model, with its size and symmetries where the dataset states them.
-fn read_model(dir: &Path, object: u32) -> anyhow::Result<Model> {
-    let model = ModelFolder::open_within(limits(), dir)?.read(object)?;
-    model.with_context(|| {
-        format!(
-            "model of object {object} is missing: {} does not exist",
-            Dataset::model_path_in(dir, object).display()
-        )
-    })
-}
-
-/// Counts the images by what became of them; the distances from the truth, where it is known, say what fusing did.
+/// Counts the images by outcome. If the truth is known, the distances from it show the effect of fusing.
 fn summarize(lines: &[Line]) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    let (mut mve, mut single, mut fused) = (Vec::new(), Vec::new(), Vec::new());
     for line in lines {
-        *counts.entry(line.what.describe()).or_default() += 1;
-        mve.extend(line.single.as_ref().and_then(|single| single.mve));
-        if let Some((of_single, of_fused)) = line.off {
-            single.push(of_single * 1e3);
-            fused.push(of_fused * 1e3);
-        }
+        *counts.entry(line.description).or_default() += 1;
     }
-    let mut text = String::new();
-    for (what, count) in counts {
-        text.push_str(&format!("\n  {count:>7}  {what}"));
-    }
-    if let Some(median) = median(&mut mve) {
+    let counts = counts.iter();
+    let mut text: String = counts
+        .map(|(what, count)| format!("\n  {count:>7}  {what}"))
+        .collect();
+    let mve = lines.iter().filter_map(|line| line.single.as_ref()?.1);
+    if let Some(median) = median(&mut mve.collect::<Vec<_>>()) {
         text.push_str(&format!("\n  median MVE {median:.3}"));
     }
+    let off = lines.iter().filter_map(|line| line.off);
+    let (mut single, mut fused): (Vec<f64>, Vec<f64>) = off.unzip();
     if let (Some(single), Some(fused)) = (median(&mut single), median(&mut fused)) {
+        let (single, fused) = (1e3 * single, 1e3 * fused);
         text.push_str(&format!(
-            "\n  object's centre off by {single:.2} mm from one image, {fused:.2} mm fused (medians, against the ground truth)"
+            "\n  object's center off by {single:.2} mm from one image, {fused:.2} mm fused (medians, against the ground truth)"
         ));
     }
     text
-}
-
-/// The camera does not move before the first image.
-fn motion_between(
-    before: Option<&Isometry3<f64>>,
-    now: &Isometry3<f64>,
-) -> Result<CameraMotion, FusionError> {
-    before.map_or(Ok(CameraMotion::none()), |before| {
-        CameraMotion::new(now * before.inverse())
-    })
 }

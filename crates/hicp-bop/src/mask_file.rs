@@ -1,0 +1,62 @@
+//! The place that a mask is stored in.
+
+use hicp_io::bop::Rle;
+use hybrid_icp::Mask;
+
+use crate::fault::{Fault, FaultKind};
+use crate::scenes::Image;
+
+/// The place that a mask is stored in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Source<'a> {
+    /// The visible mask of an instance, by its index in the ground truth.
+    Instance(usize),
+    /// The run-length code of a detection.
+    Code(&'a Rle),
+}
+
+impl Source<'_> {
+    /// Reads the mask, which must have the size of the image's depth.
+    pub(crate) fn read(self, image: &Image) -> Result<Mask, Fault> {
+        let Image { scene, im_id, .. } = image;
+        let expected = (image.depth.width(), image.depth.height());
+        match self {
+            Self::Instance(instance) => {
+                let mask = scene.read_visible_mask(*im_id, instance);
+                let mask = mask.map_err(|error| missing_mask(Fault::of(&error)))?;
+                let path = scene.visible_mask_path(*im_id, instance);
+                match (mask.width(), mask.height()) {
+                    found if found == expected => Ok(mask),
+                    found => Err(wrong_size(&path.display().to_string(), found, image)),
+                }
+            }
+            // A short code may stand for a huge mask, so its size is checked before it is decoded.
+            Self::Code(code) => match (code.width(), code.height()) {
+                found if found == expected => Ok(code.to_mask()),
+                found => {
+                    let name = format!("a segmentation of image {im_id} in --detections");
+                    Err(wrong_size(&name, found, image))
+                }
+            },
+        }
+    }
+}
+
+/// Marks the fault of an instance without a mask.
+fn missing_mask(fault: Fault) -> Fault {
+    let kind = match fault.kind {
+        FaultKind::Missing => FaultKind::MissingMask,
+        other => other,
+    };
+    Fault { kind, ..fault }
+}
+
+fn wrong_size(name: &str, (width, height): (u32, u32), image: &Image) -> Fault {
+    let path = image.scene.depth_path(image.im_id);
+    let path = path.map_or_else(|e| e.to_string(), |path| path.display().to_string());
+    Fault::damaged(format!(
+        "{name} is {width}x{height} pixels but {path} is {}x{}, expected the same size",
+        image.depth.width(),
+        image.depth.height(),
+    ))
+}

@@ -1,0 +1,148 @@
+//! `hybrid-icp bop compare`.
+
+mod report;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+use clap::Args;
+use hicp_bop::{MaskSource, Rescore};
+
+use self::report::Comparison;
+use super::eval::{DELTA_MM, EvalJob, Evaluation};
+use super::options::{DatasetOptions, ThreadOptions};
+use super::refine::{RefineJob, RowOptions};
+use crate::choice::Source;
+use crate::limits::limits;
+use crate::outputs::{Files, journal_of};
+use crate::terminal::say;
+
+/// Refine a result file with several pipelines, and compare them by their evaluations.
+///
+/// Writes, for every pipeline, its result file and its evaluation as JSON, and the comparison as compare.md, compare.html and
+/// compare.json: average recalls, the median ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, the time
+/// per pose on one thread and its ratio to that of the first pipeline; AR and median ADI by object. If a run is interrupted,
+/// the same command continues it.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    dataset: DatasetOptions,
+    /// The result file to refine.
+    #[arg(long, value_name = "FILE.csv")]
+    init: PathBuf,
+    /// The pipelines: names (`hybrid-icp pipelines` lists them) or TOML files.
+    #[arg(long, value_name = "A,B,…", value_delimiter = ',', required = true)]
+    pipelines: Vec<Source>,
+    /// The folder to write to, which is created if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    threads: ThreadOptions,
+}
+
+const EXAMPLE: &str = "\
+Example:
+  hybrid-icp bop compare --dataset bop/ycbv --init cosypose_ycbv-test.csv \\
+      --pipelines hybrid,nn-point-to-point --out compared";
+
+/// Name of the initial poses.
+const INITIAL: &str = "initial";
+/// Name of the files of the comparison, and their endings.
+const COMPARISON: &str = "compare";
+const FORMS: [&str; 3] = ["md", "html", "json"];
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let mut names = BTreeSet::from([INITIAL, COMPARISON].map(str::to_owned));
+    let mut pipelines = Vec::new();
+    for source in &arguments.pipelines {
+        let name = source.short_name();
+        if !names.insert(name.clone()) {
+            bail!(
+                "--pipelines gives {name} twice, expected names that differ from each other, from {INITIAL} and from {COMPARISON}"
+            );
+        }
+        pipelines.push((name, source.choose(&[])?));
+    }
+    let out = &arguments.out;
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("cannot make the folder {}", out.display()))?;
+    arguments.check_files()?;
+    let mut comparison = Comparison::new(&arguments.dataset, &arguments.init);
+    comparison.add(INITIAL, arguments.evaluate(INITIAL, &arguments.init)?, None);
+    for (name, pipeline) in pipelines {
+        let output = out.join(format!("{name}.csv"));
+        let job = RefineJob {
+            dataset: &arguments.dataset,
+            results: &arguments.init,
+            choice: RowOptions::default(),
+            masks: MaskSource::Visible,
+            pipeline,
+            output: &output,
+            rows: None,
+            threads: arguments.threads,
+            timed: true,
+            rescore: Rescore::Keep,
+            resume: true,
+            resumed_by: "the same command",
+            listed_by: None,
+        };
+        let seconds = job.run(limits().read_results(&arguments.init)?)?;
+        comparison.add(&name, arguments.evaluate(&name, &output)?, seconds);
+    }
+    let texts = [comparison.markdown(), comparison.html(), comparison.json()?];
+    for (ending, text) in FORMS.iter().zip(texts) {
+        let path = out.join(format!("{COMPARISON}.{ending}"));
+        hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
+    }
+    let page = out.join(format!("{COMPARISON}.html"));
+    say(format_args!(
+        "\n{}\n{}",
+        comparison.overall().markdown(),
+        page.display()
+    ))
+}
+
+impl Arguments {
+    fn evaluate(&self, name: &str, results: &Path) -> anyhow::Result<Evaluation> {
+        say(format_args!("\n{name}:"))?;
+        let json = self.out.join(format!("{name}.json"));
+        let job = EvalJob {
+            dataset: &self.dataset,
+            results,
+            targets: None,
+            symmetric: None,
+            delta_mm: DELTA_MM,
+            json: Some(&json),
+            errors: None,
+            calibration: false,
+            threads: self.threads,
+        };
+        job.run()
+    }
+
+    /// Checks that every file of the comparison can be written, and that none replaces an input.
+    fn check_files(&self) -> anyhow::Result<()> {
+        let names = self.pipelines.iter().map(Source::short_name);
+        let names: Vec<String> = names.collect();
+        let mut written: Vec<PathBuf> = Vec::new();
+        written.extend(FORMS.map(|ending| self.out.join(format!("{COMPARISON}.{ending}"))));
+        written.push(self.out.join(format!("{INITIAL}.json")));
+        for name in names {
+            let results = self.out.join(format!("{name}.csv"));
+            written.extend(journal_of(&results));
+            written.extend([results, self.out.join(format!("{name}.json"))]);
+        }
+        let files = Files::default()
+            .reads("--init", [&self.init])
+            .reads(
+                "--pipelines",
+                self.pipelines.iter().filter_map(Source::file),
+            )
+            .writes("--out", &written);
+        files.check()?;
+        files.spare_dataset(&self.dataset.root, &self.dataset.split)
+    }
+}

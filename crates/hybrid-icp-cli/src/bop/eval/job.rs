@@ -1,0 +1,181 @@
+//! The evaluation of a result file, for every command that needs one.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use hicp_bop::{EvaluatedObject, FrameKey, Judge, Judged, JudgedFrame, Renders, Scenes, Targets};
+use hicp_io::bop::ResultRow;
+use rayon::prelude::*;
+
+use super::calibration::Calibration;
+use super::errors;
+use super::report::{Report, Summary};
+use crate::bop::options::{DatasetOptions, ThreadOptions};
+use crate::bop::{faults, models, targets};
+use crate::limits::limits;
+use crate::terminal::{progress_bar, say, warn};
+
+/// The benchmark's visibility tolerance in millimeters.
+pub(crate) const DELTA_MM: f64 = 15.0;
+
+/// Most messages about images that are reported one by one.
+const MISFITS_SHOWN: usize = 10;
+
+/// An evaluation of a result file.
+pub(crate) struct EvalJob<'a> {
+    pub(crate) dataset: &'a DatasetOptions,
+    pub(crate) results: &'a Path,
+    /// The targets, if not those of the dataset.
+    pub(crate) targets: Option<&'a Path>,
+    /// Objects whose AD is ADI, if not those with declared symmetries.
+    pub(crate) symmetric: Option<&'a [u32]>,
+    /// Visibility tolerance of VSD in millimeters.
+    pub(crate) delta_mm: f64,
+    /// Where the recalls go as JSON.
+    pub(crate) json: Option<&'a Path>,
+    /// Where the errors of every estimate go.
+    pub(crate) errors: Option<&'a Path>,
+    /// Whether to report if the scores rank right poses first.
+    pub(crate) calibration: bool,
+    pub(crate) threads: ThreadOptions,
+}
+
+/// The result of an evaluation.
+pub(crate) struct Evaluation {
+    pub(crate) all: Summary,
+    pub(crate) objects: BTreeMap<u32, Summary>,
+    /// ADI of the evaluated estimates to the nearest instance of their target in meters, by row.
+    pub(crate) adi_m: BTreeMap<usize, f64>,
+}
+
+impl EvalJob<'_> {
+    /// Evaluates the file, prints the table and writes the outputs.
+    pub(crate) fn run(&self) -> anyhow::Result<Evaluation> {
+        let rows = limits().read_results(self.results)?;
+        let dataset = self.dataset.open()?;
+        let split = &self.dataset.split;
+        let wanted = targets::choose(&dataset, split, self.targets)?;
+        let objects: BTreeSet<u32> = wanted.values().flat_map(|t| t.keys().copied()).collect();
+        let pool = self.threads.pool(wanted.len())?;
+        let scenes = Scenes::new(&dataset, split, pool.current_num_threads() + 1);
+        let models_dir = dataset.eval_models_dir()?;
+        let models = pool.install(|| models::read(&models_dir, &objects))?;
+        let diameters = pool.install(|| models::wrong_diameters(&models, &models_dir));
+        let objects = EvaluatedObject::of_models(&models, self.symmetric);
+        let judge = Judge::new(objects, &scenes, &rows, 1e-3 * self.delta_mm);
+        let progress = progress_bar(wanted.len(), "images");
+        let images: Vec<(&FrameKey, &BTreeMap<u32, u32>)> = wanted.iter().collect();
+        let judged: Vec<JudgedFrame> = pool.install(|| {
+            let images = images.par_iter().with_max_len(1);
+            let judged = images.map_init(Renders::default, |renders, (image, wanted)| {
+                let judged = judge.frame(renders, **image, wanted);
+                progress.inc(1);
+                judged
+            });
+            judged.collect()
+        });
+        progress.finish_and_clear();
+        let calibration = pool.install(|| {
+            let calibration = || Calibration::of(&rows, &scenes, &judge.objects);
+            self.calibration.then(calibration)
+        });
+
+        let mut warnings: Vec<String> = diameters.into_values().collect();
+        warnings.extend(self.misfits(&rows, &wanted));
+        let missing = models::missing(&models, &models_dir);
+        warnings.extend(missing.map(|text| format!("{text}; its targets are left out")));
+        let misfits: Vec<&String> = judged.iter().flat_map(|image| &image.misfits).collect();
+        warnings.extend(
+            misfits
+                .iter()
+                .take(MISFITS_SHOWN)
+                .map(|text| (*text).clone()),
+        );
+        if misfits.len() > MISFITS_SHOWN {
+            let more = misfits.len() - MISFITS_SHOWN;
+            warnings.push(format!("{more} more files that do not fit"));
+        }
+        warnings.iter().for_each(warn);
+        let targets: Vec<&Judged> = judged.iter().flat_map(|image| &image.targets).collect();
+        let report = Report {
+            results: self.results.display().to_string(),
+            dataset: self.dataset.root.display().to_string(),
+            split: split.clone(),
+            delta_mm: self.delta_mm,
+            left_out: judged.iter().map(|image| image.left_out).sum(),
+            all: Summary::of(&targets),
+            objects: Summary::by_object(&targets),
+            warnings,
+            calibration,
+        };
+        if let Some(path) = self.errors {
+            errors::write(path, &targets, &rows)?;
+        }
+        if let Some(path) = self.json {
+            let text = serde_json::to_string_pretty(&report).context("cannot write JSON")?;
+            hicp_io::write_atomically(path, |file| writeln!(file, "{text}"))?;
+        }
+        let is_empty = report.all.targets == 0;
+        if !is_empty {
+            say(report.table())?;
+        }
+        let faults = judged.iter().flat_map(|image| &image.faults);
+        let damaged = faults::report(faults, models.broken.values());
+        if damaged > 0 {
+            bail!("{damaged} files could not be used; their targets are in no figure");
+        }
+        if is_empty {
+            bail!(
+                "none of the {} targets could be judged, expected --dataset and --split to name images with ground truth, depth and models",
+                report.left_out
+            );
+        }
+        let rows_and_errors = targets
+            .iter()
+            .flat_map(|t| t.rows.iter().zip(&t.errors.estimates));
+        let nearest = rows_and_errors.map(|(row, against)| {
+            let adi = against.iter().map(|errors| errors.adi_m);
+            (*row, adi.fold(f64::INFINITY, f64::min))
+        });
+        Ok(Evaluation {
+            adi_m: nearest.collect(),
+            all: report.all,
+            objects: report.objects,
+        })
+    }
+
+    /// Returns warnings about rows that belong to no target or exceed the instances of theirs.
+    fn misfits(&self, rows: &[ResultRow], wanted: &Targets) -> Vec<String> {
+        let results = self.results.display();
+        let mut warnings = Vec::new();
+        let (mut strangers, mut beyond) = (Vec::new(), 0);
+        let mut counts: BTreeMap<(u32, u32, u32), u32> = BTreeMap::new();
+        for row in rows {
+            let of_frame = wanted.get(&(row.scene_id, row.im_id));
+            let Some(wanted) = of_frame.and_then(|objects| objects.get(&row.obj_id)) else {
+                strangers.push(row);
+                continue;
+            };
+            let count = counts.entry((row.scene_id, row.im_id, row.obj_id));
+            let count = count.and_modify(|count| *count += 1).or_insert(1);
+            beyond += usize::from(*count > *wanted);
+        }
+        if let Some(first) = strangers.first() {
+            warnings.push(format!(
+                "{results}: {} of {} rows are of no target and not looked at, the first of object {} in image {} of scene {}",
+                strangers.len(),
+                rows.len(),
+                first.obj_id,
+                first.im_id,
+                first.scene_id
+            ));
+        }
+        if beyond > 0 {
+            warnings.push(format!(
+                "{results}: {beyond} rows beyond the number of instances of their target are not looked at, those with the lowest scores"
+            ));
+        }
+        warnings
+    }
+}

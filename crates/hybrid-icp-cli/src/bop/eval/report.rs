@@ -1,0 +1,129 @@
+//! The report of an evaluation: a table for people, JSON for programs.
+
+use std::collections::BTreeMap;
+
+use hicp_bop::Judged;
+use hybrid_icp::Recalls;
+use serde::Serialize;
+
+use super::calibration::Calibration;
+use crate::bop::statistics::median;
+use crate::terminal::table;
+
+/// The recalls of a part of the dataset.
+#[derive(Debug, Serialize)]
+pub(crate) struct Summary {
+    /// Evaluated instances.
+    pub(crate) targets: usize,
+    /// Evaluated instances beyond the number of estimates.
+    missing: usize,
+    pub(crate) ar: f64,
+    pub(crate) ar_vsd: f64,
+    pub(crate) ar_mssd: f64,
+    pub(crate) ar_mspd: f64,
+    /// Recall of ADD, of ADI for symmetric objects, below a tenth of the diameter.
+    ad_recall: f64,
+    /// Median ADI of the estimates that are matched to an instance in millimeters; `null` without any.
+    pub(crate) median_adi_mm: Option<f64>,
+}
+
+impl Summary {
+    /// Summarizes targets.
+    pub(super) fn of(targets: &[&Judged]) -> Self {
+        let (mut recalls, mut adi) = (Recalls::default(), Vec::new());
+        for target in targets {
+            recalls.count(&target.errors);
+            let found = target.errors.adi_of_instances();
+            adi.extend(found.into_iter().flatten().map(|m| 1e3 * m));
+        }
+        Self {
+            targets: recalls.instances(),
+            missing: recalls.missing(),
+            ar: recalls.average(),
+            ar_vsd: recalls.vsd(),
+            ar_mssd: recalls.mssd(),
+            ar_mspd: recalls.mspd(),
+            ad_recall: recalls.ad(),
+            median_adi_mm: median(&mut adi),
+        }
+    }
+
+    /// Summarizes the targets of each object.
+    pub(super) fn by_object(targets: &[&Judged]) -> BTreeMap<u32, Self> {
+        let mut by_object: BTreeMap<u32, Vec<&Judged>> = BTreeMap::new();
+        for target in targets {
+            by_object.entry(target.obj_id).or_default().push(target);
+        }
+        let objects = by_object.iter();
+        objects
+            .map(|(id, of_object)| (*id, Self::of(of_object)))
+            .collect()
+    }
+
+    fn cells(&self, name: String) -> Vec<String> {
+        let mut cells = vec![name, self.targets.to_string(), self.missing.to_string()];
+        let recalls = [
+            self.ar,
+            self.ar_vsd,
+            self.ar_mssd,
+            self.ar_mspd,
+            self.ad_recall,
+        ];
+        cells.extend(recalls.map(|recall| format!("{recall:.3}")));
+        let median = self.median_adi_mm;
+        cells.push(median.map_or("-".to_owned(), |mm| format!("{mm:.2}")));
+        cells
+    }
+}
+
+/// The recalls of a dataset.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) results: String,
+    pub(super) dataset: String,
+    pub(super) split: String,
+    /// Visibility tolerance of VSD in millimeters.
+    pub(super) delta_mm: f64,
+    /// Requested instances that could not be evaluated: no image, no model, or no ground truth.
+    pub(super) left_out: usize,
+    #[serde(flatten)]
+    pub(super) all: Summary,
+    pub(super) objects: BTreeMap<u32, Summary>,
+    pub(super) warnings: Vec<String>,
+    /// Whether the scores rank right poses first, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) calibration: Option<Calibration>,
+}
+
+const HEADS: [&str; 9] = [
+    "object",
+    "targets",
+    "missing",
+    "AR",
+    "VSD",
+    "MSSD",
+    "MSPD",
+    "AD(D/I)<0.1d",
+    "median ADI mm",
+];
+
+impl Report {
+    /// Returns a table of the recalls, objects first.
+    pub(super) fn table(&self) -> String {
+        let mut rows = vec![HEADS.map(str::to_owned).to_vec()];
+        let objects = self.objects.iter();
+        rows.extend(objects.map(|(id, summary)| summary.cells(id.to_string())));
+        rows.push(self.all.cells("all".to_owned()));
+        let mut text = table(&rows, 0);
+        if self.left_out > 0 {
+            let count = self.left_out;
+            text.push_str(&format!(
+                "\n{count} targets could not be judged and are in no figure"
+            ));
+        }
+        if let Some(calibration) = &self.calibration {
+            text.push_str(&format!("\n{}", calibration.table()));
+        }
+        text
+    }
+}

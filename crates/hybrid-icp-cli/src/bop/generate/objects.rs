@@ -1,0 +1,82 @@
+//! The objects that scenes are made of.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+use hicp_io::{IoError, LengthUnit, read_mesh};
+use hicp_sim::Household;
+use hybrid_icp::Model;
+
+use crate::bop::models;
+use crate::limits::limits;
+
+/// Models with their ids, ascending.
+#[derive(Debug)]
+pub(super) struct Objects {
+    pub(super) ids: Vec<u32>,
+    pub(super) models: Vec<Model>,
+}
+
+/// Diameters in meters that a scene can hold.
+const DIAMETERS: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+
+impl Objects {
+    /// Returns the project's household objects, numbered from 1 in their order.
+    pub(super) fn household() -> anyhow::Result<Self> {
+        let models = Household::ALL.iter().map(|object| object.model());
+        let models = models.collect::<Result<Vec<_>, _>>()?;
+        let ids = (1..).zip(&models).map(|(id, _)| id).collect();
+        Ok(Self { ids, models })
+    }
+
+    /// Reads a folder: BOP models by their ids where it has a models_info.json, else its meshes numbered from 1 by name.
+    pub(super) fn read(dir: &Path, unit: LengthUnit) -> anyhow::Result<Self> {
+        let info = dir.join("models_info.json");
+        let (ids, models): (Vec<u32>, Vec<Model>) = if hicp_io::is_absent(&info) {
+            let read = |(id, path)| Ok((id, Model::new(read_mesh(path, unit)?)));
+            let models = (1..).zip(meshes(dir)?).map(read);
+            models.collect::<Result<_, IoError>>()?
+        } else {
+            let ids: BTreeSet<u32> = limits().read_models_info(&info)?.into_keys().collect();
+            let read = models::read(dir, &ids)?;
+            if let Some(broken) = read.broken.values().next() {
+                bail!("{broken}");
+            }
+            read.by_id.into_iter().unzip()
+        };
+        if models.is_empty() {
+            bail!(
+                "--objects {}: found no mesh, expected PLY, OBJ or STL files",
+                dir.display()
+            );
+        }
+        for (id, model) in ids.iter().zip(&models) {
+            if !DIAMETERS.contains(&model.diameter()) {
+                bail!(
+                    "--objects {}: object {id} has a diameter of {} m, expected {} to {} m: check --objects-unit",
+                    dir.display(),
+                    model.diameter(),
+                    DIAMETERS.start(),
+                    DIAMETERS.end()
+                );
+            }
+        }
+        Ok(Self { ids, models })
+    }
+}
+
+/// Returns the mesh files of a folder, by name.
+fn meshes(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let cannot = || format!("cannot list --objects {}", dir.display());
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(dir).with_context(cannot)? {
+        let path = entry.with_context(cannot)?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if matches!(extension.as_deref(), Some("ply" | "obj" | "stl")) {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}

@@ -1,0 +1,50 @@
+//! Options that the commands over datasets share.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+use hicp_io::IoError;
+use hicp_io::bop::Dataset;
+
+use crate::limits::limits;
+
+/// Which images of which dataset.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct DatasetOptions {
+    /// The dataset's folder, with models/ and the split's folder.
+    #[arg(long = "dataset", id = "dataset", value_name = "DIR")]
+    pub(crate) root: PathBuf,
+    /// The split's folder: test, test_primesense, train_pbr, …
+    #[arg(long, value_name = "NAME", default_value = "test")]
+    pub(crate) split: String,
+}
+
+impl DatasetOptions {
+    /// Opens the dataset with the limits of this run, and checks that it has the split.
+    pub(crate) fn open(&self) -> Result<Dataset, IoError> {
+        let dataset = Dataset::open(&self.root)?.with_limits(limits());
+        dataset.scene_ids(&self.split)?;
+        Ok(dataset)
+    }
+}
+
+/// How many threads work.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct ThreadOptions {
+    /// Threads; the number of cores if not given. Only times depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
+    threads: Option<u16>,
+}
+
+impl ThreadOptions {
+    /// Starts the threads, at most one per image.
+    pub(crate) fn pool(self, images: usize) -> anyhow::Result<rayon::ThreadPool> {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = self.threads.map_or_else(cores, usize::from);
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.min(images.max(1)))
+            .build()
+            .context("cannot start the threads")
+    }
+}

@@ -1,0 +1,68 @@
+//! The journal of a `bop refine`: the results of finished images, so that a killed run can be resumed.
+
+use std::path::Path;
+
+use anyhow::bail;
+use hicp_bop::{FrameResult, FrameRows};
+use hicp_io::{RowLog, is_absent};
+
+use crate::limits::limits;
+use crate::terminal::warn;
+
+/// A file next to the output: a header with the settings of the run, then a line of JSON for every finished image.
+#[derive(Debug)]
+pub(super) struct Journal(RowLog);
+
+impl Journal {
+    /// Starts a journal for a run with these settings, or with `resume` continues the one that is there.
+    ///
+    /// Returns the stored result of every image, `None` for images that are not done.
+    pub(super) fn open(
+        path: &Path,
+        settings: &str,
+        resume: bool,
+        frames: &[FrameRows],
+    ) -> anyhow::Result<(Self, Vec<Option<FrameResult>>)> {
+        if !resume && !is_absent(path) {
+            bail!(
+                "{} is there, and may hold the results of a run that did not finish: continue that run with --resume, or remove the file",
+                path.display()
+            );
+        }
+        let (log, lines) = RowLog::resume(path, settings, 1, &limits())?;
+        let mut results: Vec<Option<FrameResult>> = frames.iter().map(|_| None).collect();
+        let mut damaged = 0;
+        for line in lines {
+            match serde_json::from_str::<(usize, FrameResult)>(&line) {
+                Ok((place, result)) if is_of(frames.get(place), &result) => {
+                    results[place] = Some(result);
+                }
+                _ => damaged += 1,
+            }
+        }
+        if damaged > 0 {
+            warn(format_args!(
+                "{}: {damaged} lines are damaged; their images are done again",
+                path.display()
+            ));
+        }
+        Ok((Self(log), results))
+    }
+
+    /// Stores the result of an image, given by its place among the images of the run.
+    pub(super) fn append(&self, place: usize, result: &FrameResult) -> anyhow::Result<()> {
+        self.0.append(&serde_json::to_string(&(place, result))?)?;
+        Ok(self.0.sync()?)
+    }
+
+    /// Removes the journal of a run whose output is written.
+    pub(super) fn remove(self) -> anyhow::Result<()> {
+        Ok(self.0.remove()?)
+    }
+}
+
+/// Returns whether a result is of the rows of an image.
+fn is_of(frame: Option<&FrameRows>, result: &FrameResult) -> bool {
+    let indices = result.rows.iter().map(|row| row.index);
+    frame.is_some_and(|(_, expected)| indices.eq(expected.iter().copied()))
+}

@@ -1,0 +1,72 @@
+//! The options that choose rows of a result file.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use hicp_bop::{Shard, best_rows};
+use hicp_io::bop::ResultRow;
+
+use crate::bop::targets;
+use crate::terminal::warn;
+
+/// Which rows of a result file are refined and written; all by default.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct RowOptions {
+    /// Refine and write only part I of N, counted from 1. Images are never split. If the rows of each image stand together,
+    /// the outputs of all parts, concatenated without all but the first header line, equal the output of one run.
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    shard: Option<Shard>,
+    /// Read only the first N rows of the result file; --top-k and --targets choose among these, and --shard divides the rest.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    limit: Option<u32>,
+    /// Refine and write only the K rows with the best scores of every object in every image, the first of equals.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    top_k: Option<u32>,
+    /// Refine and write only rows of the targets of this file: of each target the inst_count rows with the best scores, which
+    /// are the rows that an evaluation reads.
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) targets: Option<PathBuf>,
+}
+
+impl RowOptions {
+    /// Returns the options with their values.
+    pub(super) fn settings(&self) -> [(&'static str, Option<String>); 4] {
+        let targets = self.targets.as_ref();
+        [
+            ("--limit", self.limit.map(|n| n.to_string())),
+            ("--top-k", self.top_k.map(|k| k.to_string())),
+            ("--targets", targets.map(|path| path.display().to_string())),
+            ("--shard", self.shard.map(|shard| shard.to_string())),
+        ]
+    }
+
+    /// Returns the options that are given.
+    pub(super) fn given(&self) -> Vec<&'static str> {
+        let given = self.settings().into_iter();
+        given
+            .filter_map(|(option, value)| value.map(|_| option))
+            .collect()
+    }
+
+    /// Keeps the chosen rows of `file`.
+    pub(super) fn choose(
+        &self,
+        mut rows: Vec<ResultRow>,
+        file: &Path,
+    ) -> anyhow::Result<Vec<ResultRow>> {
+        rows.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
+        let targets = self.targets.as_deref().map(targets::read).transpose()?;
+        let rows = best_rows(rows, self.top_k.map(|top| top as usize), targets.as_ref());
+        let Some(shard) = self.shard else {
+            return Ok(rows);
+        };
+        let part = shard.take(rows);
+        if !part.contiguous {
+            warn(format_args!(
+                "{}: the rows of an image do not stand together, so the concatenated outputs of all shards have another order than one run",
+                file.display()
+            ));
+        }
+        Ok(part.rows)
+    }
+}

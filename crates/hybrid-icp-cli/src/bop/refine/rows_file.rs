@@ -1,0 +1,98 @@
+//! The status of every row of a `bop refine`, as comma-separated values.
+
+use std::path::Path;
+
+use hicp_bop::{FrameResult, RowResult};
+use hicp_io::IoError;
+use hicp_io::bop::ResultRow;
+
+const HEADER: [&str; 8] = [
+    "scene_id",
+    "im_id",
+    "obj_id",
+    "row",
+    "status",
+    "mve_initial",
+    "mve",
+    "warnings",
+];
+
+/// Writes a line per row of the output, in its order: its status, its MVE before and after, and its warnings.
+///
+/// The MVE is empty for a row that did not reach the pipeline. `row` counts from 0, as in the errors of `bop eval`.
+pub(super) fn write(
+    path: &Path,
+    rows: &[ResultRow],
+    results: &[FrameResult],
+) -> Result<(), IoError> {
+    let mut of_rows: Vec<&RowResult> = results.iter().flat_map(|result| &result.rows).collect();
+    of_rows.sort_by_key(|result| result.index);
+    hicp_io::write_atomically(path, |file| {
+        let mut lines = csv::Writer::from_writer(file);
+        lines.write_record(HEADER)?;
+        for result in of_rows {
+            let row = &rows[result.index];
+            let warnings: Vec<String> = result.warnings().iter().map(ToString::to_string).collect();
+            let (before, after) = result.mve.unzip();
+            lines.serialize((
+                (row.scene_id, row.im_id, row.obj_id, result.index),
+                result.status.to_string(),
+                [before, after].map(|mve| mve.map(|mve| mve.to_string())),
+                warnings.join("; "),
+            ))?;
+        }
+        lines.flush()
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use hicp_bop::RowStatus;
+    use hybrid_icp::{Flatness, Isometry3};
+
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_order_of_the_output_with_what_is_known_of_them() {
+        let rows: Vec<ResultRow> = (5..8)
+            .map(|obj_id| ResultRow::new(1, 2, obj_id, Isometry3::identity()))
+            .collect();
+        let flatness = Flatness::new(0.01, 0.001, 0.01, 0.2);
+        let row = |index, status, mve, flatness| RowResult {
+            index,
+            status,
+            pose: None,
+            mve,
+            flatness,
+        };
+        let frame = |rows| FrameResult {
+            rows,
+            ..FrameResult::default()
+        };
+        let results = [
+            frame(vec![row(
+                2,
+                RowStatus::Refined,
+                Some((0.95, 0.1)),
+                Some(flatness),
+            )]),
+            frame(vec![
+                row(1, RowStatus::NoMask, None, None),
+                row(0, RowStatus::Refined, Some((0.5, 0.25)), None),
+            ]),
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.csv");
+        write(&path, &rows, &results).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(path).unwrap(),
+            "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings\n\
+             1,2,5,0,refined,0.5,0.25,\n\
+             1,2,6,1,kept: no mask of the object,,,\n\
+             1,2,7,2,refined,0.95,0.1,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \
+             another object; the surface inside the mask is flat to within 0.0010 m, that of the model at the pose only to within 0.0100 m, and \
+             0.0100 m away from it: what is there may be another object\"\n"
+        );
+    }
+}

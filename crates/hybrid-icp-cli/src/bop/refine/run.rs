@@ -1,0 +1,128 @@
+//! Runs a refinement of a result file.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use anyhow::bail;
+use hicp_bop::{DatasetRefiner, FrameResult, FrameRows, Scenes, frames_of};
+use hicp_io::bop::ResultRow;
+use rayon::prelude::*;
+
+use super::job::RefineJob;
+use super::journal::Journal;
+use super::summary::{Distrust, mean_seconds, report_faults, summary};
+use super::{rows_file, settings, warnings};
+use crate::bop::models;
+use crate::interrupt;
+use crate::outputs::journal_of;
+use crate::terminal::{progress_bar, say};
+
+impl RefineJob<'_> {
+    /// Refines the rows, writes the output and reports what happened.
+    ///
+    /// Returns the mean seconds per pose that reached the pipeline, `None` without any.
+    pub(crate) fn run(&self, mut rows: Vec<ResultRow>) -> anyhow::Result<Option<f64>> {
+        let dataset = self.dataset.open()?;
+        let frames = frames_of(&rows);
+        let pool = self.threads.pool(frames.len())?;
+        let start = Instant::now();
+        let models_dir = dataset.models_dir()?;
+        // A file that changes while it is read must count as another file when the run is continued.
+        let settings = settings::of(self, &rows, &models_dir);
+        let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
+        let models = pool.install(|| models::read(&models_dir, &objects))?;
+        pool.install(|| warnings::about_models(&models, &models_dir));
+        let shared = DatasetRefiner {
+            models,
+            scenes: Scenes::new(
+                &dataset,
+                &self.dataset.split,
+                pool.current_num_threads() + 1,
+            ),
+            masks: self.masks.clone(),
+        };
+        let (journal, mut results) = match journal_of(self.output) {
+            Some(path) => {
+                let (journal, results) = Journal::open(&path, &settings, self.resume, &frames)?;
+                (Some(journal), results)
+            }
+            None => (None, vec![None; frames.len()]),
+        };
+        let resumed = results.iter().flatten().count();
+        let journal_ref = journal.as_ref();
+        let ran = pool.install(|| self.work(&shared, journal_ref, &rows, &frames, &mut results));
+        if interrupt::asked() && ran.is_err() && journal.is_some() {
+            bail!(
+                "interrupted: {} of {} frames are done; {} goes on from there",
+                results.iter().flatten().count(),
+                frames.len(),
+                self.resumed_by
+            );
+        }
+        ran?;
+        let results: Vec<FrameResult> = results.into_iter().flatten().collect();
+        for result in &results {
+            result.enter(&mut rows, self.rescore, self.timed);
+        }
+        // The output may replace the input. It comes last, so that a run that fails before can be continued.
+        if let Some(path) = self.rows {
+            rows_file::write(path, &rows, &results)?;
+        }
+        hicp_io::bop::write_results(self.output, &rows)?;
+        journal.map_or(Ok(()), Journal::remove)?;
+
+        let distrust = Distrust::of(&results);
+        let mut text = format!(
+            "{}: {} rows of {} frames in {:.1} s on {} threads",
+            self.output.display(),
+            rows.len(),
+            results.len(),
+            start.elapsed().as_secs_f64(),
+            pool.current_num_threads(),
+        );
+        if resumed > 0 {
+            text.push_str(&format!(", {resumed} frames from the journal"));
+        }
+        text.push_str(&summary(&results, &shared.models, &distrust));
+        // Warnings go to standard error even if standard output fails.
+        let said = say(text);
+        warnings::about_images(&results, &rows);
+        distrust.warn(self);
+        report_faults(self, (&shared.models, &models_dir), &results)?;
+        said?;
+        Ok(mean_seconds(&results))
+    }
+
+    /// Refines the images that have no result yet.
+    ///
+    /// Threads take images in order, so they work in the same few scenes, and memory holds one image per thread.
+    fn work(
+        &self,
+        shared: &DatasetRefiner,
+        journal: Option<&Journal>,
+        rows: &[ResultRow],
+        frames: &[FrameRows],
+        results: &mut [Option<FrameResult>],
+    ) -> anyhow::Result<()> {
+        let progress = progress_bar(rows.len(), "rows");
+        interrupt::can_resume();
+        let places = results.iter_mut().zip(frames).enumerate();
+        let ran = places.par_bridge().try_for_each_init(
+            || self.pipeline.refiner(),
+            |refiner, (place, (result, (frame, indices)))| {
+                if interrupt::asked() {
+                    bail!("interrupted");
+                }
+                if result.is_none() {
+                    let done = shared.frame(refiner, *frame, rows, indices);
+                    journal.map_or(Ok(()), |journal| journal.append(place, &done))?;
+                    *result = Some(done);
+                }
+                progress.inc(indices.len() as u64);
+                Ok::<(), anyhow::Error>(())
+            },
+        );
+        progress.finish_and_clear();
+        ran
+    }
+}

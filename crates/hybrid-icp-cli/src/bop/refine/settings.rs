@@ -1,0 +1,94 @@
+//! The settings that the results of a `bop refine` depend on.
+
+use std::collections::BTreeSet;
+use std::fmt::{self, Write as _};
+use std::hash::{DefaultHasher, Hasher};
+use std::io::ErrorKind;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+use hicp_io::bop::{Dataset, ResultRow};
+
+use super::job::RefineJob;
+
+/// Version of the journal's lines.
+const FORM: u32 = 4;
+
+/// Returns the settings of a job as a line of text, by option and by file of the dataset.
+///
+/// A run continues only with the results of a run with equal settings. Images are left out because there are too many.
+pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> String {
+    let root = &job.dataset.root;
+    let dataset = root.canonicalize().unwrap_or_else(|_| root.clone());
+    let pipeline = &job.pipeline;
+    let mut settings = vec![
+        format!("journal of bop refine, form {FORM}"),
+        format!("hybrid-icp={}", env!("CARGO_PKG_VERSION")),
+        format!("--dataset={}", dataset.display()),
+        format!("--split={}", job.dataset.split),
+        format!("--pipeline={}", pipeline.name()),
+    ];
+    let chosen = job.choice.settings().into_iter();
+    settings.extend(chosen.map(|(option, value)| match value {
+        Some(value) => format!("{option}={value}"),
+        None => format!("{option}=none"),
+    }));
+    settings.push(format!("digest-of-results={}", digest(&rows)));
+    settings.push(format!("digest-of-masks={}", digest(&job.masks)));
+    let parts = (pipeline.toml(), pipeline.overrides());
+    settings.push(format!("digest-of-pipeline={}", digest(&parts)));
+    settings.extend(files(job, rows, models_dir));
+    settings.join(", ").replace('\n', " ")
+}
+
+/// Returns the files that describe the models and scenes that rows name, each with its state.
+///
+/// Two files of one size and time of change count as equal: reading all of them would take as long as some runs.
+fn files(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> Vec<String> {
+    let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
+    let scenes: BTreeSet<u32> = rows.iter().map(|row| row.scene_id).collect();
+    let mut paths = vec![models_dir.join("models_info.json")];
+    let models = objects.iter();
+    paths.extend(models.map(|id| Dataset::model_path_in(models_dir, *id)));
+    let split = job.dataset.root.join(&job.dataset.split);
+    for scene in scenes {
+        let names = ["scene_camera.json", "scene_gt.json", "scene_gt_info.json"];
+        paths.extend(names.map(|name| split.join(format!("{scene:06}")).join(name)));
+    }
+    let named = |path: &Path| {
+        let inside = path.strip_prefix(&job.dataset.root).unwrap_or(path);
+        format!("{}={}", inside.display(), state(path))
+    };
+    paths.iter().map(|path| named(path)).collect()
+}
+
+/// Describes a file by its size and the time of its last change in seconds since 1970, without spaces.
+fn state(path: &Path) -> String {
+    let metadata = match std::fs::metadata(path) {
+        Ok(metadata) => metadata,
+        Err(error) if error.kind() == ErrorKind::NotFound => return "absent".to_owned(),
+        Err(error) => return error.to_string(),
+    };
+    let changed = metadata.modified().ok();
+    let changed = changed.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    let changed = changed.map_or_else(
+        || "unknown".to_owned(),
+        |since| format!("{}.{:09}", since.as_secs(), since.subsec_nanos()),
+    );
+    format!("{}-bytes@{changed}", metadata.len())
+}
+
+/// Returns a digest of the debug form of a value, which it need not hold in memory.
+fn digest(value: &impl fmt::Debug) -> String {
+    struct Digest(DefaultHasher);
+    impl fmt::Write for Digest {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            self.0.write(text.as_bytes());
+            Ok(())
+        }
+    }
+    let mut digest = Digest(DefaultHasher::new());
+    // Hashing does not fail.
+    let _ = write!(digest, "{value:?}");
+    format!("{:016x}", digest.0.finish())
+}

@@ -1,0 +1,132 @@
+//! The report at the end of a `bop refine`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::bail;
+use hicp_bop::{FrameResult, Models, RowResult, RowStatus};
+use hybrid_icp::{EXPLAINS_NOTHING, PAPER_ALPHA, Warning};
+
+use super::job::RefineJob;
+use crate::bop::statistics::median;
+use crate::bop::{faults, models};
+use crate::terminal::warn;
+
+fn rows_of(results: &[FrameResult]) -> impl Iterator<Item = &RowResult> {
+    results.iter().flat_map(|result| &result.rows)
+}
+
+/// Counts the rows by status, one line each.
+pub(super) fn summary(results: &[FrameResult], models: &Models, distrust: &Distrust) -> String {
+    let mut text = String::new();
+    let mut counts: BTreeMap<RowStatus, usize> = BTreeMap::new();
+    for row in rows_of(results) {
+        *counts.entry(row.status).or_default() += 1;
+    }
+    for (status, count) in &counts {
+        text.push_str(&format!("\n  {count:>7}  {status}"));
+        if *status == RowStatus::MissingModel {
+            text.push_str(&format!(" (object {})", models::ids(&models.missing)));
+        }
+    }
+    let (mut before, mut after): (Vec<f64>, Vec<f64>) =
+        rows_of(results).filter_map(|row| row.mve).unzip();
+    if let (Some(before), Some(after)) = (median(&mut before), median(&mut after)) {
+        text.push_str(&format!("\n  median MVE {before:.3} -> {after:.3}"));
+    }
+    if distrust.unexplained > 0 {
+        let count = distrust.unexplained;
+        text.push_str(&format!(
+            "\n  {count:>7}  with an MVE of {PAPER_ALPHA} or more: not to be trusted"
+        ));
+    }
+    text
+}
+
+/// The poses in the output that are not to be trusted.
+pub(super) struct Distrust {
+    /// The number of rows whose pose does not explain the image.
+    unexplained: usize,
+    /// Warnings, one for each reason.
+    texts: Vec<String>,
+}
+
+impl Distrust {
+    pub(super) fn of(results: &[FrameResult]) -> Self {
+        let rows = rows_of(results).filter(|row| row.mve.is_some());
+        let warnings: Vec<Vec<Warning>> = rows.map(RowResult::warnings).collect();
+        let count = |is: fn(&Warning) -> bool| {
+            let of_kind = warnings.iter().filter(|of_row| of_row.iter().any(is));
+            of_kind.count()
+        };
+        let rows = warnings.len();
+        let other = "what was found there may be another object";
+        let unexplained = count(|w| matches!(w, Warning::Unexplained { .. }));
+        let elsewhere = count(|w| matches!(w, Warning::FoundElsewhere { .. }));
+        let flat = count(|w| matches!(w, Warning::Flat { .. }));
+        let mut texts = Vec::new();
+        if unexplained > 0 {
+            texts.push(format!(
+                "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: they are not to be trusted"
+            ));
+        }
+        if elsewhere > 0 {
+            texts.push(format!(
+                "in {elsewhere} of {rows} rows the initial pose explained nothing of the mask (MVE {EXPLAINS_NOTHING} or more): {other}"
+            ));
+        }
+        if flat > 0 {
+            texts.push(format!(
+                "in {flat} of {rows} rows the surface inside the mask is flat, and that of the model at the pose is not: {other}"
+            ));
+        }
+        Self { unexplained, texts }
+    }
+
+    /// Warns of these poses.
+    pub(super) fn warn(&self, job: &RefineJob<'_>) {
+        let which = match (job.rows, job.listed_by) {
+            (Some(path), _) => format!(" ({} tells which)", path.display()),
+            (None, Some(option)) => format!(" ({option} tells which)"),
+            (None, None) => String::new(),
+        };
+        for text in &self.texts {
+            warn(format_args!("{}: {text}{which}", job.output.display()));
+        }
+    }
+}
+
+/// Returns the mean seconds per pose that reached the pipeline, `None` without any.
+pub(super) fn mean_seconds(results: &[FrameResult]) -> Option<f64> {
+    let spent: f64 = results.iter().filter_map(|result| result.seconds).sum();
+    let poses = rows_of(results).filter(|row| row.mve.is_some()).count();
+    (poses > 0).then(|| spent / poses as f64)
+}
+
+/// Warns of missing files. Fails if a file is damaged or no image was found.
+pub(super) fn report_faults(
+    job: &RefineJob<'_>,
+    (models, models_dir): (&Models, &Path),
+    results: &[FrameResult],
+) -> anyhow::Result<()> {
+    if let Some(text) = models::missing(models, models_dir) {
+        warn(format_args!("{text}; its rows are unchanged"));
+    }
+    let faults = results.iter().flat_map(|result| &result.faults);
+    let damaged = faults::report(faults, models.broken.values());
+    if damaged > 0 {
+        bail!(
+            "{damaged} files could not be used; their rows are in {} unchanged",
+            job.output.display()
+        );
+    }
+    let is_missing = |row: &RowResult| row.status == RowStatus::MissingFrame;
+    if !results.is_empty() && rows_of(results).all(is_missing) {
+        bail!(
+            "{}: none of its frames is in {}, expected --dataset and --split to name the images that it was made for",
+            job.results.display(),
+            job.dataset.root.join(&job.dataset.split).display()
+        );
+    }
+    Ok(())
+}

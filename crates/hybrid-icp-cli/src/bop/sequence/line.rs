@@ -1,0 +1,118 @@
+//! The report of one image, as a line of JSON.
+
+use hybrid_icp::fusion::Update;
+use hybrid_icp::{Isometry3, Matrix6, Outcome, SequentialEvent, SequentialStep};
+use serde_json::{Value, json};
+
+use crate::pose_json::add_pose;
+
+/// An image of the sequence.
+#[derive(Clone, Debug)]
+pub(super) struct Line {
+    pub(super) im_id: u32,
+    /// Index of the instance whose mask the image was registered in, in the ground truth of the image.
+    pub(super) instance: Option<usize>,
+    pub(super) fused: Isometry3<f64>,
+    covariance: Option<Matrix6<f64>>,
+    /// The outcome from this image alone, and its MVE.
+    pub(super) single: Option<(Outcome, Option<f64>)>,
+    /// The outcome in one word, or a few joined by hyphens, for programs.
+    pub(super) outcome: &'static str,
+    /// The outcome for people.
+    pub(super) description: &'static str,
+    reason: Option<String>,
+    /// Distances of the object's center from the truth in meters, from this image alone and fused.
+    pub(super) off: Option<(f64, f64)>,
+}
+
+impl Line {
+    /// Reports an image without an estimate: the pose moved with the camera.
+    pub(super) fn moved(
+        im_id: u32,
+        why: &'static str,
+        fused: Isometry3<f64>,
+        covariance: Option<Matrix6<f64>>,
+    ) -> Self {
+        Self {
+            im_id,
+            instance: None,
+            fused,
+            covariance,
+            single: None,
+            outcome: "moved",
+            description: why,
+            reason: Some(why.to_owned()),
+            off: None,
+        }
+    }
+
+    /// Reports an image that was registered.
+    pub(super) fn registered(im_id: u32, instance: usize, step: SequentialStep) -> Self {
+        let (outcome, description, reason) = describe(&step.event);
+        Self {
+            im_id,
+            instance: Some(instance),
+            fused: step.camera_from_object,
+            covariance: step.covariance,
+            single: Some((step.outcome, step.mve)),
+            outcome,
+            description,
+            reason,
+            off: None,
+        }
+    }
+
+    /// Returns the line.
+    pub(super) fn json(&self, scene_id: u32, obj_id: u32) -> Value {
+        let mut line = json!({
+            "scene_id": scene_id, "im_id": self.im_id, "obj_id": obj_id, "outcome": self.outcome,
+            // Symmetric: rows are columns.
+            "covariance": self.covariance.as_ref().map(Matrix6::as_slice),
+        });
+        if let Some(reason) = &self.reason {
+            line["reason"] = json!(reason);
+        }
+        if let Some(instance) = self.instance {
+            line["instance"] = json!(instance);
+        }
+        add_pose(&mut line, &self.fused);
+        if let Some((outcome, mve)) = &self.single {
+            line["single"] = json!({
+                "mve": mve,
+                "iterations": outcome.iterations,
+                "termination": outcome.termination.name(),
+            });
+            add_pose(&mut line["single"], &outcome.camera_from_object);
+        }
+        line
+    }
+}
+
+/// Returns the name of an event, a description for people, and the reason of a failure.
+fn describe(event: &SequentialEvent) -> (&'static str, &'static str, Option<String>) {
+    match event {
+        SequentialEvent::Estimated(update) => {
+            let description = match update {
+                Update::Provisional(..) => "kept until a better one comes",
+                Update::Rejected(_) => "rejected by the gate",
+                Update::Restarted(..) => "started again: contradicted the fused pose",
+                _ => update.name(),
+            };
+            let reason = update.failure().map(ToString::to_string);
+            (update.name(), description, reason)
+        }
+        SequentialEvent::Refused(error) => {
+            let description = "refused: no pose or no covariance";
+            ("refused", description, Some(error.to_string()))
+        }
+        SequentialEvent::NoEstimate(termination) => {
+            let reason = termination.explain().to_owned();
+            (
+                "no-estimate",
+                "no estimate: nothing to register",
+                Some(reason),
+            )
+        }
+        _ => ("no-estimate", "no estimate", None),
+    }
+}

@@ -1,0 +1,166 @@
+//! `hybrid-icp experiment`.
+
+mod sequential;
+mod study;
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::{Args, Subcommand, ValueEnum};
+use hicp_experiments::{Config, Experiment, Report, Study, Variant};
+use hicp_sim::Household;
+use hybrid_icp::{Preset, UnknownPreset};
+
+use self::study::{StudyOptions, conclude};
+use crate::choice::Source;
+use crate::limits::{limits, pipeline_limits};
+
+/// Rerun the paper's studies, on its kind of objects or on any meshes.
+///
+/// A study writes into its folder: `config.json` (exactly what was run), `cases.csv` (one row per case, level and variant, as it
+/// goes), and from these a summary: `report.html`, `figure.svg`, `figure.png`, `summary.csv`, `differences.csv`, `claims.csv`. All
+/// variants see the same images and initial poses.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Robustness to the initial pose: ten equal bins of the initial VSD (§VI-B.1).
+    InitNoise(Arguments),
+    /// Robustness to depth noise of 0 to 5 % (§VI-B.2).
+    DepthNoise(Arguments),
+    /// Robustness to reconstructed models, levels 0 to 4 (§VI-B.3).
+    ModelNoise(Arguments),
+    /// Time per refinement under the conditions of those three studies (Table I).
+    Timing(Arguments),
+    /// The threshold of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
+    Alpha(Arguments),
+    /// The presets that go beyond the paper: every start under depth noise, model noise and imperfect masks.
+    Beyond(Arguments),
+    Sequential(sequential::Arguments),
+    Report(ReportArguments),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    study: StudyOptions,
+    /// The household objects to run on: those that everything was chosen on, or those that results are reported on; each
+    /// study has its own by default.
+    #[arg(long, value_enum, conflicts_with = "objects")]
+    household: Option<HouseholdSet>,
+    /// Cases per object, spread evenly over the bins where there are bins.
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    poses: u64,
+    /// Which pipelines: names (`hybrid-icp pipelines` lists them) and TOML files, separated by commas, or all; alpha takes those
+    /// that switch, by default hybrid; beyond takes hybrid, two baselines and what goes beyond the paper.
+    #[arg(long, value_name = "LIST|all", value_delimiter = ',')]
+    variants: Vec<Choice>,
+    /// Leave the column of times empty: two runs then give the same bytes.
+    #[arg(long)]
+    no_times: bool,
+}
+
+/// Put finished studies into one report, with a figure like the paper's Figure 6.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArguments {
+    /// The folders of the studies.
+    #[arg(required = true, value_name = "DIR")]
+    studies: Vec<PathBuf>,
+    /// The folder to write to, which is created if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Half of the household objects.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum HouseholdSet {
+    Tuning,
+    Test,
+}
+
+/// What `--variants` names.
+#[derive(Clone, Debug)]
+enum Choice {
+    All,
+    One(Source),
+}
+
+impl FromStr for Choice {
+    type Err = UnknownPreset;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPreset> {
+        match text {
+            "all" => Ok(Self::All),
+            one => one.parse().map(Self::One),
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::InitNoise(arguments) => study(Experiment::InitNoise, arguments),
+        Command::DepthNoise(arguments) => study(Experiment::DepthNoise, arguments),
+        Command::ModelNoise(arguments) => study(Experiment::ModelNoise, arguments),
+        Command::Timing(arguments) => study(Experiment::Timing, arguments),
+        Command::Alpha(arguments) => study(Experiment::Alpha, arguments),
+        Command::Beyond(arguments) => study(Experiment::Beyond, arguments),
+        Command::Sequential(arguments) => sequential::run(arguments),
+        Command::Report(arguments) => report(&arguments.studies, &arguments.out),
+    }
+}
+
+fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
+    let household = match arguments.household {
+        None => experiment.household(),
+        Some(HouseholdSet::Tuning) => Household::TUNING,
+        Some(HouseholdSet::Test) => Household::TEST,
+    };
+    let options = &arguments.study;
+    let subjects = options.subjects(&household)?;
+    let variants = variants(experiment, &arguments.variants)?;
+    let (poses, seed) = (arguments.poses, options.seed);
+    let mut config = Config::new(experiment, &subjects, &variants, poses, seed)?;
+    config.times = !arguments.no_times;
+    let out = options.folder(experiment.name());
+    // Threads disturb each other's times.
+    let threads = matches!(experiment, Experiment::Timing).then_some(1);
+    let names = [experiment.name(), "cases"];
+    options.run(&config, &subjects, &out, names, threads)?;
+    report(std::slice::from_ref(&out), &out)
+}
+
+fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Variant>> {
+    if choices.is_empty() {
+        return Ok(match experiment {
+            Experiment::Alpha => vec![Variant::preset(Preset::Hybrid)],
+            Experiment::Beyond => Variant::beyond(),
+            _ => Variant::paper(),
+        });
+    }
+    let mut variants = Vec::new();
+    for choice in choices {
+        match choice {
+            Choice::All => variants.extend(Variant::paper()),
+            Choice::One(Source::Preset(preset)) => variants.push(Variant::preset(*preset)),
+            Choice::One(Source::File(path)) => {
+                variants.push(Variant::read_within(&pipeline_limits(), path)?);
+            }
+        }
+    }
+    Ok(variants)
+}
+
+fn report(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
+    let mut studies = Vec::new();
+    for folder in folders {
+        let name = folder.file_name().unwrap_or(folder.as_os_str());
+        let study = Study::read_within(&limits(), folder)?;
+        studies.push((name.to_string_lossy().into_owned(), study));
+    }
+    let report = Report::of(studies);
+    report.write(out)?;
+    let claims = report.claims();
+    conclude(
+        claims.map(|(study, claim)| (format!("{study}: "), claim)),
+        out,
+    )
+}

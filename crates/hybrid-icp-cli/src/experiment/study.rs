@@ -1,0 +1,98 @@
+//! What all studies share: their options, their progress, and their conclusions.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use hicp_experiments::{Claim, Design, ExperimentError, RunOptions, Subject, run};
+use hicp_sim::Household;
+
+use crate::interrupt;
+use crate::limits::limits;
+use crate::terminal::{progress_bar, say};
+
+/// The options of every study.
+#[derive(Debug, Args)]
+pub(super) struct StudyOptions {
+    /// A folder of meshes in meters (OBJ, PLY, STL) instead of the ten household objects.
+    #[arg(long, value_name = "DIR")]
+    objects: Option<PathBuf>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Number of threads, by default all processors, and one for timing. The results do not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// The folder to write to, which is created if it does not exist; study/NAME by default.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Continue a study that was interrupted.
+    #[arg(long)]
+    resume: bool,
+}
+
+impl StudyOptions {
+    /// Reads the meshes, or creates the household objects.
+    pub(super) fn subjects(
+        &self,
+        household: &[Household],
+    ) -> Result<Vec<Subject>, ExperimentError> {
+        match &self.objects {
+            Some(folder) => Subject::read_folder(folder),
+            None => Subject::household(household),
+        }
+    }
+
+    /// Returns the folder of the study `name`.
+    pub(super) fn folder(&self, name: &str) -> PathBuf {
+        let out = self.out.clone();
+        out.unwrap_or_else(|| Path::new("study").join(name))
+    }
+
+    /// Runs a study with a progress bar, until it is finished or interrupted.
+    pub(super) fn run<D: Design>(
+        &self,
+        config: &D,
+        subjects: &[Subject],
+        out: &Path,
+        [name, unit]: [&str; 2],
+        default_threads: Option<usize>,
+    ) -> Result<(), ExperimentError> {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let options = RunOptions {
+            threads: self.threads.or(default_threads).unwrap_or_else(cores),
+            resume: self.resume,
+            limits: limits(),
+        };
+        let bar = progress_bar(config.layout().n_cases(), unit);
+        bar.set_message(name.to_owned());
+        let mut has_started = false;
+        interrupt::can_resume();
+        let ran = run(config, subjects, out, options, &mut |done| {
+            bar.set_position(done as u64);
+            if !has_started {
+                bar.reset_eta();
+                has_started = true;
+            }
+            match interrupt::asked() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        });
+        bar.finish_and_clear();
+        ran
+    }
+}
+
+/// Prints the claims of studies, each with its verdict, and the name of the report's page.
+pub(super) fn conclude<'a>(
+    claims: impl IntoIterator<Item = (String, &'a Claim)>,
+    out: &Path,
+) -> anyhow::Result<()> {
+    for (study, claim) in claims {
+        let (verdict, text, figures) = (claim.verdict.name(), &claim.text, &claim.figures);
+        say(format_args!("{study}{verdict}: {text} ({figures})"))?;
+    }
+    let page = out.join("report.html");
+    say(format_args!("{} holds it all", page.display()))
+}

@@ -1,0 +1,236 @@
+//! Pictures of images, with the outlines of models drawn on them.
+
+pub(crate) mod contour;
+pub(crate) mod text;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use hybrid_icp::{
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Refiner, RenderedView,
+};
+
+use contour::contours;
+
+/// A colour, 8 bits per channel.
+pub(crate) type Rgb = [u8; 3];
+
+/// Orange: the pose before. Distinguishable from [`AFTER`] by the colour-blind.
+pub(crate) const BEFORE: Rgb = [230, 159, 0];
+/// Sky blue: the pose after.
+pub(crate) const AFTER: Rgb = [86, 180, 233];
+
+/// Sides of pixels that a dash is long, and that lie between two.
+const DASH: (usize, usize) = (7, 5);
+/// How much of a line is seen where something hides the model.
+const FAINT: f32 = 0.4;
+/// How much darker the pixels beside a line become, so that it stands out from any colour.
+const SHADE: f32 = 0.55;
+
+/// How much darker a surface is that is seen from the side.
+const TURNED: f32 = 0.6;
+
+/// How an outline is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) color: Rgb,
+    pub(crate) dashed: bool,
+}
+
+impl Line {
+    pub(crate) fn solid(color: Rgb) -> Self {
+        Self {
+            color,
+            dashed: false,
+        }
+    }
+
+    /// Whether it is drawn at a place along it, pixels.
+    pub(crate) fn draws(&self, place: usize) -> bool {
+        !self.dashed || place % (DASH.0 + DASH.1) < DASH.0
+    }
+}
+
+/// An RGB picture.
+pub(crate) struct Picture {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// Shows depth in grey: near is bright, nothing is black.
+    pub(crate) fn of_depth(depth: &DepthImage) -> Self {
+        let mut measured: Vec<f32> = depth
+            .pixels()
+            .iter()
+            .copied()
+            .filter(|z| *z > 0.0)
+            .collect();
+        measured.sort_by(f32::total_cmp);
+        // The middle 96 % set the contrast, so that a stray pixel does not.
+        let at = |share: usize| {
+            measured
+                .get(measured.len().saturating_sub(1) * share / 100)
+                .copied()
+        };
+        let (near, far) = (at(2).unwrap_or(0.0), at(98).unwrap_or(1.0));
+        let range = (far - near).max(1e-3);
+        let grey = |z: f32| {
+            let t = ((z - near) / range).clamp(0.0, 1.0);
+            (210.0 - 150.0 * t) as u8
+        };
+        let rgb = depth
+            .pixels()
+            .iter()
+            .flat_map(|z| if *z > 0.0 { [grey(*z); 3] } else { [0; 3] })
+            .collect();
+        Self {
+            width: depth.width(),
+            height: depth.height(),
+            rgb,
+        }
+    }
+
+    /// Shows depth as [`Picture::of_depth`] does, darker where the surface turns away from the camera.
+    pub(crate) fn shaded(
+        depth: &Arc<DepthImage>,
+        camera: &PinholeCamera,
+    ) -> Result<Self, hybrid_icp::ImageError> {
+        let mask = Mask::full(depth.width(), depth.height());
+        let observation = Observation::new(Arc::clone(depth), mask, *camera)?;
+        let mut picture = Self::of_depth(depth);
+        for (index, surfel) in observation.surfels(1) {
+            let (u, v) = observation.pixel(index);
+            let facing = surfel.normal.dot(&surfel.point.coords.normalize()).abs();
+            picture.mix((u.into(), v.into()), [0; 3], TURNED * (1.0 - facing));
+        }
+        Ok(picture)
+    }
+
+    /// Draws the silhouette's outline of a model at a pose, two pixels wide.
+    pub(crate) fn outline(
+        &mut self,
+        refiner: &mut Refiner,
+        model: &Model,
+        observation: &Observation,
+        camera_from_object: &Isometry3<f64>,
+        color: Rgb,
+    ) {
+        let workspace = refiner.workspace_mut();
+        let view = workspace.view(model, observation.camera(), camera_from_object);
+        let mut ink = Ink::of(self);
+        ink.outline(view, Line::solid(color), |_, _, _| false);
+        self.draw(&ink);
+    }
+
+    /// Draws lines: first the shade next to all of them, then the lines in their order.
+    pub(crate) fn draw(&mut self, ink: &Ink) {
+        let mut shade: BTreeMap<(i64, i64), f32> = BTreeMap::new();
+        for ((u, v), _, opacity) in &ink.dots {
+            for (du, dv) in (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (du, dv))) {
+                let most = shade.entry((u + du, v + dv)).or_default();
+                *most = most.max(SHADE * opacity);
+            }
+        }
+        for (place, opacity) in shade {
+            self.mix(place, [0; 3], opacity);
+        }
+        for (place, color, opacity) in &ink.dots {
+            self.mix(*place, *color, *opacity);
+        }
+    }
+
+    /// Mixes a color into a pixel. Does nothing outside the picture.
+    pub(crate) fn mix(&mut self, (u, v): (i64, i64), color: Rgb, opacity: f32) {
+        let u = u32::try_from(u).ok().filter(|u| *u < self.width);
+        let v = u32::try_from(v).ok().filter(|v| *v < self.height);
+        let (Some(u), Some(v)) = (u, v) else {
+            return;
+        };
+        let index = 3 * (v as usize * self.width as usize + u as usize);
+        for (channel, color) in self.rgb[index..index + 3].iter_mut().zip(color) {
+            let mixed = f32::from(*channel) * (1.0 - opacity) + f32::from(color) * opacity;
+            // In the range of a byte, as both are.
+            *channel = mixed.round() as u8;
+        }
+    }
+
+    /// Returns the picture, in the middle of the width, above white rows.
+    pub(crate) fn above(&self, width: u32, rows: u32) -> Self {
+        let (row, height) = (3 * width as usize, self.height + rows);
+        let mut rgb = vec![255; row * height as usize];
+        let own = 3 * self.width as usize;
+        let left = 3 * ((width - self.width) / 2) as usize;
+        let pairs = rgb
+            .chunks_exact_mut(row)
+            .zip(self.rgb.chunks_exact(own.max(1)));
+        pairs.for_each(|(to, from)| to[left..left + own].copy_from_slice(from));
+        Self { width, height, rgb }
+    }
+
+    /// Draws a sample of a line, its left end at `(x, y)`.
+    pub(crate) fn stroke(&mut self, (x, y): (i32, i32), length: i32, thickness: i32, line: Line) {
+        let rows = y - thickness / 2..y - thickness / 2 + thickness;
+        for (u, v) in rows.flat_map(|v| (0..length).map(move |u| (u, v))) {
+            if line.draws(u as usize) {
+                self.mix(((x + u).into(), v.into()), line.color, 1.0);
+            }
+        }
+    }
+
+    /// Writes the picture as PNG.
+    pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
+        hicp_io::write_rgb_png(path, self.width, self.height, &self.rgb)
+    }
+}
+
+/// Lines to draw: all of a picture's together, so that no line shades another.
+#[derive(Debug)]
+pub(crate) struct Ink {
+    width: i64,
+    height: i64,
+    /// Pixels with their colors and opacities.
+    dots: Vec<((i64, i64), Rgb, f32)>,
+}
+
+impl Ink {
+    /// Creates ink for a picture.
+    pub(crate) fn of(picture: &Picture) -> Self {
+        Self {
+            width: picture.width.into(),
+            height: picture.height.into(),
+            dots: Vec::new(),
+        }
+    }
+
+    /// Adds the outline of a view, two pixels wide, faint where `hidden(u, v, depth of the model)` holds.
+    ///
+    /// There is no outline where the border of the image cuts the silhouette.
+    pub(crate) fn outline(
+        &mut self,
+        view: &RenderedView,
+        line: Line,
+        hidden: impl Fn(u32, u32, f32) -> bool,
+    ) {
+        let (columns, rows) = (0..self.width, 0..self.height);
+        let mut dots: BTreeMap<(i64, i64), f32> = BTreeMap::new();
+        for path in contours(view) {
+            for (place, side) in path.iter().enumerate() {
+                let is_inside = columns.contains(&side.outside.0) && rows.contains(&side.outside.1);
+                if !line.draws(place) || !is_inside {
+                    continue;
+                }
+                let (u, v) = side.inside;
+                let is_hidden = hidden(u, v, view.depth_at(u, v));
+                for place in [(i64::from(u), i64::from(v)), side.outside] {
+                    let most = dots.entry(place).or_default();
+                    *most = most.max(if is_hidden { FAINT } else { 1.0 });
+                }
+            }
+        }
+        let dots = dots.into_iter();
+        self.dots
+            .extend(dots.map(|(place, opacity)| (place, line.color, opacity)));
+    }
+}

@@ -1,0 +1,11 @@
+//! Poses in JSON, as in pose files.
+
+use hybrid_icp::Isometry3;
+use serde_json::{Value, json};
+
+/// Adds a pose to a JSON object.
+pub(crate) fn add_pose(object: &mut Value, pose: &Isometry3<f64>) {
+    let (rotation, translation_mm) = hicp_io::pose_to_bop(pose);
+    object["cam_R_m2c"] = json!(rotation);
+    object["cam_t_m2c"] = json!(translation_mm);
+}

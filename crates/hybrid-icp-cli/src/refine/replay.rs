@@ -1,0 +1,134 @@
+//! `hybrid-icp replay`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow, bail};
+use clap::Args;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::inputs::Inputs;
+use super::trace::TraceLines;
+use crate::choice::Pipeline;
+use crate::limits::limits;
+use crate::terminal::{say, warn};
+
+/// Run a trace again and compare every iteration.
+///
+/// The trace (`hybrid-icp refine --trace FILE`) names the files and holds the pipeline that made it. The same files give the
+/// same iterations to the last digit. If a line differs, the exit code is 1.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The trace.
+    #[arg(value_name = "TRACE")]
+    trace: PathBuf,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let path = arguments.trace.as_path();
+    let text = limits().read_text(path)?;
+    let old = text
+        .lines()
+        .zip(1..)
+        .map(|(line, number)| {
+            serde_json::from_str(line)
+                .with_context(|| format!("{}:{number}: expected JSON", path.display()))
+        })
+        .collect::<anyhow::Result<Vec<Value>>>()?;
+    let Some(header) = old.first() else {
+        bail!("{}: empty, expected a trace", path.display());
+    };
+    let header = Header { path, line: header };
+    if header.text("event")? != "start" {
+        bail!(
+            "{}:1: \"event\" is {}, expected \"start\": the first line of a trace says what ran",
+            path.display(),
+            header.line["event"]
+        );
+    }
+    let version = header.text("version")?;
+    if version != env!("CARGO_PKG_VERSION") {
+        warn(format_args!(
+            "{} was made by version {version}, this is {}: results may differ",
+            path.display(),
+            env!("CARGO_PKG_VERSION")
+        ));
+    }
+    let new = replay(&header)?;
+    let differing = (1..)
+        .zip(new.iter().zip(&old))
+        .find(|(_, (new, old))| new != old);
+    if let Some((number, (new, old))) = differing {
+        bail!(
+            "{}:{number} differs:\n  there {old}\n  now   {new}",
+            path.display()
+        );
+    }
+    if new.len() != old.len() {
+        bail!(
+            "{} has {} lines, the run has {}; those of both agree",
+            path.display(),
+            old.len(),
+            new.len()
+        );
+    }
+    say(format_args!(
+        "{}: {} lines, all as they were",
+        path.display(),
+        old.len()
+    ))
+}
+
+/// Runs what the header states, and returns the lines of that run under the same header.
+fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
+    let overrides: Vec<String> = header.get("set", "a list of texts")?;
+    let origin = format!("the pipeline of {}", header.path.display());
+    let pipeline = Pipeline::parse(&origin, header.text("toml")?, &overrides)?;
+    let unit = header.text("model_unit")?.parse();
+    let inputs = Inputs {
+        model: header.text("model")?.into(),
+        model_unit: unit.map_err(|_| header.refuse("model_unit", "m, mm or cm"))?,
+        depth: header.text("depth")?.into(),
+        depth_scale: Some(header.get("depth_scale", "a number")?),
+        mask: header.text("mask")?.into(),
+        camera: header.text("camera")?.into(),
+        init: header.text("init")?.into(),
+    };
+    let read = inputs.read()?;
+    let init = read.init.camera_from_object;
+    let observation = inputs.observe(read.depth, read.mask, read.camera)?;
+    let mut trace = TraceLines::new(Some(header.line.clone()));
+    let mut refiner = pipeline.refiner();
+    refiner.refine_observed(&read.model, &observation, &init, &mut trace);
+    // Through text, as the old lines: numbers in JSON are read back exactly.
+    let lines = trace.lines().iter();
+    lines
+        .map(|line| Ok(serde_json::from_str(&line.to_string())?))
+        .collect()
+}
+
+/// The first line.
+struct Header<'a> {
+    path: &'a Path,
+    line: &'a Value,
+}
+
+impl Header<'_> {
+    fn get<T: DeserializeOwned>(&self, key: &str, expected: &str) -> anyhow::Result<T> {
+        let value = serde_json::from_value(self.line[key].clone());
+        value.map_err(|_| self.refuse(key, expected))
+    }
+
+    fn text(&self, key: &str) -> anyhow::Result<String> {
+        self.get(key, "a text")
+    }
+
+    fn refuse(&self, key: &str, expected: &str) -> anyhow::Error {
+        anyhow!(
+            "{}:1: \"{key}\" is {}, expected {expected}",
+            self.path.display(),
+            self.line[key]
+        )
+    }
+}

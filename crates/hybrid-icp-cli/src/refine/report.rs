@@ -1,0 +1,164 @@
+//! The report of a refinement: JSON for programs, lines for people.
+
+use hicp_io::PoseFile;
+use hybrid_icp::{Refinement, StageRecord, Verdict};
+use serde::Serialize;
+
+use crate::terminal::table;
+
+/// The JSON report of a refinement; lengths in millimeters as in BOP, losses in m².
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    #[serde(rename = "cam_R_m2c")]
+    rotation: [f64; 9],
+    #[serde(rename = "cam_t_m2c")]
+    translation_mm: [f64; 3],
+    pipeline: String,
+    outcome: &'static str,
+    /// The reason of the outcome in words.
+    reason: String,
+    termination: &'static str,
+    mve_initial: f64,
+    mve: f64,
+    iterations: usize,
+    n_pairs: usize,
+    time_ms: f64,
+    /// The warnings about the inputs and the result, as on standard error.
+    pub(crate) warnings: Vec<String>,
+    trace: Vec<StageReport>,
+}
+
+/// One ICP stage that ran.
+#[derive(Debug, Serialize)]
+struct StageReport {
+    /// Its number, from 1.
+    stage: usize,
+    /// The choice of the switch before this stage, and the MVE behind it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regime: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regime_mve: Option<f64>,
+    selection: &'static str,
+    association: &'static str,
+    filters: Vec<&'static str>,
+    metric: &'static str,
+    stop_rules: Vec<&'static str>,
+    n_source: usize,
+    iterations: usize,
+    n_pairs: usize,
+    mean_loss: Option<f64>,
+    termination: &'static str,
+    outcome: &'static str,
+}
+
+impl Report {
+    pub(crate) fn new(
+        pipeline: &str,
+        init: &PoseFile,
+        refined: &Refinement,
+        reason: String,
+        warnings: Vec<String>,
+        stages: &[StageRecord],
+        time_ms: f64,
+    ) -> Self {
+        let outcome = &refined.outcome;
+        let (rotation, translation_mm) = match outcome.verdict {
+            Verdict::Refined => hicp_io::pose_to_bop(&outcome.camera_from_object),
+            // The numbers of the file, which may be orthogonal to their digits only.
+            Verdict::KeptInitial(_) => (init.rotation, init.translation_mm),
+        };
+        Self {
+            rotation,
+            translation_mm,
+            pipeline: pipeline.to_owned(),
+            outcome: verdict(outcome.verdict),
+            reason,
+            termination: outcome.termination.name(),
+            mve_initial: refined.mve_initial,
+            mve: refined.mve,
+            iterations: outcome.iterations,
+            n_pairs: outcome.n_pairs(),
+            time_ms,
+            warnings,
+            trace: (1..).zip(stages).map(StageReport::new).collect(),
+        }
+    }
+}
+
+impl StageReport {
+    fn new((stage, record): (usize, &StageRecord)) -> Self {
+        let outcome = &record.outcome;
+        Self {
+            stage,
+            regime: record.switched.map(|event| event.regime.name()),
+            regime_mve: record.switched.and_then(|event| event.score),
+            selection: record.selection,
+            association: record.association,
+            filters: record.filters.clone(),
+            metric: record.metric,
+            stop_rules: record.stop_rules.clone(),
+            n_source: record.n_source,
+            iterations: outcome.iterations,
+            n_pairs: outcome.n_pairs(),
+            mean_loss: outcome.evaluation.map(|e| e.mean_loss),
+            termination: outcome.termination.name(),
+            outcome: verdict(outcome.verdict),
+        }
+    }
+}
+
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Refined => "refined",
+        Verdict::KeptInitial(_) => "kept_initial",
+    }
+}
+
+/// Returns the trace as a table: one line per stage that ran.
+pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
+    let heads = [
+        "stage",
+        "regime",
+        "association",
+        "metric",
+        "ended",
+        "iterations",
+        "pairs",
+        "mean loss mm²",
+    ];
+    let mut rows = vec![heads.map(str::to_owned)];
+    rows.extend((1..).zip(stages).map(|(stage, record): (usize, _)| {
+        let outcome = &record.outcome;
+        let regime = record.switched.map_or("", |event| event.regime.name());
+        let loss = outcome.evaluation.map(|e| e.mean_loss * 1e6);
+        [
+            stage.to_string(),
+            regime.to_owned(),
+            record.association.to_owned(),
+            record.metric.to_owned(),
+            outcome.termination.to_string(),
+            outcome.iterations.to_string(),
+            outcome.n_pairs().to_string(),
+            loss.map_or_else(|| "-".to_owned(), |loss| format!("{loss:.4}")),
+        ]
+    }));
+    table(&rows, 5)
+}
+
+/// Returns one line about the whole.
+pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
+    let outcome = &refined.outcome;
+    match outcome.verdict {
+        Verdict::Refined => format!(
+            "refined: MVE {:.3} -> {:.3}, {} pairs, {} iterations; ended because {reason}",
+            refined.mve_initial,
+            refined.mve,
+            outcome.n_pairs(),
+            outcome.iterations,
+        ),
+        Verdict::KeptInitial(_) => format!(
+            "kept the initial pose: {reason}; MVE {:.3}, {} iterations",
+            refined.mve, outcome.iterations
+        ),
+    }
+}

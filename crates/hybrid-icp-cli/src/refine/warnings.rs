@@ -1,0 +1,74 @@
+//! Warnings about well-formed inputs of a refinement that do not fit together, and about its result.
+
+use hybrid_icp::{Isometry3, Model, Observation, Refinement, Verdict, Warning};
+
+use super::inputs::Inputs;
+
+/// The largest depth of a `DepthImage`.
+const MAX_DEPTH_METERS: f32 = 1000.0;
+
+/// Returns why a refinement ended as it did. For a pose that was kept, names the cause in the inputs if there is a plain one.
+pub(crate) fn reason(
+    refined: &Refinement,
+    model: &Model,
+    observation: &Observation,
+    init: &Isometry3<f64>,
+) -> String {
+    let ended = refined.outcome.termination.explain();
+    if refined.outcome.verdict == Verdict::Refined {
+        return ended.to_owned();
+    }
+    let cause = if observation.mask().bounding_region().area() == 0 {
+        "the mask is empty"
+    } else if observation.n_measured() == 0 {
+        "no depth was measured inside the mask"
+    } else if observation.n_surfels() == 0 {
+        "the depth measured inside the mask is too sparse for surface normals"
+    } else if (init * model.center()).z + model.radius() <= 0.0 {
+        "the object at the initial pose is behind the camera"
+    } else {
+        return ended.to_owned();
+    };
+    format!("{cause}, so that {ended}")
+}
+
+/// Returns warnings about units that do not fit together, with the files and options to check.
+pub(super) fn about_units(
+    model: &Model,
+    observation: &Observation,
+    init: &Isometry3<f64>,
+    inputs: &Inputs,
+    depth_scale: f64,
+) -> Vec<String> {
+    let warnings = hybrid_icp::warnings(model, observation, init).into_iter();
+    let (unit, depth, mask) = (inputs.model_unit, &inputs.depth, inputs.mask.display());
+    let in_words = |warning| {
+        let (file, advice) = match warning {
+            Warning::Diameter { .. } => (&inputs.model, format!(", check --model-unit {unit}")),
+            Warning::BehindCamera { .. } => (&inputs.init, String::new()),
+            Warning::NoDepth => (
+                depth,
+                format!(
+                    " at {depth_scale} mm per unit; depths beyond {MAX_DEPTH_METERS} m count as missing: check --depth-scale \
+                     and {mask}"
+                ),
+            ),
+            Warning::Depth { .. } => (
+                depth,
+                format!(": check --depth-scale (now {depth_scale} mm per unit) and cam_t_m2c (mm)"),
+            ),
+            Warning::Mask { .. } | Warning::Sliver { .. } => (
+                &inputs.mask,
+                format!(": check --model-unit {unit} and cam_t_m2c (mm)"),
+            ),
+            _ => (&inputs.model, String::new()),
+        };
+        format!("{}: {warning}{advice}", file.display())
+    };
+    warnings.map(in_words).collect()
+}
+
+/// Returns warnings about a pose that is not to be trusted.
+pub(crate) fn about_result(refined: &Refinement) -> Vec<String> {
+    refined.warnings().iter().map(ToString::to_string).collect()
+}
