@@ -11,7 +11,7 @@ use crate::limits::{Limit, ReadLimits};
 
 /// An object instance found in an image.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
-#[serde(expecting = "an object with a detection")]
+#[serde(expecting = "an object with `scene_id`, `image_id`, `category_id` and `score`")]
 pub struct Detection {
     /// The scene.
     pub scene_id: u32,

@@ -10,7 +10,7 @@ use crate::limits::{Limit, ReadLimits};
 
 /// Instances of one object in one image.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
-#[serde(expecting = "an object with a target")]
+#[serde(expecting = "an object with `scene_id`, `im_id`, `obj_id` and `inst_count`")]
 pub struct Target {
     /// The scene.
     pub scene_id: u32,
