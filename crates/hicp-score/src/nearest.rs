@@ -4,108 +4,56 @@ use hicp_core::{Isometry3, Point3};
 
 /// Points per leaf: small enough to prune, large enough that a leaf is a short scan.
 const LEAF_SIZE: usize = 8;
-/// A tree that halves its points at every level is at most this deep; so is the stack of a query.
-const MAX_DEPTH: usize = 64;
 
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    min: Point3<f64>,
-    max: Point3<f64>,
-    /// A leaf's first point; an inner node's second child (its first child is the next node).
-    first: usize,
-    /// A leaf's number of points; 0 for an inner node.
-    count: usize,
-}
-
-impl Node {
-    fn distance_squared(&self, point: &Point3<f64>) -> f64 {
-        let gap = (self.min - point).sup(&(point - self.max));
-        gap.map(|g| g.max(0.0)).norm_squared()
-    }
-}
-
-/// A balanced tree of tight boxes over points, in `f64` so that nothing is lost against a search by
-/// definition.
+/// A balanced binary tree of tight boxes over points, in `f64` so that no precision is lost against an exhaustive search.
 ///
-/// An estimate may be far off, and then every query lies far outside the points: tight boxes still
-/// prune there, where the half-spaces of a k-d tree hardly do (kiddo's took 10 to 24 times as long
-/// for 30,000 points a little over a diameter off).
+/// An estimate may be far off. Then every query lies far outside the points. Tight boxes still prune there, whereas the
+/// half-spaces of a k-d tree hardly do: kiddo's took 10 to 24 times as long for 30,000 points a little over a diameter off.
 #[derive(Debug)]
 pub(crate) struct NearestPoints {
-    nodes: Vec<Node>,
-    /// In the order of the leaves.
+    /// The points of node 0 are all points. Nodes 2i + 1 and 2i + 2 divide those of node i in halves.
     points: Vec<Point3<f64>>,
+    /// The box around each node's points. A node of at most [`LEAF_SIZE`] points is not divided.
+    boxes: Vec<[Point3<f64>; 2]>,
 }
 
 impl NearestPoints {
-    /// Builds the tree, O(n log n). Points that are not finite are near nothing.
+    /// Builds the tree. Points that are not finite are left out. Cost: O(n log n).
     pub(crate) fn new(points: &[Point3<f32>]) -> Self {
         let finite = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
-        let mut tree = Self {
-            nodes: Vec::new(),
-            points: finite.map(|p| p.cast::<f64>()).collect(),
-        };
-        if !tree.points.is_empty() {
-            tree.split(0, tree.points.len());
-        }
-        tree
+        let mut points: Vec<Point3<f64>> = finite.map(|p| p.cast::<f64>()).collect();
+        let mut boxes = Vec::new();
+        divide(&mut points, 0, &mut boxes);
+        Self { points, boxes }
     }
 
-    fn split(&mut self, from: usize, to: usize) {
-        let points = &mut self.points[from..to];
-        let corners = (points[0], points[0]);
-        let (min, max) = points
-            .iter()
-            .fold(corners, |(min, max), p| (min.inf(p), max.sup(p)));
-        let (node, n) = (self.nodes.len(), points.len());
-        self.nodes.push(Node {
-            min,
-            max,
-            first: from,
-            count: if n <= LEAF_SIZE { n } else { 0 },
-        });
-        if n <= LEAF_SIZE {
-            return;
-        }
-        let axis = (max - min).imax();
-        points.select_nth_unstable_by(n / 2, |a, b| a[axis].total_cmp(&b[axis]));
-        self.split(from, from + n / 2);
-        self.nodes[node].first = self.nodes.len();
-        self.split(from + n / 2, to);
-    }
-
-    /// Returns the squared distance to the nearest point, or `limit` when none is nearer than that.
+    /// Returns the squared distance to the nearest point, or `limit` if no point is nearer than that.
     fn distance_squared(&self, from: &Point3<f64>, limit: f64) -> f64 {
-        let mut best = limit;
-        let mut stack = [(0, 0.0); MAX_DEPTH];
-        let mut depth = usize::from(!self.nodes.is_empty());
-        while depth > 0 {
-            depth -= 1;
-            let (index, distance) = stack[depth];
-            if distance >= best {
-                continue;
-            }
-            let node = &self.nodes[index];
-            if node.count > 0 {
-                for point in &self.points[node.first..node.first + node.count] {
-                    best = best.min((point - from).norm_squared());
-                }
-                continue;
-            }
-            let [a, b] = [index + 1, node.first]
-                .map(|child| (child, self.nodes[child].distance_squared(from)));
-            let (near, far) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-            // Every level leaves at most one node behind, so the stack never holds more than the
-            // depth plus one.
-            stack[depth] = far;
-            stack[depth + 1] = near;
-            depth += 2;
-        }
-        best
+        self.search(0, &self.points, from, limit)
     }
 
-    /// Returns ADI of `points`, which must be those of the tree; 0 without points, infinite for
-    /// what is not finite.
+    fn search(&self, node: usize, points: &[Point3<f64>], from: &Point3<f64>, limit: f64) -> f64 {
+        if points.len() <= LEAF_SIZE {
+            let distances = points.iter().map(|point| (point - from).norm_squared());
+            return distances.fold(limit, f64::min);
+        }
+        let (first, second) = points.split_at(points.len() / 2);
+        let child = |node: usize, points| (distance_squared(&self.boxes[node], from), node, points);
+        let (a, b) = (child(2 * node + 1, first), child(2 * node + 2, second));
+        let near_first = if a.0 <= b.0 { [a, b] } else { [b, a] };
+        near_first
+            .into_iter()
+            .fold(limit, |best, (distance, node, points)| {
+                if distance < best {
+                    self.search(node, points, from, best)
+                } else {
+                    best
+                }
+            })
+    }
+
+    /// Returns ADI of `points`, which must be those of the tree. Returns 0 without points, and infinity if a distance is not
+    /// finite.
     pub(crate) fn adi(
         &self,
         estimate: &Isometry3<f64>,
@@ -115,8 +63,8 @@ impl NearestPoints {
         if points.is_empty() {
             return 0.0;
         }
-        // The points at the true pose, seen from the frame of the estimate: the tree stays where it
-        // is. The translations are subtracted first, so that nothing is lost far from the camera.
+        // The points at the true pose, in the frame of the estimate, so that the tree does not move. The translations are
+        // subtracted first, which keeps the precision far from the camera.
         let back = estimate.rotation.inverse();
         let shift = back * (truth.translation.vector - estimate.translation.vector);
         let rotation = (back * truth.rotation).to_rotation_matrix();
@@ -125,7 +73,7 @@ impl NearestPoints {
             .map(|x| {
                 let x = x.cast::<f64>();
                 let moved = rotation * x + shift;
-                // The same point is one of those looked at, and often not far from the nearest.
+                // The same point is one of those searched, and often not far from the nearest.
                 let same = (moved - x).norm_squared();
                 if same.is_finite() {
                     self.distance_squared(&moved, same).sqrt()
@@ -138,6 +86,34 @@ impl NearestPoints {
     }
 }
 
+/// Orders the points of a node so that its halves lie side by side along the longest edge of its box, and stores the boxes.
+fn divide(points: &mut [Point3<f64>], node: usize, boxes: &mut Vec<[Point3<f64>; 2]>) {
+    let Some(first) = points.first().copied() else {
+        return;
+    };
+    let (min, max) = points
+        .iter()
+        .fold((first, first), |(min, max), p| (min.inf(p), max.sup(p)));
+    if boxes.len() <= node {
+        boxes.resize(node + 1, [Point3::origin(); 2]);
+    }
+    boxes[node] = [min, max];
+    if points.len() <= LEAF_SIZE {
+        return;
+    }
+    let (axis, middle) = ((max - min).imax(), points.len() / 2);
+    points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
+    let (first, second) = points.split_at_mut(middle);
+    divide(first, 2 * node + 1, boxes);
+    divide(second, 2 * node + 2, boxes);
+}
+
+/// Returns the squared distance of a box from a point.
+fn distance_squared([min, max]: &[Point3<f64>; 2], point: &Point3<f64>) -> f64 {
+    let gap = (min - point).sup(&(point - max));
+    gap.map(|g| g.max(0.0)).norm_squared()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,12 +121,7 @@ mod tests {
     /// By what a search passes over: the distance to the nearest point of the box.
     #[test]
     fn the_distance_of_a_box_is_that_of_its_nearest_point() {
-        let node = Node {
-            min: Point3::new(-1.0, 0.0, 2.0),
-            max: Point3::new(1.0, 0.5, 5.0),
-            first: 0,
-            count: 0,
-        };
+        let node = [Point3::new(-1.0, 0.0, 2.0), Point3::new(1.0, 0.5, 5.0)];
         let places: [f64; 8] = [-3.0, -1.0, -0.25, 0.0, 0.25, 1.0, 2.5, 8.0];
         for x in places {
             for y in places {
@@ -159,7 +130,7 @@ mod tests {
                     let nearest =
                         Point3::new(x.clamp(-1.0, 1.0), y.clamp(0.0, 0.5), z.clamp(2.0, 5.0));
                     let expected = (point - nearest).norm_squared();
-                    assert_eq!(node.distance_squared(&point), expected, "{point}");
+                    assert_eq!(distance_squared(&node, &point), expected, "{point}");
                 }
             }
         }
@@ -174,16 +145,13 @@ mod tests {
             .map(|p| p.map(f64::from).cast())
             .collect();
         let tree = NearestPoints::new(&points);
-        let inner = (0..tree.nodes.len()).filter(|index| tree.nodes[*index].count == 0);
-        let mut halved = 0;
-        for index in inner {
-            let node = tree.nodes[index];
-            let [a, b] = [index + 1, node.first].map(|child| tree.nodes[child]);
-            let axis = (node.max - node.min).imax();
-            assert!(a.max[axis] < b.min[axis], "node {index}");
-            halved += 1;
+        // 500 points halve into 64 leaves of 7 or 8 points.
+        assert_eq!(tree.boxes.len(), 127);
+        for node in 0..63 {
+            let [min, max] = tree.boxes[node];
+            let [a, b] = [2 * node + 1, 2 * node + 2].map(|child| tree.boxes[child]);
+            let axis = (max - min).imax();
+            assert!(a[1][axis] < b[0][axis], "node {node}");
         }
-        // 500 points halve into 64 leaves of 7 or 8.
-        assert_eq!((halved, tree.nodes.len()), (63, 127));
     }
 }
