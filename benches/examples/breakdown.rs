@@ -13,10 +13,10 @@ use hybrid_icp::Minimize;
 use hybrid_icp::presets::paper_stop;
 use hybrid_icp::{
     AllSamples, Cascade, Context, Correspondences, DataAssociation, ErrorMetric, Icp, Isometry3,
-    MeanVsd, NormalEquations, Observation, PAPER_ALPHA, PinholeCamera, PixelRegion, PointSelection,
-    PointToPlane, PointToPoint, Preset, Problem, Projective, Rasterizer, RenderedView, Renderer,
-    Repeat, Score, Session, Stage, Step, Surfel, Switch, Threshold, TriMesh, VisibleSurface,
-    WarmNearestNeighbor, Workspace,
+    MeanVsd, NearestNeighbor, NormalEquations, Observation, PAPER_ALPHA, PinholeCamera,
+    PixelRegion, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective,
+    Rasterizer, RenderedView, Renderer, Repeat, Score, Session, Stage, Step, Surfel, Switch,
+    Threshold, TriMesh, VisibleSurface, Workspace,
 };
 
 /// What time is spent on.
@@ -166,7 +166,7 @@ fn projective(metric: impl ErrorMetric + 'static) -> Box<dyn Stage> {
 fn nearest(metric: impl ErrorMetric + 'static) -> Box<dyn Stage> {
     Box::new(Icp {
         selection: Timed(AllSamples),
-        association: Timed(WarmNearestNeighbor::default()),
+        association: Timed(NearestNeighbor::default()),
         filter: (),
         metric: Timed(metric),
         stop: paper_stop(),

@@ -14,11 +14,10 @@ use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
 use hicp_benches::stages::{GATE_METERS, STOP};
 use hybrid_icp::{
     Context, DataAssociation, DepthImage, ErrorMetric, Generalized, Icp, Isometry3, Mask, Matrix3,
-    MaxDistance, MeanVsd, Model, ModelConfig, Observation, OrganizedNearestNeighbor, Outcome,
-    OutlierFilter, PinholeCamera, Point3, PointSelection, PointToPlane, PointToPoint, Preset,
-    Problem, Projective, Rasterizer, RenderedView, Renderer, Score, Session, Stage, Stride, Surfel,
-    Translation3, TriMesh, UnitVector3, Vector3, VisibleSurface, WarmNearestNeighbor, Workspace,
-    rotation_from_matrix, se3,
+    MaxDistance, MeanVsd, Model, ModelConfig, NearestNeighbor, Observation, Outcome, OutlierFilter,
+    PinholeCamera, Point3, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective,
+    Rasterizer, RenderedView, Renderer, Score, Session, Stage, Stride, Surfel, Translation3,
+    TriMesh, UnitVector3, Vector3, VisibleSurface, Workspace, rotation_from_matrix, se3,
 };
 use serde_json::{Value, json};
 
@@ -245,7 +244,7 @@ struct Bench {
 impl Bench {
     /// Does what a row names, once.
     fn run(&mut self, row: &str, loaded: &Loaded) -> Result<Value, Failure> {
-        let nearest = WarmNearestNeighbor::default();
+        let nearest = NearestNeighbor::default();
         let gate = MaxDistance::meters(GATE_METERS);
         match row {
             "observe" => observe(&loaded.depth, &loaded.mask, loaded.camera),
@@ -261,10 +260,6 @@ impl Bench {
             "projective" => Ok(self.icp(loaded, &loaded.source, Projective, (), PointToPlane)),
             "nn-point-to-point" => {
                 Ok(self.icp(loaded, &loaded.source, nearest, gate, PointToPoint))
-            }
-            "nn-point-to-point-all" => {
-                let all = OrganizedNearestNeighbor::default();
-                Ok(self.icp(loaded, &loaded.source, all, gate, PointToPoint))
             }
             "nn-point-to-plane" => {
                 Ok(self.icp(loaded, &loaded.source, nearest, gate, PointToPlane))

@@ -2,8 +2,7 @@
 
 use hybrid_icp::{
     BoxedStage, DataAssociation, ErrorMetric, Generalized, Icp, IterationLimit, MaxDistance,
-    PointToPlane, PointToPoint, Projective, SmallMotion, Stride, VisibleSurface,
-    WarmNearestNeighbor,
+    NearestNeighbor, PointToPlane, PointToPoint, Projective, SmallMotion, Stride, VisibleSurface,
 };
 
 /// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
@@ -37,7 +36,7 @@ where
 #[must_use]
 pub fn all() -> Vec<(&'static str, BoxedStage)> {
     let some = Stride::AboutPoints(2000);
-    let nearest = WarmNearestNeighbor::default;
+    let nearest = NearestNeighbor::default;
     vec![
         (
             "projective-point-to-plane-every-pixel",

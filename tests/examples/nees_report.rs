@@ -9,7 +9,8 @@
 use hicp_sim::Household;
 use hicp_tests::nees::{Nees, Pairs, measure};
 use hybrid_icp::{
-    Generalized, NearestNeighbor, PlaneToPoint, PointToPlane, Projective, Stride, VisibleSurface,
+    Generalized, NearestNeighbor, PlaneToPoint, PointToPlane, Projective, SearchIndex, Stride,
+    VisibleSurface,
 };
 
 fn main() {
@@ -19,9 +20,7 @@ fn main() {
     let visible = VisibleSurface {
         stride: Stride::Pixels(1),
     };
-    let nearest = NearestNeighbor {
-        targets: Stride::Pixels(1),
-    };
+    let nearest = || NearestNeighbor::new(Stride::Pixels(1), SearchIndex::default());
     println!(
         "| pairs | object | noise | NEES of `covariance` | NEES of `sandwich_covariance` | 99 % band | RMS error of the centre |"
     );
@@ -42,7 +41,7 @@ fn main() {
             let plane = (visible, Projective, PointToPlane);
             let model_plane = (visible, Projective, PlaneToPoint);
             let generalized = (visible, Projective, Generalized::default());
-            let nearest_generalized = (visible, nearest, Generalized::default());
+            let nearest_generalized = (visible, nearest(), Generalized::default());
             for (label, made, start) in [
                 (
                     "fixed, exact normals and weights",
@@ -75,7 +74,7 @@ fn main() {
                 );
                 row(
                     &format!("{label}; nearest, generalized"),
-                    measure(object, start, runs, made, nearest_generalized),
+                    measure(object, start, runs, made, nearest_generalized.clone()),
                 );
             }
         }

@@ -22,7 +22,7 @@
 //!
 //! | selections | associations | filters | weights |
 //! |---|---|---|---|
-//! | [`AllSamples`] | `NearestNeighbor`, [`WarmNearestNeighbor`], [`OrganizedNearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
+//! | [`AllSamples`] | [`NearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
 //! | [`VisibleSurface`] | [`KNearest`] | [`MaxNormalAngle`] | [`DistanceWeight`] |
 //! | [`ObservedSurface`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
 //! | [`WithoutBoundary`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
@@ -48,12 +48,10 @@ mod search;
 mod selection;
 mod stride;
 
-#[cfg(feature = "kiddo")]
-pub use association::NearestNeighbor;
 pub use association::{
-    ClosestPointOnMesh, DataAssociation, KNearest, NormalCompatible, NormalShooting,
-    ObservationToModel, OrganizedNearestNeighbor, Projective, ProjectiveInterpolated,
-    ProjectiveSearch, Reciprocal, WarmNearestNeighbor,
+    ClosestPointOnMesh, DataAssociation, KNearest, NearestNeighbor, NormalCompatible,
+    NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated, ProjectiveSearch,
+    Reciprocal, SearchIndex,
 };
 pub use filter::{
     BoundaryTargets, ConstantWeight, DistanceWeight, MadDistance, MaxDistance, MaxNormalAngle,

@@ -6,7 +6,7 @@ use std::cell::Cell;
 /// What is counted where nothing outside can see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Work {
-    /// Nodes and leaves of search trees, and blocks of image grids, that a search looked at.
+    /// Nodes and leaves of search trees that a search visited.
     NodesVisited,
     /// Pixels that the rasterizer tried against a triangle.
     PixelsTested,

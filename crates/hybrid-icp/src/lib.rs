@@ -57,10 +57,10 @@ pub use hicp_association::{
     AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
     DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
     MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
-    ObservationToModel, ObservedSurface, OneToOne, OrganizedNearestNeighbor, OutlierFilter,
-    PointSelection, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal,
-    Schedule, SensorNoise, SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount,
-    VarTrimmed, VisibleSurface, VoxelGrid, WarmNearestNeighbor, WithoutBoundary,
+    ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
+    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SearchIndex,
+    SensorNoise, SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed,
+    VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 #[doc(hidden)]
 pub use hicp_core::internal;

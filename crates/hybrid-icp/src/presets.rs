@@ -45,7 +45,7 @@ pub use beyond::{
     hybrid_visible, local, search, search_with,
 };
 
-use hicp_association::{AllSamples, Projective, VisibleSurface, WarmNearestNeighbor};
+use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};
 use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat};
 use hicp_metric::{PointToPlane, PointToPoint};
 use hicp_score::MeanVsd;
@@ -71,7 +71,7 @@ pub type PaperIcp<P, A, M> = Icp<P, A, (), M, PaperStop>;
 /// A stage of the paper with projective association.
 pub type ProjectiveIcp<M> = PaperIcp<VisibleSurface, Projective, M>;
 /// A stage of the paper with nearest neighbors.
-pub type NearestIcp<M> = PaperIcp<AllSamples, WarmNearestNeighbor, M>;
+pub type NearestIcp<M> = PaperIcp<AllSamples, NearestNeighbor, M>;
 /// Cascading ICP with projective association, in either order.
 pub type ProjectiveCascade<M, N> = Cascade<(ProjectiveIcp<M>, ProjectiveIcp<N>)>;
 /// Cascading ICP with nearest neighbors, in either order.
@@ -98,7 +98,7 @@ fn projective<M>(metric: M) -> ProjectiveIcp<M> {
 fn nearest<M>(metric: M) -> NearestIcp<M> {
     Icp {
         selection: AllSamples,
-        association: WarmNearestNeighbor::default(),
+        association: NearestNeighbor::default(),
         filter: (),
         metric,
         stop: paper_stop(),

@@ -6,7 +6,8 @@ use hicp_tests::{Scene, camera, render, scene};
 use hybrid_icp::{
     Context, Divergence, Icp, Isometry3, IterationLimit, Matrix3, NO_TRIANGLE, NearestNeighbor,
     Observation, Observer, PointToPlane, PointToPoint, Projective, Refiner, Regime, RegimeEvent,
-    SmallMotion, Stage, Stride, Switch, Switcher, UnitQuaternion, Vector3, VisibleSurface,
+    SearchIndex, SmallMotion, Stage, Stride, Switch, Switcher, UnitQuaternion, Vector3,
+    VisibleSurface,
 };
 
 // --- The component ---
@@ -77,9 +78,7 @@ fn switching() -> impl Stage + Send + 'static {
         aligned: planes(),
         misaligned: Icp {
             selection: VisibleSurface::default(),
-            association: NearestNeighbor {
-                targets: Stride::Pixels(1),
-            },
+            association: NearestNeighbor::new(Stride::Pixels(1), SearchIndex::default()),
             filter: (),
             metric: PointToPoint,
             stop: (Divergence::count_aware(), IterationLimit(200)),

@@ -32,6 +32,21 @@ fn every_shipped_file_gives_the_same_bits_as_its_code() {
     }
 }
 
+#[test]
+fn the_former_name_of_nearest_neighbor_builds_the_same_part() {
+    let case = scene(Household::Mug, 0.5, &mut rng(22));
+    let init = perturb(&mut rng(23), &case.truth, 0.03, 0.4);
+    let current = Preset::NnPointToPlane.toml();
+    let former = current.replace("\"nearest-neighbor\"", "\"warm-nearest-neighbor\"");
+    assert_ne!(former, current);
+    let [found, expected] = [former.as_str(), current].map(|text| {
+        let file = PipelineFile::parse(text, "preset").unwrap();
+        let mut refiner = Refiner::boxed(file.build().unwrap());
+        refiner.refine(&case.model, &case.observation, &init)
+    });
+    assert_eq!(found, expected);
+}
+
 /// A file that uses a part, with every parameter that has no default given.
 fn smallest_use(kind: PartKind, name: &str) -> String {
     let part = Catalog::built_in()

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use hicp_core::{
-    Context, Correspondences, Facing, Isometry3, Model, Pair, Point3, RigidTransform, Surfel,
-    UnitVector3, se3,
-};
+use hicp_core::{Context, Correspondences, Facing, Isometry3, Model, Point3, Surfel, UnitVector3};
 
 use crate::association::data_association::DataAssociation;
-use crate::search::box_tree::{Bounds, BoxTree};
+use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
+use crate::search::box_tree::{Bounds, BoxTree, Element};
 use crate::search::triangle::closest_point;
 use crate::stride::Stride;
 
@@ -53,21 +51,17 @@ impl DataAssociation for ClosestPointOnMesh {
             return;
         };
         let faces = MeshFaces::of(model);
-        let view = ObjectView::new(camera_from_object);
-        let stride = self.stride.pixels(observation.n_surfels());
-        let mut candidates = 0;
-        for (target_index, target) in observation.surfels(stride) {
-            candidates += 1;
-            let Some(view) = &view else {
-                continue;
-            };
-            let query = view.object_from_camera.point(&target.point);
-            if let Some((triangle, source)) = faces.closest(&query, &view.eye, self.visible_only) {
-                let source = view.camera_from_object.surfel(&source);
-                pairs.push(Pair::new(triangle, source, target_index, *target));
-            }
+        FromObservation {
+            observation,
+            stride: self.stride,
+            surface: ClosestFace {
+                mesh: &faces,
+                visible_only: self.visible_only && faces.oriented,
+            },
+            camera_from_object,
+            pairs,
         }
-        pairs.set_candidates(candidates);
+        .associate();
     }
 
     fn name(&self) -> &'static str {
@@ -75,35 +69,12 @@ impl DataAssociation for ClosestPointOnMesh {
     }
 }
 
-/// A pose as an association from the observation needs it.
-pub(crate) struct ObjectView {
-    pub(crate) camera_from_object: RigidTransform,
-    pub(crate) object_from_camera: RigidTransform,
-    /// The camera's centre in the object frame.
-    pub(crate) eye: Point3<f32>,
-}
-
-impl ObjectView {
-    /// Returns `None` for a pose that is not finite.
-    pub(crate) fn new(camera_from_object: &Isometry3<f64>) -> Option<Self> {
-        let object_from_camera = camera_from_object.inverse();
-        se3::is_finite(&object_from_camera).then(|| Self {
-            camera_from_object: RigidTransform::new(camera_from_object),
-            object_from_camera: RigidTransform::new(&object_from_camera),
-            eye: Point3::from(object_from_camera.translation.vector.cast::<f32>()),
-        })
-    }
-}
-
-/// Returns whether a surface element can be seen from `eye`, as far as its own orientation says.
-#[inline]
-pub(crate) fn faces(normal: &UnitVector3<f32>, point: &Point3<f32>, eye: &Point3<f32>) -> bool {
-    normal.dot(&(eye - point)) > 0.0
-}
+/// Triangles of a leaf: fewer than points, because the distance to a triangle costs more than that to a point.
+const LEAF_SIZE: usize = 4;
 
 /// The triangles of a mesh in the order of the tree's leaves.
 struct MeshFaces {
-    tree: BoxTree,
+    tree: BoxTree<LEAF_SIZE>,
     faces: Vec<Face>,
     /// Whether normals are known to point out of the object.
     oriented: bool,
@@ -114,6 +85,33 @@ struct Face {
     corners: [Point3<f32>; 3],
     normal: UnitVector3<f32>,
     triangle: u32,
+}
+
+impl Element for Face {
+    fn bounds(&self) -> Bounds {
+        let [a, b, c] = &self.corners;
+        Bounds {
+            min: a.inf(b).inf(c),
+            max: a.sup(b).sup(c),
+        }
+    }
+
+    fn center(&self) -> Point3<f32> {
+        let Bounds { min, max } = self.bounds();
+        Point3::from((min.coords + max.coords) * 0.5)
+    }
+}
+
+impl Face {
+    /// Returns the closest point of the triangle and its squared distance.
+    #[inline(always)]
+    fn closest(&self, query: &Point3<f32>) -> (Point3<f32>, f32) {
+        let query = query.cast::<f64>();
+        let closest = closest_point(&query, &self.corners.map(|corner| corner.cast::<f64>()));
+        #[allow(clippy::cast_possible_truncation)] // The tree compares in `f32`.
+        let distance_squared = (closest - query).norm_squared() as f32;
+        (closest.cast::<f32>(), distance_squared)
+    }
 }
 
 impl MeshFaces {
@@ -139,46 +137,42 @@ impl MeshFaces {
             })
             .collect();
         let mut tree = BoxTree::default();
-        tree.rebuild(faces.len(), |element| {
-            let [a, b, c] = faces[element as usize].corners;
-            Bounds {
-                min: a.inf(&b).inf(&c),
-                max: a.sup(&b).sup(&c),
-            }
-        });
-        // Leaf order: a leaf is then one stretch of memory.
-        let faces = tree
-            .order()
-            .iter()
-            .map(|element| faces[*element as usize])
-            .collect();
+        tree.rebuild(&faces);
+        let in_order = tree.order().iter().map(|i| faces[*i as usize]);
         Self {
+            faces: in_order.collect(),
             tree,
-            faces,
             oriented: mesh.is_closed(),
         }
     }
+}
 
-    /// Returns the closest triangle and the surfel there, in the object frame.
-    fn closest(
-        &self,
-        query: &Point3<f32>,
-        eye: &Point3<f32>,
-        visible_only: bool,
-    ) -> Option<(u32, Surfel)> {
-        let exact = query.cast::<f64>();
-        let on_face =
-            |face: &Face| closest_point(&exact, &face.corners.map(|corner| corner.cast::<f64>()));
-        let found = self.tree.nearest(query, |slot| {
-            let face = &self.faces[slot];
-            let hidden =
-                visible_only && self.oriented && !faces(&face.normal, &face.corners[0], eye);
-            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of the tree.
-            (!hidden).then(|| (on_face(face) - exact).norm_squared() as f32)
-        })?;
-        let face = &self.faces[found.slot];
-        let point = on_face(face).cast::<f32>();
-        let normal = if self.oriented || faces(&face.normal, &point, eye) {
+struct ClosestFace<'a> {
+    mesh: &'a MeshFaces,
+    visible_only: bool,
+}
+
+impl IndexedSurface for ClosestFace<'_> {
+    #[inline(always)]
+    fn closest(&self, query: &Point3<f32>, eye: &Point3<f32>) -> Option<(u32, Surfel)> {
+        let mut best: Option<(&Face, Point3<f32>)> = None;
+        let mut bound = f32::MAX;
+        let mut leaves = self.mesh.tree.leaves_near(query);
+        while let Some(slots) = leaves.next(bound) {
+            for face in &self.mesh.faces[slots] {
+                if self.visible_only && !faces(&face.normal, &face.corners[0], eye) {
+                    continue;
+                }
+                let (point, distance) = face.closest(query);
+                let earlier = best.is_none_or(|(best, _)| face.triangle < best.triangle);
+                if distance < bound || (distance == bound && earlier) {
+                    bound = distance;
+                    best = Some((face, point));
+                }
+            }
+        }
+        let (face, point) = best?;
+        let normal = if self.mesh.oriented || faces(&face.normal, &point, eye) {
             face.normal
         } else {
             -face.normal

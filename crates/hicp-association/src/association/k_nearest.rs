@@ -4,7 +4,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
-use crate::search::box_tree::Found;
+use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
@@ -12,7 +12,7 @@ use crate::stride::Stride;
 /// Pairs every model point with each of its k closest observed points, at a weight of 1/k each.
 ///
 /// The soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec (2002): the k matches
-/// average out part of the noise of single ones, at the price of a bias toward the middle of the neighbourhood. A model
+/// average out part of the noise of single ones, at the price of a bias toward the middle of the neighborhood. A model
 /// point has a total weight of 1, also where fewer than k points were observed. Pairs of one point are in order of distance,
 /// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k²) at most per point, for k is meant to be small.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct KNearest {
     pub k: usize,
     /// Which observed pixels are searched.
     pub targets: Stride,
-    found: Scratch<Vec<Found>>,
+    found: Scratch<Vec<Nearest>>,
 }
 
 impl KNearest {
@@ -54,16 +54,22 @@ impl DataAssociation for KNearest {
         let Some(observation) = context.problem.observation() else {
             return;
         };
-        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
+        let observed = ObservedPoints::<PointTree>::of(observation, self.targets);
         let mover = RigidTransform::new(camera_from_object);
         let found = &mut self.found.0;
-        pairs.reserve(source.len().saturating_mul(self.k.max(1).min(index.len())));
+        pairs.reserve(
+            source
+                .len()
+                .saturating_mul(self.k.max(1).min(observed.len())),
+        );
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            observed
+                .index()
+                .nearest_n(&source.point, self.k.max(1), found);
             let weight = 1.0 / found.len() as f32;
             for neighbor in &*found {
-                let (target_index, target) = index.get(neighbor.element);
+                let (target_index, target) = observed.get(neighbor.element);
                 pairs.push(Pair {
                     weight,
                     ..Pair::new(source_index, source, target_index, target)

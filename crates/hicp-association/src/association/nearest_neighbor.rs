@@ -1,29 +1,89 @@
-//! Nearest-neighbour data association.
+//! Nearest-neighbor data association.
 
-use hicp_core::{Context, Correspondences, Isometry3, Pair, Point3, RigidTransform, Surfel};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::{Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
+use crate::scratch::Scratch;
+#[cfg(feature = "kiddo")]
+use crate::search::kd_tree::KdTree;
+use crate::search::nearest::PointIndex;
 use crate::search::observed_points::ObservedPoints;
+use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
 
-/// Pairs every model point with the closest observed point (§III-A.1; Besl & McKay 1992), through a k-d tree.
+/// Pairs every model point with the closest observed point (§III-A.1; Besl & McKay 1992).
 ///
-/// The tree over the observed surfels is built once per observation and stride and shared by all threads and hypotheses.
-/// An observation without surfels gives no pairs. Cost: O(n log n) once per observation, then O(log n) per point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The index over the observed surfels is built once per observation, stride and kind of index, and shared by all threads
+/// and hypotheses. An observation without surfels gives no pairs. Cost: O(n log n) once per observation, then O(log n) per
+/// point.
+#[derive(Clone, Debug, PartialEq)]
 pub struct NearestNeighbor {
-    /// Which observed pixels enter the tree. A tree that fits the cache answers several times faster, at hardly any loss of accuracy.
+    /// Observed pixels that enter the index. An index that fits the cache is searched several times faster, at hardly any
+    /// loss of accuracy.
     pub targets: Stride,
+    /// Index that is searched.
+    pub index: SearchIndex,
+    /// For each source point, the element of the index that it was paired with last.
+    last: Scratch<Vec<u32>>,
+}
+
+/// Index that [`NearestNeighbor`] searches.
+///
+/// Both find an exact nearest neighbor. They differ in time, and in which of several equally near points they return.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SearchIndex {
+    /// A tree of bounding boxes, eight to a node. The presets use it.
+    ///
+    /// A search starts from the pair of the last iteration and visits only boxes that may hold something nearer (compare
+    /// Greenspan & Godin 2001). Along a registration a point moves little, so few boxes remain. Of equally near points, the
+    /// first in the image is returned. The result does not depend on where the search starts.
+    #[default]
+    BoxTree,
+    /// kiddo's k-d tree. Of equally near points, any may be returned.
+    #[cfg(feature = "kiddo")]
+    KdTree,
+}
+
+impl NearestNeighbor {
+    /// Creates the association.
+    #[must_use]
+    pub fn new(targets: Stride, index: SearchIndex) -> Self {
+        Self {
+            targets,
+            index,
+            last: Scratch::default(),
+        }
+    }
+
+    fn search<T: PointIndex>(
+        &mut self,
+        observation: &Observation,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        let observed = ObservedPoints::<T>::of(observation, self.targets);
+        let last = &mut self.last.0;
+        // Any element is a valid start, so elements that another run left behind cost time at worst.
+        last.resize(source.len(), 0);
+        pairs.reserve(source.len());
+        vectorized(Search {
+            observed: &observed,
+            source,
+            camera_from_object: RigidTransform::new(camera_from_object),
+            last,
+            pairs,
+        });
+    }
 }
 
 impl Default for NearestNeighbor {
-    /// About 4,000 observed points.
+    /// About 4,000 observed points in a box tree.
     // Deviation: §III-A.1 searches all of C; a strided C is faster to search at hardly any loss of accuracy. `Stride::Pixels(1)` searches all.
     fn default() -> Self {
-        Self {
-            targets: Stride::AboutPoints(4000),
-        }
+        Self::new(Stride::AboutPoints(4000), SearchIndex::default())
     }
 }
 
@@ -38,14 +98,13 @@ impl DataAssociation for NearestNeighbor {
         let Some(observation) = context.problem.observation() else {
             return;
         };
-        let index = ObservedPoints::of(observation, self.targets, KdTree::new);
-        let mover = RigidTransform::new(camera_from_object);
-        pairs.reserve(source.len());
-        for (source_index, surfel) in (0..).zip(source) {
-            let source = mover.surfel(surfel);
-            if let Some(element) = index.tree().nearest(&source.point) {
-                let (target_index, target) = index.get(element);
-                pairs.push(Pair::new(source_index, source, target_index, target));
+        match self.index {
+            SearchIndex::BoxTree => {
+                self.search::<PointTree>(observation, source, camera_from_object, pairs);
+            }
+            #[cfg(feature = "kiddo")]
+            SearchIndex::KdTree => {
+                self.search::<KdTree>(observation, source, camera_from_object, pairs);
             }
         }
     }
@@ -55,30 +114,28 @@ impl DataAssociation for NearestNeighbor {
     }
 }
 
-/// `None` when there is nothing to find: the tree would answer with item 0 at an infinite distance.
-struct KdTree(Option<ImmutableKdTree<f32, 3>>);
+struct Search<'a, T> {
+    observed: &'a ObservedPoints<T>,
+    source: &'a [Surfel],
+    camera_from_object: RigidTransform,
+    last: &'a mut [u32],
+    pairs: &'a mut Correspondences,
+}
 
-impl KdTree {
-    #[allow(clippy::needless_pass_by_value)] // As every tree over observed points is built.
-    fn new(points: Vec<Point3<f32>>) -> Self {
-        let points: Vec<[f32; 3]> = points.iter().map(|point| (*point).into()).collect();
-        let filled = !points.is_empty();
-        Self(
-            filled
-                .then(|| ImmutableKdTree::new_from_slice(&points).ok())
-                .flatten(),
-        )
-    }
+impl<T: PointIndex> VectorLoop for Search<'_, T> {
+    type Output = ();
 
-    fn nearest(&self, query: &Point3<f32>) -> Option<u32> {
-        let query: [f32; 3] = (*query).into();
-        let found = self
-            .0
-            .as_ref()?
-            .query(&query)
-            .nearest_one::<SquaredEuclidean<f32>>()
-            .execute();
-        // A query that is not finite "finds" item 0 at an infinite distance.
-        found.distance.is_finite().then_some(found.item)
+    #[inline(always)]
+    fn run(self) {
+        for ((source_index, surfel), last) in (0..).zip(self.source).zip(self.last) {
+            let source = self.camera_from_object.surfel(surfel);
+            let start = self.observed.start_at(*last, &source.point);
+            let found = self.observed.index().nearest_from(&source.point, start);
+            let Some(element) = found else { continue };
+            *last = element;
+            let (target_index, target) = self.observed.get(element);
+            self.pairs
+                .push(Pair::new(source_index, source, target_index, target));
+        }
     }
 }

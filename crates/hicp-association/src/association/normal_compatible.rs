@@ -1,11 +1,11 @@
-//! Nearest neighbours of a similar orientation.
+//! Nearest neighbors of a similar orientation.
 
 use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::filter::max_normal_angle::min_cosine;
 use crate::scratch::Scratch;
-use crate::search::box_tree::Found;
+use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
@@ -13,7 +13,7 @@ use crate::stride::Stride;
 /// Pairs every model point with the closest observed point whose normal is compatible (Godin et al. 1994; Pulli 1999).
 ///
 /// Among the k closest observed points, the closest with n·m ≥ cos θ_max; no pair when none is. Where two sheets of the
-/// surface run side by side (a mug's wall, a thin plate) the plain nearest neighbour sits on the wrong one, and rejecting it
+/// surface run side by side (a mug's wall, a thin plate) the plain nearest neighbor sits on the wrong one, and rejecting it
 /// afterwards leaves the point without a pair; this finds the one behind it. Cost: O(log n + k²) at most per point, for k is meant to be small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalCompatible {
@@ -23,7 +23,7 @@ pub struct NormalCompatible {
     pub k: usize,
     /// Which observed pixels are searched.
     pub targets: Stride,
-    found: Scratch<Vec<Found>>,
+    found: Scratch<Vec<Nearest>>,
 }
 
 impl NormalCompatible {
@@ -57,17 +57,19 @@ impl DataAssociation for NormalCompatible {
         let Some(observation) = context.problem.observation() else {
             return;
         };
-        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
+        let observed = ObservedPoints::<PointTree>::of(observation, self.targets);
         let mover = RigidTransform::new(camera_from_object);
         let min_cosine = min_cosine(self.max_angle_degrees);
         let found = &mut self.found.0;
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            observed
+                .index()
+                .nearest_n(&source.point, self.k.max(1), found);
             let compatible = found
                 .iter()
-                .map(|neighbor| index.get(neighbor.element))
+                .map(|neighbor| observed.get(neighbor.element))
                 .find(|(_, target)| source.normal.dot(&target.normal) >= min_cosine);
             if let Some((target_index, target)) = compatible {
                 pairs.push(Pair::new(source_index, source, target_index, target));

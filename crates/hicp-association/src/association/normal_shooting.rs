@@ -5,7 +5,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 use crate::association::data_association::DataAssociation;
 use crate::length::Length;
 use crate::scratch::Scratch;
-use crate::search::box_tree::Found;
+use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
@@ -14,7 +14,7 @@ use crate::stride::Stride;
 ///
 /// The intersection of the line (p, n) with the observed surface, in the form for point sets: among the k observed points
 /// closest to p, the one with the smallest distance |(c − p) − n (n·(c − p))| to the line; of equally distant ones the one
-/// closest to p. Both directions of the line count. Settles faster than the nearest neighbour on smooth surfaces, and is
+/// closest to p. Both directions of the line count. Settles faster than the nearest neighbor on smooth surfaces, and is
 /// less stable on noisy or complex ones (Rusinkiewicz & Levoy 2001). Cost: O(n log n) once per observation, then O(log n +
 /// k) per point.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct NormalShooting {
     pub max_offset: Option<Length>,
     /// Which observed pixels are searched.
     pub targets: Stride,
-    found: Scratch<Vec<Found>>,
+    found: Scratch<Vec<Nearest>>,
 }
 
 impl NormalShooting {
@@ -61,7 +61,7 @@ impl DataAssociation for NormalShooting {
         let Some(observation) = context.problem.observation() else {
             return;
         };
-        let index = ObservedPoints::of(observation, self.targets, PointTree::new);
+        let observed = ObservedPoints::<PointTree>::of(observation, self.targets);
         let mover = RigidTransform::new(camera_from_object);
         let limit = self
             .max_offset
@@ -70,10 +70,12 @@ impl DataAssociation for NormalShooting {
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            index.tree().nearest_n(&source.point, self.k.max(1), found);
+            observed
+                .index()
+                .nearest_n(&source.point, self.k.max(1), found);
             let mut best: Option<(f32, u32, Surfel)> = None;
             for neighbor in &*found {
-                let (target_index, target) = index.get(neighbor.element);
+                let (target_index, target) = observed.get(neighbor.element);
                 let offset = distance_to_line(&source, &target);
                 if best.is_none_or(|(smallest, _, _)| offset < smallest) {
                     best = Some((offset, target_index, target));

@@ -111,8 +111,7 @@ impl PixelGrid {
             v_min: region.v_min as f32,
             width: width as f32,
             height: height as f32,
-            // The side of an accepted image fits.
-            stride: u32::try_from(width).unwrap_or(0),
+            stride: region.u_max - region.u_min,
         }
     }
 

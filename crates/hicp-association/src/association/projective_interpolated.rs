@@ -17,7 +17,7 @@ use crate::association::pixel_projection::PixelProjection;
 /// point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveInterpolated {
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth. 0, negative
+    /// Largest difference in depth between neighboring pixels of one surface, as a fraction of the depth. 0, negative
     /// values and NaN interpolate only between equal depths or nowhere.
     pub max_step: f32,
 }

@@ -4,12 +4,12 @@ use hicp_core::{Context, Correspondences, Isometry3, Observation, Pair, RigidTra
 
 use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::PixelProjection;
-use crate::search::box_tree::distance_squared;
+use crate::search::nearest::distance_squared;
 
 /// Pairs a model point with the closest observed point within a window around the pixel that it projects to
 /// (Benjemaa & Schmitt 1997; Dorai et al. 1998).
 ///
-/// Between [`crate::Projective`], which it equals at radius 0, and a nearest-neighbour search: a window of ±r pixels
+/// Between [`crate::Projective`], which it equals at radius 0, and a nearest-neighbor search: a window of ±r pixels
 /// bridges misalignments and holes of r pixels and needs no tree. Closest in three dimensions; of equally close points the
 /// first in row-major order. The window is cut at the border of the observed region, but a point that projects outside the
 /// image has no pair. Cost: O((2r + 1)²) per point.
@@ -82,12 +82,12 @@ fn closest(
     for row in rows {
         let from = column.saturating_sub(radius).max(region.u_min);
         let to = (column + radius + 1).min(region.u_max);
-        let Some(first) = region.index(from, row) else {
+        if from >= to {
             continue;
-        };
-        // At most 2³⁰ pixels in any accepted image.
-        let first = u32::try_from(first).unwrap_or(u32::MAX);
-        for index in (first..).take(to.saturating_sub(from) as usize) {
+        }
+        // Fits: an accepted image has at most 2³⁰ pixels.
+        let first = (row - region.v_min) * (region.u_max - region.u_min) + (from - region.u_min);
+        for index in first..first + (to - from) {
             let Some(target) = observation.surfel(index) else {
                 continue;
             };

@@ -1,16 +1,16 @@
-//! Mutual nearest neighbours.
+//! Mutual nearest neighbors.
 
 use hicp_core::{Context, Correspondences, Isometry3, Point3, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
-use crate::search::box_tree::distance_squared;
+use crate::search::nearest::distance_squared;
 use crate::search::point_tree::PointTree;
 
 /// Keeps those pairs of another association in which no other model point is closer to the target (Pajdla & Van Gool 1995,
 /// ε = 0).
 ///
-/// With a nearest-neighbour association inside, the pairs that are mutually nearest: model points without a counterpart (the
+/// With a nearest-neighbor association inside, the pairs that are mutually nearest: model points without a counterpart (the
 /// hidden side, what the mask cut off) lose theirs to the points in front of them. Model points equally close to the target
 /// are kept alike. The distance is taken to all moved points of the selection, whether they have a pair or not; the inner
 /// association must start from these, so one that starts from the observation does not belong here.
@@ -60,7 +60,7 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
                 .map(|surfel| mover.point(&surfel.point))
                 .filter(|point| point.iter().all(|x| x.is_finite())),
         );
-        tree.rebuild(points.len(), |i| points[i]);
+        tree.rebuild(points);
         pairs.retain(|pair| {
             let own = distance_squared(&pair.target.point, &pair.source.point);
             tree.nearest(&pair.target.point)

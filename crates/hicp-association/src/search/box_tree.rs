@@ -1,12 +1,16 @@
 //! A tree of axis-aligned boxes for exact nearest-element queries.
 
+use std::ops::Range;
+
 use hicp_core::Point3;
 use hicp_core::internal::Work;
 
-/// Elements per leaf: small enough to prune, large enough that a leaf is a short scan.
-const LEAF_SIZE: usize = 8;
-/// A tree that halves its elements at every level is at most this deep; so is the stack of a query.
-const MAX_DEPTH: usize = 64;
+/// Children of a node.
+const WIDTH: usize = 8;
+/// Upper bound on the number of levels of a tree over 2³² elements whose nodes are at least half full.
+const MAX_DEPTH: usize = 16;
+/// Marks a child that is a leaf.
+const LEAF: u32 = 1 << 31;
 /// Rounding may put the computed distance of a box a few units in the last place beyond that of an element inside it.
 const PRUNING_SLACK: f32 = 1.0 - 1.0e-6;
 
@@ -24,233 +28,232 @@ impl Bounds {
             max: self.max.sup(&other.max),
         }
     }
+}
+
+/// An element that a [`BoxTree`] can hold. All coordinates must be finite.
+pub(crate) trait Element {
+    /// Returns the smallest box around the element.
+    fn bounds(&self) -> Bounds;
+
+    /// Returns the point by which elements are divided between boxes.
+    fn center(&self) -> Point3<f32>;
+}
+
+impl Element for Point3<f32> {
+    fn bounds(&self) -> Bounds {
+        Bounds {
+            min: *self,
+            max: *self,
+        }
+    }
 
     fn center(&self) -> Point3<f32> {
-        Point3::from((self.min.coords + self.max.coords) * 0.5)
-    }
-
-    fn distance_squared(&self, point: &Point3<f32>) -> f32 {
-        let gap = |axis: usize| {
-            (self.min[axis] - point[axis])
-                .max(point[axis] - self.max[axis])
-                .max(0.0)
-        };
-        let (x, y, z) = (gap(0), gap(1), gap(2));
-        x * x + y * y + z * z
+        *self
     }
 }
 
-/// Returns |a − b|², the same bits for (b, a).
-#[inline]
-pub(crate) fn distance_squared(a: &Point3<f32>, b: &Point3<f32>) -> f32 {
-    let (x, y, z) = (a.x - b.x, a.y - b.y, a.z - b.z);
-    x * x + y * y + z * z
-}
-
-/// An element that a query found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Found {
-    /// Squared distance, m², finite.
-    pub(crate) distance_squared: f32,
-    /// Which element, by the order in which they were given to the tree.
-    pub(crate) element: u32,
-    /// Where the element lies in the tree's own order, see [`BoxTree::order`].
-    pub(crate) slot: usize,
-}
-
-impl Found {
-    /// Nearer first; of equally near elements the one given first.
-    fn precedes(&self, other: &Self) -> bool {
-        self.distance_squared < other.distance_squared
-            || (self.distance_squared == other.distance_squared && self.element < other.element)
-    }
-}
-
+/// Eight boxes: `min[axis][child]`.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    bounds: Bounds,
-    /// A leaf's first slot; an inner node's second child (its first child is the next node).
-    first: u32,
-    /// A leaf's number of slots; 0 for an inner node.
-    count: u32,
+    min: [[f32; WIDTH]; 3],
+    max: [[f32; WIDTH]; 3],
+    /// Index of a node, or of a leaf with [`LEAF`] set. Missing children are boxes at infinity.
+    child: [u32; WIDTH],
 }
 
-/// A balanced tree of boxes over elements of any shape; whoever asks says how far an element is.
+/// A tree of boxes with eight children per node, so that a node takes a few vector operations.
 ///
-/// Answers are exact and depend on the elements alone: ties go to the element given first. Building splits at the median of
-/// the longest extent, O(n log n), and reuses the memory of the tree before; queries allocate nothing.
+/// The tree divides elements of any shape and leaves the distance of an element to its owner. The owner keeps a copy of the
+/// elements in the tree's order ([`BoxTree::order`]), in which the elements of a leaf are consecutive. A position in that
+/// order is called a slot. Every leaf but the last has exactly `LEAF_SIZE` slots.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct BoxTree {
+pub(crate) struct BoxTree<const LEAF_SIZE: usize> {
     nodes: Vec<Node>,
     order: Vec<u32>,
 }
 
-impl BoxTree {
-    /// Builds the tree over elements 0..count anew. All bounds must be finite.
-    pub(crate) fn rebuild(&mut self, count: usize, bounds: impl Fn(u32) -> Bounds) {
+impl<const LEAF_SIZE: usize> BoxTree<LEAF_SIZE> {
+    /// Replaces the tree by one over `elements` and reuses its memory. Cost: O(n log n).
+    pub(crate) fn rebuild(&mut self, elements: &[impl Element]) {
         self.nodes.clear();
-        self.order.clear();
-        self.order.extend((0_u32..).take(count));
-        if count > 0 {
-            self.split(0, count, &bounds);
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
+        order.extend((0_u32..).take(elements.len()));
+        if !order.is_empty() {
+            self.build(elements, &mut order, 0);
         }
+        self.order = order;
     }
 
-    fn split(&mut self, from: usize, to: usize, bounds_of: &impl Fn(u32) -> Bounds) {
-        let order = &mut self.order[from..to];
-        let first = bounds_of(order[0]);
-        let (mut bounds, center) = (first, first.center());
-        let mut centers = Bounds {
-            min: center,
-            max: center,
-        };
-        for element in &order[1..] {
-            let other = bounds_of(*element);
-            let center = other.center();
-            bounds = bounds.join(&other);
-            centers = centers.join(&Bounds {
-                min: center,
-                max: center,
-            });
-        }
-        let node = self.nodes.len();
-        let count = to - from;
-        // Slots and nodes are fewer than 2³²: elements are counted in u32.
-        #[allow(clippy::cast_possible_truncation)]
-        self.nodes.push(Node {
-            bounds,
-            first: from as u32,
-            count: if count <= LEAF_SIZE { count as u32 } else { 0 },
-        });
-        if count <= LEAF_SIZE {
-            return;
-        }
-        let axis = (centers.max - centers.min).imax();
-        let key = |element: u32| bounds_of(element).center()[axis];
-        // The index makes the order total, so the tree does not depend on how the selection works.
-        order.select_nth_unstable_by(count / 2, |a, b| {
-            key(*a).total_cmp(&key(*b)).then_with(|| a.cmp(b))
-        });
-        let middle = from + count / 2;
-        self.split(from, middle, bounds_of);
-        #[allow(clippy::cast_possible_truncation)]
-        let second = self.nodes.len() as u32;
-        self.nodes[node].first = second;
-        self.split(middle, to, bounds_of);
-    }
-
-    /// The elements in the order of the leaves; an owner that keeps their data in this order scans leaves without jumps.
+    /// Returns the indices of the elements, slot by slot.
     pub(crate) fn order(&self) -> &[u32] {
         &self.order
     }
 
-    /// Returns the nearest element; `None` without one, and for a query that is not finite.
-    ///
-    /// `distance_squared(slot)` is the squared distance of the element at a slot, `None` for one that must not be found.
-    #[inline]
-    pub(crate) fn nearest(
-        &self,
-        query: &Point3<f32>,
-        distance_squared: impl Fn(usize) -> Option<f32>,
-    ) -> Option<Found> {
-        let mut best: Option<Found> = None;
-        self.visit(
-            query,
-            |found| {
-                if best.is_none_or(|best| found.precedes(&best)) {
-                    best = Some(found);
-                }
-                best.map_or(f32::INFINITY, |best| best.distance_squared)
-            },
-            distance_squared,
-        );
-        best
+    /// Builds the node over the slots from `first` on, which hold `order`; returns its index.
+    fn build(&mut self, elements: &[impl Element], order: &mut [u32], mut first: usize) -> u32 {
+        // There are fewer nodes and leaves than elements, which are counted in `u32`.
+        #[allow(clippy::cast_possible_truncation)]
+        let index = self.nodes.len() as u32;
+        self.nodes.push(Node {
+            min: [[f32::INFINITY; WIDTH]; 3],
+            max: [[f32::INFINITY; WIDTH]; 3],
+            child: [LEAF; WIDTH],
+        });
+        let halve = |order| halve::<LEAF_SIZE>(elements, order);
+        let (a, b) = halve(order);
+        let ((a, b), (c, d)) = (halve(a), halve(b));
+        let quarters = [a, b, c, d];
+        let parts = quarters.map(halve);
+        for (slot, part) in parts.into_iter().flat_map(|(a, b)| [a, b]).enumerate() {
+            if part.is_empty() {
+                continue;
+            }
+            let Bounds { min, max } = bounds(elements, part);
+            let length = part.len();
+            #[allow(clippy::cast_possible_truncation)]
+            let child = if length <= LEAF_SIZE {
+                (first / LEAF_SIZE) as u32 | LEAF
+            } else {
+                self.build(elements, part, first)
+            };
+            first += length;
+            let node = &mut self.nodes[index as usize];
+            node.child[slot] = child;
+            for axis in 0..3 {
+                node.min[axis][slot] = min[axis];
+                node.max[axis][slot] = max[axis];
+            }
+        }
+        index
     }
 
-    /// Replaces the content of `found` by the `count` nearest elements, nearest first.
-    pub(crate) fn nearest_n(
-        &self,
-        query: &Point3<f32>,
-        count: usize,
-        found: &mut Vec<Found>,
-        distance_squared: impl Fn(usize) -> Option<f32>,
-    ) {
-        found.clear();
-        if count == 0 {
-            return;
+    /// Starts a search for the elements nearest to a point. A query that is not finite is near nothing.
+    #[inline(always)]
+    pub(crate) fn leaves_near(&self, query: &Point3<f32>) -> LeavesNear<'_, LEAF_SIZE> {
+        let finite = query.iter().all(|x| x.is_finite());
+        LeavesNear {
+            tree: self,
+            query: [query.x, query.y, query.z],
+            stack: [(0, 0.0); MAX_DEPTH * WIDTH],
+            depth: usize::from(finite && !self.nodes.is_empty()),
         }
-        self.visit(
-            query,
-            |next| {
-                if found.len() < count || found.last().is_some_and(|last| next.precedes(last)) {
-                    if found.len() == count {
-                        found.pop();
-                    }
-                    let position = found.partition_point(|other| other.precedes(&next));
-                    found.insert(position, next);
-                }
-                match found.last() {
-                    Some(last) if found.len() == count => last.distance_squared,
-                    _ => f32::INFINITY,
-                }
-            },
-            distance_squared,
-        );
     }
+}
 
-    /// Shows the elements to `take`, near boxes first, until none can be nearer than the bound that `take` returned last.
-    #[inline]
-    fn visit(
-        &self,
-        query: &Point3<f32>,
-        mut take: impl FnMut(Found) -> f32,
-        distance_squared: impl Fn(usize) -> Option<f32>,
-    ) {
-        if self.nodes.is_empty() || !query.iter().all(|x| x.is_finite()) {
-            return;
-        }
-        let mut bound = f32::INFINITY;
-        let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH];
-        let mut depth = 1;
-        let mut visited = 0;
-        while depth > 0 {
-            depth -= 1;
-            let (index, distance) = stack[depth];
+/// Returns the smallest box around some elements, which must not be none.
+fn bounds(elements: &[impl Element], order: &[u32]) -> Bounds {
+    let boxes = order.iter().map(|i| elements[*i as usize].bounds());
+    boxes
+        .reduce(|a, b| a.join(&b))
+        .unwrap_or_else(|| unreachable!("a part without elements has no box"))
+}
+
+/// Splits at the median of the longest extent of the centers, so that the first half has whole leaves. A single leaf is not
+/// split.
+fn halve<'a, const LEAF_SIZE: usize>(
+    elements: &[impl Element],
+    order: &'a mut [u32],
+) -> (&'a mut [u32], &'a mut [u32]) {
+    if order.len() <= LEAF_SIZE {
+        return (order, &mut []);
+    }
+    let center = |element: u32| elements[element as usize].center();
+    let first = center(order[0]);
+    let (min, max) = order.iter().fold((first, first), |(min, max), element| {
+        let center = center(*element);
+        (min.inf(&center), max.sup(&center))
+    });
+    let axis = (max - min).imax();
+    let middle = (order.len() / 2)
+        .next_multiple_of(LEAF_SIZE)
+        .min(order.len() - 1);
+    // The index makes the order total, so the tree does not depend on how the selection works.
+    order.select_nth_unstable_by(middle, |a, b| {
+        (center(*a)[axis].total_cmp(&center(*b)[axis])).then_with(|| a.cmp(b))
+    });
+    order.split_at_mut(middle)
+}
+
+/// A search of a [`BoxTree`] that yields leaves, near ones first.
+#[derive(Debug)]
+pub(crate) struct LeavesNear<'a, const LEAF_SIZE: usize> {
+    tree: &'a BoxTree<LEAF_SIZE>,
+    query: [f32; 3],
+    /// Nodes and leaves to visit, with their squared distances.
+    stack: [(u32, f32); MAX_DEPTH * WIDTH],
+    depth: usize,
+}
+
+impl<const LEAF_SIZE: usize> LeavesNear<'_, LEAF_SIZE> {
+    /// Returns the slots of the next leaf that may hold an element at a squared distance of at most `bound`, which must be
+    /// finite. The bound may shrink from call to call.
+    #[inline(always)]
+    pub(crate) fn next(&mut self, bound: f32) -> Option<Range<usize>> {
+        while self.depth > 0 {
+            self.depth -= 1;
+            let (index, distance) = self.stack[self.depth];
             if distance * PRUNING_SLACK > bound {
                 continue;
             }
-            visited += 1;
-            let node = &self.nodes[index as usize];
-            if node.count > 0 {
-                let from = node.first as usize;
-                for slot in from..from + node.count as usize {
-                    let Some(distance_squared) = distance_squared(slot) else {
-                        continue;
-                    };
-                    if distance_squared <= bound && distance_squared.is_finite() {
-                        bound = take(Found {
-                            distance_squared,
-                            element: self.order[slot],
-                            slot,
-                        });
-                    }
-                }
-                continue;
+            Work::NodesVisited.count(1);
+            if index & LEAF != 0 {
+                let first = (index & !LEAF) as usize * LEAF_SIZE;
+                return Some(first..self.tree.order.len().min(first + LEAF_SIZE));
             }
-            let children = [index + 1, node.first].map(|child| {
-                let bounds = &self.nodes[child as usize].bounds;
-                (child, bounds.distance_squared(query))
-            });
-            let (near, far) = if children[0].1 <= children[1].1 {
-                (children[0], children[1])
-            } else {
-                (children[1], children[0])
-            };
-            // Invariant: every level leaves at most one node behind, so the stack never holds more than the depth plus one.
-            stack[depth] = far;
-            stack[depth + 1] = near;
-            depth += 2;
+            let tree = self.tree;
+            self.push_children(&tree.nodes[index as usize], bound);
         }
-        Work::NodesVisited.count(visited);
+        None
+    }
+
+    /// Pushes the children that may be near enough, in any order except that the nearest one is on top.
+    #[inline(always)]
+    fn push_children(&mut self, node: &Node, bound: f32) {
+        let distances = node.distances(&self.query);
+        // Finite, so that missing children are left out.
+        let limit = (bound / PRUNING_SLACK).min(f32::MAX);
+        let mut near = 0;
+        for (slot, distance) in distances.iter().enumerate() {
+            near |= u32::from(*distance <= limit) << slot;
+        }
+        let mut nearest = (0, f32::INFINITY);
+        while near != 0 {
+            let slot = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let mut found = (node.child[slot], distances[slot]);
+            if found.1 < nearest.1 {
+                std::mem::swap(&mut nearest, &mut found);
+            }
+            if found.1 < f32::INFINITY {
+                self.push(found);
+            }
+        }
+        if nearest.1 < f32::INFINITY {
+            self.push(nearest);
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, child: (u32, f32)) {
+        self.stack[self.depth] = child;
+        self.depth += 1;
+    }
+}
+
+impl Node {
+    /// Returns the squared distances of the boxes from a point.
+    #[inline(always)]
+    fn distances(&self, query: &[f32; 3]) -> [f32; WIDTH] {
+        let mut distances = [0.0; WIDTH];
+        for ((query, min), max) in query.iter().zip(&self.min).zip(&self.max) {
+            for ((distance, min), max) in distances.iter_mut().zip(min).zip(max) {
+                let (below, above) = (min - query, query - max);
+                let gap = if below > above { below } else { above };
+                let gap = if gap > 0.0 { gap } else { 0.0 };
+                *distance += gap * gap;
+            }
+        }
+        distances
     }
 }

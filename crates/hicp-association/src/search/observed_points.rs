@@ -4,46 +4,59 @@ use std::sync::Arc;
 
 use hicp_core::{Observation, Point3, Surfel};
 
+use crate::search::nearest::{Nearest, PointIndex, distance_squared};
 use crate::stride::Stride;
 
-/// The observed surfels of one stride with their indices, and a tree over their positions.
+/// The observed surfels of one stride with their indices, and an index over their positions.
+///
+/// The index numbers the surfels from 0 in the order of the image.
 pub(crate) struct ObservedPoints<T> {
     surfels: Vec<(u32, Surfel)>,
-    tree: T,
+    index: T,
 }
 
-impl<T: Send + Sync + 'static> ObservedPoints<T> {
-    /// Built once per observation, stride and kind of tree, shared by all threads and hypotheses.
-    ///
-    /// `plant` makes the tree over the positions; an observation's surfels are finite by construction.
-    pub(crate) fn of(
-        observation: &Observation,
-        targets: Stride,
-        plant: impl Fn(Vec<Point3<f32>>) -> T,
-    ) -> Arc<Self> {
+impl<T: PointIndex> ObservedPoints<T> {
+    /// Returns the points of a stride. They are built once per observation, stride and kind of index, and shared by all
+    /// threads and hypotheses.
+    pub(crate) fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
         let stride = targets.pixels(observation.n_surfels());
         observation.derived().get_or_build(u64::from(stride), || {
             let surfels: Vec<(u32, Surfel)> =
                 observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
-            let tree = plant(surfels.iter().map(|(_, s)| s.point).collect());
-            Self { surfels, tree }
+            // An observation's surfels are finite by construction.
+            let points: Vec<Point3<f32>> = surfels.iter().map(|(_, s)| s.point).collect();
+            let index = T::new(&points);
+            Self { surfels, index }
         })
     }
 
-    /// How many there are.
+    /// Returns the number of surfels.
     pub(crate) fn len(&self) -> usize {
         self.surfels.len()
     }
 
-    /// The tree, which counts the surfels from 0 in the order of the image.
-    #[inline]
-    pub(crate) fn tree(&self) -> &T {
-        &self.tree
+    /// Returns the index over the positions.
+    #[inline(always)]
+    pub(crate) fn index(&self) -> &T {
+        &self.index
     }
 
-    /// Returns the index in the observation and the surfel of one that the tree found.
-    #[inline]
+    /// Returns the pixel index in the observation and the surfel of one that the index found.
+    #[inline(always)]
     pub(crate) fn get(&self, element: u32) -> (u32, Surfel) {
         self.surfels[element as usize]
+    }
+
+    /// Returns an element with its distance from `query`, to start a search from, or [`Nearest::NONE`] if there is no such
+    /// element.
+    #[inline(always)]
+    pub(crate) fn start_at(&self, element: u32, query: &Point3<f32>) -> Nearest {
+        match self.surfels.get(element as usize) {
+            Some((_, surfel)) => Nearest {
+                distance_squared: distance_squared(query, &surfel.point),
+                element,
+            },
+            None => Nearest::NONE,
+        }
     }
 }

@@ -2,64 +2,206 @@
 
 use hicp_core::Point3;
 
-use crate::search::box_tree::{Bounds, BoxTree, Found, distance_squared};
+use crate::search::box_tree::BoxTree;
+use crate::search::nearest::{Nearest, PointIndex};
 
-/// A [`BoxTree`] over points, with the points in the order of its leaves.
+/// Points of a leaf. Comparing two vectors of points costs less than visiting another node.
+const LEAF_SIZE: usize = 16;
+
+/// A [`BoxTree`] over points.
+///
+/// Answers are exact and depend on the points alone: of equally near points, the one given first is found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PointTree {
-    tree: BoxTree,
-    points: Vec<Point3<f32>>,
+    tree: BoxTree<LEAF_SIZE>,
+    /// The points of each leaf: `leaf[axis][lane]`. Missing points lie at infinity.
+    leaves: Vec<[[f32; LEAF_SIZE]; 3]>,
 }
 
-impl PointTree {
-    /// Builds a tree over points, which must be finite.
-    #[allow(clippy::needless_pass_by_value)] // As every tree over observed points is built.
-    pub(crate) fn new(points: Vec<Point3<f32>>) -> Self {
+impl PointIndex for PointTree {
+    fn new(points: &[Point3<f32>]) -> Self {
         let mut tree = Self::default();
-        tree.rebuild(points.len(), |i| points[i]);
+        tree.rebuild(points);
         tree
     }
 
-    /// Builds the tree anew, reusing its memory. Points must be finite; `point(i)` is the i-th of `count`.
-    pub(crate) fn rebuild(&mut self, count: usize, point: impl Fn(usize) -> Point3<f32>) {
-        self.tree.rebuild(count, |element| {
-            let point = point(element as usize);
-            Bounds {
-                min: point,
-                max: point,
+    #[inline(always)]
+    fn nearest_from(&self, query: &Point3<f32>, start: Nearest) -> Option<u32> {
+        self.search(query, start, |_| true)
+            .map(|nearest| nearest.element)
+    }
+}
+
+impl PointTree {
+    /// Replaces the tree by one over `points`, which must be finite, and reuses its memory.
+    pub(crate) fn rebuild(&mut self, points: &[Point3<f32>]) {
+        self.tree.rebuild(points);
+        self.leaves.clear();
+        self.leaves.reserve(points.len().div_ceil(LEAF_SIZE));
+        for elements in self.tree.order().chunks(LEAF_SIZE) {
+            let mut leaf = [[f32::INFINITY; LEAF_SIZE]; 3];
+            for (lane, element) in elements.iter().enumerate() {
+                for (axis, coordinates) in leaf.iter_mut().enumerate() {
+                    coordinates[lane] = points[*element as usize][axis];
+                }
             }
-        });
-        self.points.clear();
-        let order = self.tree.order();
-        self.points
-            .extend(order.iter().map(|element| point(*element as usize)));
+            self.leaves.push(leaf);
+        }
     }
 
-    /// Returns the nearest point among those that `accept` takes by their index; of equally near ones the first.
-    #[inline]
+    /// Returns the nearest point.
+    #[inline(always)]
+    pub(crate) fn nearest(&self, query: &Point3<f32>) -> Option<Nearest> {
+        self.search(query, Nearest::NONE, |_| true)
+    }
+
+    /// Returns the nearest of those points whose index `accept` accepts.
+    #[inline(always)]
     pub(crate) fn nearest_where(
         &self,
         query: &Point3<f32>,
-        accept: impl Fn(usize) -> bool,
-    ) -> Option<Found> {
-        let order = self.tree.order();
-        self.tree.nearest(query, |slot| {
-            accept(order[slot] as usize).then(|| distance_squared(query, &self.points[slot]))
-        })
+        accept: impl Fn(u32) -> bool,
+    ) -> Option<Nearest> {
+        self.search(query, Nearest::NONE, accept)
     }
 
-    /// Returns the nearest point; of equally near ones the first.
-    #[inline]
-    pub(crate) fn nearest(&self, query: &Point3<f32>) -> Option<Found> {
-        self.tree.nearest(query, |slot| {
-            Some(distance_squared(query, &self.points[slot]))
-        })
+    #[inline(always)]
+    fn search(
+        &self,
+        query: &Point3<f32>,
+        start: Nearest,
+        accept: impl Fn(u32) -> bool,
+    ) -> Option<Nearest> {
+        let mut best = if start.precedes(&Nearest::NONE) {
+            start
+        } else {
+            Nearest::NONE
+        };
+        self.visit(query, best.distance_squared, |found| {
+            if found.precedes(&best) && accept(found.element) {
+                best = found;
+            }
+            best.distance_squared
+        });
+        (best.element != Nearest::NONE.element).then_some(best)
     }
 
     /// Replaces the content of `found` by the `count` nearest points, nearest first.
-    pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Found>) {
-        self.tree.nearest_n(query, count, found, |slot| {
-            Some(distance_squared(query, &self.points[slot]))
+    pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Nearest>) {
+        found.clear();
+        if count == 0 {
+            return;
+        }
+        self.visit(query, f32::MAX, |next| {
+            if found.len() < count || found.last().is_some_and(|last| next.precedes(last)) {
+                found.truncate(count - 1);
+                let position = found.partition_point(|other| other.precedes(&next));
+                found.insert(position, next);
+            }
+            match found.last() {
+                Some(last) if found.len() == count => last.distance_squared,
+                _ => f32::MAX,
+            }
         });
+    }
+
+    /// Passes points to `take` until no other point is within the squared distance that `take` returned last.
+    #[inline(always)]
+    fn visit(&self, query: &Point3<f32>, mut bound: f32, mut take: impl FnMut(Nearest) -> f32) {
+        let order = self.tree.order();
+        let mut leaves = self.tree.leaves_near(query);
+        while let Some(slots) = leaves.next(bound) {
+            let distances = distances(&self.leaves[slots.start / LEAF_SIZE], query);
+            let mut near = 0;
+            for (lane, distance) in distances.iter().enumerate() {
+                near |= u32::from(*distance <= bound) << lane;
+            }
+            while near != 0 {
+                let lane = near.trailing_zeros() as usize;
+                near &= near - 1;
+                bound = take(Nearest {
+                    distance_squared: distances[lane],
+                    element: order[slots.start + lane],
+                });
+            }
+        }
+    }
+}
+
+/// Returns the squared distances of the points of a leaf, rounded as [`super::nearest::distance_squared`] rounds.
+#[inline(always)]
+fn distances(leaf: &[[f32; LEAF_SIZE]; 3], query: &Point3<f32>) -> [f32; LEAF_SIZE] {
+    let mut distances = [0.0; LEAF_SIZE];
+    for (lane, distance) in distances.iter_mut().enumerate() {
+        let (x, y, z) = (
+            query.x - leaf[0][lane],
+            query.y - leaf[1][lane],
+            query.z - leaf[2][lane],
+        );
+        *distance = x * x + y * y + z * z;
+    }
+    distances
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::nearest::distance_squared;
+
+    fn number(state: &mut u64) -> f32 {
+        *state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (*state >> 40) as f32 / 16_777_216.0
+    }
+
+    /// On a coarse grid, where ties are the rule.
+    #[test]
+    fn answers_are_those_of_a_search_of_all_points_whatever_the_start() {
+        let mut state = 5;
+        for count in [1, 2, 7, 8, 9, 16, 17, 63, 64, 65, 200, 1000, 4100] {
+            for cells in [6.0, 1e6] {
+                let mut point =
+                    || Point3::from([(); 3].map(|()| (number(&mut state) * cells).floor() / cells));
+                let points: Vec<Point3<f32>> = (0..count).map(|_| point()).collect();
+                let queries: Vec<Point3<f32>> = (0..50).map(|_| point() * 1.5).collect();
+                let tree = PointTree::new(&points);
+                for query in &queries {
+                    let at = |element: u32| Nearest {
+                        distance_squared: distance_squared(query, &points[element as usize]),
+                        element,
+                    };
+                    let mut all: Vec<Nearest> = (0..count).map(at).collect();
+                    all.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared));
+                    assert_eq!(tree.nearest(query), Some(all[0]));
+                    for start in [0, count - 1, count / 2].map(at) {
+                        let found = tree.nearest_from(query, start);
+                        assert_eq!(found, Some(all[0].element), "{count} {start:?}");
+                    }
+                    let odd = all.iter().find(|found| found.element % 2 == 1);
+                    assert_eq!(tree.nearest_where(query, |i| i % 2 == 1), odd.copied());
+                    let mut found = Vec::new();
+                    for n in [0, 1, 3, 20] {
+                        tree.nearest_n(query, n, &mut found);
+                        assert_eq!(found, all[..n.min(all.len())]);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_found_without_points_or_for_a_query_that_is_not_finite() {
+        assert_eq!(PointTree::new(&[]).nearest(&Point3::origin()), None);
+        let tree = PointTree::new(&[Point3::origin()]);
+        for x in [f32::NAN, f32::INFINITY, f32::MAX] {
+            let query = Point3::new(x, 0.0, 0.0);
+            let start = Nearest {
+                distance_squared: distance_squared(&query, &Point3::origin()),
+                element: 0,
+            };
+            assert_eq!(tree.nearest_from(&query, start), None, "{x}");
+            assert_eq!(tree.nearest(&query), None, "{x}");
+        }
     }
 }

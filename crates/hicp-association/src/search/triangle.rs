@@ -6,7 +6,7 @@ use hicp_core::Point3;
 /// §5.1.5).
 ///
 /// The regions of the three corners, the three edges and the face are told apart by barycentric coordinates that are not yet
-/// normalised. Exact up to rounding for triangles of non-zero area.
+/// normalized. Exact up to rounding for triangles of non-zero area.
 pub(crate) fn closest_point(point: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));

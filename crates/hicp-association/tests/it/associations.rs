@@ -6,9 +6,9 @@ use crate::common::{
     Random, Scene, ball_scene, blind_scene, box_mesh, bumpy_ball, hostile_poses, scene_of, squared,
 };
 use hicp_association::{
-    AllSamples, ClosestPointOnMesh, DataAssociation, KNearest, Length, NormalCompatible,
-    NormalShooting, ObservationToModel, OrganizedNearestNeighbor, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, Reciprocal, Stride, WarmNearestNeighbor,
+    AllSamples, ClosestPointOnMesh, DataAssociation, KNearest, Length, NearestNeighbor,
+    NormalCompatible, NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated,
+    ProjectiveSearch, Reciprocal, SearchIndex, Stride,
 };
 use hicp_core::{
     DepthImage, Isometry3, Mask, Model, Observation, Pair, PinholeCamera, Point3, RigidTransform,
@@ -20,10 +20,12 @@ const ALL: Stride = Stride::Pixels(1);
 
 fn all_associations() -> Vec<Box<dyn DataAssociation>> {
     vec![
+        Box::new(NearestNeighbor::default()),
         #[cfg(feature = "kiddo")]
-        Box::new(hicp_association::NearestNeighbor::default()),
-        Box::new(WarmNearestNeighbor::default()),
-        Box::new(OrganizedNearestNeighbor::default()),
+        Box::new(NearestNeighbor::new(
+            Stride::AboutPoints(4000),
+            SearchIndex::KdTree,
+        )),
         Box::new(KNearest::default()),
         Box::new(NormalCompatible::default()),
         Box::new(NormalShooting::default()),
@@ -110,36 +112,33 @@ fn all_trees_find_the_same() {
     let source = scene.select(&mut AllSamples, &scene.truth);
     let targets = Stride::Pixels(2);
     let mut ours = KNearest::new(1, targets);
-    let mut theirs = hicp_association::NearestNeighbor { targets };
-    // From pose to pose they begin with the matches of the last one.
-    let mut warm = WarmNearestNeighbor::new(targets);
-    let mut organized = OrganizedNearestNeighbor::new(targets);
+    let mut theirs = NearestNeighbor::new(targets, SearchIndex::KdTree);
+    // From pose to pose it starts with the pairs of the last one.
+    let mut warm = NearestNeighbor::new(targets, SearchIndex::BoxTree);
     for seed in 0..5 {
         let pose = scene.nearby(seed);
         let expected = scene.associate(&mut theirs, &source, &pose);
         assert_eq!(scene.associate(&mut ours, &source, &pose), expected);
         assert_eq!(scene.associate(&mut warm, &source, &pose), expected);
-        assert_eq!(scene.associate(&mut organized, &source, &pose), expected);
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// From near and far, at and behind the camera, beside the image, and from the matches of another pose.
+    /// From near and far, at and behind the camera, next to the image, and from the pairs of another pose.
     #[test]
-    fn a_search_of_the_image_finds_what_a_tree_finds(seed: u64, stride in 1_u32..6, spread in 0.0_f64..1.5) {
+    fn a_search_from_the_last_pairs_finds_what_a_new_one_finds(seed: u64, stride in 1_u32..6, spread in 0.0_f64..1.5) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let mut source = Random::new(seed).surfels(40, 0.1);
         source.extend(scene.select(&mut AllSamples, &scene.truth).iter().take(40));
         let targets = Stride::Pixels(stride);
-        let mut tree = WarmNearestNeighbor::new(targets);
-        let mut image = OrganizedNearestNeighbor::new(targets);
+        let mut warm = NearestNeighbor::new(targets, SearchIndex::BoxTree);
         for (turn, toward) in [(0, 0.0), (1, spread), (2, -2.0 * spread), (3, 0.0)] {
             let mut pose = scene.nearby(seed.wrapping_add(turn));
             pose.translation.vector += Vector3::new(0.3, -0.2, 1.0) * toward;
-            let expected = scene.associate(&mut tree, &source, &pose);
-            prop_assert_eq!(scene.associate(&mut image, &source, &pose), expected);
+            let expected = scene.associate(&mut KNearest::new(1, targets), &source, &pose);
+            prop_assert_eq!(scene.associate(&mut warm, &source, &pose), expected);
         }
     }
 

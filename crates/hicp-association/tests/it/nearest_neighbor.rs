@@ -1,11 +1,22 @@
 //! Nearest neighbours against brute force (pitfall 26).
 
 use crate::support::{Numbers, RayCaster, cuboid, depth_image, observe_depth, sphere_depth};
-use hicp_association::{DataAssociation, NearestNeighbor, Stride};
+use hicp_association::{DataAssociation, NearestNeighbor, SearchIndex, Stride};
 use hicp_core::{
     Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera,
     Point3, Problem, RenderCache, RigidTransform, Surfel, UnitVector3, Vector3,
 };
+
+const INDEXES: &[SearchIndex] = &[
+    SearchIndex::BoxTree,
+    #[cfg(feature = "kiddo")]
+    SearchIndex::KdTree,
+];
+
+fn nearest_neighbors(targets: Stride) -> impl Iterator<Item = NearestNeighbor> {
+    let new = move |index: &SearchIndex| NearestNeighbor::new(targets, *index);
+    INDEXES.iter().map(new)
+}
 
 fn camera() -> PinholeCamera {
     PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
@@ -41,30 +52,29 @@ fn assert_nearest(
     source: &[Surfel],
     pose: &Isometry3<f64>,
 ) {
-    let mut association = NearestNeighbor {
-        targets: Stride::Pixels(stride),
-    };
-    let pairs = associate(&mut association, observation, source, pose);
-    assert_eq!(pairs.len(), source.len());
-    let targets: Vec<&Surfel> = observation.surfels(stride).map(|(_, s)| s).collect();
-    let mover = RigidTransform::new(pose);
-    for (i, (pair, surfel)) in pairs.as_slice().iter().zip(source).enumerate() {
-        assert_eq!((pair.source_index as usize, pair.weight), (i, 1.0));
-        assert_eq!(pair.source, mover.surfel(surfel));
-        assert!(
-            targets.contains(&&pair.target),
-            "the target is an observed surfel of the stride"
-        );
-        let nearest = targets
-            .iter()
-            .map(|t| (t.point - pair.source.point).norm_squared())
-            .fold(f32::INFINITY, f32::min);
-        let found = (pair.target.point - pair.source.point).norm_squared();
-        // Sums of three squares in another order: equal points may tie, others may not.
-        assert!(
-            found <= nearest * (1.0 + 4.0 * f32::EPSILON),
-            "{found} {nearest}"
-        );
+    for mut association in nearest_neighbors(Stride::Pixels(stride)) {
+        let pairs = associate(&mut association, observation, source, pose);
+        assert_eq!(pairs.len(), source.len());
+        let targets: Vec<&Surfel> = observation.surfels(stride).map(|(_, s)| s).collect();
+        let mover = RigidTransform::new(pose);
+        for (i, (pair, surfel)) in pairs.as_slice().iter().zip(source).enumerate() {
+            assert_eq!((pair.source_index as usize, pair.weight), (i, 1.0));
+            assert_eq!(pair.source, mover.surfel(surfel));
+            assert!(
+                targets.contains(&&pair.target),
+                "the target is an observed surfel of the stride"
+            );
+            let nearest = targets
+                .iter()
+                .map(|t| (t.point - pair.source.point).norm_squared())
+                .fold(f32::INFINITY, f32::min);
+            let found = (pair.target.point - pair.source.point).norm_squared();
+            // Sums of three squares in another order: equal points may tie, others may not.
+            assert!(
+                found <= nearest * (1.0 + 4.0 * f32::EPSILON),
+                "{found} {nearest}"
+            );
+        }
     }
 }
 
@@ -125,14 +135,11 @@ fn pitfall_26_nothing_to_find_gives_no_pairs() {
     );
     let no_depth = DepthImage::from_meters(64, 48, vec![0.0; 64 * 48]).unwrap();
     let no_depth = Observation::new(no_depth, Mask::full(64, 48), camera());
+    let identity = Isometry3::identity();
     for observation in [no_mask.unwrap(), no_depth.unwrap()] {
-        let pairs = associate(
-            &mut NearestNeighbor::default(),
-            &observation,
-            &source,
-            &Isometry3::identity(),
-        );
-        assert!(pairs.is_empty());
+        for mut association in nearest_neighbors(Stride::AboutPoints(4000)) {
+            assert!(associate(&mut association, &observation, &source, &identity).is_empty());
+        }
     }
     // A stride that misses every surfel.
     let mut mask = vec![false; 64 * 48];
@@ -142,19 +149,10 @@ fn pitfall_26_nothing_to_find_gives_no_pairs() {
         }
     }
     let observation = Observation::new(wall(), Mask::new(64, 48, mask).unwrap(), camera()).unwrap();
-    let mut sparse = NearestNeighbor {
-        targets: Stride::Pixels(50),
-    };
-    assert!(associate(&mut sparse, &observation, &source, &Isometry3::identity()).is_empty());
-    assert!(
-        associate(
-            &mut NearestNeighbor::default(),
-            &observation,
-            &[],
-            &Isometry3::identity()
-        )
-        .is_empty()
-    );
+    for mut sparse in nearest_neighbors(Stride::Pixels(50)) {
+        assert!(associate(&mut sparse, &observation, &source, &identity).is_empty());
+        assert!(associate(&mut sparse, &observation, &[], &identity).is_empty());
+    }
 }
 
 #[test]
@@ -168,22 +166,23 @@ fn pitfall_26_queries_that_are_not_finite_have_no_pair_and_far_ones_have() {
     {
         source[3 * i].point[i] = bad;
     }
-    let mut association = NearestNeighbor::default();
-    let pairs = associate(
-        &mut association,
-        &observation,
-        &source,
-        &Isometry3::identity(),
-    );
-    let indices: Vec<u32> = pairs.as_slice().iter().map(|p| p.source_index).collect();
-    assert_eq!(indices, [1, 2, 4, 5, 7, 8, 9]);
-    let source = surfels(&mut numbers, 10, 0.1);
-    // A thousand kilometres away something is still nearest; where squares overflow nothing is.
-    for (distance, expected) in [(1e6, 10), (1e12, 10), (1e25, 0), (1e39, 0), (1e300, 0)] {
-        let pose = Isometry3::translation(distance, 0.0, 0.0);
-        let pairs = associate(&mut association, &observation, &source, &pose);
-        assert_eq!(pairs.len(), expected, "{distance}");
-        assert!(pairs.as_slice().iter().all(|p| p.distance().is_finite()));
+    let finite = surfels(&mut numbers, 10, 0.1);
+    for mut association in nearest_neighbors(Stride::AboutPoints(4000)) {
+        let pairs = associate(
+            &mut association,
+            &observation,
+            &source,
+            &Isometry3::identity(),
+        );
+        let indices: Vec<u32> = pairs.as_slice().iter().map(|p| p.source_index).collect();
+        assert_eq!(indices, [1, 2, 4, 5, 7, 8, 9]);
+        // A thousand kilometers away something is still nearest; where squares overflow nothing is.
+        for (distance, expected) in [(1e6, 10), (1e12, 10), (1e25, 0), (1e39, 0), (1e300, 0)] {
+            let pose = Isometry3::translation(distance, 0.0, 0.0);
+            let pairs = associate(&mut association, &observation, &finite, &pose);
+            assert_eq!(pairs.len(), expected, "{distance}");
+            assert!(pairs.as_slice().iter().all(|p| p.distance().is_finite()));
+        }
     }
 }
 

@@ -179,7 +179,8 @@ fn boxed_and_static_components_are_one() {
         pairs
     };
     let nearest = NearestNeighbor::default();
-    let mut boxes: [Box<dyn DataAssociation>; 2] = [Box::new(Projective), Box::new(nearest)];
+    let mut boxes: [Box<dyn DataAssociation>; 2] =
+        [Box::new(Projective), Box::new(nearest.clone())];
     assert_eq!(run(&mut boxes[0]), run(&mut { Projective }));
     assert_eq!(run(&mut boxes[1]), run(&mut { nearest }));
     assert!(!run(&mut boxes[0]).is_empty() && !run(&mut boxes[1]).is_empty());

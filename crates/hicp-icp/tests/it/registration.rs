@@ -5,7 +5,7 @@ use crate::support::{
 };
 use hicp_association::{
     AllSamples, DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection,
-    Projective, Stride, VisibleSurface,
+    Projective, SearchIndex, Stride, VisibleSurface,
 };
 use hicp_core::Iteration;
 use hicp_core::{
@@ -144,9 +144,10 @@ impl PointSelection for Given {
 fn associations() -> Vec<Box<dyn DataAssociation>> {
     vec![
         Box::new(Projective),
-        Box::new(NearestNeighbor {
-            targets: Stride::Pixels(3),
-        }),
+        Box::new(NearestNeighbor::new(
+            Stride::Pixels(3),
+            SearchIndex::default(),
+        )),
     ]
 }
 

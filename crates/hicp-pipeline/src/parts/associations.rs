@@ -2,8 +2,8 @@
 
 use hicp_association::{
     ClosestPointOnMesh, KNearest, Length, NearestNeighbor, NormalCompatible, NormalShooting,
-    ObservationToModel, OrganizedNearestNeighbor, Projective, ProjectiveInterpolated,
-    ProjectiveSearch, Reciprocal, Stride, WarmNearestNeighbor,
+    ObservationToModel, Projective, ProjectiveInterpolated, ProjectiveSearch, Reciprocal,
+    SearchIndex, Stride,
 };
 
 use super::common::{length, stride};
@@ -17,21 +17,16 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_association("nearest-neighbor", |p| {
         p.about = "Pairs a point with the closest observed point. Source: §III-A.1; Besl & McKay \
             1992. Cost: O(n log m), and O(m log m) once per observation.";
-        Ok(NearestNeighbor {
-            targets: searched(p)?,
-        })
-    });
-    catalog.add_association("warm-nearest-neighbor", |p| {
-        p.about = "Pairs a point with the closest observed point, searched from the one of the \
-            last iteration: the same pairs, faster. Source: §III-A.1; Besl & McKay 1992, \
-            Greenspan & Godin 2001. Cost: O(n log m), and O(m log m) once per observation.";
-        Ok(WarmNearestNeighbor::new(searched(p)?))
-    });
-    catalog.add_association("organized-nearest-neighbor", |p| {
-        p.about = "Pairs a point with the closest observed point, searched in the image around \
-            its projection: the same pairs, faster for visible points. Source: §III-A.1; Besl & \
-            McKay 1992. Cost: O(n (f d / z)²), and O(pixels of the box) once per observation.";
-        Ok(OrganizedNearestNeighbor::new(stride(p, 4000, 1, SEARCHED)?))
+        let indexes = [
+            ("box-tree", SearchIndex::BoxTree),
+            ("kd-tree", SearchIndex::KdTree),
+        ];
+        let targets = searched(p)?;
+        let meaning = "index to search: bounding boxes, or kiddo's k-d tree";
+        Ok(NearestNeighbor::new(
+            targets,
+            p.word("index", &indexes, meaning)?,
+        ))
     });
     catalog.add_association("projective", |p| {
         p.about = "Pairs a point with the observed point at the pixel that it projects to. \

@@ -15,12 +15,11 @@ use hybrid_icp::{
     KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
     MeanVsd, MedianDistance, MetricSchedule, MinPairs, NearestNeighbor, NormalCompatible,
     NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
-    OrganizedNearestNeighbor, Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint,
-    PosePrior, Preset, Prior, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
-    Rasterizer, Reciprocal, Regime, Robust, SampledMve, Scale, Schedule, SensorNoiseWeight,
-    SmallMotion, StableSampling, SwitchUntilStall, Symmetric, Threshold, Thresholds, TimeLimit,
-    Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WarmNearestNeighbor,
-    WeightedSum, WithoutBoundary,
+    Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
+    Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
+    Regime, Robust, SampledMve, Scale, Schedule, SearchIndex, SensorNoiseWeight, SmallMotion,
+    StableSampling, Stride, SwitchUntilStall, Symmetric, Threshold, Thresholds, TimeLimit, Trimmed,
+    UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WeightedSum, WithoutBoundary,
 };
 
 #[test]
@@ -41,8 +40,8 @@ fn selections() {
 fn associations() {
     let strict = AssociationLaws::default();
     check_association(NearestNeighbor::default, strict);
-    check_association(WarmNearestNeighbor::default, strict);
-    check_association(OrganizedNearestNeighbor::default, strict);
+    let k_d_tree = || NearestNeighbor::new(Stride::AboutPoints(4000), SearchIndex::KdTree);
+    check_association(k_d_tree, strict);
     check_association(KNearest::default, strict);
     check_association(NormalCompatible::default, strict);
     check_association(NormalShooting::default, strict);

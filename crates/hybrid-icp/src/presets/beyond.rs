@@ -6,8 +6,8 @@
 //! `docs/presets.md` states the effect of each change.
 
 use hicp_association::{
-    AllSamples, MaxDistance, MaxNormalAngle, ObservationToModel, Projective, Stride,
-    VisibleSurface, WarmNearestNeighbor,
+    AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel, Projective,
+    Stride, VisibleSurface,
 };
 use hicp_icp::{
     Cascade, Convergence, Divergence, Guard, HypothesisSearch, Icp, IterationLimit, Repeat,
@@ -32,7 +32,7 @@ pub type HybridVisible = Repeat<
     Switch<
         Threshold<MeanVsd>,
         Near,
-        Icp<VisibleSurface, WarmNearestNeighbor, MaxNormalAngle, PointToPoint, PaperStop>,
+        Icp<VisibleSurface, NearestNeighbor, MaxNormalAngle, PointToPoint, PaperStop>,
     >,
 >;
 /// The type of [`local`].
@@ -124,7 +124,7 @@ pub fn hybrid_visible() -> HybridVisible {
             aligned: near(2000),
             misaligned: Icp {
                 selection: VisibleSurface::default(),
-                association: WarmNearestNeighbor::default(),
+                association: NearestNeighbor::default(),
                 filter: MaxNormalAngle::degrees(THETA_DEGREES),
                 metric: PointToPoint,
                 stop: stop(50),
