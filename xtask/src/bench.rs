@@ -4,6 +4,9 @@ use anyhow::{Result, bail};
 
 use crate::process::{cargo, command, execute, require, target};
 
+/// Selects all benches but `instructions`, which needs a feature.
+pub(crate) const BENCHES: &str = "--bench [!i]*";
+
 /// Runs the benches and saves them as a baseline (`last` without `--save`), then compares with
 /// another one.
 pub(crate) fn run(options: &[&str]) -> Result<()> {
@@ -21,7 +24,7 @@ pub(crate) fn run(options: &[&str]) -> Result<()> {
             "cargo install critcmp --version 0.1.8 --locked",
         )?;
     }
-    let mut bench = cargo("bench --package hicp-benches --benches -- --save-baseline");
+    let mut bench = cargo(&format!("bench {BENCHES} -- --save-baseline"));
     execute(
         bench
             .env("CRITERION_HOME", target().join("criterion"))

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 
+use crate::bench::BENCHES;
 use crate::process::{cargo, execute};
 use crate::{counts, instructions, licenses, python, read, tidy, valgrind};
 
@@ -30,7 +31,7 @@ pub(crate) fn run() -> Result<()> {
         execute(doc.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     step("benches, each run once", || {
-        execute(&mut cargo("test --benches --quiet"))
+        execute(&mut cargo(&format!("test {BENCHES} --quiet")))
     })?;
     step("work counts", counts::check)?;
     step("instruction counts", instructions::run)?;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::DepthPatch;
+use super::patch::DepthPatch;
 use crate::region::PixelRegion;
 use crate::vectorized::{VectorLoop, vectorized};
 

@@ -1,8 +1,8 @@
 //! Plane fits beside depth edges.
 
 use super::edges::Edges;
+use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use super::window::{Rays, WindowSums};
-use super::{DepthPatch, MIN_DEPTH_METERS};
 use crate::vectorized::VectorLoop;
 
 /// Half side of the gated window, pixels. Its rows must fit [`Joined`].

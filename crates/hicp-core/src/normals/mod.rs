@@ -9,16 +9,16 @@
 mod edges;
 mod gated;
 mod lanes;
+mod patch;
 mod window;
 
 use std::ops::Range;
 
 use edges::Edges;
 use gated::FitGated;
+pub(crate) use patch::DepthPatch;
 use window::{ColumnSums, Rays, RowFits};
 
-use crate::camera::PinholeCamera;
-use crate::region::PixelRegion;
 use crate::vectorized::vectorized;
 
 /// The window is chosen so that the standard error of the slope (tangent of the tilt) stays below this, if it can be.
@@ -31,23 +31,6 @@ const EDGE_TILT_DEGREES: f64 = 85.0;
 const EDGE_SIGMAS: f64 = 5.0;
 /// Pixels examined for the noise estimate.
 const NOISE_SAMPLES: usize = 4096;
-/// Depths below this many metres carry no normal: their inverses would drown those of the pixels around in rounding.
-const MIN_DEPTH_METERS: f32 = 1e-4;
-
-/// Depth inside a region: metres, 0 where the pixel is not to be used. Row-major.
-pub(crate) struct DepthPatch<'a> {
-    pub(crate) region: PixelRegion,
-    pub(crate) camera: &'a PinholeCamera,
-    pub(crate) depth: &'a [f32],
-}
-
-impl DepthPatch<'_> {
-    /// The pixels of a row, which is one of the region's.
-    fn row(&self, v: usize) -> &[f32] {
-        let width = self.region.width();
-        &self.depth[v * width..(v + 1) * width]
-    }
-}
 
 /// Calls `found(row, first_column, normals)` for every row, from its first used pixel to its last; normals are in the camera frame
 /// and face the camera, and are zero where there is none.

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::lanes::Lanes;
-use super::{DepthPatch, MIN_DEPTH_METERS};
+use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use crate::vectorized::{VectorLoop, vectorized};
 
 /// Fewest pixels that a plane is fitted to.
