@@ -7,13 +7,14 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use hicp_benches::case;
 use hicp_sim::{Household, perturb, rng};
+use hybrid_icp::core::{Problem, Vector6, se3};
 use hybrid_icp::fusion::{
     CameraMotion, Fuser, FuserConfig, Fusion, FusionLimits, FusionMethod, PoseEstimate,
     UnitCovariance,
 };
-use hybrid_icp::{
-    Preset, Problem, Rasterizer, SequentialEstimator, Session, Vector6, Workspace, se3,
-};
+use hybrid_icp::icp::{Session, Workspace};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::{Preset, SequentialEstimator};
 
 /// Estimates as a pipeline makes them: 4 mm and 4° apart, of unequal uncertainty about the object.
 fn estimates(count: usize) -> (Vec<PoseEstimate>, UnitCovariance) {

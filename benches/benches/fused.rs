@@ -7,12 +7,15 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hicp_benches::fused::Fused;
 use hicp_benches::{OBJECTS, case};
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
-use hybrid_icp::{
-    Correspondences, DataAssociation, ErrorMetric, PointSelection, PointToPlane, Problem,
-    Projective, Rasterizer, Stride, VisibleSurface, Workspace,
+use hybrid_icp::association::{
+    DataAssociation, PointSelection, Projective, Stride, VisibleSurface,
 };
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{Correspondences, Problem};
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{ErrorMetric, PointToPlane};
+use hybrid_icp::raster::Rasterizer;
 
 fn fused(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("fused");

@@ -14,14 +14,20 @@ use gungraun::{
 };
 use hicp_benches::{Case, case};
 use hicp_sim::Household;
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
-use hybrid_icp::{
-    AllSamples, Correspondences, DataAssociation, DepthImage, ErrorMetric, Isometry3, Mask,
-    MeanVsd, NearestNeighbor, Observation, PinholeCamera, PointSelection, PointToPlane,
-    PointToPoint, Preset, Problem, Projective, Rasterizer, Refinement, Refiner, RenderedView,
-    Renderer, Score, Step, Surfel, VisibleSurface, Workspace,
+use hybrid_icp::association::{
+    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
 };
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Correspondences, DepthImage, Isometry3, Mask, Observation, PinholeCamera, Problem,
+    RenderedView, Renderer, Surfel,
+};
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{ErrorMetric, PointToPlane, PointToPoint, Step};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::{Preset, Refinement, Refiner};
 
 /// Fails a bench that executes 3 % more than `instructions`: the count when the limit was set, with
 /// the compiler that `xtask/src/instructions.rs` names. A commit that changes it gives the reason.

@@ -6,7 +6,8 @@ use std::cell::RefCell;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use hicp_benches::{OBJECTS, case, forget_renders};
-use hybrid_icp::{Observation, Preset, Problem, Refiner};
+use hybrid_icp::core::{Observation, Problem};
+use hybrid_icp::{Preset, Refiner};
 
 /// A warm refinement: the observation, its search tree, the scratch memory, and the renders that fit the cache are there.
 fn pipeline(criterion: &mut Criterion) {

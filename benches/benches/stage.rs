@@ -4,7 +4,9 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use hicp_benches::{OBJECTS, case, stages};
-use hybrid_icp::{Problem, Rasterizer, Session, Workspace};
+use hybrid_icp::core::Problem;
+use hybrid_icp::icp::{Session, Workspace};
+use hybrid_icp::raster::Rasterizer;
 
 fn stage(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("stage");

@@ -6,13 +6,16 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hicp_benches::{Case, OBJECTS, case};
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
-use hybrid_icp::{
-    AllSamples, Correspondences, DataAssociation, MeanVsd, NearestNeighbor, Observation,
-    PointSelection, PointToPlane, PointToPoint, Problem, Projective, Rasterizer, RenderedView,
-    Renderer, Score, Surfel, VisibleSurface, Workspace,
+use hybrid_icp::association::{
+    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
 };
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{Correspondences, Observation, Problem, RenderedView, Renderer, Surfel};
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{PointToPlane, PointToPoint};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Score};
 
 fn cases() -> Vec<Case> {
     OBJECTS.into_iter().map(case).collect()

@@ -16,7 +16,7 @@ use hicp_sim::{
     perturb, rng, rotation,
 };
 use hicp_tests::{camera, render};
-use hybrid_icp::{DepthImage, Isometry3, Mask, Matrix3, Model, Translation3, Vector3};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Matrix3, Model, Translation3, Vector3};
 
 type Failure = Box<dyn std::error::Error>;
 

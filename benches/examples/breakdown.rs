@@ -8,16 +8,22 @@ use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use hicp_benches::{Case, OBJECTS, case, forget_renders};
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
-use hybrid_icp::presets::paper_stop;
-use hybrid_icp::{
-    AllSamples, Cascade, Context, Correspondences, DataAssociation, ErrorMetric, Icp, Isometry3,
-    MeanVsd, NearestNeighbor, NormalEquations, Observation, PAPER_ALPHA, PinholeCamera,
-    PixelRegion, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective,
-    Rasterizer, RenderedView, Renderer, Repeat, Score, Session, Stage, Step, Surfel, Switch,
-    Threshold, TriMesh, VisibleSurface, Workspace,
+use hybrid_icp::Preset;
+use hybrid_icp::association::{
+    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
 };
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Context, Correspondences, Isometry3, Observation, PinholeCamera, PixelRegion, Problem,
+    RenderedView, Renderer, Surfel, TriMesh,
+};
+use hybrid_icp::icp::{Cascade, Icp, Repeat, Session, Stage, Workspace};
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
+use hybrid_icp::presets::paper_stop;
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::switch::{PAPER_ALPHA, Switch, Threshold};
 
 /// What time is spent on.
 const STEPS: [&str; 7] = [

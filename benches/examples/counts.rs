@@ -15,8 +15,10 @@ use std::fmt::Write as _;
 use hicp_benches::work::{CountingRenderer, StageWork};
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::{Counting, allocations};
-use hybrid_icp::internal::Work;
-use hybrid_icp::{Isometry3, Preset, Problem, Session, Workspace};
+use hybrid_icp::Preset;
+use hybrid_icp::core::internal::Work;
+use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::icp::{Session, Workspace};
 
 #[global_allocator]
 static COUNTING: Counting = Counting;

@@ -12,13 +12,20 @@ use hicp_benches::forget_renders;
 use hicp_benches::fused::Fused;
 use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
 use hicp_benches::stages::{GATE_METERS, STOP};
-use hybrid_icp::{
-    Context, DataAssociation, DepthImage, ErrorMetric, Generalized, Icp, Isometry3, Mask, Matrix3,
-    MaxDistance, MeanVsd, Model, ModelConfig, NearestNeighbor, Observation, Outcome, OutlierFilter,
-    PinholeCamera, Point3, PointSelection, PointToPlane, PointToPoint, Preset, Problem, Projective,
-    Rasterizer, RenderedView, Renderer, Score, Session, Stage, Stride, Surfel, Translation3,
-    TriMesh, UnitVector3, Vector3, VisibleSurface, Workspace, rotation_from_matrix, se3,
+use hybrid_icp::Preset;
+use hybrid_icp::association::{
+    DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection, Projective,
+    Stride, VisibleSurface,
 };
+use hybrid_icp::core::{
+    Context, DepthImage, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation, PinholeCamera,
+    Point3, Problem, RenderedView, Renderer, Surfel, Translation3, TriMesh, UnitVector3, Vector3,
+    rotation_from_matrix, se3,
+};
+use hybrid_icp::icp::{Icp, Outcome, Session, Stage, Workspace};
+use hybrid_icp::metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Score};
 use serde_json::{Value, json};
 
 type Failure = Box<dyn std::error::Error>;

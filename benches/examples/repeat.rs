@@ -10,7 +10,9 @@
 use std::time::Instant;
 
 use hicp_benches::{Case, OBJECTS, case, forget_renders};
-use hybrid_icp::{Observation, PipelineFile, Preset, Problem, Refiner, Trace};
+use hybrid_icp::core::{Observation, Problem};
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::{Preset, Refiner, Trace};
 
 /// A pipeline with the times of its runs, milliseconds.
 struct Run {

@@ -14,15 +14,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use hicp_sim::{AxialPolynomial, Household, perturb, rng};
+use hybrid_icp::core::{Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Vector3};
 use hybrid_icp::fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, FuserConfig, Fusion, FusionLimits, FusionMethod,
     Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
 };
-use hybrid_icp::{
-    BoxedStage, Calibration, Isometry3, Mask, MeanVsd, Model, Observation, Outcome, PinholeCamera,
-    Preset, Problem, SequentialConfig, SequentialEstimator, Session, Stage, Vector3,
-    render_depth_image,
-};
+use hybrid_icp::icp::{Outcome, Session, Stage};
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::score::MeanVsd;
+use hybrid_icp::{BoxedStage, Calibration, Preset, SequentialConfig, SequentialEstimator};
 
 type Failed = Box<dyn std::error::Error>;
 

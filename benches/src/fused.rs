@@ -4,7 +4,7 @@
 //! time, with `f32` sums that are carried over to `f64` every few hundred points. No trait, no weight, no filter, no
 //! list of pairs: nothing but the arithmetic and the one load per observed pixel that cannot be avoided.
 
-use hybrid_icp::{Isometry3, Matrix6, Observation, Point3, Surfel, Vector3, Vector6, se3};
+use hybrid_icp::core::{Isometry3, Matrix6, Observation, Point3, Surfel, Vector3, Vector6, se3};
 
 /// Unknowns and the residual: the columns of a row.
 const COLUMNS: usize = 7;
@@ -328,10 +328,13 @@ mod avx2 {
 mod tests {
     use super::*;
     use crate::{OBJECTS, case};
-    use hybrid_icp::{
-        Correspondences, DataAssociation, ErrorMetric, PointSelection, PointToPlane, Problem,
-        Projective, Rasterizer, Stride, VisibleSurface, Workspace,
+    use hybrid_icp::association::{
+        DataAssociation, PointSelection, Projective, Stride, VisibleSurface,
     };
+    use hybrid_icp::core::{Correspondences, Problem};
+    use hybrid_icp::icp::Workspace;
+    use hybrid_icp::metric::{ErrorMetric, PointToPlane};
+    use hybrid_icp::raster::Rasterizer;
 
     /// The hand-written loop and the traits take the same step, to 10⁻⁴ of what it moves.
     #[test]

@@ -7,10 +7,12 @@ use hicp_sim::{
     object_pose, perturb, rng,
 };
 use hicp_tests::{Scene, camera, render};
-use hybrid_icp::{
-    Isometry3, Model, ModelConfig, Observation, Point3, PointSelection, Problem, Rasterizer,
-    Stride, Surfel, Translation3, TriMesh, VisibleSurface, Workspace,
+use hybrid_icp::association::{PointSelection, Stride, VisibleSurface};
+use hybrid_icp::core::{
+    Isometry3, Model, ModelConfig, Observation, Point3, Problem, Surfel, Translation3, TriMesh,
 };
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::raster::Rasterizer;
 
 /// The objects: those without a symmetry, so that a rotation error means something.
 pub const OBJECTS: [Household; 5] = [
@@ -195,7 +197,7 @@ pub fn with_10_000_triangles(model: &Model) -> Model {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hybrid_icp::Facing;
+    use hybrid_icp::core::Facing;
 
     #[test]
     fn instances_are_of_the_size_that_is_stated() {

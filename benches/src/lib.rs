@@ -9,7 +9,8 @@ use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
 };
 use hicp_tests::Scene;
-use hybrid_icp::{Isometry3, Problem, Workspace};
+use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::icp::Workspace;
 
 /// A scene and a start at the paper's mean initialisation error.
 #[derive(Debug)]

@@ -1,9 +1,11 @@
 //! The single stages that benches and the comparison with other libraries run.
 
-use hybrid_icp::{
-    BoxedStage, DataAssociation, ErrorMetric, Generalized, Icp, IterationLimit, MaxDistance,
-    NearestNeighbor, PointToPlane, PointToPoint, Projective, SmallMotion, Stride, VisibleSurface,
+use hybrid_icp::BoxedStage;
+use hybrid_icp::association::{
+    DataAssociation, MaxDistance, NearestNeighbor, Projective, Stride, VisibleSurface,
 };
+use hybrid_icp::icp::{Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 
 /// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
 pub const GATE_METERS: f32 = 0.03;

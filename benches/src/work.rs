@@ -4,10 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use hybrid_icp::{
-    Isometry3, IterationEvent, Observer, PinholeCamera, PixelRegion, Rasterizer, RegimeEvent,
-    RenderedView, Renderer, StageEvent, Termination, TriMesh,
-};
+use hybrid_icp::core::{Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
+use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent, Termination};
+use hybrid_icp::raster::Rasterizer;
 
 /// What the renders of a run did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -92,7 +91,7 @@ impl Observer for StageWork {
     }
 
     fn on_regime(&mut self, event: &RegimeEvent) {
-        if event.regime == hybrid_icp::Regime::ALIGNED {
+        if event.regime == hybrid_icp::icp::Regime::ALIGNED {
             self.aligned += 1;
         } else {
             self.misaligned += 1;
@@ -123,10 +122,11 @@ mod tests {
     use super::*;
     use crate::{OBJECTS, case};
     use hicp_sim::{perturb, rng};
-    use hybrid_icp::{
-        Context, Correspondences, DataAssociation, Icp, NearestNeighbor, PointToPlane, Problem,
-        Session, Stage, Surfel, VisibleSurface, Workspace, presets::paper_stop,
-    };
+    use hybrid_icp::association::{DataAssociation, NearestNeighbor, VisibleSurface};
+    use hybrid_icp::core::{Context, Correspondences, Problem, Surfel};
+    use hybrid_icp::icp::{Icp, Session, Stage, Workspace};
+    use hybrid_icp::metric::PointToPlane;
+    use hybrid_icp::presets::paper_stop;
 
     /// Counts the points that ask.
     #[derive(Default)]

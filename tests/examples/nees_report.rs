@@ -8,10 +8,8 @@
 
 use hicp_sim::Household;
 use hicp_tests::nees::{Nees, Pairs, measure};
-use hybrid_icp::{
-    Generalized, NearestNeighbor, PlaneToPoint, PointToPlane, Projective, SearchIndex, Stride,
-    VisibleSurface,
-};
+use hybrid_icp::association::{NearestNeighbor, Projective, SearchIndex, Stride, VisibleSurface};
+use hybrid_icp::metric::{Generalized, PlaneToPoint, PointToPlane};
 
 fn main() {
     let runs = std::env::args()

@@ -6,7 +6,9 @@ use std::time::Instant;
 
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hicp_tests::{OBJECTS, median, scene, symmetric_pose_distance};
-use hybrid_icp::{Preset, Problem, Refiner, Score, Vsd};
+use hybrid_icp::core::Problem;
+use hybrid_icp::score::{Score, Vsd};
+use hybrid_icp::{Preset, Refiner};
 
 const STARTS_PER_OBJECT: usize = 20;
 

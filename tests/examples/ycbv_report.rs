@@ -9,7 +9,9 @@ use std::time::Instant;
 use hicp_io::bop::{Dataset, read_results};
 use hicp_tests::median;
 use hicp_tests::ycbv::{Instance, instances, root};
-use hybrid_icp::{Isometry3, Preset, Refiner, adi};
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::score::adi;
+use hybrid_icp::{Preset, Refiner};
 
 const ESTIMATORS: [(&str, &str); 4] = [
     ("CosyPose", "cosypose_ycbv-test.csv"),

@@ -10,10 +10,12 @@ pub mod ycbv;
 use std::sync::Arc;
 
 use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
-use hybrid_icp::{
-    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer,
-    Symmetries, Workspace, se3,
+use hybrid_icp::core::{
+    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Symmetries,
+    se3,
 };
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::raster::Rasterizer;
 
 /// The ten objects that the starts, and the figures quoted from them, are about.
 pub const OBJECTS: [Household; 10] = [

@@ -1,13 +1,15 @@
 //! Monte-Carlo consistency of covariances: the normalised estimation error squared (NEES).
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
-use hybrid_icp::ErrorMetric;
-use hybrid_icp::Iteration;
-use hybrid_icp::{
-    BoundaryTargets, Context, Correspondences, DataAssociation, Icp, IterationLimit, Minimize,
-    Observation, OutlierFilter, Pair, PinholeCamera, PointSelection, Problem, Rasterizer, Repeat,
-    Session, SmallMotion, Stage, Surfel, Vector6, Workspace, sandwich_covariance, se3,
+use hybrid_icp::association::{BoundaryTargets, DataAssociation, OutlierFilter, PointSelection};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Context, Correspondences, Observation, Pair, PinholeCamera, Problem, Surfel, Vector6, se3,
 };
+use hybrid_icp::icp::{Icp, IterationLimit, Repeat, Session, SmallMotion, Stage, Workspace};
+use hybrid_icp::metric::ErrorMetric;
+use hybrid_icp::metric::{Minimize, sandwich_covariance};
+use hybrid_icp::raster::Rasterizer;
 
 use crate::render;
 

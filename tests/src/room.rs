@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hicp_io::bop::Scene;
-use hybrid_icp::{DepthImage, Isometry3, PinholeCamera, Point3};
+use hybrid_icp::core::{DepthImage, Isometry3, PinholeCamera, Point3};
 
 /// Depths beyond this are left out, metres: structured light measures badly there.
 pub const MAX_DEPTH_METERS: f32 = 5.0;

@@ -1,9 +1,10 @@
 //! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a table row of how a pipeline does on them.
 
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
-use hybrid_icp::{
-    Isometry3, PipelineFile, Problem, Rasterizer, Session, Stage, Verdict, Workspace,
-};
+use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::icp::{Session, Stage, Verdict, Workspace};
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::raster::Rasterizer;
 
 use crate::{OBJECTS, Scene, median, scene, symmetric_pose_distance};
 
@@ -47,7 +48,7 @@ pub struct Row {
     pub degrees_p90: f64,
     /// Median translation error, millimetres.
     pub millimeters: f64,
-    /// Median of [`hybrid_icp::Outcome::iterations`]: every evaluation, the first and the rejected included.
+    /// Median of [`hybrid_icp::icp::Outcome::iterations`]: every evaluation, the first and the rejected included.
     pub iterations: f64,
     /// Share of the starts whose pose was kept.
     pub kept: f64,

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use hicp_io::bop::Dataset;
-use hybrid_icp::{DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera};
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera,
+};
 
 /// Returns the dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has
 /// result files as the excerpt has that the tests are of.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::top_estimates;
+use hybrid_icp::score::top_estimates;
 
 use crate::frames::Targets;
 
@@ -15,7 +15,7 @@ use crate::frames::Targets;
 ///
 /// ```
 /// use hicp_io::bop::ResultRow;
-/// use hybrid_icp::Isometry3;
+/// use hybrid_icp::core::Isometry3;
 /// let row = |object, score| {
 ///     let mut row = ResultRow::new(1, 2, object, Isometry3::identity());
 ///     row.score = score;
@@ -58,7 +58,7 @@ pub fn best_rows(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hybrid_icp::Isometry3;
+    use hybrid_icp::core::Isometry3;
 
     fn rows() -> Vec<ResultRow> {
         let row = |(im_id, obj_id, score)| {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use hicp_io::bop::Detection;
 use hicp_io::is_absent;
-use hybrid_icp::{Isometry3, Mask, Model, Observation, Refiner};
+use hybrid_icp::Refiner;
+use hybrid_icp::core::{Isometry3, Mask, Model, Observation};
 
 use crate::assignment::assign_masks;
 use crate::box_mask::BoxMask;

@@ -1,6 +1,6 @@
 //! A mask where there is no segmentation: what was measured in a box about the estimate.
 
-use hybrid_icp::{
+use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, Vector3,
 };
 

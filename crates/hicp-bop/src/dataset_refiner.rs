@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Isometry3, Model, Observation, Refiner, Verdict, warnings};
+use hybrid_icp::core::{Isometry3, Model, Observation};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{Refiner, warnings};
 
 use crate::bop_image::BopImage;
 use crate::frames::FrameKey;

@@ -17,7 +17,7 @@ pub type FrameRows = (FrameKey, Vec<usize>);
 ///
 /// ```
 /// use hicp_io::bop::ResultRow;
-/// use hybrid_icp::Isometry3;
+/// use hybrid_icp::core::Isometry3;
 /// let row = |image| ResultRow::new(1, image, 5, Isometry3::identity());
 /// let frames = hicp_bop::frames_of(&[row(7), row(3), row(7)]);
 /// assert_eq!(frames, [((1, 3), vec![1]), ((1, 7), vec![0, 2])]);

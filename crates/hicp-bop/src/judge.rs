@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{
-    Isometry3, Model, ModelPoints, N_TOLERANCES, PoseErrors, Rasterizer, RenderedView, Renderer,
-    ScoreError, TargetErrors, bop_vsd, most_visible, spheres_overlap, top_estimates,
+use hybrid_icp::core::{Isometry3, Model, RenderedView, Renderer};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{
+    ModelPoints, N_TOLERANCES, PoseErrors, ScoreError, TargetErrors, bop_vsd, most_visible,
+    spheres_overlap, top_estimates,
 };
 
 use crate::fault::{Fault, chain};

@@ -1,7 +1,7 @@
 //! The place that a mask is stored in.
 
 use hicp_io::bop::Rle;
-use hybrid_icp::Mask;
+use hybrid_icp::core::Mask;
 
 use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hicp_io::bop::{Dataset, ModelInfo};
 use hicp_io::{IoError, LengthUnit, ReadLimits, is_absent};
-use hybrid_icp::{Model, ModelConfig};
+use hybrid_icp::core::{Model, ModelConfig};
 
 use crate::fault::chain;
 

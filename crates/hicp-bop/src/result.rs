@@ -1,7 +1,9 @@
 //! What a refinement of rows returns, and how it is entered into the file's rows.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Flatness, Isometry3, UnitQuaternion, Warning, warnings_of_result};
+use hybrid_icp::core::{Isometry3, UnitQuaternion};
+use hybrid_icp::score::Flatness;
+use hybrid_icp::{Warning, warnings_of_result};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::fault::Fault;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hybrid_icp::Termination;
+use hybrid_icp::icp::Termination;
 use serde::{Deserialize, Serialize};
 
 use crate::fault::{Fault, FaultKind};

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use hicp_io::bop::{Dataset, Scene};
-use hybrid_icp::{DepthImage, PinholeCamera};
+use hybrid_icp::core::{DepthImage, PinholeCamera};
 
 use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;

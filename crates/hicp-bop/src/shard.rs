@@ -94,7 +94,7 @@ impl Shard {
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
-    use hybrid_icp::Isometry3;
+    use hybrid_icp::core::Isometry3;
 
     fn rows(images: &[u32]) -> Vec<ResultRow> {
         let row =

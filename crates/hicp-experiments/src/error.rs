@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use hicp_io::IoError;
 use hicp_sim::SimError;
-use hybrid_icp::PipelineError;
+use hybrid_icp::pipeline::PipelineError;
 use thiserror::Error;
 
 /// The reason why a study could not be run, read or reported.

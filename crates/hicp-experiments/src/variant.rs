@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use hybrid_icp::{BoxedStage, PipelineFile, PipelineLimits, Preset};
+use hybrid_icp::pipeline::{PipelineFile, PipelineLimits};
+use hybrid_icp::{BoxedStage, Preset};
 use serde::{Deserialize, Serialize};
 
 use crate::error::ExperimentError;

@@ -1,8 +1,8 @@
 //! The laws of data associations.
 
-use hybrid_icp::{
-    Correspondences, DataAssociation, Isometry3, Observation, Pair, Point3, Problem,
-    RigidTransform, Surfel,
+use hybrid_icp::association::DataAssociation;
+use hybrid_icp::core::{
+    Correspondences, Isometry3, Observation, Pair, Point3, Problem, RigidTransform, Surfel,
 };
 
 use crate::law::{BOXED, NAMED, PURE, Subject, bits};

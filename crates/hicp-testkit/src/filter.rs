@@ -1,6 +1,7 @@
 //! The laws of outlier filters.
 
-use hybrid_icp::{Correspondences, Isometry3, Iteration, OutlierFilter, Pair};
+use hybrid_icp::association::OutlierFilter;
+use hybrid_icp::core::{Correspondences, Isometry3, Iteration, Pair};
 
 use crate::association::finite;
 use crate::law::{BOXED, PURE, Subject, bits};

@@ -1,7 +1,7 @@
 //! The laws of fusers.
 
+use hybrid_icp::core::{Isometry3, Matrix6, Vector6, se3};
 use hybrid_icp::fusion::{CameraMotion, Fuser, PoseEstimate, Update};
-use hybrid_icp::{Isometry3, Matrix6, Vector6, se3};
 
 use crate::law::{BOXED, NAMED, PURE, Subject};
 

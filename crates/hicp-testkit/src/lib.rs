@@ -9,7 +9,8 @@
 //!
 //! ```
 //! use hicp_testkit::{MetricLaws, check_metric};
-//! use hybrid_icp::{ErrorMetric, NormalEquations, Pair};
+//! use hybrid_icp::core::Pair;
+//! use hybrid_icp::metric::{ErrorMetric, NormalEquations};
 //!
 //! /// The distance of the points along the normal of the model.
 //! #[derive(Debug)]

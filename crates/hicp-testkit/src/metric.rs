@@ -1,9 +1,9 @@
 //! The laws of error metrics.
 
-use hybrid_icp::{
-    Correspondences, ErrorMetric, Isometry3, Iteration, Minimize, NormalEquations, Pair, Problem,
-    RigidTransform, Step, Surfel, Vector3, se3,
+use hybrid_icp::core::{
+    Correspondences, Isometry3, Iteration, Pair, Problem, RigidTransform, Surfel, Vector3, se3,
 };
+use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, Step};
 
 use crate::law::{BOXED, NAMED, PURE, Subject};
 use crate::pairs::{good_pairs, hard_pairs};

@@ -1,9 +1,7 @@
 //! The pairs that filters and metrics are tried on.
 
-use hybrid_icp::{
-    Correspondences, DataAssociation, Isometry3, NearestNeighbor, Pair, Point3, PointSelection,
-    Problem, VisibleSurface,
-};
+use hybrid_icp::association::{DataAssociation, NearestNeighbor, PointSelection, VisibleSurface};
+use hybrid_icp::core::{Correspondences, Isometry3, Pair, Point3, Problem};
 
 use crate::scenes::{Scene, scenes, workspace};
 

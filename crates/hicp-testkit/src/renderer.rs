@@ -1,6 +1,7 @@
 //! The laws of renderers.
 
-use hybrid_icp::{NO_TRIANGLE, PixelRegion, Rasterizer, RenderedView, Renderer};
+use hybrid_icp::core::{NO_TRIANGLE, PixelRegion, RenderedView, Renderer};
+use hybrid_icp::raster::Rasterizer;
 
 use crate::law::{BOXED, PURE, Subject};
 use crate::scenes::{Case, cases, sides};

@@ -3,10 +3,12 @@
 use std::sync::{Arc, OnceLock};
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
-use hybrid_icp::{
-    Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Rasterizer, Translation3,
-    UnitQuaternion, Vector3, Workspace, render_depth_image,
+use hybrid_icp::core::{
+    Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Translation3, UnitQuaternion,
+    Vector3,
 };
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::raster::{Rasterizer, render_depth_image};
 
 /// A model seen in a small depth image, and where it truly is.
 #[derive(Debug)]

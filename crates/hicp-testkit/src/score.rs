@@ -1,6 +1,9 @@
 //! The laws of scores and switchers.
 
-use hybrid_icp::{Isometry3, Problem, RegimeEvent, Score, Switcher};
+use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::icp::RegimeEvent;
+use hybrid_icp::score::Score;
+use hybrid_icp::switch::Switcher;
 
 use crate::law::{BOXED, NAMED, PURE, SHARED_RENDER, Subject};
 use crate::scenes::{cases, scenes, workspace};

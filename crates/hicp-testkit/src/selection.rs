@@ -1,6 +1,7 @@
 //! The laws of point selections.
 
-use hybrid_icp::{Isometry3, PointSelection, Problem, Surfel};
+use hybrid_icp::association::PointSelection;
+use hybrid_icp::core::{Isometry3, Problem, Surfel};
 
 use crate::law::{BOXED, NAMED, PURE, SHARED_RENDER, Subject};
 use crate::scenes::{cases, workspace};

@@ -2,9 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use hybrid_icp::{
-    Isometry3, IterationEvent, Observer, Outcome, Problem, Session, Stage, Verdict, Workspace, se3,
-};
+use hybrid_icp::core::{Isometry3, Problem, se3};
+use hybrid_icp::icp::{IterationEvent, Observer, Outcome, Session, Stage, Verdict, Workspace};
 
 use crate::law::{BOXED, PURE, Subject, bits};
 use crate::scenes::{cases, sides, workspace};

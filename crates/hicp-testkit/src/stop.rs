@@ -1,8 +1,7 @@
 //! The laws of stop rules.
 
-use hybrid_icp::{
-    Evaluation, Isometry3, Iteration, Judgment, Problem, Progress, StopRule, Vector3, se3,
-};
+use hybrid_icp::core::{Isometry3, Iteration, Problem, Vector3, se3};
+use hybrid_icp::icp::{Evaluation, Judgment, Progress, StopRule};
 
 use crate::law::{BOXED, PURE, Subject};
 
@@ -117,7 +116,7 @@ fn courses() -> Vec<Course> {
     let start = Isometry3::translation(0.1, -0.05, 0.6);
     // The distance of every turn to the goal along a twist.
     let at = |share: f64| {
-        let twist = hybrid_icp::Vector6::new(0.02, 0.01, -0.03, 0.2, -0.1, 0.3) * share;
+        let twist = hybrid_icp::core::Vector6::new(0.02, 0.01, -0.03, 0.2, -0.1, 0.3) * share;
         se3::exp(&twist) * start
     };
     let course = |name, turn: &dyn Fn(i32) -> (usize, f64, f64)| Course {

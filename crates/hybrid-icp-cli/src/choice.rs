@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use hybrid_icp::{BoxedStage, PipelineFile, Preset, Refiner, UnknownPreset};
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::{BoxedStage, Preset, Refiner, UnknownPreset};
 
 use crate::limits::pipeline_limits;
 

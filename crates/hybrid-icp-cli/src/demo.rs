@@ -8,10 +8,10 @@ use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
     object_pose, perturb, rng,
 };
-use hybrid_icp::{
-    Isometry3, Mask, Observation, PinholeCamera, Problem, Score, Trace, Vsd, render_depth_image,
-    se3,
-};
+use hybrid_icp::Trace;
+use hybrid_icp::core::{Isometry3, Mask, Observation, PinholeCamera, Problem, se3};
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::score::{Score, Vsd};
 
 use crate::choice::PipelineArguments;
 use crate::outputs::Files;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use hicp_io::LengthUnit;
-use hybrid_icp::{Facing, MeshSurvey, Model, TriMesh};
+use hybrid_icp::core::{Facing, MeshSurvey, Model, TriMesh};
 use serde::Serialize;
 
 use crate::limits::limits;

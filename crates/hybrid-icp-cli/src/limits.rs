@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use clap::Args;
 use hicp_io::ReadLimits;
-use hybrid_icp::PipelineLimits;
+use hybrid_icp::pipeline::PipelineLimits;
 
 const READ: ReadLimits = ReadLimits::DEFAULT;
 const WORK: PipelineLimits = PipelineLimits::DEFAULT;

@@ -7,9 +7,10 @@ use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use hicp_io::{LengthUnit, write_atomically, write_obj, write_ply};
 use hicp_sim::{Household, Proportions};
-use hybrid_icp::{
-    Isometry3, Model, PinholeCamera, Rasterizer, RenderedView, Renderer, UnitQuaternion, Vector3,
+use hybrid_icp::core::{
+    Isometry3, Model, PinholeCamera, RenderedView, Renderer, UnitQuaternion, Vector3,
 };
+use hybrid_icp::raster::Rasterizer;
 
 use crate::picture::Picture;
 use crate::terminal::say;

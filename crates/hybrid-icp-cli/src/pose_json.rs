@@ -1,6 +1,6 @@
 //! Poses in JSON, as in pose files.
 
-use hybrid_icp::Isometry3;
+use hybrid_icp::core::Isometry3;
 use serde_json::{Value, json};
 
 /// Adds a pose to a JSON object.

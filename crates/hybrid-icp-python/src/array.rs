@@ -1,6 +1,6 @@
 //! Reads and creates NumPy arrays, and checks shapes and types.
 
-use hybrid_icp::{Isometry3, Matrix3, Matrix6, Point3, Translation3, rotation_from_matrix};
+use hybrid_icp::core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, rotation_from_matrix};
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{
     AllowTypeChange, Element, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,

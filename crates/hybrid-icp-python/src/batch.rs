@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-use hybrid_icp::{Isometry3, Model, Observation, Refinement, Refiner, StageRecord, Trace};
+use hybrid_icp::core::{Isometry3, Model, Observation};
+use hybrid_icp::{Refinement, Refiner, StageRecord, Trace};
 use pyo3::prelude::*;
 
 /// How often signals are looked for.

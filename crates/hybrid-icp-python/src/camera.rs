@@ -1,6 +1,6 @@
 //! `Camera`.
 
-use hybrid_icp::{Matrix3, PinholeCamera, PixelCenters};
+use hybrid_icp::core::{Matrix3, PinholeCamera, PixelCenters};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};

@@ -1,6 +1,7 @@
 //! The events that observers receive.
 
-use hybrid_icp::{IterationEvent, RegimeEvent, StageEvent, StageRecord, Verdict};
+use hybrid_icp::StageRecord;
+use hybrid_icp::icp::{IterationEvent, RegimeEvent, StageEvent, Verdict};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use hicp_io::LengthUnit;
-use hybrid_icp::{
-    MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, ModelPoints, Point3, Symmetries,
-    SymmetryAxis, TriMesh, Vector3, warnings_of_model,
+use hybrid_icp::core::{
+    MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, Point3, Symmetries, SymmetryAxis,
+    TriMesh, Vector3,
 };
+use hybrid_icp::score::ModelPoints;
+use hybrid_icp::warnings_of_model;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hybrid_icp::{DepthImage, Mask, Observation, PinholeCamera};
+use hybrid_icp::core::{DepthImage, Mask, Observation, PinholeCamera};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};

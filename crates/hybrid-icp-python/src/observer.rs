@@ -2,7 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use hybrid_icp::{IterationEvent, Observer, RegimeEvent, StageEvent, Trace};
+use hybrid_icp::Trace;
+use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, Warning, warning_of_distance};
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::{Preset, Refiner, Warning, warning_of_distance};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};

@@ -1,6 +1,7 @@
 //! `Result`.
 
-use hybrid_icp::{Quality, Refinement, StageRecord, Verdict};
+use hybrid_icp::icp::{Quality, Verdict};
+use hybrid_icp::{Refinement, StageRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

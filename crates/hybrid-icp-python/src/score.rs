@@ -1,9 +1,9 @@
 //! Renders, scores and pose errors.
 
-use hybrid_icp::{
-    Isometry3, MeanVsd, Occlusion, Problem, Rasterizer, RenderedView, Renderer, Score,
-    VISIBILITY_TOLERANCE_METERS, Workspace,
-};
+use hybrid_icp::core::{Isometry3, Problem, RenderedView, Renderer};
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Occlusion, Score, VISIBILITY_TOLERANCE_METERS};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -37,7 +37,7 @@ pub(crate) fn render_depth(
 ) -> PyResult<Matrix<f32>> {
     let pose = array::motion(T_co, "T_co")?.isometry;
     let mesh = model.get().model.mesh();
-    let image = py.detach(|| hybrid_icp::render_depth_image(mesh, &camera.0, &pose));
+    let image = py.detach(|| hybrid_icp::raster::render_depth_image(mesh, &camera.0, &pose));
     Ok(depth::image(image.width(), image.pixels()))
 }
 
@@ -120,7 +120,7 @@ pub(crate) fn vsd<'py>(
             view
         };
         let (estimate, truth) = (render(&estimate), render(&truth));
-        hybrid_icp::bop_vsd(
+        hybrid_icp::score::bop_vsd(
             observation.depth(),
             camera,
             &estimate,

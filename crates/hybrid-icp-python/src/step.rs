@@ -1,9 +1,9 @@
 //! Single steps of the error metrics.
 
-use hybrid_icp::{
-    Correspondences, Isometry3, Iteration, Minimize, Pair, Point3, PointToPlane, PointToPoint,
-    Step, Surfel, UnitVector3, Vector3,
+use hybrid_icp::core::{
+    Correspondences, Isometry3, Iteration, Pair, Point3, Surfel, UnitVector3, Vector3,
 };
+use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint, Step};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};

@@ -7,7 +7,9 @@
 
 use std::error::Error;
 
-use hybrid_icp::{Model, Observation, Preset, Refiner, Verdict};
+use hybrid_icp::core::{Model, Observation};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{Preset, Refiner};
 
 mod scene;
 

@@ -4,10 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    AtResolution, Cascade, Divergence, Guard, Icp, IterationLimit, MaxDistance, MaxNormalAngle,
-    MeanVsd, Projective, SmallMotion, Symmetric, VisibleSurface,
-};
+use hybrid_icp::association::{MaxDistance, MaxNormalAngle, Projective, VisibleSurface};
+use hybrid_icp::icp::{AtResolution, Cascade, Divergence, Guard, Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::Symmetric;
+use hybrid_icp::score::MeanVsd;
 
 mod scene;
 

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use hybrid_icp::PipelineFile;
+use hybrid_icp::pipeline::PipelineFile;
 
 mod scene;
 

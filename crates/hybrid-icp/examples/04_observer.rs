@@ -7,9 +7,9 @@
 use std::error::Error;
 use std::ops::ControlFlow;
 
-use hybrid_icp::{
-    Isometry3, IterationEvent, Observer, Preset, Refiner, RegimeEvent, StageEvent, se3,
-};
+use hybrid_icp::core::{Isometry3, se3};
+use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
+use hybrid_icp::{Preset, Refiner};
 
 mod scene;
 

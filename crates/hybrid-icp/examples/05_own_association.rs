@@ -4,10 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit, Pair,
-    PointToPlane, RigidTransform, SmallMotion, Surfel, VisibleSurface,
-};
+use hybrid_icp::association::{DataAssociation, VisibleSurface};
+use hybrid_icp::core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::PointToPlane;
 
 mod scene;
 

@@ -4,10 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    Divergence, ErrorMetric, Icp, IterationLimit, NormalEquations, Pair, PointToPlane, Projective,
-    SmallMotion, Vector3, VisibleSurface, WeightedSum,
-};
+use hybrid_icp::association::{Projective, VisibleSurface};
+use hybrid_icp::core::{Pair, Vector3};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::{ErrorMetric, NormalEquations, PointToPlane, WeightedSum};
 
 mod scene;
 

@@ -4,11 +4,11 @@
 
 use std::error::Error;
 
-use hybrid_icp::Iteration;
-use hybrid_icp::Judgment;
-use hybrid_icp::{
-    Icp, IterationLimit, PointToPlane, Progress, Projective, StopRule, Termination, VisibleSurface,
-};
+use hybrid_icp::association::{Projective, VisibleSurface};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::icp::Judgment;
+use hybrid_icp::icp::{Icp, IterationLimit, Progress, StopRule, Termination};
+use hybrid_icp::metric::PointToPlane;
 
 mod scene;
 

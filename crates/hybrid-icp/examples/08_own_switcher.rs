@@ -4,7 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{Context, Isometry3, Preset, Regime, RegimeEvent, Repeat, Switch, Switcher};
+use hybrid_icp::Preset;
+use hybrid_icp::core::{Context, Isometry3};
+use hybrid_icp::icp::{Regime, RegimeEvent, Repeat};
+use hybrid_icp::switch::{Switch, Switcher};
 
 mod scene;
 

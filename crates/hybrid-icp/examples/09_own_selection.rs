@@ -4,10 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    Context, Divergence, Icp, Isometry3, IterationLimit, PointSelection, PointToPlane, Projective,
-    SmallMotion, Surfel, VisibleSurface,
-};
+use hybrid_icp::association::{PointSelection, Projective, VisibleSurface};
+use hybrid_icp::core::{Context, Isometry3, Surfel};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::PointToPlane;
 
 mod scene;
 

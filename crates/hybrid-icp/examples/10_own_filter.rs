@@ -4,10 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    Correspondences, Icp, Iteration, IterationLimit, MaxNormalAngle, NearestNeighbor,
-    OutlierFilter, PointToPlane, SmallMotion, VisibleSurface,
-};
+use hybrid_icp::association::{MaxNormalAngle, NearestNeighbor, OutlierFilter, VisibleSurface};
+use hybrid_icp::core::{Correspondences, Iteration};
+use hybrid_icp::icp::{Icp, IterationLimit, SmallMotion};
+use hybrid_icp::metric::PointToPlane;
 
 mod scene;
 

@@ -4,7 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{Context, Isometry3, KeepBest, Preset, Score};
+use hybrid_icp::Preset;
+use hybrid_icp::core::{Context, Isometry3};
+use hybrid_icp::icp::KeepBest;
+use hybrid_icp::score::Score;
 
 mod scene;
 

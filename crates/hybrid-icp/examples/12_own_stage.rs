@@ -4,9 +4,10 @@
 
 use std::error::Error;
 
-use hybrid_icp::{
-    Isometry3, MeanVsd, Outcome, Preset, Problem, Score, Session, Stage, Translation3, Verdict,
-};
+use hybrid_icp::Preset;
+use hybrid_icp::core::{Isometry3, Problem, Translation3};
+use hybrid_icp::icp::{Outcome, Session, Stage, Verdict};
+use hybrid_icp::score::{MeanVsd, Score};
 
 mod scene;
 

@@ -9,10 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use hybrid_icp::{
-    Isometry3, PinholeCamera, PixelRegion, Rasterizer, Refiner, RenderedView, Renderer, TriMesh,
-    presets,
-};
+use hybrid_icp::core::{Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::{Refiner, presets};
 
 mod scene;
 

@@ -7,13 +7,12 @@
 use std::error::Error;
 
 use hicp_sim::{RelativeGaussian, rng};
+use hybrid_icp::core::{Model, Observation, Vector6, se3};
 use hybrid_icp::fusion::{
     CameraMotion, Failure, Fuser, Fusion, PoseEstimate, Solution, Transport, Update,
 };
-use hybrid_icp::{
-    Model, Observation, Preset, SequentialConfig, SequentialEstimator, Vector6, render_depth_image,
-    se3,
-};
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::{Preset, SequentialConfig, SequentialEstimator};
 
 mod scene;
 
@@ -87,7 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for image in 1..=5 {
         let clean = render_depth_image(&given.mesh, &given.camera, &truth);
         let mask = clean.pixels().iter().map(|z| *z > 0.0).collect();
-        let mask = hybrid_icp::Mask::new(clean.width(), clean.height(), mask)?;
+        let mask = hybrid_icp::core::Mask::new(clean.width(), clean.height(), mask)?;
         let depth = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean);
         let observation = Observation::new(depth, mask, given.camera)?;
         let step = estimator.step(&model, &observation, &moved);

@@ -1,19 +1,38 @@
 //! Refine 6D object poses in depth images.
 //!
-//! A detector gives a segmentation mask and a rough pose; [`Refiner`] makes it a better one and says how well it explains
-//! the image. The default pipeline is Hybrid ICP (Dreczkowski & Johns), which looks at the image to decide how to register;
-//! it and the eight classical variants it was compared with are [`Preset`]s, and every part they are made of is public.
+//! A detector gives a segmentation mask and a rough pose. [`Refiner`] returns a better pose and a score that says how well
+//! it explains the image:
 //!
-//! **Should you use this crate?** Yes: it re-exports the crates below it. Depend on one of those alone only if you write a
-//! component and want few dependencies. Files (meshes, PNGs, BOP datasets) are read by `hicp-io`.
+//! ```no_run
+//! use hybrid_icp::prelude::*;
+//! # fn inputs() -> (Model, Observation, Isometry3<f64>) { unimplemented!("yours") }
+//! let (model, observation, init) = inputs();
+//! let refined = Refiner::preset(Preset::Auto).refine(&model, &observation, &init);
+//! if refined.mve < 0.3 && refined.warnings().is_empty() {
+//!     println!("{}", refined.outcome.camera_from_object);
+//! }
+//! ```
 //!
-//! Hybrid ICP is one configured pipeline:
+//! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is enough. Depend on one of
+//! those alone only if you write a component and want few dependencies. `hicp-io` reads files (meshes, PNGs, BOP datasets).
+//!
+//! | module | contents | custom component |
+//! |---|---|---|
+//! | [`core`] | poses, cameras, images, models, pairs; [`nalgebra`] is re-exported | `core::Renderer` |
+//! | [`association`] | which points are paired, and which pairs are kept | `PointSelection`, `DataAssociation`, `OutlierFilter` |
+//! | [`metric`] | what is minimized | `ErrorMetric`, `Minimize`, `RobustKernel` |
+//! | [`icp`] | the loop, stop rules, stages made of stages | `Stage`, `StopRule`, `Observer` |
+//! | [`score`] | how well a pose explains the image; BOP's errors | `Score` |
+//! | [`switch`] | which stage runs | `Switcher` |
+//! | [`fusion`] | estimates of a moving camera | `Fuser` |
+//! | [`raster`] | the software renderer | |
+//! | [`presets`] | the paper's pipelines and those beyond it | |
+//! | `pipeline` | pipelines from TOML files (feature `pipeline`) | |
+//!
+//! Hybrid ICP (Dreczkowski & Johns), which chooses the registration from the image, is one configured pipeline:
 //!
 //! ```
-//! use hybrid_icp::{
-//!     AllSamples, Cascade, Convergence, Divergence, Icp, IterationLimit, MeanVsd, NearestNeighbor, PointToPlane,
-//!     PointToPoint, Projective, Refiner, Repeat, Switch, Threshold, VisibleSurface,
-//! };
+//! use hybrid_icp::prelude::*;
 //!
 //! let stop = (Divergence::strict(), Convergence::default(), IterationLimit(50));
 //! let visible = VisibleSurface::default();
@@ -33,10 +52,8 @@
 //! # let _ = refiner;
 //! ```
 //!
-//! Conventions: metres, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
-//! right and y down; pixel centres are at integers.
-//!
-//! Start with [`presets`] (the pipelines), [`Refiner`] (one call), [`pipeline`] (files), [`fusion`] (a moving camera).
+//! Conventions: meters, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
+//! right and y down; pixel centers are at integers.
 
 mod calibration;
 mod checks;
@@ -48,56 +65,22 @@ mod sequential_step;
 mod trace;
 mod warning;
 
+pub use hicp_association as association;
+pub use hicp_core as core;
+pub use hicp_core::nalgebra;
+pub use hicp_fusion as fusion;
+pub use hicp_icp as icp;
+pub use hicp_metric as metric;
+#[cfg(feature = "pipeline")]
+pub use hicp_pipeline as pipeline;
+pub use hicp_raster as raster;
+pub use hicp_score as score;
+pub use hicp_switch as switch;
+
 pub use calibration::Calibration;
 pub use checks::{
     EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings, warnings_of_model,
     warnings_of_result,
-};
-pub use hicp_association::{
-    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DataAssociation,
-    DistanceWeight, KNearest, Length, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance,
-    MinPairs, NearestNeighbor, NormalCompatible, NormalShooting, NormalSpace, NormalWeight,
-    ObservationToModel, ObservedSurface, OneToOne, OutlierFilter, PointSelection, Projective,
-    ProjectiveInterpolated, ProjectiveSearch, RandomSample, Reciprocal, Schedule, SearchIndex,
-    SensorNoise, SensorNoiseWeight, StableSampling, Stride, Trimmed, UniformCount, VarTrimmed,
-    VisibleSurface, VoxelGrid, WithoutBoundary,
-};
-#[doc(hidden)]
-pub use hicp_core::internal;
-pub use hicp_core::{
-    CameraError, Context, Correspondences, DepthImage, Derived, DistanceImage, Facing, Id,
-    ImageError, Isometry3, Iteration, MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Mask, Matrix3, Matrix6,
-    MeshError, MeshSurvey, Model, ModelConfig, NO_TRIANGLE, Observation, Pair, PinholeCamera,
-    PixelCenters, PixelRegion, Point2, Point3, Problem, RenderCache, RenderedView, Renderer,
-    RigidTransform, RotationError, Surfel, Symmetries, SymmetryAxis, SymmetryError, Translation3,
-    TriMesh, UnitQuaternion, UnitVector3, Vector3, Vector6, rotation_from_matrix, rotation_grid,
-    se3, so3,
-};
-pub use hicp_fusion as fusion;
-pub use hicp_icp::{
-    AbsoluteLoss, Anderson, AtResolution, Bound, Cascade, Convergence, Deadline, Divergence,
-    Evaluation, Guard, HypothesisSearch, Icp, IterationEvent, IterationLimit, Judgment, KeepBest,
-    LossRule, Observer, Oscillation, Outcome, Progress, Quality, Regime, RegimeEvent, Repeat,
-    Rotations, SearchOptions, Session, SmallMotion, Stage, StageEvent, StopRule, Termination,
-    TimeLimit, Verdict, Workspace,
-};
-pub use hicp_metric::{
-    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, MetricSchedule, Minimize, NormalEquations, Observability, PlaneToPoint,
-    PointToPlane, PointToPoint, PosePrior, Prior, Robust, RobustKernel, Scale, Step, Symmetric,
-    Terms, WeightedSum, sandwich_covariance,
-};
-#[cfg(feature = "pipeline")]
-pub use hicp_pipeline::{self as pipeline, PipelineError, PipelineFile, PipelineLimits};
-pub use hicp_raster::{Rasterizer, render_depth_image};
-pub use hicp_score::{
-    Flatness, LabeledScore, MeanVsd, ModelPoints, N_THRESHOLDS, N_TOLERANCES, Occlusion,
-    PoseErrors, Recalls, ReliabilityBin, SampledMve, Score, ScoreError, TargetErrors,
-    VISIBILITY_TOLERANCE_METERS, Vsd, add, adi, bop_vsd, match_instances, most_visible, mspd, mssd,
-    reliability, roc_area, spheres_overlap, tolerances, top_estimates, visibility_masks, vsd,
-};
-pub use hicp_switch::{
-    PAPER_ALPHA, Switch, SwitchAmong, SwitchUntilStall, Switcher, Threshold, Thresholds,
 };
 pub use preset::{BoxedStage, Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
@@ -105,6 +88,27 @@ pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
 pub use warning::Warning;
+
+/// What most programs need: `use hybrid_icp::prelude::*;`.
+///
+/// Everything else is in the modules.
+pub mod prelude {
+    pub use crate::{Preset, Refinement, Refiner, presets};
+    pub use hicp_association::{
+        AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, Projective, VisibleSurface,
+    };
+    pub use hicp_core::{
+        DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Problem, TriMesh,
+        Vector3,
+    };
+    pub use hicp_icp::{
+        Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, SmallMotion, Stage,
+        Termination, Verdict,
+    };
+    pub use hicp_metric::{ErrorMetric, Kernel, PointToPlane, PointToPoint, Robust};
+    pub use hicp_score::{MeanVsd, Score};
+    pub use hicp_switch::{Switch, Threshold};
+}
 
 /// Compiles the README's examples.
 #[cfg(doctest)]

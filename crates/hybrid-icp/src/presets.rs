@@ -15,7 +15,8 @@
 //! Each preset has a named type whose fields are public, so that a program can change it:
 //!
 //! ```
-//! use hybrid_icp::{LossRule, Refiner, presets};
+//! use hybrid_icp::icp::LossRule;
+//! use hybrid_icp::{Refiner, presets};
 //! let mut stage = presets::hybrid();
 //! stage.times = 3;
 //! stage.stage.switcher.alpha = 0.3;
@@ -29,7 +30,10 @@
 //! To put in a part of another type, move the others over:
 //!
 //! ```
-//! use hybrid_icp::{Icp, Kernel, PointToPlane, Refiner, Repeat, Robust, Scale, Switch, presets};
+//! use hybrid_icp::metric::{Kernel, PointToPlane, Robust, Scale};
+//! use hybrid_icp::icp::{Icp, Repeat};
+//! use hybrid_icp::switch::Switch;
+//! use hybrid_icp::{Refiner, presets};
 //! let Repeat { times, stage: Switch { switcher, aligned, misaligned } } = presets::hybrid();
 //! let metric = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Mad { floor_meters: 1e-3 });
 //! let Icp { selection, association, filter, stop, .. } = misaligned;

@@ -43,7 +43,10 @@ impl Refinement {
 /// [`Refiner::into_stage`] returns it.
 ///
 /// ```
-/// use hybrid_icp::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Preset, Refiner, TriMesh};
+/// use hybrid_icp::core::{
+///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
+/// };
+/// use hybrid_icp::{Preset, Refiner};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
 /// let plate = vec![

@@ -23,9 +23,10 @@ use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 ///
 /// ```
 /// use hybrid_icp::fusion::{CameraMotion, FusionMethod};
-/// use hybrid_icp::{
-///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, SequentialEstimator, TriMesh, presets,
+/// use hybrid_icp::core::{
+///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
 /// };
+/// use hybrid_icp::{SequentialEstimator, presets};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
 /// let plate = vec![
@@ -37,7 +38,7 @@ use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 /// let mut estimator = SequentialEstimator::for_object(presets::hybrid(), FusionMethod::Average, &model, &init)?;
 /// let mut motion = CameraMotion::none();
 /// for distance in [0.60_f32, 0.58, 0.56] {
-///     let depth = hybrid_icp::render_depth_image(
+///     let depth = hybrid_icp::raster::render_depth_image(
 ///         model.mesh(), &camera, &Isometry3::translation(0.0, 0.0, f64::from(distance)));
 ///     let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
 ///     let step = estimator.step(&model, &Observation::new(depth, mask, camera)?, &motion);

@@ -9,7 +9,8 @@ use hicp_io::{
     IoError, LengthUnit, read_camera_json, read_depth_png, read_mask_png, read_mesh,
     read_point_cloud_ply, read_pose_json, read_rgb_png, write_mask_png, write_ply, write_pose_json,
 };
-use hybrid_icp::{PipelineFile, TriMesh, se3};
+use hybrid_icp::core::{TriMesh, se3};
+use hybrid_icp::pipeline::PipelineFile;
 
 use super::file::{beside, with_bytes};
 

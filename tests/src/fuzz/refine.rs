@@ -1,10 +1,12 @@
 //! Arbitrary bytes into a small mesh, camera, depth image, mask, pose and pipeline, and a whole refinement of them.
 
-use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, PipelineFile,
-    PipelineLimits, Point3, Preset, Refinement, Refiner, Symmetries, SymmetryAxis, TriMesh,
-    Vector3, Verdict, se3,
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, Point3,
+    Symmetries, SymmetryAxis, TriMesh, Vector3, se3,
 };
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::pipeline::{PipelineFile, PipelineLimits};
+use hybrid_icp::{Preset, Refinement, Refiner};
 
 use super::bytes::Bytes;
 use super::parts;

@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::allocations;
 use hicp_tests::scene;
+use hybrid_icp::core::{Isometry3, Vector3};
 use hybrid_icp::fusion::{CameraMotion, FusionMethod};
+use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Catalog, Part, PartKind};
-use hybrid_icp::{Isometry3, PipelineFile, Preset, Refiner, SequentialEstimator, Vector3};
+use hybrid_icp::{Preset, Refiner, SequentialEstimator};
 
 #[test]
 fn a_warm_run_allocates_nothing() {
@@ -113,7 +115,7 @@ fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
     let scene = scene(Household::Bottle, 1.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
     let uncertain = CameraMotion::none()
-        .with_covariance(&(hybrid_icp::Matrix6::identity() * 1e-8))
+        .with_covariance(&(hybrid_icp::core::Matrix6::identity() * 1e-8))
         .expect("a covariance");
     for method in FusionMethod::ALL {
         let stage = Preset::Hybrid.build();

@@ -5,10 +5,11 @@ use crate::custom_metric::AlongRay;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::allocations;
 use hicp_tests::scene;
-use hybrid_icp::{
-    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit,
-    PointToPlane, Refiner, Surfel, VisibleSurface, WeightedSum,
-};
+use hybrid_icp::Refiner;
+use hybrid_icp::association::{DataAssociation, VisibleSurface};
+use hybrid_icp::core::{Context, Correspondences, Isometry3, Surfel};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit};
+use hybrid_icp::metric::{PointToPlane, WeightedSum};
 
 /// Allocations of the second of two equal refinements, and how many iterations it took.
 fn warm_allocations(association: impl DataAssociation + Send + 'static) -> (u64, u64) {

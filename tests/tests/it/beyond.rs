@@ -7,11 +7,14 @@ use std::time::Duration;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, scene};
-use hybrid_icp::{
-    Bound, HypothesisSearch, Isometry3, MeanVsd, Observation, PipelineFile, Point3, Preset,
-    Problem, Rasterizer, Refiner, Rotations, SampledMve, Score, SearchOptions, Termination,
-    UnitQuaternion, Vector3, Verdict, Workspace, add, adi, mssd, presets, se3,
+use hybrid_icp::core::{Isometry3, Observation, Point3, Problem, UnitQuaternion, Vector3, se3};
+use hybrid_icp::icp::{
+    Bound, HypothesisSearch, Rotations, SearchOptions, Termination, Verdict, Workspace,
 };
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, SampledMve, Score, add, adi, mssd};
+use hybrid_icp::{Preset, Refiner, presets};
 use proptest::prelude::*;
 
 /// The MVE by which a search judges.

@@ -4,12 +4,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::render;
-use hybrid_icp::fusion::{BoxedFuser, Fusion, PoseEstimate};
-use hybrid_icp::{
-    BoxedStage, DepthImage, Derived, Isometry3, Mask, Model, Observation, PinholeCamera,
-    PipelineFile, Preset, Rasterizer, Refinement, Refiner, SequentialEstimator, Symmetries,
-    TriMesh, Workspace,
+use hybrid_icp::core::{
+    DepthImage, Derived, Isometry3, Mask, Model, Observation, PinholeCamera, Symmetries, TriMesh,
 };
+use hybrid_icp::fusion::{BoxedFuser, Fusion, PoseEstimate};
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::{BoxedStage, Preset, Refinement, Refiner, SequentialEstimator};
 
 /// Compiles only if the documentation is right: models and observations are shared by reference, workspaces are one per thread.
 #[test]
@@ -28,7 +30,7 @@ fn data_are_send_and_sync_and_workspaces_are_send() {
     shared::<Preset>();
     shared::<PoseEstimate>();
     shared::<Fusion>();
-    shared::<hybrid_icp::ModelPoints>();
+    shared::<hybrid_icp::score::ModelPoints>();
     shared::<hicp_io::bop::Dataset>();
     shared::<hicp_io::bop::Scene>();
     shared::<hicp_io::IoError>();

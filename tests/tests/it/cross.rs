@@ -22,11 +22,12 @@ use std::path::Path;
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hicp_tests::{Scene, camera, render};
+use hybrid_icp::BoxedStage;
+use hybrid_icp::core::{Isometry3, Model, ModelConfig, Observation, Problem, se3};
+use hybrid_icp::icp::{Outcome, Session, Verdict, Workspace};
+use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Catalog, PartKind};
-use hybrid_icp::{
-    BoxedStage, Isometry3, Model, ModelConfig, Observation, Outcome, PipelineFile, Problem,
-    Rasterizer, Session, Verdict, Workspace, se3,
-};
+use hybrid_icp::raster::Rasterizer;
 
 /// Evaluations per run.
 const ITERATIONS: usize = 12;

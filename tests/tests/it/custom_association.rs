@@ -2,10 +2,10 @@
 
 use hicp_testkit::{AssociationLaws, check_association};
 use hicp_tests::starts::{measure_stage, starts};
-use hybrid_icp::{
-    Context, Correspondences, DataAssociation, Divergence, Icp, Isometry3, IterationLimit, Pair,
-    PointToPoint, Projective, RigidTransform, SmallMotion, Stage, Surfel, VisibleSurface,
-};
+use hybrid_icp::association::{DataAssociation, Projective, VisibleSurface};
+use hybrid_icp::core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion, Stage};
+use hybrid_icp::metric::PointToPoint;
 
 // --- The component ---
 

@@ -3,11 +3,11 @@
 use hicp_sim::MEAN_ROTATION_ERROR_DEGREES;
 use hicp_testkit::{FilterLaws, check_filter};
 use hicp_tests::starts::{Start, measure_stage, starts};
-use hybrid_icp::Iteration;
-use hybrid_icp::{
-    Correspondences, Icp, IterationLimit, OutlierFilter, PointToPlane, Projective, SmallMotion,
-    Stage, VisibleSurface,
-};
+use hybrid_icp::association::{OutlierFilter, Projective, VisibleSurface};
+use hybrid_icp::core::Correspondences;
+use hybrid_icp::core::Iteration;
+use hybrid_icp::icp::{Icp, IterationLimit, SmallMotion, Stage};
+use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 

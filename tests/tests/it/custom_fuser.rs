@@ -3,14 +3,12 @@
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{FuserLaws, check_fuser};
 use hicp_tests::{camera, render, scene};
+use hybrid_icp::core::{Isometry3, Matrix6, Observation, Vector6, se3};
 use hybrid_icp::fusion::{
     CameraMotion, Failure, Fuser, FuserConfig, Fusion, PoseEstimate, RecursiveFuser, Solution,
     Transport, Update,
 };
-use hybrid_icp::{
-    Isometry3, Matrix6, Observation, Preset, SequentialConfig, SequentialEstimator,
-    SequentialEvent, Vector6, se3,
-};
+use hybrid_icp::{Preset, SequentialConfig, SequentialEstimator, SequentialEvent};
 
 // --- The component ---
 

@@ -2,10 +2,10 @@
 
 use hicp_testkit::{MetricLaws, check_metric, check_minimize};
 use hicp_tests::starts::{measure_stage, starts};
-use hybrid_icp::{
-    Divergence, ErrorMetric, Icp, IterationLimit, Minimize, NormalEquations, Pair, PointToPlane,
-    Projective, SmallMotion, Stage, VisibleSurface, WeightedSum,
-};
+use hybrid_icp::association::{Projective, VisibleSurface};
+use hybrid_icp::core::Pair;
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion, Stage};
+use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, PointToPlane, WeightedSum};
 
 // --- The component ---
 

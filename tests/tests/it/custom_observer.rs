@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
-use hybrid_icp::{
-    Isometry3, IterationEvent, Observer, Preset, Refiner, StageEvent, Termination, se3,
-};
+use hybrid_icp::core::{Isometry3, se3};
+use hybrid_icp::icp::{IterationEvent, Observer, StageEvent, Termination};
+use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 

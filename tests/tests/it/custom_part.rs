@@ -2,11 +2,13 @@
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
+use hybrid_icp::association::{AllSamples, Projective};
+use hybrid_icp::core::Pair;
+use hybrid_icp::icp::Icp;
+use hybrid_icp::metric::{ErrorMetric, NormalEquations};
 use hybrid_icp::pipeline::{Catalog, Range};
-use hybrid_icp::{
-    AllSamples, ErrorMetric, Icp, NormalEquations, Pair, PipelineFile, PipelineLimits, Projective,
-    Refiner, presets,
-};
+use hybrid_icp::pipeline::{PipelineFile, PipelineLimits};
+use hybrid_icp::{Refiner, presets};
 
 /// Point-to-plane with a gain, such as a program may add.
 #[derive(Clone, Debug)]

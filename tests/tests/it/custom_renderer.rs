@@ -3,10 +3,14 @@
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
 use hicp_testkit::{RendererLaws, check_renderer};
 use hicp_tests::{Scene, median, scene};
-use hybrid_icp::{
-    DepthImage, Isometry3, MeanVsd, NO_TRIANGLE, Observation, PinholeCamera, PixelRegion, Preset,
-    Problem, Rasterizer, RenderedView, Renderer, Score, Session, Stage, TriMesh, Workspace,
+use hybrid_icp::Preset;
+use hybrid_icp::core::{
+    DepthImage, Isometry3, NO_TRIANGLE, Observation, PinholeCamera, PixelRegion, Problem,
+    RenderedView, Renderer, TriMesh,
 };
+use hybrid_icp::icp::{Session, Stage, Workspace};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, Score};
 
 // --- The component ---
 

@@ -3,9 +3,11 @@
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{ScoreLaws, check_score};
 use hicp_tests::scene;
-use hybrid_icp::{
-    Context, Guard, Isometry3, Preset, Problem, Rasterizer, Refiner, Score, Verdict, Workspace,
-};
+use hybrid_icp::core::{Context, Isometry3, Problem};
+use hybrid_icp::icp::{Guard, Verdict, Workspace};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::Score;
+use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 

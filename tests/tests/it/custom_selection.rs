@@ -2,10 +2,10 @@
 
 use hicp_testkit::check_selection;
 use hicp_tests::starts::{Start, measure_stage, starts};
-use hybrid_icp::{
-    Context, Divergence, Icp, Isometry3, IterationLimit, NearestNeighbor, PointSelection,
-    PointToPlane, SmallMotion, Stage, Surfel, VisibleSurface,
-};
+use hybrid_icp::association::{NearestNeighbor, PointSelection, VisibleSurface};
+use hybrid_icp::core::{Context, Isometry3, Surfel};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion, Stage};
+use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 

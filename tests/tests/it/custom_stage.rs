@@ -5,10 +5,12 @@ use std::f64::consts::PI;
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{StageLaws, check_stage};
 use hicp_tests::scene;
-use hybrid_icp::{
-    Isometry3, MeanVsd, Model, Outcome, Point3, Preset, Problem, Refiner, Score, Session, Stage,
-    Translation3, UnitQuaternion, UnitVector3, Vector3, Verdict, se3,
+use hybrid_icp::core::{
+    Isometry3, Model, Point3, Problem, Translation3, UnitQuaternion, UnitVector3, Vector3, se3,
 };
+use hybrid_icp::icp::{Outcome, Session, Stage, Verdict};
+use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 

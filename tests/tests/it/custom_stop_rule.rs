@@ -2,12 +2,11 @@
 
 use hicp_testkit::{StopRuleLaws, check_stop_rule};
 use hicp_tests::starts::{measure_stage, starts};
-use hybrid_icp::Iteration;
-use hybrid_icp::Judgment;
-use hybrid_icp::{
-    Icp, IterationLimit, PointToPlane, Progress, Projective, Stage, StopRule, Termination,
-    VisibleSurface,
-};
+use hybrid_icp::association::{Projective, VisibleSurface};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::icp::Judgment;
+use hybrid_icp::icp::{Icp, IterationLimit, Progress, Stage, StopRule, Termination};
+use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 

@@ -3,12 +3,16 @@
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{SwitcherLaws, check_switcher};
 use hicp_tests::{Scene, camera, render, scene};
-use hybrid_icp::{
-    Context, Divergence, Icp, Isometry3, IterationLimit, Matrix3, NO_TRIANGLE, NearestNeighbor,
-    Observation, Observer, PointToPlane, PointToPoint, Projective, Refiner, Regime, RegimeEvent,
-    SearchIndex, SmallMotion, Stage, Stride, Switch, Switcher, UnitQuaternion, Vector3,
-    VisibleSurface,
+use hybrid_icp::Refiner;
+use hybrid_icp::association::{NearestNeighbor, Projective, SearchIndex, Stride, VisibleSurface};
+use hybrid_icp::core::{
+    Context, Isometry3, Matrix3, NO_TRIANGLE, Observation, UnitQuaternion, Vector3,
 };
+use hybrid_icp::icp::{
+    Divergence, Icp, IterationLimit, Observer, Regime, RegimeEvent, SmallMotion, Stage,
+};
+use hybrid_icp::metric::{PointToPlane, PointToPoint};
+use hybrid_icp::switch::{Switch, Switcher};
 
 // --- The component ---
 

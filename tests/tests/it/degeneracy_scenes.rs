@@ -6,14 +6,16 @@
 
 use std::f64::consts::PI;
 
-use hybrid_icp::Iteration;
-use hybrid_icp::Minimize;
-use hybrid_icp::{
-    Conditioned, Context, Correspondences, DataAssociation, Degeneracy, DepthImage, Isometry3,
-    Mask, Model, Observability, Observation, Pair, PinholeCamera, Point3, PointSelection,
-    PointToPlane, PointToPoint, Problem, Projective, Rasterizer, Surfel, TriMesh, UnitVector3,
-    Vector3, Vector6, Workspace, se3,
+use hybrid_icp::association::{DataAssociation, PointSelection, Projective};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation, Pair, PinholeCamera,
+    Point3, Problem, Surfel, TriMesh, UnitVector3, Vector3, Vector6, se3,
 };
+use hybrid_icp::icp::Workspace;
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{Conditioned, Degeneracy, Observability, PointToPlane, PointToPoint};
+use hybrid_icp::raster::Rasterizer;
 
 /// Distance of the surfaces' origin from the camera.
 const DISTANCE: f64 = 0.5;

@@ -2,12 +2,16 @@
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, scene};
-use hybrid_icp::{
-    AllSamples, BoxedStage, Cascade, Convergence, DataAssociation, Divergence, ErrorMetric, Icp,
-    Isometry3, IterationLimit, MeanVsd, NearestNeighbor, OutlierFilter, PointSelection,
-    PointToPlane, PointToPoint, Preset, Projective, Refinement, Refiner, Repeat, Score, StopRule,
-    Switch, Switcher, Threshold, VisibleSurface, presets,
+use hybrid_icp::association::{
+    AllSamples, DataAssociation, NearestNeighbor, OutlierFilter, PointSelection, Projective,
+    VisibleSurface,
 };
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, StopRule};
+use hybrid_icp::metric::{ErrorMetric, PointToPlane, PointToPoint};
+use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::switch::{Switch, Switcher, Threshold};
+use hybrid_icp::{BoxedStage, Preset, Refinement, Refiner, presets};
 
 fn cases() -> Vec<(Scene, Isometry3<f64>)> {
     let mut rng = rng(11);

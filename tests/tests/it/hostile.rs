@@ -2,11 +2,14 @@
 
 use hicp_sim::{Household, Solid, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
-use hybrid_icp::{
-    CameraError, Convergence, DepthImage, Icp, Isometry3, IterationLimit, Mask, Model, Observation,
-    PinholeCamera, Point3, PointToPlane, Preset, Projective, Refinement, Refiner, Termination,
-    TriMesh, Vector3, Verdict, VisibleSurface, se3,
+use hybrid_icp::association::{Projective, VisibleSurface};
+use hybrid_icp::core::{
+    CameraError, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
+    Vector3, se3,
 };
+use hybrid_icp::icp::{Convergence, Icp, IterationLimit, Termination, Verdict};
+use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::{Preset, Refinement, Refiner};
 
 fn mug() -> Scene {
     scene(Household::Mug, 0.0, &mut rng(5))
@@ -80,7 +83,7 @@ fn half_of_the_object_outside_the_image_still_registers() {
     let model = Household::Hammer.model().unwrap();
     let camera = camera();
     // Half of the hammer is beyond the right edge: at 0.45 m the image ends 0.25 m from the axis.
-    let turn = hybrid_icp::UnitQuaternion::new(Vector3::new(0.9, 0.5, 0.4));
+    let turn = hybrid_icp::core::UnitQuaternion::new(Vector3::new(0.9, 0.5, 0.4));
     let truth = Isometry3::from_parts(Vector3::new(0.25, 0.02, 0.45).into(), turn);
     let (depth, mask) = render(&model, &camera, &truth);
     let visible = mask.pixels().iter().filter(|m| **m).count();

@@ -26,6 +26,7 @@ mod custom_stop_rule;
 mod custom_switcher;
 mod degeneracy_scenes;
 mod determinism;
+mod facade;
 mod fuzz_regressions;
 mod hostile;
 mod metrics;

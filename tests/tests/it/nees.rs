@@ -4,7 +4,8 @@
 
 use hicp_sim::Household;
 use hicp_tests::nees::{Nees, Pairs, measure};
-use hybrid_icp::{Generalized, PlaneToPoint, PointToPlane, Projective, Stride, VisibleSurface};
+use hybrid_icp::association::{Projective, Stride, VisibleSurface};
+use hybrid_icp::metric::{Generalized, PlaneToPoint, PointToPlane};
 
 const RUNS: usize = 500;
 const VISIBLE: VisibleSurface = VisibleSurface {

@@ -4,10 +4,16 @@ use hicp_io::pose_from_bop;
 use hicp_sim::{Household, RelativeGaussian, rng};
 use hicp_tests::OBJECTS;
 use hicp_tests::starts::starts;
+use hybrid_icp::core::{
+    CameraError, DepthImage, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
+    PinholeCamera, Point3, TriMesh,
+};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::score::Flatness;
+use hybrid_icp::switch::PAPER_ALPHA;
 use hybrid_icp::{
-    CameraError, DepthImage, Flatness, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
-    PAPER_ALPHA, PinholeCamera, Point3, Preset, Refinement, Refiner, TriMesh, Verdict, Warning,
-    render_depth_image, warning_of_diameter, warnings, warnings_of_result,
+    Preset, Refinement, Refiner, Warning, warning_of_diameter, warnings, warnings_of_result,
 };
 
 const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];

@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
+use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Accepts, Catalog, PartKind};
-use hybrid_icp::{PipelineFile, Preset, Refiner};
+use hybrid_icp::{Preset, Refiner};
 
 #[test]
 fn every_shipped_file_gives_the_same_bits_as_its_code() {

@@ -2,11 +2,10 @@
 
 use hicp_sim::Household;
 use hicp_tests::render;
+use hybrid_icp::core::{Isometry3, Model, Observation, PinholeCamera, Vector3};
 use hybrid_icp::pipeline::{Accepts, Catalog, Part, PartKind, PipelineError};
-use hybrid_icp::{
-    Isometry3, Model, Observation, PinholeCamera, PipelineFile, PipelineLimits, Preset, Refiner,
-    Vector3,
-};
+use hybrid_icp::pipeline::{PipelineFile, PipelineLimits};
+use hybrid_icp::{Preset, Refiner};
 
 const ICP: &str = r#"{ type = "icp", selection = "all-samples", association = "projective", metric = "point-to-plane" }"#;
 

@@ -4,15 +4,22 @@ use std::ops::ControlFlow;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
-use hybrid_icp::Iteration;
-use hybrid_icp::{
-    AllSamples, BoxedStage, Context, Convergence, Correspondences, DataAssociation, DepthImage,
-    GaussNewton, Generalized, Icp, Isometry3, IterationEvent, IterationLimit, LevenbergMarquardt,
-    Mask, Minimize, Observation, Observer, Outcome, Pair, PinholeCamera, PlaneToPoint,
-    PointToPlane, PointToPoint, Preset, Problem, Projective, Quality, Rasterizer, Refiner,
-    RigidTransform, Session, Stage, StageEvent, Surfel, Symmetric, UnitVector3, Vector3, Verdict,
-    VisibleSurface, Workspace, se3,
+use hybrid_icp::association::{AllSamples, DataAssociation, Projective, VisibleSurface};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Context, Correspondences, DepthImage, Isometry3, Mask, Observation, Pair, PinholeCamera,
+    Problem, RigidTransform, Surfel, UnitVector3, Vector3, se3,
 };
+use hybrid_icp::icp::{
+    Convergence, Icp, IterationEvent, IterationLimit, Observer, Outcome, Quality, Session, Stage,
+    StageEvent, Verdict, Workspace,
+};
+use hybrid_icp::metric::{
+    GaussNewton, Generalized, LevenbergMarquardt, Minimize, PlaneToPoint, PointToPlane,
+    PointToPoint, Symmetric,
+};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::{BoxedStage, Preset, Refiner};
 
 fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
     let (t, q) = (pose.translation.vector, pose.rotation.coords);
@@ -168,7 +175,7 @@ fn the_returned_pose_carries_the_points_onto_their_targets_far_from_the_origin()
 /// Where every evaluation stood, by its bits, and what it found.
 #[derive(Default)]
 struct Evaluations {
-    poses: Vec<([u64; 7], hybrid_icp::Evaluation)>,
+    poses: Vec<([u64; 7], hybrid_icp::icp::Evaluation)>,
     last_of_stages: Vec<usize>,
 }
 
@@ -208,7 +215,7 @@ fn the_initial_pose_is_evaluated_first_and_the_returned_one_was_evaluated_itself
                 let least = losses.fold(f64::INFINITY, f64::min);
                 // A pose that was turned down for the pairs it lost may have had a lower mean.
                 let accepted = claimed.1.mean_loss <= least * 1.01;
-                let lost = outcome.termination == hybrid_icp::Termination::PairsLost;
+                let lost = outcome.termination == hybrid_icp::icp::Termination::PairsLost;
                 assert!(accepted || lost, "{preset}: {outcome:?}, {least}");
             }
         }
@@ -231,13 +238,13 @@ fn a_scene_of_another_size_is_refined_alike() {
             };
             let mesh = small.model.mesh();
             let vertices = mesh.vertices().iter().map(|p| p * factor).collect();
-            let mesh = hybrid_icp::TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+            let mesh = hybrid_icp::core::TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
             let depth = small.observation.depth();
             let pixels = depth.pixels().iter().map(|z| z * factor).collect();
             let depth = DepthImage::from_meters(depth.width(), depth.height(), pixels).unwrap();
             let mask = small.observation.mask().clone();
             let large = Scene {
-                model: hybrid_icp::Model::new(mesh),
+                model: hybrid_icp::core::Model::new(mesh),
                 observation: Observation::new(depth, mask, camera()).unwrap(),
                 truth: scaled(&small.truth),
             };

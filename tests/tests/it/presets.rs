@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
-use hybrid_icp::{
-    Isometry3, PinholeCamera, PipelineFile, PixelRegion, Preset, Rasterizer, Refiner, RenderedView,
-    Renderer, TriMesh, presets,
-};
+use hybrid_icp::core::{Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
+use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::{Preset, Refiner, presets};
 
 #[test]
 fn a_preset_changed_in_place_gives_the_bits_of_its_file_with_the_same_override() {
@@ -26,7 +26,7 @@ fn a_preset_changed_in_place_gives_the_bits_of_its_file_with_the_same_override()
     let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
     let (steps, _) = &mut refiner.stage_mut().0;
     steps.max_steps = 1;
-    steps.misaligned.0.1.association.stride = hybrid_icp::Stride::AboutPoints(200);
+    steps.misaligned.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
     let changed = refiner.refine(&scene.model, &scene.observation, &init);
     assert_eq!(changed, expected);
     assert_ne!(changed, unchanged);

@@ -2,7 +2,9 @@
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{scene, symmetric_pose_distance};
-use hybrid_icp::{AtResolution, Cascade, Observation, Refiner, presets};
+use hybrid_icp::core::Observation;
+use hybrid_icp::icp::{AtResolution, Cascade};
+use hybrid_icp::{Refiner, presets};
 
 #[test]
 fn a_coarse_pixel_holds_the_surfel_of_its_fine_pixel() {

@@ -3,7 +3,7 @@
 use hicp_sim::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen, components};
 use hicp_tests::median;
 use hicp_tests::room::{bounds, frames, root};
-use hybrid_icp::render_depth_image;
+use hybrid_icp::raster::render_depth_image;
 
 #[test]
 fn real_frames_become_one_surface() {

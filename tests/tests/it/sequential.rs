@@ -4,14 +4,14 @@ use std::time::{Duration, Instant};
 
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
 use hicp_tests::{camera, median, render, symmetric_pose_distance};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, Problem, Vector6, se3};
 use hybrid_icp::fusion::{
     CameraMotion, CovarianceModel, Failure, FuserConfig, FusionError, FusionMethod, Gate, Gated,
     InflatedCovariance, UnitCovariance, Update,
 };
+use hybrid_icp::icp::{Outcome, Session, Stage};
 use hybrid_icp::{
-    Calibration, DepthImage, Isometry3, Mask, Model, Observation, Outcome, Preset, Problem,
-    SequentialConfig, SequentialEstimator, SequentialEvent, Session, Stage, Trace, Vector6,
-    presets, se3,
+    Calibration, Preset, SequentialConfig, SequentialEstimator, SequentialEvent, Trace, presets,
 };
 
 /// What a camera sees that moves toward an object: images, true poses, and the motion before each.

@@ -2,14 +2,20 @@
 
 use hicp_sim::{Household, SimRng, perturb, rng};
 use hicp_tests::{Scene, scene};
-use hybrid_icp::Iteration;
-use hybrid_icp::{
-    AllSamples, Anderson, Cascade, Correspondences, Guard, Icp, Isometry3, IterationEvent,
-    IterationLimit, KeepBest, MaxDistance, MeanVsd, NearestNeighbor, Observer, Outcome,
-    OutlierFilter, PointToPlane, PointToPoint, Preset, Problem, Projective, Quality, Rasterizer,
-    Refiner, Regime, Schedule, Session, SmallMotion, Stage, StageEvent, Switch, SwitchAmong,
-    Termination, Thresholds, Verdict, VisibleSurface, Workspace, presets,
+use hybrid_icp::association::{
+    AllSamples, MaxDistance, NearestNeighbor, OutlierFilter, Projective, Schedule, VisibleSurface,
 };
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{Correspondences, Isometry3, Problem};
+use hybrid_icp::icp::{
+    Anderson, Cascade, Guard, Icp, IterationEvent, IterationLimit, KeepBest, Observer, Outcome,
+    Quality, Regime, Session, SmallMotion, Stage, StageEvent, Termination, Verdict, Workspace,
+};
+use hybrid_icp::metric::{PointToPlane, PointToPoint};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::MeanVsd;
+use hybrid_icp::switch::{Switch, SwitchAmong, Thresholds};
+use hybrid_icp::{Preset, Refiner, presets};
 
 fn case(object: Household, seed: u64, translation: f64, angle: f64) -> (Scene, Isometry3<f64>) {
     let mut rng: SimRng = rng(seed);
@@ -161,7 +167,7 @@ fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
         let mut context = workspace.context(&problem);
         let mut source = Vec::new();
         let pose = outcome.camera_from_object;
-        use hybrid_icp::{DataAssociation, PointSelection};
+        use hybrid_icp::association::{DataAssociation, PointSelection};
         VisibleSurface::default().select(&mut context, &init, &mut source);
         let mut pairs = Correspondences::new();
         pairs.begin(&pose, source.len());

@@ -3,7 +3,9 @@
 use hicp_io::bop::{Dataset, read_results};
 use hicp_tests::median;
 use hicp_tests::ycbv::{instances, root};
-use hybrid_icp::{Preset, Refiner, adi, se3};
+use hybrid_icp::core::se3;
+use hybrid_icp::score::adi;
+use hybrid_icp::{Preset, Refiner};
 
 #[test]
 fn from_the_true_pose_hybrid_stays_within_five_millimetres() {

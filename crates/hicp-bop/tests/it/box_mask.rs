@@ -1,7 +1,7 @@
 //! The mask of an estimate where there is no segmentation.
 
 use hicp_bop::BoxMask;
-use hybrid_icp::{
+use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, TriMesh,
     Vector3,
 };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hicp_bop::{EvaluatedObject, Judge, Renders, RowStatus, Scenes, visible_objects};
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Isometry3, Vector3};
+use hybrid_icp::core::{Isometry3, Vector3};
 
 use crate::refining::{BLOCK, KEY, dataset, estimate, models, truth};
 

@@ -2,7 +2,7 @@
 
 use hicp_bop::ModelFolder;
 use hicp_io::{IoError, IoErrorKind, LengthUnit, ReadLimits};
-use hybrid_icp::{Point3, TriMesh};
+use hybrid_icp::core::{Point3, TriMesh};
 
 #[test]
 fn sizes_and_models_are_read_within_the_limits() {

@@ -13,10 +13,11 @@ use hicp_io::bop::{
     write_scene_gt,
 };
 use hicp_io::{IoError, LengthUnit, ReadLimits, write_depth_png, write_mask_png, write_ply};
-use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Matrix3, PinholeCamera, Point3, Preset, Refiner, TriMesh, Vector3,
-    render_depth_image,
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Matrix3, PinholeCamera, Point3, TriMesh, Vector3,
 };
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::{Preset, Refiner};
 
 pub(crate) const KEY: (u32, u32) = (1, 4);
 pub(crate) const BLOCK: u32 = 5;

@@ -5,7 +5,8 @@ use hybrid_icp::fusion::{
     CovarianceModel, FuserConfig, FusionError, FusionMethod, MveCovariance, UnitCovariance,
     probability_within,
 };
-use hybrid_icp::{BoxedStage, Calibration, MeanVsd, Preset, SequentialConfig, SequentialEstimator};
+use hybrid_icp::score::MeanVsd;
+use hybrid_icp::{BoxedStage, Calibration, Preset, SequentialConfig, SequentialEstimator};
 
 /// A method of §V-A as the study runs it, or one behind a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

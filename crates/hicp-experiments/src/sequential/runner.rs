@@ -6,7 +6,8 @@ use std::ops::Range;
 use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera};
 use hicp_sim::{CaseConfig, CaseMaker, InitialPose, stream};
 use hybrid_icp::fusion::{CameraMotion, PoseEstimate};
-use hybrid_icp::{SequentialEstimator, SequentialEvent, render_depth_image};
+use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::{SequentialEstimator, SequentialEvent};
 
 use super::config::{TrajectoryClock, TrajectoryConfig};
 use super::rule::FusionRule;

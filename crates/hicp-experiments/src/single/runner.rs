@@ -7,7 +7,9 @@ use hicp_sim::{
     Case, CaseMaker, Corruption, DepthNoise, DepthSensor, MaskDefects, Reconstruction,
     ReconstructionNoise, RelativeGaussian,
 };
-use hybrid_icp::{BoxedStage, Rasterizer, Session, Workspace};
+use hybrid_icp::BoxedStage;
+use hybrid_icp::icp::{Session, Workspace};
+use hybrid_icp::raster::Rasterizer;
 
 use super::condition::{Condition, MaskFault};
 use super::config::Config;

@@ -6,7 +6,8 @@ use hicp_experiments::{
     Config, Design, Experiment, FusionRule, Subject, TrajectoryConfig, Variant,
 };
 use hicp_sim::Household;
-use hybrid_icp::{PipelineLimits, Preset};
+use hybrid_icp::Preset;
+use hybrid_icp::pipeline::PipelineLimits;
 
 fn subjects() -> Vec<Subject> {
     Subject::household(&[Household::Mug, Household::Book]).unwrap()

@@ -19,6 +19,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             1992. Cost: O(n log m), and O(m log m) once per observation.";
         let indexes = [
             ("box-tree", SearchIndex::BoxTree),
+            #[cfg(feature = "kiddo")]
             ("kd-tree", SearchIndex::KdTree),
         ];
         let targets = searched(p)?;
@@ -99,11 +100,11 @@ pub(super) fn add(catalog: &mut Catalog) {
 const SEARCHED: &str = "observed points to search, about";
 
 fn searched(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
-    stride(p, 4000, 0, SEARCHED)
+    stride(p, 4000, SEARCHED)
 }
 
 fn asking(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
-    stride(p, 2000, 0, "observed points to pair, about")
+    stride(p, 2000, "observed points to pair, about")
 }
 
 fn considered(p: &mut Parameters<'_>) -> Result<usize, PipelineError> {

@@ -32,11 +32,10 @@ pub(super) fn length(
 pub(super) fn stride(
     p: &mut Parameters<'_>,
     points: u32,
-    pixels: u32,
     meaning: &'static str,
 ) -> Result<Stride, PipelineError> {
     let points = p.count("points", 1, points, meaning)?;
-    let pixels = p.count("pixels", 0, pixels, "spacing of the grid instead, if not 0")?;
+    let pixels = p.count("pixels", 0, 0, "spacing of the grid instead, if not 0")?;
     Ok(match pixels {
         0 => Stride::AboutPoints(points),
         _ => Stride::Pixels(pixels),

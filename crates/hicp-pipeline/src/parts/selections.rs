@@ -20,14 +20,14 @@ pub(super) fn add(catalog: &mut Catalog) {
         p.about = "Selects the points visible at the stage's initial estimate: V_O. \
             Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";
         Ok(VisibleSurface {
-            stride: stride(p, 2000, 0, KEPT)?,
+            stride: stride(p, 2000, KEPT)?,
         })
     });
     catalog.add_selection("observed-surface", |p| {
         p.about = "Selects the observed surface, moved into the object frame at the stage's \
             initial estimate. Cost: O(m).";
         Ok(ObservedSurface {
-            stride: stride(p, 2000, 0, KEPT)?,
+            stride: stride(p, 2000, KEPT)?,
         })
     });
     catalog.add_selection("without-boundary", |p| {

@@ -10,16 +10,21 @@ use hicp_testkit::{
     check_minimize, check_renderer, check_score, check_selection, check_stage, check_stop_rule,
     check_switcher,
 };
-use hybrid_icp::Iteration;
-use hybrid_icp::Judgment;
-use hybrid_icp::Minimize;
-use hybrid_icp::{
-    Context, Correspondences, DataAssociation, ErrorMetric, Isometry3, Model, NormalEquations,
-    Observation, Outcome, OutlierFilter, Pair, PinholeCamera, PixelRegion, PointSelection,
-    PointToPlane, PointToPoint, Problem, Progress, Projective, Rasterizer, Regime, RegimeEvent,
-    RenderedView, Renderer, Score, Session, Stage, Step, StopRule, Surfel, Switcher, Termination,
-    TriMesh, Vector3, Verdict,
+use hybrid_icp::association::{DataAssociation, OutlierFilter, PointSelection, Projective};
+use hybrid_icp::core::Iteration;
+use hybrid_icp::core::{
+    Context, Correspondences, Isometry3, Model, Observation, Pair, PinholeCamera, PixelRegion,
+    Problem, RenderedView, Renderer, Surfel, TriMesh, Vector3,
 };
+use hybrid_icp::icp::Judgment;
+use hybrid_icp::icp::{
+    Outcome, Progress, Regime, RegimeEvent, Session, Stage, StopRule, Termination, Verdict,
+};
+use hybrid_icp::metric::Minimize;
+use hybrid_icp::metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::Score;
+use hybrid_icp::switch::Switcher;
 
 /// Runs a check that must fail with a message that names the law.
 fn caught(law: &str, check: impl FnOnce()) {

@@ -8,19 +8,28 @@ use hicp_testkit::{
     check_minimize, check_renderer, check_score, check_selection, check_stage, check_stop_rule,
     check_switcher, scenes,
 };
-use hybrid_icp::{
-    AbsoluteLoss, AllSamples, AtResolution, Bound, BoundaryTargets, ClosestPointOnMesh,
-    Conditioned, ConstantWeight, Convergence, Deadline, Degeneracy, DistanceWeight, Divergence,
-    ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Guard, IterationLimit, KNearest,
-    KeepBest, Kernel, LevenbergMarquardt, MadDistance, Matrix6, MaxDistance, MaxNormalAngle,
-    MeanVsd, MedianDistance, MetricSchedule, MinPairs, NearestNeighbor, NormalCompatible,
-    NormalShooting, NormalSpace, NormalWeight, ObservationToModel, ObservedSurface, OneToOne,
-    Oscillation, PAPER_ALPHA, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Preset, Prior,
-    Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample, Rasterizer, Reciprocal,
-    Regime, Robust, SampledMve, Scale, Schedule, SearchIndex, SensorNoiseWeight, SmallMotion,
-    StableSampling, Stride, SwitchUntilStall, Symmetric, Threshold, Thresholds, TimeLimit, Trimmed,
-    UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, Vsd, WeightedSum, WithoutBoundary,
+use hybrid_icp::Preset;
+use hybrid_icp::association::{
+    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DistanceWeight, KNearest,
+    MadDistance, MaxDistance, MaxNormalAngle, MedianDistance, MinPairs, NearestNeighbor,
+    NormalCompatible, NormalShooting, NormalSpace, NormalWeight, ObservationToModel,
+    ObservedSurface, OneToOne, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
+    Reciprocal, Schedule, SearchIndex, SensorNoiseWeight, StableSampling, Stride, Trimmed,
+    UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
+use hybrid_icp::core::Matrix6;
+use hybrid_icp::icp::{
+    AbsoluteLoss, AtResolution, Bound, Convergence, Deadline, Divergence, Guard, IterationLimit,
+    KeepBest, Oscillation, Regime, SmallMotion, TimeLimit,
+};
+use hybrid_icp::metric::{
+    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
+    LevenbergMarquardt, MetricSchedule, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
+    Robust, Scale, Symmetric, WeightedSum,
+};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::{MeanVsd, SampledMve, Vsd};
+use hybrid_icp::switch::{PAPER_ALPHA, SwitchUntilStall, Threshold, Thresholds};
 
 #[test]
 fn selections() {

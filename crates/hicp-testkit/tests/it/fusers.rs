@@ -5,11 +5,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hicp_testkit::{FuserLaws, check_fuser};
+use hybrid_icp::core::{Isometry3, Matrix6, Point3, Symmetries, SymmetryAxis, Vector3};
 use hybrid_icp::fusion::{
     BatchFuser, CameraMotion, Fuser, FuserConfig, FusionMethod, Gate, Gated, LastEstimate,
     MostConfident, PoseEstimate, RecursiveFuser, SymmetryAware, Transport, UnitCovariance, Update,
 };
-use hybrid_icp::{Isometry3, Matrix6, Point3, Symmetries, SymmetryAxis, Vector3};
 
 fn config() -> FuserConfig {
     FuserConfig {

@@ -6,7 +6,8 @@ use std::path::Path;
 use hicp_bop::{ModelFolder, Models};
 use hicp_io::IoError;
 use hicp_io::bop::Dataset;
-use hybrid_icp::{Model, warning_of_diameter};
+use hybrid_icp::core::Model;
+use hybrid_icp::warning_of_diameter;
 use rayon::prelude::*;
 
 use crate::limits::limits;

@@ -1,6 +1,6 @@
 //! Outlines of silhouettes: closed paths along the sides between pixels inside and outside.
 
-use hybrid_icp::{PixelRegion, RenderedView};
+use hybrid_icp::core::{PixelRegion, RenderedView};
 
 /// A side between a pixel inside and a pixel outside the silhouette, as columns and rows of the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

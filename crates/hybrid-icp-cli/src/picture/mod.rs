@@ -6,8 +6,9 @@ pub(crate) mod text;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Refiner, RenderedView,
+use hybrid_icp::Refiner;
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, RenderedView,
 };
 
 use contour::contours;
@@ -96,7 +97,7 @@ impl Picture {
     pub(crate) fn shaded(
         depth: &Arc<DepthImage>,
         camera: &PinholeCamera,
-    ) -> Result<Self, hybrid_icp::ImageError> {
+    ) -> Result<Self, hybrid_icp::core::ImageError> {
         let mask = Mask::full(depth.width(), depth.height());
         let observation = Observation::new(Arc::clone(depth), mask, *camera)?;
         let mut picture = Self::of_depth(depth);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, PoseFile};
-use hybrid_icp::{DepthImage, Mask, Model, Observation, PinholeCamera};
+use hybrid_icp::core::{DepthImage, Mask, Model, Observation, PinholeCamera};
 
 use crate::limits::limits;
 use crate::options::positive;

@@ -1,7 +1,8 @@
 //! The report of a refinement: JSON for programs, lines for people.
 
 use hicp_io::PoseFile;
-use hybrid_icp::{Refinement, StageRecord, Verdict};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{Refinement, StageRecord};
 use serde::Serialize;
 
 use crate::terminal::table;

@@ -4,7 +4,9 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::anyhow;
-use hybrid_icp::{Isometry3, IterationEvent, Observer, RegimeEvent, StageEvent, Trace};
+use hybrid_icp::Trace;
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
 use serde_json::{Value, json};
 
 use super::inputs::Inputs;

@@ -1,6 +1,8 @@
 //! Warnings about well-formed inputs of a refinement that do not fit together, and about its result.
 
-use hybrid_icp::{Isometry3, Model, Observation, Refinement, Verdict, Warning};
+use hybrid_icp::core::{Isometry3, Model, Observation};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{Refinement, Warning};
 
 use super::inputs::Inputs;
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, write_results};
-use hybrid_icp::{DepthImage, Isometry3, Mask, Vector3};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Vector3};
 use serde_json::{Value, json};
 
 /// The dataset with targets: every instance of it. The depth of an image with an occluder says nothing against the truth.

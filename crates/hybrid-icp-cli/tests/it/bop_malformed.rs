@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, Rle, write_results};
-use hybrid_icp::{DepthImage, Mask};
+use hybrid_icp::core::{DepthImage, Mask};
 use serde_json::json;
 
 const REFINE: &str = "bop refine --dataset . --results in.csv --output out.csv";

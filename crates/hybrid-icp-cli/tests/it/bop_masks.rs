@@ -3,7 +3,7 @@
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, read_results, write_results};
-use hybrid_icp::{Isometry3, Mask};
+use hybrid_icp::core::{Isometry3, Mask};
 use serde_json::{Value, json};
 
 #[test]

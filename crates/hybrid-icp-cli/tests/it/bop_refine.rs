@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, Rle, read_results, write_results};
-use hybrid_icp::{Isometry3, Mask};
+use hybrid_icp::core::{Isometry3, Mask};
 use serde_json::{Value, json};
 
 #[test]

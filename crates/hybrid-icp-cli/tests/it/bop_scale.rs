@@ -5,7 +5,7 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, read_results, write_results};
-use hybrid_icp::{Isometry3, Vector3};
+use hybrid_icp::core::{Isometry3, Vector3};
 
 fn output(world: &World) -> Vec<u8> {
     std::fs::read(world.path("out.csv")).unwrap()

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::*;
 use hicp_io::LengthUnit;
 use hicp_io::bop::{Dataset, Scene, read_results};
-use hybrid_icp::{Isometry3, se3};
+use hybrid_icp::core::{Isometry3, se3};
 use serde_json::Value;
 
 const IMAGES: usize = 7;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, Rle, write_results};
-use hybrid_icp::Isometry3;
+use hybrid_icp::core::Isometry3;
 use serde_json::{Value, json};
 
 const AFTER: [u8; 3] = [86, 180, 233];

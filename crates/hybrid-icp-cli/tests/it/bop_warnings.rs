@@ -5,7 +5,7 @@ use crate::common::*;
 use crate::world::*;
 use hicp_io::LengthUnit;
 use hicp_io::bop::{read_results, write_results};
-use hybrid_icp::{DepthImage, Isometry3, Point3, TriMesh};
+use hybrid_icp::core::{DepthImage, Isometry3, Point3, TriMesh};
 use serde_json::json;
 
 /// What the cameras state of the depth.

@@ -2,7 +2,8 @@
 
 use crate::common::*;
 use hicp_io::LengthUnit;
-use hybrid_icp::{DepthImage, Isometry3, Mask, Point3, TriMesh, Vector3, render_depth_image};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Point3, TriMesh, Vector3};
+use hybrid_icp::raster::render_depth_image;
 use serde_json::Value;
 
 /// Writes a mesh as binary STL.

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use hicp_io::LengthUnit;
-use hybrid_icp::{DepthImage, Mask};
+use hybrid_icp::core::{DepthImage, Mask};
 
 /// Asserts that a scene is refused with all of these words, and that outputs that were there stay as they were.
 #[track_caller]

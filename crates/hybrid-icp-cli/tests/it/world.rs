@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use hicp_io::bop::{ResultRow, read_results, write_results};
 use hicp_io::{LengthUnit, read_mesh};
 use hicp_sim::{Household, perturb, rng};
-use hybrid_icp::{DepthImage, Isometry3, Mask, Model, TriMesh, Vector3, render_depth_image, se3};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, TriMesh, Vector3, se3};
+use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
 
 use crate::common::*;

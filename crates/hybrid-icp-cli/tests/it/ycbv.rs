@@ -7,7 +7,9 @@ use crate::common::run;
 use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, read_results};
 use hicp_sim::{RelativeGaussian, rng};
-use hybrid_icp::{DepthImage, Observation, PAPER_ALPHA, Preset, Refiner, Warning};
+use hybrid_icp::core::{DepthImage, Observation};
+use hybrid_icp::switch::PAPER_ALPHA;
+use hybrid_icp::{Preset, Refiner, Warning};
 
 /// The dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has result files as
 /// the excerpt has that these tests are of.
@@ -224,7 +226,7 @@ fn one_real_instance_is_refined_by_its_files() {
     assert_eq!(done.err, "");
     let result: serde_json::Value = serde_json::from_str(&done.out).unwrap();
     assert!(result["mve"].as_f64().unwrap() < 0.5 * result["mve_initial"].as_f64().unwrap());
-    let error = |pose: &hybrid_icp::Isometry3<f64>| {
+    let error = |pose: &hybrid_icp::core::Isometry3<f64>| {
         (pose.translation.vector - truth.camera_from_object.translation.vector).norm()
     };
     assert!(error(&crate::common::pose_of(&result)) < 0.5 * error(&row.camera_from_object()));

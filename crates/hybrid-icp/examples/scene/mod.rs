@@ -5,10 +5,13 @@
 use std::error::Error;
 
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
-use hybrid_icp::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Refiner, Stage, Translation3,
-    TriMesh, UnitQuaternion, Vector3, render_depth_image, se3,
+use hybrid_icp::Refiner;
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Translation3, TriMesh,
+    UnitQuaternion, Vector3, se3,
 };
+use hybrid_icp::icp::Stage;
+use hybrid_icp::raster::render_depth_image;
 
 /// An image, what is known about it, and what a detector made of it. Lengths in metres, poses are camera from object.
 pub(crate) struct Scene {

@@ -178,7 +178,8 @@ fn explore() -> Explore {
 /// miss a part of the object ([`MeanVsd::lenient`]). To change the options, such as to set a bound:
 ///
 /// ```
-/// use hybrid_icp::{Bound, Refiner, SearchOptions, presets};
+/// use hybrid_icp::icp::{Bound, SearchOptions};
+/// use hybrid_icp::{Refiner, presets};
 /// let bound = Bound { translation_meters: 0.05, rotation_degrees: 60.0 };
 /// let options = SearchOptions { bound: Some(bound), ..SearchOptions::default() };
 /// let refiner = Refiner::new(presets::search_with(options));

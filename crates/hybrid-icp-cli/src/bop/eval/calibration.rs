@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hicp_bop::{EvaluatedObject, Scenes, frames_of};
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{LabeledScore, reliability, roc_area};
+use hybrid_icp::score::{LabeledScore, reliability, roc_area};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hicp_bop::Judged;
-use hybrid_icp::Recalls;
+use hybrid_icp::score::Recalls;
 use serde::Serialize;
 
 use super::calibration::Calibration;

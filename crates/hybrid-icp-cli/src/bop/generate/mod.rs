@@ -12,7 +12,7 @@ use hicp_io::bop::{
     Dataset, ModelInfo, ResultRow, write_models_info, write_results, write_targets,
 };
 use hicp_io::{LengthUnit, write_ply};
-use hybrid_icp::PinholeCamera;
+use hybrid_icp::core::PinholeCamera;
 use rayon::prelude::*;
 use serde_json::json;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use hicp_io::{IoError, LengthUnit, read_mesh};
 use hicp_sim::Household;
-use hybrid_icp::Model;
+use hybrid_icp::core::Model;
 
 use crate::bop::models;
 use crate::limits::limits;

@@ -13,7 +13,7 @@ use hicp_sim::{
     AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout,
     MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, SeenObject, perturb, stream,
 };
-use hybrid_icp::{Mask, Matrix3, PinholeCamera};
+use hybrid_icp::core::{Mask, Matrix3, PinholeCamera};
 use rand::RngExt as _;
 
 use super::objects::Objects;

@@ -49,7 +49,8 @@ pub(super) fn write(
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use hicp_bop::RowStatus;
-    use hybrid_icp::{Flatness, Isometry3};
+    use hybrid_icp::core::Isometry3;
+    use hybrid_icp::score::Flatness;
 
     use super::*;
 

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::bail;
 use hicp_bop::{FrameResult, Models, RowResult, RowStatus};
-use hybrid_icp::{EXPLAINS_NOTHING, PAPER_ALPHA, Warning};
+use hybrid_icp::switch::PAPER_ALPHA;
+use hybrid_icp::{EXPLAINS_NOTHING, Warning};
 
 use super::job::RefineJob;
 use crate::bop::statistics::median;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, bail};
 use hicp_io::bop::ResultRow;
-use hybrid_icp::Isometry3;
+use hybrid_icp::core::Isometry3;
 
 use crate::limits::limits;
 

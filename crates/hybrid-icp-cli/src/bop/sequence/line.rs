@@ -1,7 +1,9 @@
 //! The report of one image, as a line of JSON.
 
+use hybrid_icp::core::{Isometry3, Matrix6};
 use hybrid_icp::fusion::Update;
-use hybrid_icp::{Isometry3, Matrix6, Outcome, SequentialEvent, SequentialStep};
+use hybrid_icp::icp::Outcome;
+use hybrid_icp::{SequentialEvent, SequentialStep};
 use serde_json::{Value, json};
 
 use crate::pose_json::add_pose;

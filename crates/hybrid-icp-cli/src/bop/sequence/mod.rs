@@ -13,8 +13,9 @@ use anyhow::{Context as _, Error, bail};
 use clap::{Arg, Args, ValueEnum};
 use hicp_bop::Scenes;
 use hicp_io::bop::{ResultRow, Scene, write_results};
+use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
-use hybrid_icp::{Calibration, Isometry3, Model, SequentialEstimator, Warning};
+use hybrid_icp::{Calibration, SequentialEstimator, Warning};
 
 use self::camera_path::camera_path;
 use self::line::Line;

@@ -1,8 +1,9 @@
 //! Follows an object from image to image.
 
 use hicp_bop::{Fault, MaskSource, RowStatus, Scenes};
+use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::CameraMotion;
-use hybrid_icp::{Isometry3, Model, Preset, Refiner, SequentialEstimator, Warning, warnings};
+use hybrid_icp::{Preset, Refiner, SequentialEstimator, Warning, warnings};
 
 use super::line::Line;
 

@@ -6,7 +6,8 @@ use hicp_bop::{
     EvaluatedObject, Fault, FaultKind, Image, Judge, MaskSource, Models, Renders, Scenes,
 };
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Isometry3, Mask, Preset, Refiner};
+use hybrid_icp::core::{Isometry3, Mask};
+use hybrid_icp::{Preset, Refiner};
 
 /// An estimate of a result file.
 #[derive(Clone, Debug)]

@@ -107,7 +107,7 @@ fn cells(estimate: Option<&Estimate>) -> [String; 4] {
 
 #[cfg(test)]
 mod tests {
-    use hybrid_icp::Isometry3;
+    use hybrid_icp::core::Isometry3;
 
     use super::*;
 

@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 
 use hicp_bop::{Image, Models};
-use hybrid_icp::{Mask, Rasterizer, RenderedView, Renderer, VISIBILITY_TOLERANCE_METERS};
+use hybrid_icp::core::{Mask, RenderedView, Renderer};
+use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::score::VISIBILITY_TOLERANCE_METERS;
 
 use super::estimates::{Estimate, Estimates};
 use super::lines::{Line, grid};

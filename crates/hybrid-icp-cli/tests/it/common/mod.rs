@@ -6,9 +6,8 @@ use std::process::Command;
 
 use hicp_io::LengthUnit;
 use hicp_sim::{Household, perturb, rng};
-use hybrid_icp::{
-    DepthImage, Isometry3, Mask, PinholeCamera, TriMesh, Vector3, render_depth_image, se3,
-};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, PinholeCamera, TriMesh, Vector3, se3};
+use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
 
 /// What a run of the program left behind.
