@@ -144,7 +144,7 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
 }
 
 /// Returns [`Warning::StatedDiameter`] if the diameter that a model was created with differs by more
-/// than a twentieth from that of its mesh ([`ModelConfig::diameter`](crate::ModelConfig::diameter)).
+/// than a twentieth from that of its mesh ([`ModelConfig::diameter`](hicp_core::ModelConfig::diameter)).
 ///
 /// The file of a dataset can be wrong or belong to other models, and everything that is measured in
 /// diameters is then wrong. [`warnings_of_model`] does not include this check, because it costs

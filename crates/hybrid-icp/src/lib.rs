@@ -3,14 +3,14 @@
 //! A detector gives a segmentation mask and a rough pose. [`Refiner`] returns a better pose and a score that says how well
 //! it explains the image:
 //!
-//! ```no_run
+//! ```
 //! use hybrid_icp::prelude::*;
-//! # fn inputs() -> (Model, Observation, Isometry3<f64>) { unimplemented!("yours") }
-//! let (model, observation, init) = inputs();
+//! # fn one_call(model: Model, observation: Observation, init: Isometry3<f64>) {
 //! let refined = Refiner::preset(Preset::Auto).refine(&model, &observation, &init);
 //! if refined.mve < 0.3 && refined.warnings().is_empty() {
 //!     println!("{}", refined.outcome.camera_from_object);
 //! }
+//! # }
 //! ```
 //!
 //! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is enough. Depend on one of

@@ -108,7 +108,7 @@ pub enum Warning {
         /// MVE of the returned pose.
         mve: f64,
     },
-    /// The returned pose has an MVE of [`PAPER_ALPHA`](crate::PAPER_ALPHA) or more.
+    /// The returned pose has an MVE of [`PAPER_ALPHA`](hicp_switch::PAPER_ALPHA) or more.
     #[error("MVE {mve:.3}: the pose does not explain the image, do not trust it")]
     Unexplained {
         /// MVE of the returned pose.

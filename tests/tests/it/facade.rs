@@ -24,7 +24,10 @@ fn every_library_below_is_a_module_of_the_facade() {
         assert!(source.contains(&export), "{export} is missing");
         n_crates += 1;
     }
-    assert_eq!(n_crates, 9, "core, association, metric, score, fusion, icp, switch, raster, pipeline");
+    assert_eq!(
+        n_crates, 9,
+        "core, association, metric, score, fusion, icp, switch, raster, pipeline"
+    );
 }
 
 /// A ROS pose is x, y, z, w; a renderer has a configuration: both were out of reach of the façade's names once.
