@@ -48,19 +48,8 @@ mod search;
 mod selection;
 mod stride;
 
-pub use association::{
-    ClosestPointOnMesh, DataAssociation, KNearest, NearestNeighbor, NormalCompatible,
-    NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated, ProjectiveSearch,
-    Reciprocal, SearchIndex,
-};
-pub use filter::{
-    BoundaryTargets, ConstantWeight, DistanceWeight, MadDistance, MaxDistance, MaxNormalAngle,
-    MedianDistance, MinPairs, NormalWeight, OneToOne, OutlierFilter, Schedule, SensorNoise,
-    SensorNoiseWeight, Trimmed, VarTrimmed,
-};
+pub use association::*;
+pub use filter::*;
 pub use length::Length;
-pub use selection::{
-    AllSamples, NormalSpace, ObservedSurface, PointSelection, RandomSample, StableSampling,
-    UniformCount, VisibleSurface, VoxelGrid, WithoutBoundary,
-};
+pub use selection::*;
 pub use stride::Stride;

@@ -27,11 +27,5 @@ mod stop;
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
 pub use outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 pub use session::{Session, Workspace};
-pub use stage::{
-    Anderson, AtResolution, Cascade, Guard, HypothesisSearch, Icp, KeepBest, MAX_ITERATIONS,
-    Repeat, Rotations, SearchOptions, Stage,
-};
-pub use stop::{
-    AbsoluteLoss, Bound, Convergence, Deadline, Divergence, IterationLimit, Judgment, LossRule,
-    Oscillation, Progress, SmallMotion, StopRule, TimeLimit,
-};
+pub use stage::*;
+pub use stop::*;

@@ -48,12 +48,6 @@ mod decorator;
 mod metric;
 mod system;
 
-pub use decorator::{
-    Conditioned, Frame, Frozen, GaussNewton, Kernel, LevenbergMarquardt, MetricSchedule, PosePrior,
-    Prior, Robust, RobustKernel, Scale,
-};
-pub use metric::{
-    ErrorMetric, Generalized, Minimize, PlaneToPoint, PointToPlane, PointToPoint, Step, Symmetric,
-    Terms, WeightedSum,
-};
-pub use system::{Degeneracy, NormalEquations, Observability, sandwich_covariance};
+pub use decorator::*;
+pub use metric::*;
+pub use system::*;

@@ -40,7 +40,7 @@ const DIAMETER_TOLERANCE: f64 = 0.05;
 /// Nothing is refused for it. Cost: O(pixels of the mask's box + vertices).
 ///
 /// ```
-/// use hybrid_icp::*;
+/// use hybrid_icp::{core::*, score::Flatness, *};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
 /// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
@@ -121,7 +121,7 @@ pub fn warning_of_distance(distance: f64, median_depth: Option<f64>) -> Option<W
 /// Returns what looks wrong about a model by itself: the [`warnings`] that need no image.
 ///
 /// ```
-/// use hybrid_icp::*;
+/// use hybrid_icp::{core::*, score::Flatness, *};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// // A mesh of 80 mm that was read as metres.
 /// let corners = [[0., 0., 0.], [80., 0., 0.], [0., 80., 0.]].map(Point3::from);
@@ -151,7 +151,7 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
 /// about O(n log n) of the vertices: call it once per model.
 ///
 /// ```
-/// use hybrid_icp::*;
+/// use hybrid_icp::{core::*, score::Flatness, *};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
 /// let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?;
@@ -180,7 +180,7 @@ pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
 /// 0.2 or 0.3.
 ///
 /// ```
-/// use hybrid_icp::*;
+/// use hybrid_icp::{core::*, score::Flatness, *};
 /// // A rough pose that became a good one.
 /// let at = |residual| Some(Flatness::new(residual, 0.0025, 0.009, 0.2));
 /// assert_eq!(warnings_of_result(0.6, 0.1, at(0.002)), []);
