@@ -138,7 +138,7 @@ fn associate_projective(mut ready: Ready) -> Ready {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = nearest, config = limit(9_593_479))]
+#[bench::mug(setup = nearest, config = limit(1_740_511))]
 fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
     pair(&mut ready, &mut NearestNeighbor::default());
     black_box(ready)
