@@ -52,7 +52,7 @@ mod symmetry;
 mod vectorized;
 mod work;
 
-/// What the crates of this workspace share and users do not need. No stability is promised.
+/// Helpers that the crates of this workspace share. No stability is promised.
 #[doc(hidden)]
 pub mod internal {
     pub use crate::index::index;

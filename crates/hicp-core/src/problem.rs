@@ -1,4 +1,4 @@
-//! What is registered to what, and what components receive while they work.
+//! The two sides of a registration, and the context that components receive.
 
 use nalgebra::Isometry3;
 

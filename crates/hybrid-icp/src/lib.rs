@@ -89,7 +89,7 @@ pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
 pub use warning::Warning;
 
-/// What most programs need: `use hybrid_icp::prelude::*;`.
+/// The names that most programs need: `use hybrid_icp::prelude::*;`.
 ///
 /// Everything else is in the modules.
 pub mod prelude {

@@ -5,7 +5,7 @@ use hicp_core::{Isometry3, Iteration};
 
 use crate::outcome::{Evaluation, Termination};
 
-/// What the evaluation of a pose found: the input of a stop rule, next to the [`Iteration`].
+/// The findings at the pose just evaluated: the input of a stop rule, next to the [`Iteration`].
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
     /// Pairs and loss at the pose just evaluated.
@@ -20,7 +20,7 @@ pub struct Progress<'a> {
     pub increment: &'a Isometry3<f64>,
 }
 
-/// What a stop rule decides about the pose just evaluated.
+/// The decision of a stop rule about the pose just evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Judgment {
