@@ -7,22 +7,24 @@ use thiserror::Error;
 use crate::number::Number;
 use crate::region::PixelRegion;
 
-/// Where the centre of the first pixel lies in the coordinates that a calibration uses.
+/// The position of the first pixel's center in the coordinates of a calibration.
 ///
-/// The two conventions differ by half a pixel; mixing them shifts every point by `depth / (2 f)`.
+/// The two conventions differ by half a pixel. Mixing them shifts every point by `depth / (2 f)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PixelCenters {
-    /// Pixel (0, 0) has its centre at (0, 0): OpenCV calibrations, BOP's distance maps, this library's inside.
+    /// Pixel (0, 0) has its center at (0, 0): OpenCV calibrations, BOP's distance maps, this
+    /// library.
     #[default]
     AtIntegers,
-    /// Pixel (0, 0) has its centre at (½, ½): OpenGL renderers and BlenderProc images.
+    /// Pixel (0, 0) has its center at (½, ½): OpenGL renderers and BlenderProc images.
     AtHalves,
 }
 
-/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV frame).
+/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV
+/// frame).
 ///
-/// A point (x, y, z) in metres in the camera frame is seen at u = fx·x/z + cx, v = fy·y/z + cy; pixel centres are at
-/// integers. Focal lengths and the principal point are in pixels.
+/// A point (x, y, z) in meters in the camera frame projects to u = fx·x/z + cx, v = fy·y/z + cy.
+/// Pixel centers are at integers. Focal lengths and the principal point are in pixels.
 ///
 /// ```
 /// use hicp_core::{PinholeCamera, Point3};
@@ -45,20 +47,26 @@ pub struct PinholeCamera {
 /// The largest image side accepted, in pixels.
 pub const MAX_IMAGE_SIDE: u32 = 32_768;
 
-/// The longest focal length accepted, and the furthest principal point from the first pixel, in pixels: a thousand times those of
-/// any lens, and small enough that no pixel of a mesh that can be read is beyond the range of numbers.
+/// The longest accepted focal length and the largest accepted principal point coordinate, in
+/// pixels.
+///
+/// A thousand times the values of any lens, and small enough that no pixel coordinate of a readable
+/// mesh overflows.
 pub const MAX_FOCAL_LENGTH: f64 = 1e9;
 
-/// The shortest focal length accepted, in pixels: with less, all that a camera sees falls into one of its pixels.
+/// The shortest accepted focal length, in pixels. Below it, the whole scene falls into one pixel.
 pub const MIN_FOCAL_LENGTH: f64 = 1e-3;
 
 impl PinholeCamera {
-    /// Makes a camera whose pixel centres are at integers.
+    /// Creates a camera whose pixel centers are at integers. All lengths are in pixels.
     ///
     /// # Errors
     ///
-    /// [`CameraError`] when a focal length is not within [`MIN_FOCAL_LENGTH`] and [`MAX_FOCAL_LENGTH`], the principal point is further away
-    /// than that or not a number, or a side of the image is zero or above [`MAX_IMAGE_SIDE`].
+    /// [`CameraError`] names the value outside of its range:
+    ///
+    /// - A focal length must be within [`MIN_FOCAL_LENGTH`] and [`MAX_FOCAL_LENGTH`].
+    /// - A coordinate of the principal point must be within ±[`MAX_FOCAL_LENGTH`].
+    /// - A side of the image must be within 1 and [`MAX_IMAGE_SIDE`].
     pub fn new(
         fx: f64,
         fy: f64,
@@ -92,13 +100,14 @@ impl PinholeCamera {
         })
     }
 
-    /// Makes a camera from a calibration that states where its pixel centres lie.
+    /// Creates a camera from a calibration that states where its pixel centers lie.
     ///
-    /// The principal point is converted once, here; everything inside has centres at integers.
+    /// The principal point is converted here, once; the camera itself has its pixel centers at
+    /// integers.
     ///
     /// # Errors
     ///
-    /// As [`PinholeCamera::new`].
+    /// As for [`PinholeCamera::new`].
     #[allow(clippy::too_many_arguments)]
     pub fn with_pixel_centers(
         centers: PixelCenters,
@@ -116,11 +125,12 @@ impl PinholeCamera {
         Self::new(fx, fy, cx - shift, cy - shift, width, height)
     }
 
-    /// Makes a camera from a calibration matrix K = [fx 0 cx; 0 fy cy; 0 0 1].
+    /// Creates a camera from a calibration matrix K = [fx 0 cx; 0 fy cy; 0 0 1].
     ///
     /// # Errors
     ///
-    /// As [`PinholeCamera::new`], and when K has a skew or its last row is not (0, 0, 1), by more than 1e-6.
+    /// As for [`PinholeCamera::new`]. Also if an entry of K that should be 0 or 1 differs by more
+    /// than 1e-6.
     pub fn from_matrix(k: &Matrix3<f64>, width: u32, height: u32) -> Result<Self, CameraError> {
         for (row, column, expected) in [
             (0, 1, 0.0),
@@ -142,7 +152,10 @@ impl PinholeCamera {
         Self::new(k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)], width, height)
     }
 
-    /// Returns the camera whose pixel (i, j) looks along the ray of this one's pixel (i·factor, j·factor). 0 counts as 1.
+    /// Returns a camera of lower resolution, for every `factor`-th pixel.
+    ///
+    /// Its pixel (i, j) has the ray of this camera's pixel (i·factor, j·factor). A factor of 0
+    /// counts as 1.
     #[must_use]
     pub fn scaled_down(&self, factor: u32) -> Self {
         let factor = factor.max(1);
@@ -169,13 +182,13 @@ impl PinholeCamera {
         self.fy
     }
 
-    /// Column of the principal point, pixels, centres at integers.
+    /// Column of the principal point, pixels, with pixel centers at integers.
     #[must_use]
     pub fn cx(&self) -> f64 {
         self.cx
     }
 
-    /// Row of the principal point, pixels, centres at integers.
+    /// Row of the principal point, pixels, with pixel centers at integers.
     #[must_use]
     pub fn cy(&self) -> f64 {
         self.cy
@@ -193,15 +206,15 @@ impl PinholeCamera {
         self.height
     }
 
-    /// Returns the region of the whole image.
+    /// Returns the region of the whole image, pixels.
     #[must_use]
     pub fn region(&self) -> PixelRegion {
         PixelRegion::of_image(self.width, self.height)
     }
 
-    /// Returns the image position of a point of the camera frame, or `None` when it is not in front of the camera.
+    /// Returns the image position of a point, in pixels, or `None` if the point is not in front.
     ///
-    /// The position may lie outside the image.
+    /// The point is in the camera frame, in meters. The position may lie outside the image.
     #[must_use]
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
         (point.z > 0.0).then(|| {
@@ -212,7 +225,10 @@ impl PinholeCamera {
         })
     }
 
-    /// Returns the point of the camera frame seen at (u, v) with a depth of `depth` metres along the optical axis.
+    /// Returns the point seen at pixel (u, v) at `depth`, in the camera frame.
+    ///
+    /// The depth is along the optical axis. The point has the unit of the depth, meters inside this
+    /// library.
     #[must_use]
     pub fn unproject(&self, u: f64, v: f64, depth: f64) -> Point3<f64> {
         Point3::new(
@@ -230,11 +246,11 @@ impl PinholeCamera {
     }
 }
 
-/// A camera that cannot be.
+/// The reason why values do not describe a camera.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// A focal length that is not positive or that no lens has.
+    /// A focal length is not positive or outside the accepted range.
     #[error(
         "focal length {name} is {}, expected a number of pixels above 0, {} to {}",
         Number(*value),
@@ -247,7 +263,7 @@ pub enum CameraError {
         /// The value given.
         value: f64,
     },
-    /// A principal point that is nowhere near the image.
+    /// A coordinate of the principal point is far outside any image.
     #[error(
         "principal point {name} is {}, expected a number of pixels between -{1} and {1}",
         Number(*value),
@@ -259,7 +275,7 @@ pub enum CameraError {
         /// The value given.
         value: f64,
     },
-    /// An image side of zero or of absurd size.
+    /// An image side is zero or too large.
     #[error("image {name} is {value} pixels, expected 1 to {}", MAX_IMAGE_SIDE)]
     ImageSide {
         /// `width` or `height`.
@@ -267,7 +283,7 @@ pub enum CameraError {
         /// The value given.
         value: u32,
     },
-    /// A calibration matrix that is not of the form [fx 0 cx; 0 fy cy; 0 0 1].
+    /// A calibration matrix does not have the form [fx 0 cx; 0 fy cy; 0 0 1].
     #[error(
         "camera matrix entry [{row}][{column}] is {}, expected {expected}: K must be [fx 0 cx; 0 fy cy; 0 0 1]",
         Number(*found)
@@ -289,7 +305,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_shorten_numbers_that_would_fill_lines() {
+    fn errors_print_large_numbers_in_short_form() {
         let error = CameraError::PrincipalPoint {
             name: "cx",
             value: 2e300,

@@ -4,24 +4,27 @@ use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
 
 use crate::surfel::Surfel;
 
-/// One correspondence (cᵢ, nᵢ, oᵢ, mᵢ) of Algorithm 1, all of it in the camera frame at the current estimate.
+/// One correspondence (cᵢ, nᵢ, oᵢ, mᵢ) of Algorithm 1, in the camera frame at the current estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
-    /// The model point, moved by the current estimate: T_CO oᵢ, and its normal R_CO mᵢ.
+    /// The model point T_CO oᵢ, moved by the current estimate, and its normal R_CO mᵢ.
     pub source: Surfel,
     /// The observed point cᵢ and its normal nᵢ.
     pub target: Surfel,
     /// Weight, not negative.
     pub weight: f32,
-    /// Which source element this is: its index in the selection; for an association that starts from the observation, its index
-    /// among the model's elements. Equal indices mean the same element.
+    /// The index of the source element; equal indices mean the same element.
+    ///
+    /// It is an index into the selection. For an association that starts from the observation, it
+    /// is an index into the model's elements.
     pub source_index: u32,
-    /// Which target element this is: its row-major index in the observation's region, see [`crate::Observation::surfel`].
+    /// The index of the target element: row-major in the observation's region, see
+    /// [`crate::Observation::surfel`].
     pub target_index: u32,
 }
 
 impl Pair {
-    /// Makes a pair of weight 1.
+    /// Creates a pair of weight 1.
     #[must_use]
     pub fn new(source_index: u32, source: Surfel, target_index: u32, target: Surfel) -> Self {
         Self {
@@ -33,15 +36,16 @@ impl Pair {
         }
     }
 
-    /// Returns the distance between the two points, metres.
+    /// Returns the distance between the two points, meters.
     #[must_use]
     pub fn distance(&self) -> f32 {
         (self.source.point - self.target.point).norm()
     }
 }
 
-/// The pairs of one turn, the pose they were made at, and how many were tried. A buffer that is begun anew and refilled; the
-/// caller owns it.
+/// The pairs of one iteration, the pose they were computed at, and the number of candidates.
+///
+/// The caller owns this buffer and reuses it: every iteration clears it and keeps the memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Correspondences {
     pairs: Vec<Pair>,
@@ -60,41 +64,46 @@ impl Default for Correspondences {
 }
 
 impl Correspondences {
-    /// Makes an empty list.
+    /// Creates an empty list at the identity pose.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Removes all pairs, keeps the memory, and notes the pose at which the next ones are made and how many points ask for one.
+    /// Starts an iteration: removes all pairs, keeps the memory, and stores pose and candidate
+    /// count.
+    ///
+    /// `n_candidates` is the number of points that the association tries to pair.
     pub fn begin(&mut self, camera_from_object: &Isometry3<f64>, n_candidates: usize) {
         self.pairs.clear();
         self.camera_from_object = *camera_from_object;
         self.n_candidates = n_candidates;
     }
 
-    /// The pose at which the pairs were made: their sources are moved by it.
+    /// The pose at which the pairs were computed; it has been applied to their sources.
     #[must_use]
     pub fn camera_from_object(&self) -> &Isometry3<f64> {
         &self.camera_from_object
     }
 
-    /// How many points asked for a pair; the matched share of them is the fitness.
+    /// Number of points that the association tried to pair. The matched share of them is the
+    /// fitness.
     #[must_use]
     pub fn n_candidates(&self) -> usize {
         self.n_candidates
     }
 
-    /// Says how many points asked for a pair, for an association that does not start from the selected ones.
+    /// Sets the number of candidates, for an association that does not start from the selected
+    /// points.
     pub fn set_candidates(&mut self, n_candidates: usize) {
         self.n_candidates = n_candidates;
     }
 
-    /// Makes room for `additional` more pairs.
+    /// Reserves memory for `additional` more pairs.
     ///
     /// # Panics
     ///
-    /// When they are more than memory can hold.
+    /// If memory cannot hold them.
     pub fn reserve(&mut self, additional: usize) {
         self.pairs.reserve(additional);
     }
@@ -110,7 +119,7 @@ impl Correspondences {
         self.pairs.len()
     }
 
-    /// Returns whether there is no pair.
+    /// Returns whether there are no pairs.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.pairs.is_empty()
@@ -122,7 +131,7 @@ impl Correspondences {
         &self.pairs
     }
 
-    /// The pairs, to be re-weighted.
+    /// The pairs, for changing their weights.
     pub fn as_mut_slice(&mut self) -> &mut [Pair] {
         &mut self.pairs
     }
@@ -151,6 +160,8 @@ impl FromIterator<Pair> for Correspondences {
 }
 
 /// A rigid motion in `f32`, for moving many surfels.
+///
+/// Its use is the same as that of a pose `b_from_a`: it maps coordinates in frame `a` to frame `b`.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidTransform {
     rotation: Matrix3<f32>,
@@ -158,7 +169,7 @@ pub struct RigidTransform {
 }
 
 impl RigidTransform {
-    /// Prepares a pose.
+    /// Converts a pose to `f32`.
     #[must_use]
     pub fn new(pose: &Isometry3<f64>) -> Self {
         Self {
@@ -171,14 +182,16 @@ impl RigidTransform {
         }
     }
 
-    /// Returns the moved point.
+    /// Returns the moved point, in the unit of its input.
     #[must_use]
     #[inline]
     pub fn point(&self, point: &Point3<f32>) -> Point3<f32> {
         Point3::from(self.rotation * point.coords + self.translation)
     }
 
-    /// Returns many moved points, given and returned as `[x, y, z]` of each; the bits of [`RigidTransform::point`].
+    /// Returns many moved points, given and returned as one array per coordinate.
+    ///
+    /// The bits are those of [`RigidTransform::point`].
     #[must_use]
     #[inline(always)]
     pub fn points<const N: usize>(&self, points: &[[f32; N]; 3]) -> [[f32; N]; 3] {
@@ -191,7 +204,7 @@ impl RigidTransform {
         moved
     }
 
-    /// Returns many turned vectors, given and returned as `[x, y, z]` of each.
+    /// Returns many rotated vectors, given and returned as one array per coordinate.
     #[must_use]
     #[inline(always)]
     pub fn vectors<const N: usize>(&self, vectors: &[[f32; N]; 3]) -> [[f32; N]; 3] {
@@ -210,7 +223,7 @@ impl RigidTransform {
         turned
     }
 
-    /// Returns the moved surfel.
+    /// Returns the moved surfel: its point moved, its normal rotated.
     #[must_use]
     #[inline]
     pub fn surfel(&self, surfel: &Surfel) -> Surfel {
@@ -226,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_move_as_one_does() {
+    fn many_points_move_as_one_point_does() {
         let mover = RigidTransform::new(&Isometry3::new(
             Vector3::new(0.1, -0.2, 0.7),
             Vector3::new(1.3, -0.4, 0.9),

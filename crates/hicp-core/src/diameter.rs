@@ -4,12 +4,18 @@ use nalgebra::{Point3, Vector3};
 
 const LEAF_SIZE: usize = 16;
 
-/// Returns the largest distance between two of the points, as BOP defines a model's diameter; 0 for fewer than two points.
-/// Points that are not finite do not count.
+/// Returns the largest distance between two of the points: a model's diameter as BOP defines it.
 ///
-/// Exact up to a relative 1e-7, less than what rounding coordinates to `f32` changes. A double sweep gives a lower bound, then pairs of
-/// nodes of a box tree are discarded by the largest distance between their boxes, and by the cones in which the middle sees them, which
-/// spares round objects the pairs that are nearly as long as the longest. Cost: about O(n log n) for surfaces.
+/// The result has the unit of the points. It is 0 for fewer than two points. Points that are not
+/// finite are ignored.
+///
+/// The result is exact up to a relative 1e-7, less than the rounding of coordinates to `f32`. A few
+/// sweeps to the farthest point give a lower bound. Then pairs of nodes of a box tree are discarded
+/// by two upper bounds. The first is the largest distance between the boxes. The second comes from
+/// the cones in which the center sees the nodes; it spares round objects their many pairs of nearly
+/// maximal length.
+///
+/// Cost: about O(n log n) for surfaces.
 #[must_use]
 pub fn diameter(points: &[Point3<f32>]) -> f64 {
     let finite = |p: &&Point3<f32>| p.iter().all(|x| x.is_finite());
@@ -20,7 +26,7 @@ pub fn diameter(points: &[Point3<f32>]) -> f64 {
     }
 }
 
-/// Searches points, which are reordered, from one of them on.
+/// Searches `points`, reordering them. The sweeps start at `first`.
 fn farthest_pair(points: &mut [Point3<f64>], first: Point3<f64>) -> Search<'_> {
     let mut best = 0.0_f64;
     let mut from = first;
@@ -56,9 +62,9 @@ fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
 struct Node {
     min: Point3<f64>,
     max: Point3<f64>,
-    /// Largest distance from the middle of the whole.
+    /// Largest distance of a point from the center of the whole set.
     radius: f64,
-    /// The axis of a cone from there that holds all points, and the largest angle to it, radians.
+    /// The axis of a cone from that center that holds all points, and its half-angle in radians.
     axis: Vector3<f64>,
     angle: f64,
     start: usize,
@@ -67,8 +73,10 @@ struct Node {
 }
 
 impl Node {
-    /// Builds the tree over `points`, which is reordered; `start` is the index of its first point in the whole. Points that coincide make
-    /// a leaf of one.
+    /// Builds the tree over `points`, reordering them.
+    ///
+    /// `start` is the index of the first point in the whole set. Coinciding points become a leaf of
+    /// one.
     fn build(points: &mut [Point3<f64>], start: usize, middle_of_all: &Point3<f64>) -> Self {
         let (min, max) = bounds(points);
         let end = start + if min == max { 1 } else { points.len() };
@@ -90,7 +98,7 @@ impl Node {
             let from_middle = p - middle_of_all;
             let distance = from_middle.norm();
             radius = radius.max(distance);
-            // A point in the middle of all is in every cone.
+            // A point at the center gives NaN, which `max` ignores: it is in every cone.
             angle = angle.max((axis.dot(&from_middle) / distance).clamp(-1.0, 1.0).acos());
         }
         Self {
@@ -105,7 +113,7 @@ impl Node {
         }
     }
 
-    /// Bounds the squared distance of two points by the boxes that they are in.
+    /// Returns an upper bound of the squared distance of two points from their boxes.
     fn farthest_squared(&self, other: &Self) -> f64 {
         (self.max - other.min)
             .abs()
@@ -113,12 +121,16 @@ impl Node {
             .norm_squared()
     }
 
-    /// Bounds it by how far they are from the middle of the whole, and by how far from opposite each other they are seen there at least.
+    /// Returns an upper bound of the squared distance of two points from their cones.
+    ///
+    /// It combines their distances from the center with the angle by which they are at least from
+    /// being opposite each other.
     fn farthest_squared_about_middle(&self, other: &Self) -> f64 {
         let from_opposite = (-self.axis.dot(&other.axis)).clamp(-1.0, 1.0).acos();
         let bend = (from_opposite - self.angle - other.angle).max(0.0);
         let (a, b) = (self.radius, other.radius);
-        // Beyond a right angle the farthest two are not those that are farthest from the middle.
+        // Beyond a right angle, the farthest pair is not made of the points farthest from the
+        // center.
         a * a + b * b + 2.0 * a * b * bend.cos().max(0.0)
     }
 }
@@ -128,7 +140,7 @@ struct Search<'a> {
     points: &'a [Point3<f64>],
     /// The largest squared distance found.
     best: f64,
-    /// How many pairs of points were looked at.
+    /// Number of compared pairs of points.
     compared: u64,
 }
 
@@ -147,7 +159,7 @@ impl Search<'_> {
                     }
                 }
             }
-            // No leaf has more points than a node that is none.
+            // A leaf never has more points than an inner node.
             (Some(children), _) if a.end - a.start >= b.end - b.start => {
                 self.visit(&children.0, b);
                 self.visit(&children.1, b);
@@ -165,7 +177,8 @@ impl Search<'_> {
 mod tests {
     use super::*;
 
-    /// Boxes hold their points tightly; halves share a node's points evenly; leaves are small, or stand for points that coincide.
+    /// Checks that boxes are tight, halves have equal size, and leaves are small or hold coinciding
+    /// points.
     fn check(points: &[Point3<f64>], node: &Node, count: usize) {
         let own = &points[node.start..node.start + count];
         for axis in 0..3 {
@@ -202,7 +215,7 @@ mod tests {
     #[test]
     fn a_tree_halves_its_points_down_to_small_leaves() {
         for count in [1, 2, LEAF_SIZE, LEAF_SIZE + 1, 2 * LEAF_SIZE, 1000] {
-            // A spiral, and a heap of one of its points as large as it.
+            // A spiral, and as many copies of one of its points.
             let spiral = (0..count).map(|i| {
                 let x = i as f64;
                 Point3::new(x.sin(), x.cos(), 0.01 * x)
@@ -220,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn every_pair_of_a_leaf_is_looked_at() {
+    fn every_pair_within_a_leaf_is_compared() {
         let mut points: Vec<_> = (0..10)
             .map(|i| Point3::new(f64::from(i).sin(), f64::from(i).cos(), 0.0))
             .collect();
@@ -230,7 +243,7 @@ mod tests {
 
     #[test]
     #[allow(clippy::cast_possible_truncation)]
-    fn pairs_that_are_nearly_the_longest_are_not_all_looked_at() {
+    fn not_all_pairs_of_nearly_maximal_distance_are_compared() {
         let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
         let count = 20_000;
         let sphere = (0..count).map(|i| {

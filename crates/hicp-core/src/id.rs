@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The identity of an immutable [`crate::Model`] or [`crate::Observation`] within this process.
 ///
-/// Two things with the same id hold the same data; nothing else follows from the value.
+/// Two values with the same id hold the same data. The number itself has no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Id(u64);
 

@@ -1,16 +1,20 @@
-//! Images: depth, distance and masks, each a type of its own so that they cannot be swapped.
+//! Depth images, distance images and masks, as separate types so that they cannot be swapped.
 //!
-//! All are row-major, index `v * width + u`, in metres where they hold lengths; 0 means "nothing was measured here".
+//! All are row-major with index `v * width + u`. Lengths are in meters; 0 means that nothing was
+//! measured.
 
 use thiserror::Error;
 
 use crate::camera::PinholeCamera;
 use crate::region::PixelRegion;
 
-/// Smallest depth that counts as measured, metres: the inverse of a smaller one, down to the denormals, loses its meaning in `f32`.
+/// Smallest depth that counts as measured, meters. The inverse of a smaller one is not accurate in
+/// `f32`.
 pub const MIN_DEPTH_METERS: f32 = 1e-6;
 
-/// Depths beyond this many metres are taken as missing: no depth camera measures them, and their squares overflow.
+/// Largest depth that counts as measured, meters.
+///
+/// Depth cameras do not reach it, and squares of larger depths overflow.
 pub const MAX_DEPTH_METERS: f32 = 1000.0;
 
 /// A row-major image of any pixel type.
@@ -73,18 +77,19 @@ macro_rules! image_accessors {
     };
 }
 
-/// Depth along the optical axis (z), metres; 0 where nothing was measured.
+/// An image of depths along the optical axis (z), in meters; 0 where nothing was measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage(Raster<f32>);
 
 impl DepthImage {
-    /// Makes a depth image from metres.
+    /// Creates a depth image from depths in meters, row by row.
     ///
-    /// Values that are not finite, below [`MIN_DEPTH_METERS`], or beyond [`MAX_DEPTH_METERS`] are stored as 0, missing.
+    /// Values that are not finite, below [`MIN_DEPTH_METERS`], or above [`MAX_DEPTH_METERS`] are
+    /// stored as 0, which means missing.
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when `meters` does not hold `width * height` values.
+    /// [`ImageError::PixelCount`] if `meters` does not hold `width * height` values.
     pub fn from_meters(width: u32, height: u32, mut meters: Vec<f32>) -> Result<Self, ImageError> {
         for z in &mut meters {
             *z = measured(*z);
@@ -92,13 +97,14 @@ impl DepthImage {
         Raster::new(width, height, meters).map(Self)
     }
 
-    /// Makes a depth image of metres that come one by one, row by row, in a single pass: what [`DepthImage::from_meters`] makes of them.
+    /// Creates a depth image from an iterator over depths in meters, row by row, in a single pass.
     ///
-    /// For depths that have to be copied or converted anyway.
+    /// The result is that of [`DepthImage::from_meters`]. Use it for depths that must be copied or
+    /// converted anyway.
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when there are not `width * height` values.
+    /// [`ImageError::PixelCount`] if there are not `width * height` values.
     pub fn collect(
         width: u32,
         height: u32,
@@ -108,13 +114,14 @@ impl DepthImage {
         Raster::new(width, height, pixels).map(Self)
     }
 
-    /// Creates a depth image from the 16-bit units of a sensor, row by row; 0 is missing.
+    /// Creates a depth image from the 16-bit units of a sensor, row by row; 0 means missing.
     ///
-    /// `meters_per_unit` is the value of one unit: 0.001 for millimeters, BOP's `depth_scale` divided by 1000.
+    /// `meters_per_unit` is the value of one unit: 0.001 for millimeters, BOP's `depth_scale`
+    /// divided by 1000.
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when `units` does not hold `width * height` values.
+    /// [`ImageError::PixelCount`] if `units` does not hold `width * height` values.
     ///
     /// ```
     /// # fn main() -> Result<(), hicp_core::ImageError> {
@@ -137,11 +144,12 @@ impl DepthImage {
 
     image_accessors!(f32);
 
-    /// Returns the distance image: range along each pixel's ray instead of depth.
+    /// Returns the distance image: the range along each pixel's ray instead of the depth, in
+    /// meters.
     ///
     /// # Errors
     ///
-    /// [`ImageError::SizeMismatch`] when the camera is of another size.
+    /// [`ImageError::SizeMismatch`] if the camera has a different size.
     pub fn to_distance(&self, camera: &PinholeCamera) -> Result<DistanceImage, ImageError> {
         check_size(
             "depth image",
@@ -161,7 +169,7 @@ impl DepthImage {
     }
 }
 
-/// Returns a depth that counts as measured, or 0.
+/// Returns the depth if it counts as measured, otherwise 0.
 fn measured(z: f32) -> f32 {
     if (MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(&z) {
         z
@@ -170,18 +178,19 @@ fn measured(z: f32) -> f32 {
     }
 }
 
-/// Distance from the camera centre (range), in metres unless its maker says otherwise; 0 where there is nothing.
+/// An image of distances from the camera center (ranges); 0 where nothing was measured.
 ///
-/// VSD and MVE compare distances, not depths (§III-B).
+/// Distances are in meters unless their source states another unit. VSD and MVE compare distances,
+/// not depths (§III-B).
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceImage(Raster<f64>);
 
 impl DistanceImage {
-    /// Makes a distance image.
+    /// Creates a distance image, row by row.
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when `distances` does not hold `width * height` values.
+    /// [`ImageError::PixelCount`] if `distances` does not hold `width * height` values.
     pub fn new(width: u32, height: u32, distances: Vec<f64>) -> Result<Self, ImageError> {
         Raster::new(width, height, distances).map(Self)
     }
@@ -189,18 +198,20 @@ impl DistanceImage {
     image_accessors!(f64);
 }
 
-/// Which pixels belong to the object.
+/// The set of pixels that belong to the object.
 ///
-/// Its bounding box is found once, when it is made.
+/// Its bounding box is computed once, on creation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask(Raster<bool>, PixelRegion);
 
 impl Mask {
-    /// Makes a mask. Cost: a look at every pixel, for the bounding box.
+    /// Creates a mask, row by row.
+    ///
+    /// Cost: O(pixels), for the bounding box.
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
+    /// [`ImageError::PixelCount`] if `pixels` does not hold `width * height` values.
     pub fn new(width: u32, height: u32, pixels: Vec<bool>) -> Result<Self, ImageError> {
         let raster = Raster::new(width, height, pixels)?;
         let region = bounding_region(&raster);
@@ -211,16 +222,17 @@ impl Mask {
     ///
     /// # Errors
     ///
-    /// [`ImageError::PixelCount`] when `pixels` does not hold `width * height` values.
+    /// [`ImageError::PixelCount`] if `pixels` does not hold `width * height` values.
     pub fn from_u8(width: u32, height: u32, pixels: &[u8]) -> Result<Self, ImageError> {
         Self::new(width, height, pixels.iter().map(|p| *p != 0).collect())
     }
 
-    /// Makes a mask in which every pixel belongs to the object.
+    /// Creates a mask in which every pixel belongs to the object.
     ///
     /// # Panics
     ///
-    /// When `width * height` bytes are more than memory can hold; no camera has sides above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
+    /// If memory cannot hold `width * height` bytes. No camera has sides above
+    /// [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     #[must_use]
     pub fn full(width: u32, height: u32) -> Self {
         let pixels = vec![true; width as usize * height as usize];
@@ -239,7 +251,9 @@ impl Mask {
 
     image_accessors!(bool);
 
-    /// Returns the smallest region that holds every set pixel; empty when none is. Cost: none, it was found when the mask was made.
+    /// Returns the smallest region that holds every set pixel; empty if no pixel is set.
+    ///
+    /// Cost: O(1), since it was computed on creation.
     #[must_use]
     pub fn bounding_region(&self) -> PixelRegion {
         self.1
@@ -252,7 +266,7 @@ fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
         return region;
     }
     for (row, v) in mask.pixels.chunks_exact(mask.width as usize).zip(0_u32..) {
-        // Most rows are empty: without a way out the compiler looks at many pixels at once.
+        // Most rows are empty. Without an early exit, the compiler vectorizes the scan of a row.
         if !row.iter().fold(false, |any, set| any | set) {
             continue;
         }
@@ -275,7 +289,7 @@ fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
     region
 }
 
-/// Refuses two things of different size, naming both.
+/// Returns an error that names both sides if their sizes differ.
 pub(crate) fn check_size(
     first: &'static str,
     first_size: (u32, u32),
@@ -296,7 +310,7 @@ pub(crate) fn check_size(
     }
 }
 
-/// An image whose size does not fit.
+/// The reason why values do not form an image, or why two images do not match.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -312,18 +326,18 @@ pub enum ImageError {
         /// The number of values given.
         found: usize,
     },
-    /// Two things that must be of one size are not.
+    /// Two sides that must have the same size differ.
     #[error(
         "{first} is {first_width}x{first_height} but {second} is {second_width}x{second_height}: expected the same size"
     )]
     SizeMismatch {
-        /// What the first size belongs to.
+        /// The name of the first side.
         first: &'static str,
         /// Width of the first.
         first_width: u32,
         /// Height of the first.
         first_height: u32,
-        /// What the second size belongs to.
+        /// The name of the second side.
         second: &'static str,
         /// Width of the second.
         second_width: u32,

@@ -2,8 +2,8 @@
 
 /// Returns an index as the `u32` that buffers hold.
 ///
-/// Images, meshes and samplings are limited to fewer than 2³² elements when they are created, so an index that does not
-/// fit is a broken invariant of this library and not a condition of the data.
+/// Images, meshes and samples have fewer than 2³² elements, checked on creation. An index that does
+/// not fit is therefore a broken invariant of this library, and not a condition of the data.
 #[must_use]
 #[inline]
 pub fn index(index: usize) -> u32 {

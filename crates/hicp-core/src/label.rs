@@ -1,6 +1,6 @@
 //! Names of components for traces.
 
-/// Returns the bare name of a type, without path and type parameters: the default name of a component.
+/// Returns the name of a type without path and type parameters: a component's default name.
 ///
 /// ```
 /// struct MyAssociation<T>(T);

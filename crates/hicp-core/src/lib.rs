@@ -1,11 +1,14 @@
-//! The nouns of Hybrid ICP: rigid motions, cameras, depth images, observations, models, correspondences, and the trait of renderers.
+//! The nouns of Hybrid ICP: poses, cameras, depth images, observations, models and correspondences.
 //!
-//! **Should you use this crate?** Directly, if you write a component (an association, a metric, a score) and want to depend
-//! on little. To refine poses, use `hybrid-icp`, which re-exports it.
+//! The trait of renderers is here too.
 //!
-//! Everything is in metres and radians. A transform reads `b_from_a` and takes coordinates in frame `a` to frame `b`:
-//! the paper's T_CO is `camera_from_object`. Cameras look along +z, x right, y down; pixel centres are at integers.
-//! Buffers hold `f32`; poses and normal equations `f64`.
+//! **Should you use this crate?** Yes, if you write a component (an association, a metric, a score)
+//! and want few dependencies. To refine poses, use `hybrid-icp`, which re-exports this crate.
+//!
+//! Everything is in meters and radians. A transform reads `b_from_a` and maps coordinates in frame
+//! `a` to frame `b`: the paper's T_CO is `camera_from_object`. Cameras look along +z, with x right
+//! and y down. Pixel centers are at integers. Buffers hold `f32`; poses and normal equations hold
+//! `f64`.
 //!
 //! ```
 //! use hicp_core::{DepthImage, Isometry3, Mask, Observation, PinholeCamera, Point3, TriMesh, Model};
@@ -21,7 +24,7 @@
 //! # Ok(()) }
 //! ```
 
-// Counts and pixel coordinates become floating point numbers all over this crate; all are far below 2²⁴.
+// Counts and pixel coordinates are converted to floating point throughout; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
 
 mod camera;

@@ -7,30 +7,32 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Largest absolute vertex coordinate accepted, metres: what a map grid reaches (a UTM northing ends at 10 000 km).
+/// Largest accepted absolute vertex coordinate, meters.
 ///
-/// Far from the origin `f32` is coarse, 0.5 m at 5000 km: see [`TriMesh::coordinate_step`].
+/// Map grids reach this far: a UTM northing ends at 10 000 km. Far from the origin `f32` is coarse,
+/// 0.5 m at 5000 km: see [`TriMesh::coordinate_step`].
 pub const MAX_COORDINATE_METERS: f32 = 1.0e7;
 
-/// Largest number of vertices and of triangles accepted.
+/// Largest accepted number of vertices, and of triangles.
 pub const MAX_MESH_ELEMENTS: usize = 50_000_000;
 
-/// Which way the triangles of a mesh face, as far as the mesh itself can tell.
+/// The side to which the triangles of a mesh face, if the mesh itself determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facing {
-    /// Closed, consistently wound, counter-clockwise seen from outside: normals point out of the object.
+    /// Closed and consistently wound, counter-clockwise as seen from outside: normals point out of
+    /// the object.
     Outward,
-    /// Closed and consistently wound, the other way round.
+    /// Closed and consistently wound in the opposite direction: normals point into the object.
     Inward,
-    /// Open, inconsistently wound, or of parts that disagree: nothing may be concluded from the winding.
+    /// Open, inconsistently wound, or with parts that disagree: the winding determines nothing.
     Unknown,
 }
 
-/// A triangle mesh in metres, in the object frame.
+/// A triangle mesh in meters, in the object frame.
 ///
-/// Holds at least one triangle of non-zero area, finite coordinates and valid indices; [`TriMesh::new`] refuses anything
-/// else. Vertices that no triangle uses and triangles of zero area may be there and count for nothing but
-/// [`TriMesh::vertices`] and [`TriMesh::triangles`].
+/// Coordinates are finite, indices are valid, and at least one triangle has an area;
+/// [`TriMesh::new`] refuses anything else. Unused vertices and triangles of zero area may exist.
+/// They affect nothing but [`TriMesh::vertices`] and [`TriMesh::triangles`].
 ///
 /// ```
 /// use hicp_core::{Point3, TriMesh};
@@ -50,12 +52,13 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// Makes a mesh from vertices in metres and triangles of vertex indices counted from 0.
+    /// Creates a mesh from vertices in meters and triangles of vertex indices, counted from 0.
     ///
     /// # Errors
     ///
-    /// [`MeshError`] when there is no triangle, an index is out of range, a coordinate is not finite or beyond
-    /// [`MAX_COORDINATE_METERS`], or no triangle has an area.
+    /// [`MeshError`] if there are no triangles, an index is out of range, a coordinate is not
+    /// finite or beyond [`MAX_COORDINATE_METERS`], no triangle has an area, or there are more than
+    /// [`MAX_MESH_ELEMENTS`].
     pub fn new(vertices: Vec<Point3<f32>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (what, count) in [("vertices", vertices.len()), ("triangles", triangles.len())] {
             if count > MAX_MESH_ELEMENTS {
@@ -105,7 +108,7 @@ impl TriMesh {
         }
     }
 
-    /// The vertices, metres, object frame.
+    /// The vertices, in meters in the object frame.
     #[must_use]
     pub fn vertices(&self) -> &[Point3<f32>] {
         &self.vertices
@@ -117,21 +120,23 @@ impl TriMesh {
         &self.triangles
     }
 
-    /// Returns the corners of a triangle.
+    /// Returns the corners of a triangle, in meters in the object frame.
     ///
     /// # Panics
     ///
-    /// When `triangle` is not below the number of triangles.
+    /// If `triangle` is not below the number of triangles.
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [Point3<f32>; 3] {
         self.triangles[triangle].map(|i| self.vertices[i as usize])
     }
 
-    /// Returns the unit normal of a triangle by its winding (counter-clockwise seen from the tip), or `None` when it has no area.
+    /// Returns the unit normal of a triangle, or `None` if its area is zero.
+    ///
+    /// The winding determines its sign: the corners are counter-clockwise as seen from its tip.
     ///
     /// # Panics
     ///
-    /// When `triangle` is not below the number of triangles.
+    /// If `triangle` is not below the number of triangles.
     #[must_use]
     pub fn normal(&self, triangle: usize) -> Option<UnitVector3<f32>> {
         let double_area = self.double_area_vector(triangle);
@@ -151,7 +156,7 @@ impl TriMesh {
     ///
     /// # Panics
     ///
-    /// When `triangle` is not below the number of triangles.
+    /// If `triangle` is not below the number of triangles.
     #[must_use]
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         0.5 * self.double_area_vector(triangle).norm()
@@ -162,11 +167,12 @@ impl TriMesh {
         (b - a).cross(&(c - a))
     }
 
-    /// Returns the largest distance between neighbouring `f32` numbers among the coordinates of the vertices that triangles use, metres: how
-    /// finely they can be stated. Cost: O(triangles).
+    /// Returns the distance between adjacent `f32` numbers at the largest used coordinate, meters.
     ///
-    /// Half of it is the rounding that reading the mesh may have cost. Beyond a thousandth of the diameter it is no mesh to
-    /// register: move the mesh to its origin.
+    /// Half of it is the rounding that reading the mesh may have cost. If it exceeds a thousandth
+    /// of the diameter, the mesh is too coarse for registration: move the mesh to its origin.
+    ///
+    /// Cost: O(triangles).
     #[must_use]
     pub fn coordinate_step(&self) -> f64 {
         let used = self.used_points();
@@ -184,28 +190,32 @@ impl TriMesh {
         used
     }
 
-    /// The positions of the vertices that triangles use, in their order. Cost: O(triangles) at the first.
+    /// Iterates over the positions of the vertices that triangles use, in their order.
+    ///
+    /// Positions are in meters in the object frame. Cost: O(triangles) for the first.
     pub fn used_points(&self) -> impl Iterator<Item = Point3<f32>> + '_ {
         let used = self.used_vertices().into_iter().zip(&self.vertices);
         used.filter_map(|(used, vertex)| used.then_some(*vertex))
     }
 
-    /// Returns which way the triangles face; found on first use and kept. Cost: O(triangles) once.
+    /// Returns the side to which the triangles face, computed on first use and kept.
     ///
-    /// Vertices at the same position count as one, so that seams of texture coordinates do not open a mesh.
+    /// Vertices at the same position count as one, so that seams of texture coordinates do not open
+    /// a mesh. Cost: O(triangles), once.
     #[must_use]
     pub fn facing(&self) -> Facing {
         *self.facing.get_or_init(|| find_facing(self))
     }
 
-    /// Returns whether the mesh is closed and consistently wound, so that its back faces are never seen.
+    /// Returns whether the mesh is closed and consistently wound, so that back faces are never
+    /// visible.
     #[must_use]
     pub fn is_closed(&self) -> bool {
         self.facing() != Facing::Unknown
     }
 }
 
-/// Closedness by directed edges, orientation by the signed volume of every connected part.
+/// Determines closedness from directed edges, and orientation from the signed volume of every part.
 fn find_facing(mesh: &TriMesh) -> Facing {
     let welded = weld(mesh.vertices());
     let triangles: Vec<[u32; 3]> = mesh
@@ -218,8 +228,8 @@ fn find_facing(mesh: &TriMesh) -> Facing {
     let mut edges: HashMap<(u32, u32), i32> = HashMap::with_capacity(2 * triangles.len());
     for &[a, b, c] in &triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            // A closed, consistently wound surface walks every edge once each way. The high digits count walks,
-            // so that two forward and two backward walks (a non-manifold edge) are not mistaken for it.
+            // A closed, consistently wound surface uses every edge once in each direction. The 4
+            // counts uses, so that an edge with two uses in each direction is not mistaken for one.
             let (key, direction) = if from < to {
                 ((from, to), 1)
             } else {
@@ -237,7 +247,8 @@ fn find_facing(mesh: &TriMesh) -> Facing {
         parts.join(a, b);
         parts.join(b, c);
     }
-    // The volume of a closed part does not depend on the origin; one of its own vertices keeps it well conditioned.
+    // The volume of a closed part does not depend on the origin. One of its own vertices as the
+    // origin keeps the sum well conditioned.
     let mut volumes: HashMap<u32, (Point3<f64>, f64)> = HashMap::new();
     for corners in &triangles {
         let [a, b, c] = corners.map(|i| mesh.vertices()[i as usize].cast::<f64>());
@@ -259,7 +270,7 @@ pub(crate) fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
     (0_u32..)
         .zip(vertices)
         .map(|(index, p)| {
-            // Adding 0 turns −0 into +0.
+            // Adding 0 changes −0 to +0.
             let key = [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
             *first_at.entry(key).or_insert(index)
         })
@@ -292,39 +303,39 @@ impl DisjointSets {
     }
 }
 
-/// A mesh that cannot be registered.
+/// The reason why vertices and triangles do not form a mesh.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// No triangle.
+    /// There are no triangles.
     #[error("mesh has {vertices} vertices but no triangle")]
     NoTriangles {
         /// Number of vertices.
         vertices: usize,
     },
-    /// More vertices or triangles than indices can address.
+    /// There are more vertices or triangles than supported.
     #[error("mesh has {count} {what}, expected at most {limit}")]
     TooLarge {
         /// `vertices` or `triangles`.
         what: &'static str,
-        /// How many there are.
+        /// The number found.
         count: usize,
-        /// How many there may be.
+        /// The largest accepted number.
         limit: usize,
     },
-    /// A triangle that names a vertex that is not there.
+    /// A triangle refers to a vertex that does not exist.
     #[error(
         "triangle {triangle} uses vertex {index}, but there are {vertices} vertices (counted from 0)"
     )]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
-        /// The vertex index it holds.
+        /// The vertex index found.
         index: u32,
         /// Number of vertices.
         vertices: usize,
     },
-    /// A vertex, used or not, with a coordinate that is not finite, or so large that its square overflows.
+    /// A coordinate of a vertex, used or not, is not finite or too large.
     #[error("vertex {vertex} is ({x}, {y}, {z}) m, expected finite coordinates within ±{limit} m")]
     Coordinate {
         /// Index of the vertex.
@@ -335,7 +346,7 @@ pub enum MeshError {
         y: f32,
         /// z.
         z: f32,
-        /// Largest absolute coordinate accepted.
+        /// Largest accepted absolute coordinate, meters.
         limit: f32,
     },
     /// Every triangle has zero area.

@@ -1,13 +1,14 @@
-//! What is odd about a mesh that can be used nevertheless.
+//! Defects of a mesh that do not prevent its use.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::mesh::{DisjointSets, TriMesh, weld};
 
-/// What is odd about a mesh; all counts are 0 for a clean closed one of one part, save `components`.
+/// Counts of defects of a mesh. Except for `components`, all are 0 for a clean closed mesh.
 ///
-/// Edges and parts are those of the surface with vertices at equal positions taken for one, so that seams of texture
-/// coordinates and files that repeat vertices do not count; triangles with two corners at one position have no part in them.
+/// Vertices at equal positions count as one in edges and parts, so that seams of texture
+/// coordinates and repeated vertices are not defects. Triangles with two corners at one position
+/// belong to neither.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshSurvey {
     /// Triangles of zero area.
@@ -16,18 +17,19 @@ pub struct MeshSurvey {
     pub duplicate_triangles: usize,
     /// Vertices that no triangle uses.
     pub unused_vertices: usize,
-    /// Edges of one triangle.
+    /// Edges with one triangle.
     pub boundary_edges: usize,
-    /// Edges of more than two triangles.
+    /// Edges with more than two triangles.
     pub non_manifold_edges: usize,
-    /// Edges of two triangles that walk it the same way, so that one of them is turned over.
+    /// Edges with two triangles that use it in the same direction, so that one of them is flipped.
     pub misoriented_edges: usize,
     /// Parts that share no vertex.
     pub components: usize,
 }
 
 impl MeshSurvey {
-    /// Whether every edge has two triangles. Unlike [`TriMesh::is_closed`], the winding does not matter.
+    /// Returns whether every edge has two triangles. Unlike [`TriMesh::is_closed`], it ignores the
+    /// winding.
     #[must_use]
     pub fn is_watertight(&self) -> bool {
         self.boundary_edges == 0 && self.non_manifold_edges == 0 && self.components > 0
@@ -35,7 +37,9 @@ impl MeshSurvey {
 }
 
 impl TriMesh {
-    /// Counts what is odd about the mesh. Cost: O(triangles), with about a hundred bytes of memory for each.
+    /// Counts the defects of the mesh.
+    ///
+    /// Cost: O(triangles), with about a hundred bytes of memory for each.
     ///
     /// ```
     /// use hicp_core::{Point3, TriMesh};
@@ -51,7 +55,7 @@ impl TriMesh {
         let welded = weld(self.vertices());
         let mut parts = DisjointSets::new(self.vertices().len());
         let mut seen = HashSet::with_capacity(self.triangles().len());
-        // For every edge, how often it is walked upward and downward.
+        // For every edge, its uses in upward and in downward direction.
         let mut edges: HashMap<(u32, u32), [u32; 2]> = HashMap::new();
         let (mut degenerate, mut duplicate) = (0, 0);
         for (triangle, corners) in self.triangles().iter().enumerate() {

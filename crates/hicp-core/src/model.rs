@@ -1,4 +1,4 @@
-//! The object as everyone downstream needs it.
+//! The object to be registered.
 
 use nalgebra::Point3;
 
@@ -10,12 +10,16 @@ use crate::sampling::sample_surface;
 use crate::surfel::Surfel;
 use crate::symmetry::Symmetries;
 
-/// What a [`Model`] is made with, besides its mesh.
+/// The configuration of a [`Model`], without its mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelConfig {
-    /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES). The count hardly matters for accuracy between 300 and 3000.
+    /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES).
+    ///
+    /// Between 300 and 3000, the number hardly affects the accuracy.
     pub samples: usize,
-    /// Diameter in metres where a dataset prescribes one; otherwise it is the largest distance between two used vertices.
+    /// Diameter in meters, if a dataset prescribes one.
+    ///
+    /// By default it is the largest distance between two used vertices.
     pub diameter: Option<f64>,
     /// Declared symmetries.
     pub symmetries: Symmetries,
@@ -31,9 +35,10 @@ impl Default for ModelConfig {
     }
 }
 
-/// An object to be registered: its mesh, surface samples, size and symmetries. Immutable; metres; object frame.
+/// An object to be registered: its mesh, surface samples, size and symmetries.
 ///
-/// Building one costs O(triangles) and happens once per object; share it between threads by reference or `Arc`.
+/// Immutable, in meters, in the object frame. Building one costs O(triangles), once per object.
+/// Threads share it by reference or `Arc`.
 #[derive(Clone, Debug)]
 pub struct Model {
     id: Id,
@@ -47,13 +52,13 @@ pub struct Model {
 }
 
 impl Model {
-    /// Makes a model with the default configuration.
+    /// Creates a model with the default configuration.
     #[must_use]
     pub fn new(mesh: TriMesh) -> Self {
         Self::with_config(mesh, ModelConfig::default())
     }
 
-    /// Makes a model.
+    /// Creates a model from a mesh and a configuration.
     ///
     /// A configured diameter that is not finite and positive is ignored.
     #[must_use]
@@ -83,7 +88,7 @@ impl Model {
         }
     }
 
-    /// Identity for caches.
+    /// The identity of this model, for caches.
     #[must_use]
     pub fn id(&self) -> Id {
         self.id
@@ -95,31 +100,31 @@ impl Model {
         &self.mesh
     }
 
-    /// Area-uniform samples of the whole surface with outward normals.
+    /// Area-uniform samples of the whole surface with outward normals, in the object frame.
     #[must_use]
     pub fn samples(&self) -> &[Surfel] {
         &self.samples
     }
 
-    /// Largest distance between two vertices, metres.
+    /// Largest distance between two used vertices, or the configured diameter, in meters.
     #[must_use]
     pub fn diameter(&self) -> f64 {
         self.diameter
     }
 
-    /// Centre of the bounding box, object frame.
+    /// Center of the bounding box, meters, object frame.
     #[must_use]
     pub fn center(&self) -> Point3<f64> {
         self.center
     }
 
-    /// Largest distance of a vertex from [`Model::center`], metres.
+    /// Largest distance of a vertex from [`Model::center`], meters.
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Declared symmetries.
+    /// The declared symmetries.
     #[must_use]
     pub fn symmetries(&self) -> &Symmetries {
         &self.symmetries

@@ -1,6 +1,6 @@
 //! Numbers in messages.
 
-/// A number that was given, as people write it: powers of ten where digits would fill lines.
+/// Displays a number as people write it, with a power of ten instead of many digits.
 pub(crate) struct Number(pub(crate) f64);
 
 impl std::fmt::Display for Number {

@@ -1,4 +1,4 @@
-//! What the camera saw of the object.
+//! The camera's view of the object.
 
 use std::sync::Arc;
 
@@ -13,17 +13,23 @@ use crate::normals::{DepthPatch, estimate_normals};
 use crate::region::PixelRegion;
 use crate::surfel::Surfel;
 
-/// A segmented depth image with its vertex and normal maps: the point cloud C and vertex map V_C of §III-A.
+/// A segmented depth image with its vertex and normal maps: the point cloud C and vertex map V_C of
+/// §III-A.
 ///
-/// Immutable. The whole depth image and the mask are kept apart: correspondences come from inside the mask, but the score
-/// needs what stands in front of the object. Vertex and normal maps cover the mask's bounding box only; a pixel has a surfel
-/// when it is masked, has a depth of at least 0.1 mm, and enough neighbours on its own side of the depth edges to carry a normal.
+/// It is immutable. It keeps the whole depth image next to the mask: correspondences come from
+/// inside the mask, but the score also needs the surfaces in front of the object. The vertex and
+/// normal maps cover only the mask's bounding box. A pixel has a surfel if all of these hold:
 ///
-/// An empty mask or a depth image of zeros makes an observation without surfels; refining against it ends with "no pairs".
+/// - It is masked and its depth is at least 0.1 mm.
+/// - It has enough neighbors on its own side of the depth edges to determine a normal.
 ///
-/// Building one costs 15 to 30 ns for every pixel inside the mask's box, the more the more depth edges there are, and nothing for the
-/// others: the observations of one image share its depth (an `Arc`). Share an observation between threads and hypotheses: search
-/// trees and the like are built once per observation, see [`Observation::derived`].
+/// An empty mask or a depth image of zeros gives an observation without surfels. Refining against
+/// it ends with "no pairs".
+///
+/// Cost of building one: 15 to 30 ns per pixel inside the mask's bounding box, more with more depth
+/// edges. Pixels outside cost nothing, since the observations of one image share its depth (an
+/// `Arc`). Share an observation between threads and hypotheses, because search trees are built once
+/// per observation, see [`Observation::derived`].
 ///
 /// ```
 /// use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
@@ -50,13 +56,14 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Makes an observation.
+    /// Creates an observation from a depth image in meters, a mask and the camera of both.
     ///
-    /// `depth` is a [`DepthImage`], or an `Arc` of one that observations with other masks share; it is not copied.
+    /// `depth` is a [`DepthImage`], or an `Arc` of one that other observations share. It is not
+    /// copied.
     ///
     /// # Errors
     ///
-    /// [`ImageError::SizeMismatch`] when depth image, mask and camera are not of one size.
+    /// [`ImageError::SizeMismatch`] if depth image, mask and camera differ in size.
     pub fn new(
         depth: impl Into<Arc<DepthImage>>,
         mask: Mask,
@@ -91,7 +98,8 @@ impl Observation {
                     .map(|(z, masked)| if *masked { *z } else { 0.0 }),
             );
         }
-        // Below 2³⁰ in any accepted image; counted in 32 bits, of which a vector holds more.
+        // The sum stays below 2³⁰ in any accepted image. In 32 bits, more counters fit into a
+        // vector.
         let n_measured = patch.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>() as usize;
 
         let width = region.width();
@@ -142,7 +150,7 @@ impl Observation {
         })
     }
 
-    /// Identity for caches.
+    /// The identity of this observation, for caches.
     #[must_use]
     pub fn id(&self) -> Id {
         self.id
@@ -154,13 +162,13 @@ impl Observation {
         &self.camera
     }
 
-    /// The whole depth image, metres, 0 where nothing was measured.
+    /// The whole depth image, in meters; 0 where nothing was measured.
     #[must_use]
     pub fn depth(&self) -> &DepthImage {
         &self.depth
     }
 
-    /// The same, to make observations of other masks with: they share it.
+    /// The depth image as an `Arc`, for observations of the same image with other masks.
     ///
     /// ```
     /// use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
@@ -184,7 +192,7 @@ impl Observation {
         &self.mask
     }
 
-    /// The mask's bounding box.
+    /// The mask's bounding box, pixels.
     #[must_use]
     pub fn region(&self) -> PixelRegion {
         self.region
@@ -196,13 +204,15 @@ impl Observation {
         self.n_surfels
     }
 
-    /// Number of masked pixels that have a depth.
+    /// Number of masked pixels with a measured depth.
     #[must_use]
     pub fn n_measured(&self) -> usize {
         self.n_measured
     }
 
-    /// Returns the surfel of a pixel in the camera frame (metres, normal facing the camera), or `None` where there is none.
+    /// Returns the surfel of a pixel, or `None` if it has none.
+    ///
+    /// The surfel is in the camera frame, in meters, with its normal facing the camera.
     #[must_use]
     pub fn surfel_at(&self, u: u32, v: u32) -> Option<&Surfel> {
         self.region
@@ -211,7 +221,9 @@ impl Observation {
             .filter(|s| s.point.z > 0.0)
     }
 
-    /// Returns the surfel of the pixel whose square contains the image position (u, v), as [`Observation::index_near`] finds it.
+    /// Returns the surfel of the pixel whose square contains the image position (u, v).
+    ///
+    /// It is the surfel at [`Observation::index_near`].
     #[must_use]
     #[inline]
     pub fn surfel_near(&self, u: f32, v: f32) -> Option<&Surfel> {
@@ -219,17 +231,17 @@ impl Observation {
             .map(|index| &self.surfels[index as usize])
     }
 
-    /// Returns the index of the surfel of the pixel whose square contains the image position (u, v); `None` where there is
-    /// none, outside, and for NaN.
+    /// Returns the surfel index of the pixel whose square contains the image position (u, v).
     ///
-    /// The square of a pixel reaches half a pixel to every side of its integer centre; its lower edges belong to it.
+    /// Returns `None` if that pixel has no surfel, outside the region, and for NaN. The square of a
+    /// pixel extends half a pixel around its integer center; its lower edges belong to it.
     #[must_use]
     #[inline]
     pub fn index_near(&self, u: f32, v: f32) -> Option<u32> {
         let column = u - self.region.u_min as f32 + 0.5;
         let row = v - self.region.v_min as f32 + 0.5;
         let (width, height) = (self.region.width(), self.region.height());
-        // False for NaN, so the casts below see numbers inside the region.
+        // False for NaN, so the casts below only receive numbers inside the region.
         if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // Floor of a checked value, below 2³².
@@ -240,17 +252,19 @@ impl Observation {
         }
     }
 
-    /// Returns the surfel of an index: the row-major position of its pixel in [`Observation::region`]. `None` where there is none.
+    /// Returns the surfel at an index, or `None` if there is none.
+    ///
+    /// The index is the row-major position of the surfel's pixel in [`Observation::region`].
     #[must_use]
     #[inline]
     pub fn surfel(&self, index: u32) -> Option<&Surfel> {
         self.surfels.get(index as usize).filter(|s| s.point.z > 0.0)
     }
 
-    /// Returns the pixel (u, v) of a surfel's index, see [`Observation::surfel`].
+    /// Returns the pixel (u, v) of a surfel's index; see [`Observation::surfel`].
     #[must_use]
     pub fn pixel(&self, index: u32) -> (u32, u32) {
-        // An empty region has no indices.
+        // An empty region has no indices; the maximum avoids a division by zero.
         let width = index::index(self.region.width()).max(1);
         (
             self.region.u_min + index % width,
@@ -258,9 +272,10 @@ impl Observation {
         )
     }
 
-    /// Returns the surfels on the pixel grid u ≡ v ≡ 0 (mod `stride`) in row-major order, each with its index, see [`Observation::surfel`].
+    /// Iterates over the surfels on the pixel grid u ≡ v ≡ 0 (mod `stride`), in row-major order.
     ///
-    /// The grid is anchored at the image's corner, so equal strides pick equal pixels whatever the mask.
+    /// Each comes with its index, see [`Observation::surfel`]. The grid starts at the image's
+    /// corner, so equal strides select equal pixels for every mask. A stride of 0 counts as 1.
     pub fn surfels(&self, stride: u32) -> impl Iterator<Item = (u32, &Surfel)> {
         let stride = stride.max(1);
         let (region, width) = (self.region, self.region.width());
@@ -277,11 +292,14 @@ impl Observation {
             .filter(|(_, s)| s.point.z > 0.0)
     }
 
-    /// Returns this observation at a lower resolution: every `factor`-th pixel in both directions, from the image's corner.
+    /// Returns this observation at a lower resolution: every `factor`-th pixel in both directions.
     ///
-    /// Its camera is phase-aligned: a pixel of the coarse image looks along exactly the ray of the fine pixel that it was
-    /// taken from, so a pose means the same in both. Normals are taken over, with the noise they were smoothed against at
-    /// full resolution. Made once per factor and shared. A factor of 0 counts as 1. Cost: O(image / factor²).
+    /// The pixel grid starts at the image's corner. The camera of the result is phase-aligned: a
+    /// coarse pixel has exactly the ray of the fine pixel that it was copied from, so a pose means
+    /// the same in both. Normals are copied, and so keep the smoothing of the full resolution. A
+    /// factor of 0 counts as 1.
+    ///
+    /// The result is built once per factor and shared. Cost: O(image / factor²).
     #[must_use]
     pub fn decimated(&self, factor: u32) -> Arc<Self> {
         let factor = factor.max(1);
@@ -340,7 +358,8 @@ impl Observation {
         }
     }
 
-    /// Values derived from this observation, such as search trees: built once, shared by all threads.
+    /// Values derived from this observation, such as search trees: built once, shared by all
+    /// threads.
     #[must_use]
     pub fn derived(&self) -> &Derived {
         &self.derived

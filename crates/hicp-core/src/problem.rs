@@ -6,11 +6,13 @@ use crate::model::Model;
 use crate::observation::Observation;
 use crate::render::{RenderCache, RenderedView};
 
-/// The two sides of a registration: the model (source, moves) and the observation (target, stands still).
+/// The two sides of a registration: the model (source, moves) and the observation (target, stands
+/// still).
 ///
-/// Either side may be absent: [`Problem::default`] has neither and serves pairs that come from elsewhere. A component
-/// that needs a side does without pairs, points or agreement where it is absent; it never guesses. The sides are
-/// methods, so that later kinds of source and target (point clouds, color) do not change this type.
+/// Either side may be absent. [`Problem::default`] has neither and serves pairs that come from
+/// elsewhere. If a component needs a side that is absent, it returns no pairs, no points or no
+/// agreement; it never guesses. The sides are methods, so that later kinds of source and target
+/// (point clouds, color) do not change this type.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Problem<'a> {
     model: Option<&'a Model>,
@@ -18,7 +20,7 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Pairs a model with an observation.
+    /// Combines a model with an observation.
     #[must_use]
     pub fn new(model: &'a Model, observation: &'a Observation) -> Self {
         Self {
@@ -49,19 +51,20 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// One iteration of a stage, as filters, metrics and stop rules see it.
+/// One iteration of a stage, as filters, metrics and stop rules receive it.
 ///
-/// Components are pure: equal iterations and equal pairs give equal results, whichever iteration came before. A stage
-/// that returns to an earlier pose after a rejected one passes that pose's iteration again.
+/// Components are pure: equal iterations and equal pairs give equal results, whatever ran before.
+/// If a stage returns to an earlier pose after a rejected one, it passes that pose's iteration
+/// again.
 ///
-/// [`Iteration::default`] is the first iteration of a stage that starts at the identity, without a problem: for pairs
-/// that come from elsewhere.
+/// [`Iteration::default`] is the first iteration of a stage that starts at the identity, without a
+/// problem. It serves pairs that come from elsewhere.
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct Iteration<'a> {
     /// Index within the stage, from 0.
     pub index: usize,
-    /// The pose that the stage started from: `camera_from_object`.
+    /// The initial pose of the stage: `camera_from_object`.
     pub init: Isometry3<f64>,
     /// The model and the observation.
     pub problem: Problem<'a>,
@@ -79,7 +82,9 @@ impl<'a> Iteration<'a> {
     }
 }
 
-/// The problem and the render cache of the run: what selections, associations, scores and switchers receive.
+/// The problem and the render cache of the run.
+///
+/// Selections, associations, scores and switchers receive it.
 ///
 /// Copy `context.problem` before borrowing a view to use both:
 ///
@@ -103,10 +108,10 @@ impl<'a> Context<'a> {
         Self { problem, renders }
     }
 
-    /// Returns the model rendered at a pose in the observation's camera.
+    /// Returns the model rendered at a pose, `camera_from_object`, in the observation's camera.
     ///
-    /// Renders at most once per pose while the cache holds it. Returns `None` if the problem has no model to render or no
-    /// camera to render it for.
+    /// If the cache holds the pose, nothing is rendered. Returns `None` if the problem has no model
+    /// or no depth image.
     pub fn view(&mut self, camera_from_object: &Isometry3<f64>) -> Option<&RenderedView> {
         let (model, observation) = self.problem.sides()?;
         let camera = observation.camera();

@@ -2,7 +2,8 @@
 
 /// A half-open rectangle of pixels: columns `u_min..u_max`, rows `v_min..v_max`.
 ///
-/// A region of interest; empty when either range is. Buffers over a region are row-major and start at its corner.
+/// It is a region of interest, and empty if either range is empty. Buffers over a region are
+/// row-major and start at its corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PixelRegion {
     /// First column.
@@ -45,7 +46,7 @@ impl PixelRegion {
         self.width() * self.height()
     }
 
-    /// Returns whether the region holds no pixel.
+    /// Returns whether the region contains no pixel.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.width() == 0 || self.height() == 0
@@ -57,14 +58,16 @@ impl PixelRegion {
         (self.u_min..self.u_max).contains(&u) && (self.v_min..self.v_max).contains(&v)
     }
 
-    /// Returns the row-major index of pixel (u, v) in a buffer over this region, or `None` outside.
+    /// Returns the row-major index of pixel (u, v) in a buffer over this region.
+    ///
+    /// Outside the region, returns `None`.
     #[must_use]
     pub fn index(&self, u: u32, v: u32) -> Option<usize> {
         self.contains(u, v)
             .then(|| (v - self.v_min) as usize * self.width() + (u - self.u_min) as usize)
     }
 
-    /// Returns the common part of two regions; empty (but well formed) when there is none.
+    /// Returns the common part of two regions; empty, but well formed, if they do not overlap.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         let u_min = self.u_min.max(other.u_min);

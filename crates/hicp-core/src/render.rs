@@ -1,4 +1,4 @@
-//! Rendering: the trait that rasterizers implement, the buffer they fill, and the cache that keeps renders from being repeated.
+//! The renderer trait, the buffer that renderers fill, and the cache that avoids repeated renders.
 
 use nalgebra::{Isometry3, UnitVector3};
 
@@ -9,13 +9,14 @@ use crate::model::Model;
 use crate::region::PixelRegion;
 use crate::surfel::Surfel;
 
-/// The triangle id of a pixel that shows nothing.
+/// The triangle id of a pixel without a surface.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// A rendered region of an image: depth and visible triangle per pixel. The caller owns and reuses it.
+/// A rendered region of an image: depth and visible triangle per pixel.
 ///
-/// Buffers are row-major over [`RenderedView::region`]. Depth is along the optical axis in metres, 0 where there is
-/// nothing; the triangle is [`NO_TRIANGLE`] there.
+/// The caller owns and reuses it. Buffers are row-major over [`RenderedView::region`]. Depth is
+/// along the optical axis in meters. A pixel without a surface has depth 0 and the triangle
+/// [`NO_TRIANGLE`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderedView {
     region: PixelRegion,
@@ -24,11 +25,14 @@ pub struct RenderedView {
 }
 
 impl RenderedView {
-    /// Empties the view and makes it cover `region`. Allocates only when the region is larger than any before.
+    /// Clears the view and sets its region to `region`.
+    ///
+    /// Allocates only if the region is larger than any before.
     ///
     /// # Panics
     ///
-    /// When eight bytes per pixel are more than memory can hold; no camera has sides above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
+    /// If memory cannot hold eight bytes per pixel. No camera has sides above
+    /// [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     pub fn reset(&mut self, region: PixelRegion) {
         self.region = region;
         self.depth.clear();
@@ -37,26 +41,26 @@ impl RenderedView {
         self.triangles.resize(region.area(), NO_TRIANGLE);
     }
 
-    /// Makes this view equal to another, reusing its own memory.
+    /// Copies another view into this one, reusing the memory.
     pub fn copy_from(&mut self, other: &Self) {
         self.region = other.region;
         self.depth.clone_from(&other.depth);
         self.triangles.clone_from(&other.triangles);
     }
 
-    /// The region that the buffers cover.
+    /// The region of the buffers, pixels.
     #[must_use]
     pub fn region(&self) -> PixelRegion {
         self.region
     }
 
-    /// Depth along the optical axis, metres, 0 where there is nothing.
+    /// Depth along the optical axis, meters; 0 where there is no surface.
     #[must_use]
     pub fn depth(&self) -> &[f32] {
         &self.depth
     }
 
-    /// Index of the visible triangle, [`NO_TRIANGLE`] where there is nothing.
+    /// Index of the visible triangle; [`NO_TRIANGLE`] where there is no surface.
     #[must_use]
     pub fn triangles(&self) -> &[u32] {
         &self.triangles
@@ -70,7 +74,7 @@ impl RenderedView {
     /// Number of pixels that show the surface.
     #[must_use]
     pub fn n_rendered(&self) -> usize {
-        // Few enough at a time for 32 bits, of which a vector holds twice as many.
+        // Chunks are small enough for 32-bit counters, and more of those fit into a vector.
         let count = |depths: &[f32]| depths.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>();
         self.depth
             .chunks(1 << 16)
@@ -78,16 +82,19 @@ impl RenderedView {
             .sum()
     }
 
-    /// Returns the depth at an image pixel: 0 where nothing was rendered, and outside the region.
+    /// Returns the depth at an image pixel, in meters.
+    ///
+    /// It is 0 if nothing was rendered there, and outside the region.
     #[must_use]
     pub fn depth_at(&self, u: u32, v: u32) -> f32 {
         self.region.index(u, v).map_or(0.0, |i| self.depth[i])
     }
 
-    /// Returns the rendered surface at an image pixel, in the camera frame with the normal facing the camera.
+    /// Returns the rendered surface at an image pixel, in the camera frame with the normal facing
+    /// the camera.
     ///
-    /// `None` where nothing was rendered, and for a triangle that `mesh` does not have. `mesh`, `camera` and `camera_from_object` must be
-    /// those of the render.
+    /// Returns `None` if nothing was rendered there or `mesh` does not have the triangle. `mesh`,
+    /// `camera` and `camera_from_object` must be those of the render.
     #[must_use]
     pub fn surfel_at(
         &self,
@@ -125,14 +132,18 @@ impl RenderedView {
 ///
 /// # Contract
 ///
-/// - The view is reset to the part of `region` that the projection of the mesh can cover, and to an empty region when
-///   there is none; work is proportional to the mesh and that part, never to the image.
-/// - Pixel (u, v) shows the surface along the ray through ((u−cx)/fx, (v−cy)/fy, 1): the nearest, as depth (z) in metres.
-/// - Surface nearer than the renderer's near plane is cut away; a mesh behind the camera renders nothing.
-/// - The result does not depend on the order of the triangles, and shared edges leave neither gaps nor double hits.
+/// - Resets the view to the part of `region` that the projection of the mesh can cover, or to an
+///   empty region if it cannot cover any. Work is proportional to the mesh and that part, never to
+///   the image.
+/// - Pixel (u, v) shows the nearest surface along the ray through ((u−cx)/fx, (v−cy)/fy, 1), as
+///   depth (z) in meters.
+/// - Surface nearer than the renderer's near plane is clipped. A mesh behind the camera renders
+///   nothing.
+/// - The result does not depend on the order of the triangles. Shared edges leave neither gaps nor
+///   double hits.
 /// - Equal inputs give equal bits, whatever was rendered before.
 ///
-/// `Rasterizer` in `hicp-raster` is the implementation to use.
+/// Use `Rasterizer` of `hicp-raster`, unless you need a custom renderer.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a renderer",
     label = "this must implement `Renderer`",
@@ -163,14 +174,14 @@ impl<R: Renderer + ?Sized> Renderer for Box<R> {
     }
 }
 
-/// Number of renders kept: a Hybrid ICP iteration asks for the same pose at most a few renders apart.
+/// Number of cached renders: Hybrid ICP requests the same pose at most a few renders apart.
 const CACHED_VIEWS: usize = 4;
 
-/// A renderer that remembers its last renders: the four that were used last.
+/// A renderer that caches its four most recently used renders.
 ///
-/// The score that looks at a pose and the selection that starts from it ask for the same render; whoever comes second
-/// gets it for the price of a key comparison. Keyed by model, camera and the bits of the pose, so a hit returns exactly
-/// what a render would.
+/// A score and the selection that starts from the scored pose need the same render; the second
+/// request costs a key comparison. The key is the model, the camera and the bits of the pose, so a
+/// hit returns exactly what a render would.
 pub struct RenderCache {
     renderer: Box<dyn Renderer + Send>,
     entries: Vec<Entry>,
@@ -192,7 +203,7 @@ struct Key {
 }
 
 impl RenderCache {
-    /// Makes an empty cache around a renderer.
+    /// Creates an empty cache around a renderer.
     pub fn new(renderer: impl Renderer + Send + 'static) -> Self {
         Self {
             renderer: Box::new(renderer),
@@ -208,7 +219,8 @@ impl RenderCache {
         }
     }
 
-    /// Returns the render of the whole image at a pose, from the cache when it is there.
+    /// Returns the render of the whole image at a pose, `camera_from_object`, from the cache if
+    /// possible.
     ///
     /// The view covers the part of the image that the model's projection can cover.
     pub fn view(
@@ -236,7 +248,8 @@ impl RenderCache {
         }
         if !hit {
             self.rendered += 1;
-            // Whoever catches a renderer's panic must not find its half-filled view under the old key.
+            // Invalidate the key first: if the renderer panics, a half-filled view must not be
+            // reused.
             self.entries[chosen].key = None;
             let view = &mut self.entries[chosen].view;
             self.renderer.render(
@@ -246,7 +259,8 @@ impl RenderCache {
                 &camera.region(),
                 view,
             );
-            // All views grow together, so that which of them a warm run happens to reuse decides nothing.
+            // All views grow together, so that allocations of a warm run do not depend on the
+            // reused entry.
             let (capacity, area) = (view.depth.capacity(), view.depth.len());
             for entry in &mut self.entries {
                 if entry.view.depth.capacity() < area {
@@ -262,7 +276,7 @@ impl RenderCache {
         &entry.view
     }
 
-    /// Number of renders made so far, hits not counted.
+    /// Number of renders so far, without cache hits.
     #[must_use]
     pub fn renders(&self) -> u64 {
         self.rendered
@@ -287,7 +301,7 @@ fn pose_bits(pose: &Isometry3<f64>) -> [u64; 7] {
 mod tests {
     use super::*;
 
-    /// Shows the whole region.
+    /// A renderer that covers the whole region.
     struct Flat;
 
     impl Renderer for Flat {
@@ -304,14 +318,14 @@ mod tests {
     }
 
     #[test]
-    fn all_views_grow_with_the_largest_and_not_much_beyond() {
+    fn all_views_grow_to_the_largest_and_not_much_beyond() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let corners = corners.map(nalgebra::Point3::from).to_vec();
         let model = Model::new(TriMesh::new(corners, vec![[0, 1, 2]]).unwrap());
         let mut cache = RenderCache::new(Flat);
         for side in [10, 15, 9, 34] {
             let camera = PinholeCamera::new(9.0, 9.0, 1.0, 1.0, side, side).unwrap();
-            // From one entry to all of them, so that the next size meets both empty and full ones.
+            // Fill all entries, so that the next size replaces both empty and full ones.
             for step in 0..CACHED_VIEWS {
                 let pose = Isometry3::translation(0.0, 0.0, 1.0 + step as f64);
                 cache.view(&model, &camera, &pose);
@@ -319,7 +333,8 @@ mod tests {
                 let area = (largest * largest) as usize;
                 for entry in &cache.entries {
                     for capacity in [entry.view.depth.capacity(), entry.view.triangles.capacity()] {
-                        // Each size but the smallest has twice the pixels of the one before, so that a vector asks for no more than it wants.
+                        // Each size but the smallest doubles the pixels, so vectors request exactly
+                        // what they need.
                         assert!((area..area + area / 4).contains(&capacity), "{capacity}");
                     }
                 }

@@ -1,4 +1,4 @@
-//! Rotations and poses from matrices that are rounded.
+//! Rotations and poses from rounded matrices.
 
 use thiserror::Error;
 
@@ -6,17 +6,19 @@ use crate::number::Number;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 
-/// Largest deviation from orthogonality and from determinant 1 that is taken for rounding.
+/// Largest deviation from orthogonality and from determinant 1 that counts as rounding.
 pub const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// Returns the rotation nearest to a matrix that is one up to rounding.
+/// Returns the rotation nearest to a matrix that is a rotation up to rounding.
 ///
-/// Matrices read from files carry five to nine digits, so they are orthogonal only to that; the polar factor R (RᵀR)^−½
-/// is the nearest rotation, found by Newton's iteration R ← (R + R⁻ᵀ)/2. (nalgebra's `from_matrix` can return the identity near half turns.)
+/// Matrices read from files have five to nine digits and are orthogonal only to that precision. The
+/// nearest rotation is the polar factor R (RᵀR)^−½. It is computed by Newton's iteration R ← (R +
+/// R⁻ᵀ)/2, because nalgebra's `from_matrix` can return the identity near half turns.
 ///
 /// # Errors
 ///
-/// [`RotationError`] when an entry is not finite or the matrix is further than [`ROTATION_TOLERANCE`] from a rotation.
+/// [`RotationError`] if an entry is not finite or the matrix is further than [`ROTATION_TOLERANCE`]
+/// from a rotation.
 ///
 /// ```
 /// use hicp_core::{Matrix3, RotationError, rotation_from_matrix};
@@ -49,7 +51,8 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     }
     let mut rotation = *matrix;
     for _ in 0..4 {
-        // Within the tolerance the matrix is far from singular, and the iteration converges quadratically.
+        // Within the tolerance, the matrix is far from singular and the iteration converges
+        // quadratically.
         if let Some(inverse) = rotation.try_inverse() {
             rotation = (rotation + inverse.transpose()) * 0.5;
         }
@@ -59,12 +62,14 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     ))
 }
 
-/// Returns the pose of a 4×4 matrix [R t; 0 0 0 1] with t in meters, R being a rotation up to rounding.
+/// Returns the pose of a 4×4 matrix [R t; 0 0 0 1], with t in meters.
+///
+/// R must be a rotation up to rounding.
 ///
 /// # Errors
 ///
-/// [`PoseMatrixError`] if R is not a rotation (see [`rotation_from_matrix`]), t is not finite, or the last row is not
-/// [0 0 0 1].
+/// [`PoseMatrixError`] if R is not a rotation (see [`rotation_from_matrix`]), t is not finite, or
+/// the last row is not [0 0 0 1].
 ///
 /// ```
 /// use hicp_core::{Matrix4, pose_from_matrix};
@@ -94,7 +99,7 @@ pub fn pose_from_matrix(matrix: &Matrix4<f64>) -> Result<Isometry3<f64>, PoseMat
     Ok(Isometry3::from_parts(translation, rotation))
 }
 
-/// A 4×4 matrix that is not a pose.
+/// The reason why a 4×4 matrix is not a pose.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum PoseMatrixError {
@@ -104,17 +109,17 @@ pub enum PoseMatrixError {
     /// A component of the translation is not finite.
     #[error("translation entry [{row}][3] is {found}, expected a finite number of meters")]
     Translation {
-        /// Row from 0.
+        /// Row, from 0.
         row: usize,
         /// The value given.
         found: f64,
     },
-    /// The last row is not [0 0 0 1]: the matrix may be transposed.
+    /// The last row is not [0 0 0 1]; the matrix may be transposed.
     #[error(
         "pose matrix entry [3][{column}] is {found}, expected {expected}: the last row must be [0 0 0 1], is the matrix transposed?"
     )]
     LastRow {
-        /// Column from 0.
+        /// Column, from 0.
         column: usize,
         /// The value given.
         found: f64,
@@ -123,16 +128,16 @@ pub enum PoseMatrixError {
     },
 }
 
-/// A 3×3 matrix that is not a rotation.
+/// The reason why a 3×3 matrix is not a rotation.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum RotationError {
-    /// A component is not finite.
+    /// An entry is not finite.
     #[error("rotation entry [{row}][{column}] is {value}, expected a finite number")]
     NotFinite {
-        /// Row from 0.
+        /// Row, from 0.
         row: usize,
-        /// Column from 0.
+        /// Column, from 0.
         column: usize,
         /// The value given.
         value: f64,
@@ -145,10 +150,10 @@ pub enum RotationError {
     NotOrthogonal {
         /// max |R Rᵀ − I|.
         deviation: f64,
-        /// The largest deviation accepted.
+        /// The largest accepted deviation.
         tolerance: f64,
     },
-    /// The determinant is not +1: a reflection when it is −1.
+    /// The determinant is not +1. A determinant of −1 means a reflection.
     #[error(
         "rotation has determinant {}, expected 1 within {tolerance} (-1 is a reflection)",
         Number(*determinant)

@@ -5,15 +5,16 @@ use nalgebra::{Quaternion, UnitQuaternion};
 /// The real root of ψ⁴ = ψ + 4, which spreads the second angle of the spiral.
 const PSI: f64 = 1.533_751_168_755_204_3;
 
-/// Returns the `index`-th of `count` rotations that cover SO(3) evenly: a super-Fibonacci spiral (Alexa, CVPR 2022).
+/// Returns the `index`-th of `count` rotations that cover SO(3) evenly.
 ///
-/// Any count covers the group about as evenly as so many rotations can; the first few of many do not. An index outside of
-/// `count` goes on along the spiral. Cost: O(1), no memory.
+/// The rotations form a super-Fibonacci spiral (Alexa, CVPR 2022). All `count` rotations together
+/// cover the group about as evenly as that number of rotations can; a prefix of them does not. An
+/// index beyond `count` continues the spiral. Cost: O(1), without memory.
 ///
 /// ```
 /// use hicp_core::{rotation_grid, so3};
 /// let grid: Vec<_> = (0..500).map(|i| rotation_grid(i, 500)).collect();
-/// // Whatever the rotation, one of 500 is within about 36°.
+/// // Every rotation has one of the 500 within about 36°.
 /// let turn = so3::exp(&nalgebra::Vector3::new(0.3, -2.0, 1.1));
 /// let nearest = grid.iter().map(|r| r.angle_to(&turn)).fold(f64::INFINITY, f64::min);
 /// assert!(nearest.to_degrees() < 36.0);
@@ -41,8 +42,11 @@ mod tests {
     use crate::so3;
     use nalgebra::Vector3;
 
-    /// (x, y, z, w) = (r sin α, r cos α, R sin β, R cos β) with s = i + ½, r² = s/n, R² = 1 − s/n, α = 2πs/√2 and
-    /// β = 2πs/ψ, as the paper's page gives them, computed with thirty digits.
+    /// Compares rotations with the formulas of the paper's page, evaluated with thirty digits.
+    ///
+    /// With s = i + ½, r² = s/n, R² = 1 − s/n, α = 2πs/√2 and β = 2πs/ψ: (x, y, z, w) = (r sin α, r
+    /// cos α, R sin β, R cos β).
+    /// α = 2πs/√2 and β = 2πs/ψ.
     #[test]
     fn the_grid_is_the_published_spiral() {
         assert!((PSI.powi(4) - PSI - 4.0).abs() < 1e-14);
@@ -90,13 +94,13 @@ mod tests {
         ];
         for (index, count, expected) in golden {
             let found = rotation_grid(index, count).coords;
-            // The angles reach 184 radians, of which f64 keeps 3e-14.
+            // The angles reach 184 radians, where f64 has a precision of 3e-14.
             let error = (found - nalgebra::Vector4::from(expected)).amax();
             assert!(error < 1e-13, "{index} of {count}: {error}");
         }
     }
 
-    /// Of rotations spread evenly, the farthest from any is not much farther than of balls packed without gaps.
+    /// Evenly spread rotations leave gaps not much larger than those of densely packed balls.
     #[test]
     fn the_grid_leaves_no_large_gap_and_no_cluster() {
         for (count, largest) in [(64, 75.0), (256, 48.0), (1024, 31.0)] {

@@ -3,18 +3,25 @@
 use crate::mesh::{Facing, TriMesh};
 use crate::surfel::Surfel;
 
-/// The largest number of samples that a surface is given.
+/// The largest number of samples on a surface.
 pub const MAX_SAMPLES: usize = 10_000_000;
 
-/// Returns `count` surfels, at most [`MAX_SAMPLES`], spread evenly over the area of a mesh, in the object frame.
+/// Returns `count` surfels, at most [`MAX_SAMPLES`], spread evenly over the area of a mesh.
 ///
-/// Systematic sampling: the i-th sample stands at (i + ½)/count of the accumulated area, in the later of two triangles when
-/// that is their border, and inside its triangle at the i-th point of a low-discrepancy sequence: Roberts's R₂ from (½, ½), in
-/// the triangle's edges from its first corner, folded into it. Deterministic; every region of the surface gets its share of the samples to
-/// within one. Normals follow the winding, turned outward where a closed mesh is wound inward. Cost: O(triangles + count).
+/// Surfels are in the object frame. Normals follow the winding and are flipped if a closed mesh is
+/// wound inward. The result is deterministic, and every region of the surface receives its share of
+/// the samples to within one.
+///
+/// The method is systematic sampling. The i-th sample lies at (i + ½)/count of the accumulated
+/// area; on the border of two triangles, it belongs to the later one. Its place inside the triangle
+/// is the i-th point of Roberts's R₂ sequence from (½, ½), in coordinates along the edges from the
+/// first corner, folded into the triangle.
+///
+/// Cost: O(triangles + count).
 #[must_use]
 pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
-    // The two-dimensional analogue of the golden ratio's sequence: 1/g and 1/g², g³ = g + 1.
+    // R₂, the analogue of the golden-ratio sequence in two dimensions: 1/g and 1/g² with g³ = g +
+    // 1.
     const STEP_1: f64 = 0.754_877_666_246_692_7;
     const STEP_2: f64 = 0.569_840_290_998_053_3;
 

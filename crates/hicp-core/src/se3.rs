@@ -1,9 +1,10 @@
 //! The group of rigid motions SE(3): exponential, logarithm, adjoint and left Jacobian.
 //!
-//! A twist is ξ = [ρ; φ], **translation first** (metres), then rotation (radians). Increments and uncertainties
-//! are *left* perturbations, T ← exp(ξ^) T: for `camera_from_object` they live in the camera frame.
-//! Conventions and closed forms are those of Barfoot & Furgale, "Associating Uncertainty with Three-Dimensional
-//! Poses", T-RO 2014; they are also those of Sophus and manif. GTSAM orders rotation first and perturbs on the right.
+//! A twist is ξ = [ρ; φ], **translation first** (meters), then rotation (radians). Increments and
+//! uncertainties are *left* perturbations, T ← exp(ξ^) T: for `camera_from_object` they are in the
+//! camera frame. Conventions and closed forms are those of Barfoot & Furgale, "Associating
+//! Uncertainty with Three-Dimensional Poses", T-RO 2014. Sophus and manif use the same. GTSAM
+//! orders rotation first and perturbs on the right.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
 
@@ -25,7 +26,7 @@ pub fn exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     )
 }
 
-/// Returns ξ = ln(T)^∨ = [ρ; φ] with |φ| ≤ π.
+/// Returns the twist ξ = ln(T)^∨ = [ρ; φ] of a rigid motion, with |φ| ≤ π.
 #[must_use]
 pub fn log(motion: &Isometry3<f64>) -> Vector6<f64> {
     let phi = so3::log(&motion.rotation);
@@ -33,16 +34,18 @@ pub fn log(motion: &Isometry3<f64>) -> Vector6<f64> {
     join(&rho, &phi)
 }
 
-/// Returns Ad(T) = [C r^C; 0 C], with T exp(ξ^) T⁻¹ = exp((Ad(T) ξ)^).
+/// Returns the adjoint Ad(T) = [C r^C; 0 C], with T exp(ξ^) T⁻¹ = exp((Ad(T) ξ)^).
 ///
-/// A left covariance Σ moves to the next frame as Ad(A) Σ Ad(A)ᵀ when poses move as A T.
+/// If poses move as A T, a left covariance Σ moves as Ad(A) Σ Ad(A)ᵀ.
 #[must_use]
 pub fn adjoint(motion: &Isometry3<f64>) -> Matrix6<f64> {
     let c = motion.rotation.to_rotation_matrix().into_inner();
     blocks(&c, &(hat(&motion.translation.vector) * c), &c)
 }
 
-/// Returns the 6×6 matrix of the Lie bracket, [φ^ ρ^; 0 φ^] (the "curly hat"): Ad(exp(ξ^)) is its exponential.
+/// Returns the 6×6 matrix of the Lie bracket, [φ^ ρ^; 0 φ^] (the "curly hat").
+///
+/// Ad(exp(ξ^)) is its exponential.
 #[must_use]
 pub fn curly_hat(xi: &Vector6<f64>) -> Matrix6<f64> {
     let (rho, phi) = split(xi);
@@ -67,7 +70,9 @@ pub fn left_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
     blocks(&inverse, &(-inverse * q_matrix(xi) * inverse), &inverse)
 }
 
-/// Returns ξ = ln(T)^∨ and the blocks D and B of 𝓙(ξ)⁻¹ = [D B; 0 D], which share most of their work.
+/// Returns ξ = ln(T)^∨ and the blocks D and B of 𝓙(ξ)⁻¹ = [D B; 0 D].
+///
+/// Computing them together shares most of the work.
 ///
 /// ```
 /// use hicp_core::{Vector6, se3};
@@ -87,9 +92,10 @@ pub fn log_and_left_jacobian_inverse(
     (xi, inverse, -inverse * q_matrix(&xi) * inverse)
 }
 
-/// Returns the rotation angle (radians) and the translation distance (metres) between two poses of one object.
+/// Returns the rotation angle (radians) and the translation distance (meters) between two poses.
 ///
-/// The rotation is that of `a · b⁻¹`; the translation is |t_a − t_b|, the distance between the object origins (BOP's RE and TE).
+/// Both are poses of one object. The rotation is that of `a · b⁻¹`. The translation is |t_a − t_b|,
+/// the distance between the object origins (BOP's RE and TE).
 #[must_use]
 pub fn pose_distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     (
@@ -105,7 +111,9 @@ pub fn is_finite(pose: &Isometry3<f64>) -> bool {
         && pose.rotation.coords.iter().all(|x| x.is_finite())
 }
 
-/// Q(ξ) with the coefficients of the reference; series below [`SERIES_ANGLE`], where m₃ alone would lose ten digits.
+/// Returns Q(ξ) with the coefficients of the reference.
+///
+/// Below [`SERIES_ANGLE`] it uses series, because m₃ alone would lose ten digits.
 fn q_matrix(xi: &Vector6<f64>) -> Matrix3<f64> {
     let (rho, phi) = split(xi);
     let a2 = phi.norm_squared();
@@ -125,7 +133,8 @@ fn q_matrix(xi: &Vector6<f64>) -> Matrix3<f64> {
             (2.0 * a - 3.0 * s + a * c) / (2.0 * a2 * a2 * a),
         )
     };
-    // With s = φ·ρ and c = φ×ρ the products are outer ones: PR = ρφᵀ − sI, RP = φρᵀ − sI, PRP = −sP, PPR − (…)ᵀ = (φ×c)^.
+    // With s = φ·ρ and c = φ×ρ, the products become outer products: PR = ρφᵀ − sI, RP = φρᵀ − sI,
+    // PRP = −sP, PPR − (…)ᵀ = (φ×c)^.
     let s = phi.dot(&rho);
     let skew = rho * 0.5 + phi * (s * (m2 - m1)) + phi.cross(&phi.cross(&rho)) * m2;
     let outer = rho * phi.transpose() * m1;
@@ -148,7 +157,7 @@ fn join(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
-/// [a b; 0 d]
+/// Assembles [a b; 0 d].
 fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);

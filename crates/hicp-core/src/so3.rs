@@ -1,13 +1,15 @@
 //! The rotation group SO(3): exponential, logarithm and left Jacobian.
 //!
-//! A rotation vector φ is axis × angle, in radians. Closed forms are those of Barfoot & Furgale (T-RO 2014),
-//! with a Taylor series below [`SERIES_ANGLE`] where the closed coefficients cancel.
+//! A rotation vector φ is axis × angle, in radians. Closed forms are those of Barfoot & Furgale
+//! (T-RO 2014). Below [`SERIES_ANGLE`], where the closed coefficients cancel, a Taylor series
+//! replaces them.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Angle (radians) below which the coefficients are taken from their series.
+/// Angle (radians) below which coefficients are computed from their series.
 ///
-/// In `f64` the closed forms lose digits as 1/φ⁵: at 0.1 rad series and closed form agree to about 1e-11.
+/// In `f64`, the closed forms lose digits as 1/φ⁵. At 0.1 rad, series and closed form agree to
+/// about 1e-11.
 pub const SERIES_ANGLE: f64 = 0.1;
 
 /// Returns φ^, the skew-symmetric matrix with φ^ x = φ × x.
@@ -26,7 +28,9 @@ pub fn hat(phi: &Vector3<f64>) -> Matrix3<f64> {
     )
 }
 
-/// Returns exp(φ^), the rotation by |φ| radians about φ, which must be finite: components up to 1e150.
+/// Returns exp(φ^), the rotation by |φ| radians around φ.
+///
+/// φ must be finite, with components up to 1e150.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -47,10 +51,10 @@ pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(half.cos(), vector.x, vector.y, vector.z))
 }
 
-/// Returns φ = ln(C)^∨ with |φ| ≤ π.
+/// Returns the rotation vector φ = ln(C)^∨ with |φ| ≤ π, radians.
 ///
-/// The quaternion form has no cancellation near π: the axis is read from the vector part, which is largest there.
-/// At exactly π both signs of the axis are valid and one of them is returned.
+/// The quaternion form has no cancellation near π: the axis comes from the vector part, which is
+/// largest there. At exactly π both signs of the axis are valid, and one of them is returned.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -60,7 +64,7 @@ pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
 /// ```
 #[must_use]
 pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
-    // q and −q are the same rotation; the one with w ≥ 0 has the angle in [0, π].
+    // q and −q are the same rotation. The one with w ≥ 0 has its angle in [0, π].
     let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
     let w = sign * rotation.w;
     let vector = sign * rotation.imag();

@@ -1,6 +1,8 @@
 //! Suggestions for misspelled names.
 
-/// Returns the candidate with the fewest edits from a name, if these are at most half of its letters.
+/// Returns the candidate with the fewest edits from a name.
+///
+/// If the edits exceed half of the letters, returns `None`.
 pub fn nearest_name<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -13,7 +15,7 @@ pub fn nearest_name<'a>(
         .map(|(_, candidate)| candidate)
 }
 
-/// Levenshtein distance in bytes.
+/// Returns the Levenshtein distance in bytes.
 fn edit_distance(a: &str, b: &str) -> usize {
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.bytes().enumerate() {

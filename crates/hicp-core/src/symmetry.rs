@@ -1,16 +1,18 @@
-//! Symmetries of an object: the motions that leave it looking the same.
+//! Symmetries of an object: the motions that do not change its appearance.
 
 use thiserror::Error;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
-/// Rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
+/// Number of rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
 pub const CONTINUOUS_STEPS: usize = 315;
 
-/// The largest number of motions that symmetries read from outside may stand for: a thousand times what any object has.
+/// The largest number of motions that symmetries from a file may expand to.
+///
+/// A thousand times the number for any object.
 pub const MAX_SYMMETRY_MOTIONS: usize = 1_000_000;
 
-/// A continuous rotational symmetry: any rotation about a line.
+/// A continuous rotational symmetry: all rotations around an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SymmetryAxis {
     direction: UnitVector3<f64>,
@@ -18,17 +20,20 @@ pub struct SymmetryAxis {
 }
 
 impl SymmetryAxis {
-    /// Makes the symmetry of the line through `offset` (metres, object frame) along `direction`, which need not be of unit length.
+    /// Creates the symmetry around the axis through `offset` along `direction`.
+    ///
+    /// Both are in the object frame. `offset` is in meters. `direction` need not have unit length.
     ///
     /// # Errors
     ///
-    /// [`SymmetryError`] when the direction is zero or anything is not finite.
+    /// [`SymmetryError`] if the direction is zero or a value is not finite.
     pub fn new(direction: Vector3<f64>, offset: Point3<f64>) -> Result<Self, SymmetryError> {
         if !offset.iter().all(|x| x.is_finite()) {
             let (x, y, z) = (offset.x, offset.y, offset.z);
             return Err(SymmetryError::Offset { x, y, z });
         }
-        // Brought to unit size first: squares of very long and very short directions overflow and vanish.
+        // Scale to unit size first: squares of very long and very short directions overflow and
+        // vanish.
         let size = direction.amax();
         if !(size > 0.0 && direction.iter().all(|x| x.is_finite())) {
             let (x, y, z) = (direction.x, direction.y, direction.z);
@@ -46,13 +51,13 @@ impl SymmetryAxis {
         self.direction
     }
 
-    /// A point of the axis, metres, object frame.
+    /// A point on the axis, meters, object frame.
     #[must_use]
     pub fn offset(&self) -> Point3<f64> {
         self.offset
     }
 
-    /// Returns the rotation by `angle` radians about the axis, as a motion of the object frame.
+    /// Returns the rotation by `angle` radians around the axis, as a motion in the object frame.
     #[must_use]
     pub fn rotation(&self, angle: f64) -> Isometry3<f64> {
         let rotation = UnitQuaternion::from_axis_angle(&self.direction, angle);
@@ -61,26 +66,26 @@ impl SymmetryAxis {
     }
 }
 
-/// The declared symmetries of an object, in its frame, metres.
+/// The declared symmetries of an object, in meters in the object frame.
 ///
-/// The default has none. A motion S is a symmetry when the object looks the same at `camera_from_object` and at
-/// `camera_from_object * S`.
+/// By default there are none. A motion S is a symmetry if the object looks the same at
+/// `camera_from_object` and at `camera_from_object * S`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Symmetries {
-    /// Discrete symmetries, the identity not counted.
+    /// Discrete symmetries, without the identity.
     pub discrete: Vec<Isometry3<f64>>,
     /// Continuous symmetries.
     pub continuous: Vec<SymmetryAxis>,
 }
 
 impl Symmetries {
-    /// Returns whether nothing is declared.
+    /// Returns whether no symmetry is declared.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.discrete.is_empty() && self.continuous.is_empty()
     }
 
-    /// Returns how many motions [`Symmetries::motions`] returns, without making them.
+    /// Returns the number of motions that [`Symmetries::motions`] returns, without computing them.
     #[must_use]
     pub fn n_motions(&self) -> usize {
         let continuous = self.continuous.len().saturating_mul(CONTINUOUS_STEPS);
@@ -89,12 +94,13 @@ impl Symmetries {
 
     /// Returns the symmetry motions as BOP expands them, the identity first.
     ///
-    /// Every continuous symmetry is divided into [`CONTINUOUS_STEPS`] rotations, each composed with every discrete one (continuous ∘ discrete).
-    /// Readers refuse symmetries of more than [`MAX_SYMMETRY_MOTIONS`].
+    /// Every continuous symmetry becomes [`CONTINUOUS_STEPS`] rotations, each composed with every
+    /// discrete symmetry (continuous ∘ discrete). Readers refuse symmetries of more than
+    /// [`MAX_SYMMETRY_MOTIONS`].
     ///
     /// # Panics
     ///
-    /// When [`Symmetries::n_motions`] are more than memory can hold.
+    /// If memory cannot hold [`Symmetries::n_motions`] motions.
     #[must_use]
     pub fn motions(&self) -> Vec<Isometry3<f64>> {
         let mut discrete = vec![Isometry3::identity()];
@@ -114,11 +120,11 @@ impl Symmetries {
     }
 }
 
-/// Symmetries that are not rigid motions.
+/// The reason why values do not describe a symmetry.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SymmetryError {
-    /// An axis without direction.
+    /// The direction of an axis is zero or not finite.
     #[error("symmetry axis ({x}, {y}, {z}) has no direction, expected a finite non-zero vector")]
     Axis {
         /// x.
@@ -128,8 +134,8 @@ pub enum SymmetryError {
         /// z.
         z: f64,
     },
-    /// A point on the axis that is not finite.
-    #[error("symmetry offset ({x}, {y}, {z}) is not finite")]
+    /// A point on the axis is not finite.
+    #[error("symmetry offset ({x}, {y}, {z}) is not finite, expected finite coordinates in meters")]
     Offset {
         /// x.
         x: f64,

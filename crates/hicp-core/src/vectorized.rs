@@ -1,20 +1,22 @@
-//! Loops compiled for the vector units of the machine at hand.
+//! Loops compiled for the vector units of the current processor.
 
-/// A loop that [`vectorized`] runs: plain Rust over arrays, which the compiler turns into vector instructions.
+/// A loop for [`vectorized`]: plain Rust over arrays, which the compiler turns into vector
+/// instructions.
 ///
-/// Mark `run` and what it calls `#[inline(always)]`, or it stays compiled for the baseline.
+/// Mark `run` and the functions that it calls `#[inline(always)]`. Otherwise they are compiled for
+/// the baseline.
 pub trait VectorLoop {
-    /// What it returns.
+    /// The result of the loop.
     type Output;
 
-    /// Runs.
+    /// Runs the loop.
     fn run(self) -> Self::Output;
 }
 
-/// Runs a loop with AVX2 where the processor has it, found at run time, and as compiled for the baseline elsewhere.
+/// Runs a loop with AVX2 if the processor has it, otherwise as compiled for the baseline.
 ///
-/// Either way the bits are the same: the code is the same, lanes are added up in an order that it states, and neither
-/// contracts a product and a sum into one rounding.
+/// The choice is made at run time and does not change the bits. The code is the same, lanes are
+/// added in a stated order, and neither version contracts a product and a sum into one rounding.
 #[inline]
 pub fn vectorized<L: VectorLoop>(vector_loop: L) -> L::Output {
     pulp::Arch::new().dispatch(Adapter(vector_loop))
@@ -54,7 +56,7 @@ mod tests {
         }
     }
 
-    /// A product that is rounded before it is added differs from one that is not in half of such sums.
+    /// Fails if a product is not rounded before it is added: half of such sums would differ.
     #[test]
     fn the_bits_are_those_of_the_baseline() {
         let numbers = |seed: f64| (0..4000).map(|i| (seed + f64::from(i)).sin()).collect();

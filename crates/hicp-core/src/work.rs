@@ -3,7 +3,7 @@
 #[cfg(debug_assertions)]
 use std::cell::Cell;
 
-/// What is counted where nothing outside can see it.
+/// A kind of work that is counted because nothing outside can observe it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Work {
     /// Nodes and leaves of search trees that a search visited.
@@ -18,7 +18,9 @@ thread_local! {
 }
 
 impl Work {
-    /// Counts `n` more on this thread. Does nothing, and costs nothing, in a build without debug assertions.
+    /// Adds `n` to the count of this thread.
+    ///
+    /// Without debug assertions it does nothing and costs nothing.
     #[inline(always)]
     pub fn count(self, n: usize) {
         #[cfg(debug_assertions)]
@@ -30,7 +32,9 @@ impl Work {
         let _ = n;
     }
 
-    /// Returns what this thread has counted since the last call; 0 in a build without debug assertions.
+    /// Returns the count of this thread since the last call.
+    ///
+    /// Without debug assertions it is 0.
     #[must_use]
     pub fn take(self) -> u64 {
         #[cfg(debug_assertions)]
@@ -46,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_add_up_apart_and_start_anew_when_taken() {
+    fn counts_are_separate_and_restart_when_taken() {
         Work::NodesVisited.count(3);
         Work::NodesVisited.count(4);
         Work::PixelsTested.count(5);

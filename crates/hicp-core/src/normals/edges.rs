@@ -1,4 +1,4 @@
-//! Depth edges: between which neighbours the surface is torn.
+//! Depth edges: discontinuities of the surface between adjacent pixels.
 
 use std::ops::Range;
 
@@ -8,18 +8,20 @@ use crate::vectorized::{VectorLoop, vectorized};
 
 /// The depth edges of a patch.
 pub(super) struct Edges {
-    /// Which pixels have an edge within the window's radius, counted along the longer of rows and columns.
+    /// Pixels with an edge within the window's radius, in the maximum norm of rows and columns.
     pub(super) near: BitRows,
-    /// Which pixels are joined to their right neighbour: both are used, and the step between them is no edge.
+    /// Pixels joined to their right neighbor: both are used, and the step between them is not an
+    /// edge.
     pub(super) right: BitRows,
-    /// Which pixels are joined to the one below.
+    /// Pixels joined to the neighbor below.
     pub(super) below: BitRows,
 }
 
 impl Edges {
-    /// `None` when there is no edge at all. Neighbours without depth are no edges; nothing is fitted to them anyway.
+    /// Finds the edges, or returns `None` if there are none.
     ///
-    /// `spans` are the columns that each row uses.
+    /// `spans` are the columns that each row uses. A step to a pixel without depth is not an edge,
+    /// because nothing is fitted to that pixel.
     pub(super) fn find(
         patch: &DepthPatch<'_>,
         spans: &[Range<usize>],
@@ -53,7 +55,7 @@ impl Edges {
     }
 }
 
-/// The steps between the pixels of two rows: 1 where that is so.
+/// The steps between the pixels of two rows: 1 where the step is an edge, or joins its pixels.
 #[derive(Default)]
 struct Steps {
     edges: Vec<u8>,
@@ -61,7 +63,8 @@ struct Steps {
 }
 
 impl Steps {
-    /// Judges the steps from the pixels of one row to those of another, as many as the shorter has.
+    /// Classifies the steps from the pixels of one row to those of another, up to the shorter
+    /// length.
     fn judge(&mut self, from: &[f32], to: &[f32], edge_step: f32) {
         let n = from.len().min(to.len());
         self.edges.resize(n, 0);
@@ -93,7 +96,7 @@ impl VectorLoop for Judge<'_> {
     }
 }
 
-/// All slices are of one length; as parameters they are known not to overlap.
+/// Classifies steps. All slices have one length; parameters let the compiler assume no overlap.
 #[inline(always)]
 fn judge(from: &[f32], to: &[f32], edge_step: f32, edges: &mut [u8], joined: &mut [u8]) {
     let n = from.len();
@@ -116,7 +119,7 @@ pub(super) struct BitRows {
 
 impl BitRows {
     fn new(region: &PixelRegion) -> Self {
-        // One word more than needed, so that any bits of a row lie in two neighbouring words.
+        // One word more than needed, so that any bits of a row lie in two adjacent words.
         let words_per_row = region.width() / 64 + 2;
         Self {
             words: vec![0; words_per_row * region.height()],
@@ -128,7 +131,9 @@ impl BitRows {
         &mut self.words[v * self.words_per_row..][..self.words_per_row]
     }
 
-    /// Sets the bits of row `v` from column `first` on that are 1 in `bytes`; returns whether there were any.
+    /// Sets the bits of row `v` from column `first` on that are 1 in `bytes`.
+    ///
+    /// Returns whether there were any.
     fn set(&mut self, v: usize, first: usize, bytes: &[u8]) -> bool {
         let row = self.row_mut(v);
         let mut any = false;
@@ -140,16 +145,16 @@ impl BitRows {
                 continue;
             }
             any = true;
-            // Byte i, 0 or 1, becomes bit 56 + i: the partial products do not meet.
+            // Byte i, which is 0 or 1, becomes bit 56 + i: the partial products do not overlap.
             let bits = eight.wrapping_mul(0x0102_0408_1020_4080) >> 56;
             row[u / 64] |= bits << (u % 64);
-            // The shift by 64 in two steps.
+            // The shift is split in two, because a shift by 64 is not allowed.
             row[u / 64 + 1] |= bits >> 1 >> (63 - u % 64);
         }
         any
     }
 
-    /// The columns of row `v` that are set, among the first `width`.
+    /// Iterates over the set columns of row `v` among the first `width`.
     pub(super) fn columns(&self, v: usize, width: usize) -> impl Iterator<Item = usize> {
         let row = &self.words[v * self.words_per_row..][..self.words_per_row];
         row.iter().enumerate().flat_map(move |(index, word)| {
@@ -162,7 +167,8 @@ impl BitRows {
         })
     }
 
-    /// Returns the bits of `count` < 64 pixels from (u, v) to the right, the first in the lowest bit.
+    /// Returns the bits of `count` < 64 pixels from (u, v) to the right, the first in the lowest
+    /// bit.
     pub(super) fn get(&self, u: usize, v: usize, count: usize) -> u64 {
         let word = v * self.words_per_row + u / 64;
         let shift = u % 64;
@@ -170,7 +176,7 @@ impl BitRows {
         bits & ((1 << count) - 1)
     }
 
-    /// Sets every pixel within `radius` rows and columns of one that is set.
+    /// Sets every pixel within `radius` rows and columns of a set pixel.
     fn dilate(&mut self, radius: usize) {
         for _ in 0..radius {
             for row in self.words.chunks_exact_mut(self.words_per_row) {
@@ -185,7 +191,8 @@ impl BitRows {
         }
         let n = self.words_per_row;
         let height = self.words.len() / n;
-        // What reaches `covered` rows reaches twice as far, and one more, when shifted by covered + 1; beyond the border nothing is kept.
+        // Bits dilated by `covered` rows reach twice as far, and one more, when shifted by covered
+        // + 1. Bits beyond the border are dropped.
         let mut covered = 0;
         while covered < radius {
             let step = (covered + 1).min(radius - covered);
@@ -208,13 +215,15 @@ impl BitRows {
 mod tests {
     use super::*;
 
-    /// Rows of bits beside the same pixel by pixel: what was set, by the bytes of runs that begin anywhere and cross the words' borders.
+    /// Returns rows of bits and the same bits pixel by pixel.
+    ///
+    /// Both are set from runs of bytes that start anywhere and cross word borders.
     fn bits_and_pixels(region: &PixelRegion, seed: usize) -> (BitRows, Vec<Vec<bool>>) {
         let (width, height) = (region.width(), region.height());
         let mut bits = BitRows::new(region);
         let mut pixels = vec![vec![false; width]; height];
         for (v, row) in pixels.iter_mut().enumerate() {
-            // Words are half full, or mostly empty.
+            // Words are half full or mostly empty.
             let every = if v % 2 == 0 { 2 } else { 7 };
             for first in [seed + 5 * v, (seed * 37 + 11 * v) % width] {
                 let is_set = |u: usize| (31 * u * u + seed * u + v).is_multiple_of(every);
@@ -230,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_are_those_that_were_set() {
+    fn bits_equal_those_set_pixel_by_pixel() {
         for (seed, width) in (0..).zip([65, 70, 128, 131, 200]) {
             let region = PixelRegion::of_image(width, 8);
             let (bits, pixels) = bits_and_pixels(&region, seed);
@@ -252,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn dilation_of_crowds_is_that_of_each() {
+    fn dilation_equals_its_definition_for_many_pixels() {
         for (seed, width) in (0..).zip([65, 70, 131, 200]) {
             let region = PixelRegion::of_image(width, 8);
             for radius in 0..=3_usize {
@@ -274,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn dilation_is_by_rows_and_columns() {
+    fn dilation_equals_its_definition_for_single_pixels() {
         let region = PixelRegion {
             u_min: 3,
             u_max: 203,

@@ -1,4 +1,4 @@
-//! Plane fits beside depth edges.
+//! Plane fits next to depth edges.
 
 use super::edges::Edges;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
@@ -7,20 +7,20 @@ use crate::vectorized::VectorLoop;
 
 /// Half side of the gated window, pixels. Its rows must fit [`Joined`].
 const EDGE_RADIUS: usize = 3;
-/// Columns that are summed side by side: those of the window, and one that stays empty.
+/// Columns that are summed in parallel: those of the window, and one that stays empty.
 const LANES: usize = 2 * EDGE_RADIUS + 2;
 
 /// A set of pixels of the gated window, one byte per row: bit `8 y + x`.
 type Joined = u64;
 
-/// Fits the pixels of row `v` that lie beside depth edges, each to the neighbours on its own side.
+/// Fits the pixels of row `v` near depth edges, each to the neighbors on its own side.
 pub(super) struct FitGated<'a> {
     pub(super) patch: &'a DepthPatch<'a>,
     pub(super) edges: &'a Edges,
     pub(super) rays: &'a Rays,
     pub(super) edge_step: f32,
     pub(super) v: usize,
-    /// The normals of the row from column `first` on; those of other pixels stay as they are.
+    /// The normals of the row from column `first` on. Those of other pixels are not changed.
     pub(super) first: usize,
     pub(super) normals: &'a mut [[f32; 3]],
 }
@@ -43,8 +43,10 @@ impl VectorLoop for FitGated<'_> {
 }
 
 impl FitGated<'_> {
-    /// Sums up the pixels of a set that lie in the gate: a way around an edge's end may lead to its other side, and a slope
-    /// just short of an edge may add up.
+    /// Sums the pixels of a set that also lie within a depth gate.
+    ///
+    /// Without the gate, a path around the end of an edge may reach its other side, and slopes just
+    /// below an edge may add up.
     #[inline(always)]
     fn sums(&self, window: &Window, joined: Joined) -> WindowSums {
         let width = self.patch.region.width();
@@ -54,14 +56,15 @@ impl FitGated<'_> {
         for (lane, across) in across.iter_mut().enumerate() {
             *across = (window.left + lane).abs_diff(window.u) as f32;
         }
-        // Per column: how many pixels, their rows and the squares of those; inverse depths and their products with the row.
+        // Per column: the number of pixels, the sums of rows and of squared rows, the sum of
+        // inverse depths, and the sum of inverse depth times row.
         let (mut n, mut y, mut yy) = ([0_u32; LANES], [0_u32; LANES], [0_u32; LANES]);
         let (mut w, mut yw) = ([0.0_f64; LANES], [0.0_f64; LANES]);
         for row in 0..window.rows {
             let v = window.top + row;
             let mut z = [0.0; LANES];
             let pixels = &depth[v * width + window.left..];
-            // What follows the row's end is no member of the set.
+            // Pixels beyond the end of the row are not in the set.
             if let Some(pixels) = pixels.first_chunk() {
                 z = *pixels;
             } else {
@@ -118,17 +121,17 @@ impl Window {
         }
     }
 
-    /// The pixels that steps which are no edges lead to from the window's own without leaving it.
+    /// Returns the pixels connected to the window's center by steps that are not edges.
     #[inline(always)]
     fn joined(&self, edges: &Edges) -> Joined {
-        // Column 7 stays empty, so that shifts do not run from one row into the next.
+        // Column 7 stays empty, so that shifts do not carry from one row into the next.
         let (mut right, mut below): (Joined, Joined) = (0, 0);
         for row in 0..self.rows {
             let v = self.top + row;
             right |= edges.right.get(self.left, v, self.columns - 1) << (8 * row);
             below |= edges.below.get(self.left, v, self.columns) << (8 * row);
         }
-        // The last row's pixels are joined to some outside.
+        // The neighbors below the last row are outside the window.
         below &= !(0xff << (8 * (self.rows - 1)));
         let mut reached: Joined = 1 << (8 * (self.v - self.top) + (self.u - self.left));
         loop {

@@ -1,8 +1,8 @@
-//! Numbers that are calculated with side by side.
+//! Numbers for parallel arithmetic.
 
 use std::ops::{Add, Mul, Sub};
 
-/// Several numbers; every operation is one on each of them, which compilers recognise.
+/// Several numbers; each operation applies to all of them, a pattern that compilers vectorize.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lanes<const N: usize>(pub(super) [f64; N]);
 
@@ -12,7 +12,7 @@ impl<const N: usize> Lanes<N> {
         Self([number; N])
     }
 
-    /// The numbers from an index on.
+    /// Loads the numbers from an index on.
     #[inline(always)]
     pub(super) fn of(numbers: &[f64], from: usize) -> Self {
         let mut lanes = [0.0; N];
@@ -28,7 +28,7 @@ impl<const N: usize> Lanes<N> {
         self
     }
 
-    /// In single precision.
+    /// Converts to single precision.
     #[inline(always)]
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn single(self) -> [f32; N] {

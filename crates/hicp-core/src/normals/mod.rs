@@ -1,10 +1,12 @@
-//! Surface normals from a depth image that is not free of noise.
+//! Surface normals from a noisy depth image.
 //!
-//! A plane seen by a pinhole camera has an inverse depth that is *affine* in the pixel coordinates, so a normal is a linear
-//! least-squares fit of 1/z over a window of pixels, exact for planes at any tilt. The window's sums are carried along
-//! columns and rows, so the cost per pixel does not depend on its size; the size follows the noise found in the image.
-//! Windows never mix two sides of a depth edge: near one, a small window takes only the neighbours that are joined to the
-//! pixel by steps that are no edges.
+//! For a plane seen by a pinhole camera, the inverse depth is *affine* in the pixel coordinates. A
+//! normal is therefore a linear least-squares fit of 1/z over a window of pixels, exact for planes
+//! at any tilt. The sums of the window are updated along columns and rows, so the cost per pixel
+//! does not depend on its size. The size follows the noise of the image.
+//!
+//! Windows never mix two sides of a depth edge. Near an edge, a small window uses only the
+//! neighbors that are connected to the pixel by steps that are not edges.
 
 mod edges;
 mod gated;
@@ -21,22 +23,25 @@ use window::{ColumnSums, Rays, RowFits};
 
 use crate::vectorized::vectorized;
 
-/// The window is chosen so that the standard error of the slope (tangent of the tilt) stays below this, if it can be.
+/// Largest standard error of the slope (tangent of the tilt) that the choice of the window accepts.
 const SLOPE_ERROR: f64 = 0.1;
-/// Smallest and largest window half sides, pixels.
+/// Smallest and largest half side of the window, pixels.
 const RADIUS: std::ops::RangeInclusive<usize> = 2..=10;
-/// A step between neighbours steeper than a surface seen at this angle (degrees off frontal) is a depth edge …
+/// A step is a depth edge if it is steeper than a surface at this angle, degrees off frontal …
 const EDGE_TILT_DEGREES: f64 = 85.0;
-/// … unless noise explains it: steps below this many of *their* standard deviations, √2 times a depth's, are not edges.
+/// … and larger than this many of its standard deviations, which are √2 times those of a depth.
 const EDGE_SIGMAS: f64 = 5.0;
-/// Pixels examined for the noise estimate.
+/// Number of pixels for the noise estimate.
 const NOISE_SAMPLES: usize = 4096;
 
-/// Calls `found(row, first_column, normals)` for every row, from its first used pixel to its last; normals are in the camera frame
-/// and face the camera, and are zero where there is none.
+/// Estimates normals, and calls `found(row, first_column, normals)` for every row.
 ///
-/// Column and row count from the region's corner. Pixels without depth have no normal, nor those with too few neighbours on
-/// their own side of the depth edges (flying pixels, single-pixel lines).
+/// Each call covers the pixels from the first used one to the last. Normals are in the camera frame
+/// and face the camera. A pixel without a normal has zeros. Column and row are relative to the
+/// region's corner.
+///
+/// Pixels without depth have no normal. Neither have pixels with too few neighbors on their own
+/// side of the depth edges (flying pixels, single-pixel lines).
 pub(crate) fn estimate_normals(
     patch: &DepthPatch<'_>,
     mut found: impl FnMut(usize, usize, &[[f32; 3]]),
@@ -81,7 +86,7 @@ pub(crate) fn estimate_normals(
     }
 }
 
-/// The columns from the first pixel with depth to the last; empty when there is none.
+/// Returns the columns from the first pixel with depth to the last; empty if there is none.
 fn used(depth: &[f32]) -> Range<usize> {
     let is_used = |z: &f32| *z > 0.0;
     match (
@@ -93,10 +98,11 @@ fn used(depth: &[f32]) -> Range<usize> {
     }
 }
 
-/// Standard deviation of depth over depth, from the median second difference along rows.
+/// Returns the standard deviation of depth over depth, from the median second difference along
+/// rows.
 ///
-/// Second differences of a smooth surface are tiny and those across edges few, so their median is noise:
-/// for white noise of deviation σ they are spread by √6 σ.
+/// Second differences of a smooth surface are tiny, and those across edges are few, so their median
+/// measures noise. White noise of deviation σ gives them a deviation of √6 σ.
 fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
     let width = patch.region.width();
     let triples = patch.depth.len().saturating_sub(2);
@@ -118,7 +124,8 @@ fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
     f64::from(*median) / (0.6745 * 6.0_f64.sqrt())
 }
 
-/// The smallest half side at which the slope's standard error, noise/√Σu², is within [`SLOPE_ERROR`].
+/// Returns the smallest radius at which the slope's standard error, noise/√Σu², is within
+/// [`SLOPE_ERROR`].
 fn window_radius(slope_noise_per_pixel: f64) -> usize {
     let needed = (slope_noise_per_pixel / SLOPE_ERROR).powi(2);
     RADIUS
@@ -136,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_window_is_the_smallest_whose_slope_is_good_enough() {
+    fn the_window_is_the_smallest_with_an_accurate_slope() {
         // Σu² over a full window, pixel by pixel.
         let squares = |r: i32| -> f64 {
             let row: i32 = (-r..=r).map(|u| u * u).sum();
@@ -145,7 +152,7 @@ mod tests {
         assert_eq!(window_radius(0.0), 2);
         assert_eq!(window_radius(f64::INFINITY), 10);
         for r in 2..=10_u8 {
-            // The noise at which the standard error is just what it may be.
+            // The noise at which the standard error equals the limit.
             let noise = SLOPE_ERROR * squares(r.into()).sqrt();
             let r = usize::from(r);
             assert_eq!(window_radius(noise * (1.0 - 1e-9)), r);

@@ -1,10 +1,12 @@
-//! The depth that normals are estimated from.
+//! The depth patch from which normals are estimated.
 
 use crate::camera::PinholeCamera;
 use crate::region::PixelRegion;
 
-/// Depths below this limit have no normal. In the sums of a window, the rounding errors of their
-/// large inverses would exceed the inverse depths of the other pixels.
+/// Depths below this limit, in meters, have no normal.
+///
+/// In the sums of a window, the rounding errors of their large inverses would exceed the inverse
+/// depths of the other pixels.
 pub(super) const MIN_DEPTH_METERS: f32 = 1e-4;
 
 /// Depth inside a region in meters, row-major. Unused pixels are 0.

@@ -1,7 +1,7 @@
-//! Plane fits over sliding windows, a row at a time.
+//! Plane fits over sliding windows, one row at a time.
 //!
-//! Sums over a window's rows are kept per column, each in an array of its own; a row's windows are differences of those
-//! carried along the row, and the fits are made for several pixels at once.
+//! Sums over the window's rows are kept per column, each in a separate array. The windows of a row
+//! are differences of those sums, accumulated along the row. Several pixels are fitted at once.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use super::lanes::Lanes;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use crate::vectorized::{VectorLoop, vectorized};
 
-/// Fewest pixels that a plane is fitted to.
+/// Smallest number of pixels that determine a plane.
 const MIN_SUPPORT: f64 = 6.0;
-/// Pixels fitted at a time.
+/// Number of pixels fitted at once.
 const LANES: usize = 8;
 
 /// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
 ///
-/// Columns of zeros on both sides stand for what lies outside of the patch.
+/// Columns of zeros on both sides represent the outside of the patch.
 pub(super) struct ColumnSums {
     n: Vec<f64>,
     v: Vec<f64>,
@@ -25,7 +25,8 @@ pub(super) struct ColumnSums {
     vw: Vec<f64>,
     width: usize,
     radius: usize,
-    /// 1/z of the window's rows, so that what leaves is to the bit what entered; row r is at r modulo the number of rows.
+    /// 1/z of the window's rows, so that the removed bits equal the added ones. Row r is stored at
+    /// r modulo the number of rows.
     inverse: Vec<f64>,
     /// The columns that those rows use.
     spans: Vec<Range<usize>>,
@@ -34,7 +35,7 @@ pub(super) struct ColumnSums {
 impl ColumnSums {
     pub(super) fn new(width: usize, radius: usize) -> Self {
         let rows = 2 * radius + 1;
-        // A block of lanes may begin at the last column.
+        // A block of lanes may start at the last column.
         let columns = || vec![0.0; width + 2 * (radius + 1) + LANES];
         Self {
             n: columns(),
@@ -49,7 +50,7 @@ impl ColumnSums {
         }
     }
 
-    /// Takes the next row in (`None` below the patch) and the one that it pushes out of the window out.
+    /// Adds the next row to the window (`None` below the patch) and removes the row that leaves it.
     ///
     /// A row comes with the columns that it uses.
     pub(super) fn slide(&mut self, entering: usize, row: Option<(&Range<usize>, &[f32])>) {
@@ -74,7 +75,8 @@ impl ColumnSums {
         self.spans[slot] = span.clone();
     }
 
-    /// A kept row's inverse depths and the sums n, v, vv, w, vw in some of its columns.
+    /// Returns the inverse depths of a kept row and the sums n, v, vv, w, vw in `span`.
+    /// `span`.
     fn columns(&mut self, slot: usize, span: &Range<usize>) -> (&mut [f64], [&mut [f64]; 5]) {
         let kept = slot * self.width;
         let first = self.radius + 1;
@@ -92,7 +94,7 @@ impl ColumnSums {
     }
 }
 
-/// A row that leaves the window.
+/// The loop that removes a row from the window.
 struct SlideOut<'a> {
     inverse: &'a [f64],
     sums: [&'a mut [f64]; 5],
@@ -109,7 +111,7 @@ impl VectorLoop for SlideOut<'_> {
     }
 }
 
-/// A row that enters it.
+/// The loop that adds a row to the window.
 struct SlideIn<'a> {
     depth: &'a [f32],
     inverse: &'a mut [f64],
@@ -131,9 +133,11 @@ impl VectorLoop for SlideIn<'_> {
     }
 }
 
-/// Adds a row of inverse depths to the sums, or with a sign of −1 removes it. The slices are of one length.
+/// Adds a row of inverse depths to the sums, or removes it if the sign is −1.
+///
+/// The slices have one length.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // As parameters they are known not to overlap.
+#[allow(clippy::too_many_arguments)] // Parameters let the compiler assume no overlap.
 fn add_row(
     inverse: &[f64],
     n: &mut [f64],
@@ -165,7 +169,7 @@ type Sums = [[f64; LANES]; 9];
 /// The fits of a row.
 #[derive(Default)]
 pub(super) struct RowFits {
-    /// Unit normals toward the camera; zero where there is none.
+    /// Unit normals that face the camera; zero where there is none.
     pub(super) normals: Vec<[f32; 3]>,
     blocks: Vec<Sums>,
 }
@@ -200,7 +204,7 @@ impl RowFits {
     }
 }
 
-/// Fits the windows around a row's pixels from column `first` on.
+/// The loop that fits the windows around a row's pixels from column `first` on.
 struct Fit<'a> {
     columns: &'a ColumnSums,
     rays: &'a Rays,
@@ -211,12 +215,13 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    /// What each window gains at its right and loses at its left when it moves on by one pixel.
+    /// Computes the change of the sums when each window moves right by one pixel.
     #[inline(always)]
     fn differences(&mut self) {
         let (columns, radius) = (self.columns, self.columns.radius);
         for (block, from) in self.blocks.iter_mut().zip((self.first..).step_by(LANES)) {
-            // Column from + radius, and from − radius − 1, which the zeros on the left put at index `from`.
+            // Column from + radius, and from − radius − 1. The zeros on the left place the latter
+            // at index `from`.
             let (gained, lost) = (from + 2 * radius + 1, from);
             let sums = [&columns.n, &columns.v, &columns.vv, &columns.w, &columns.vw];
             let [gn, gv, gvv, gw, gvw] = sums.map(|sums| Lanes::of(sums, gained));
@@ -242,7 +247,7 @@ impl Fit<'_> {
         }
     }
 
-    /// The window around the pixel before the first one.
+    /// Returns the sums of the window around the pixel before the first one.
     #[inline(always)]
     fn window_before(&self) -> [f64; 9] {
         let (columns, radius) = (self.columns, self.columns.radius);
@@ -292,9 +297,10 @@ impl VectorLoop for Fit<'_> {
     }
 }
 
-/// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀), facing the camera; zero where there is none.
+/// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀).
 ///
-/// With x = (u−cx)/fx and n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
+/// The normal faces the camera, and is zero if the fit is not determined. With x = (u−cx)/fx and
+/// n·X = d on the plane, n·(x, y, 1) = d/z, so n ∝ (b fx, c fy, w₀ − x b fx − y c fy).
 #[inline(always)]
 fn plane_fit<const N: usize>(
     sums: [Lanes<N>; 9],
@@ -306,7 +312,7 @@ fn plane_fit<const N: usize>(
 ) -> [Lanes<N>; 3] {
     let [n, u, v, uu, uv, vv, w, uw, vw] = sums;
     let [v0, y, fx, fy] = [v0, y, rays.fx, rays.fy].map(Lanes::all);
-    // Central moments times n: integers but for those with w, and no division.
+    // Central moments times n: integers except for those with w, and without a division.
     let suu = n * uu - u * u;
     let suv = n * uv - u * v;
     let svv = n * vv - v * v;
@@ -319,13 +325,14 @@ fn plane_fit<const N: usize>(
     let w0 = w * determinant + b * (n * u0 - u) + c * (n * v0 - v);
     let (nx, ny) = (n * b * fx, n * c * fy);
     let nz = w0 - x * nx - y * ny;
-    // A number: with the limits of a camera and of the depths that are fitted, the squares stay below 1e90.
+    // Finite: within the limits of cameras and fitted depths, the squares stay below 1e90.
     let norm = (nx * nx + ny * ny + nz * nz).map(f64::sqrt);
     let scale = norm.map(|norm| -1.0 / norm);
     let mut normal = [nx * scale, ny * scale, nz * scale];
     for lane in 0..N {
         let fitted = (n.0[lane] >= MIN_SUPPORT)
-            // Pixels on one line determine no plane; the determinant is an integer, so it is 0 then.
+            // Pixels on one line do not determine a plane. The determinant is an integer, so it is
+            // exactly 0 then.
             & (determinant.0[lane] > 0.0)
             & (w0.0[lane] > 0.0);
         for component in &mut normal {
@@ -335,12 +342,12 @@ fn plane_fit<const N: usize>(
     normal
 }
 
-/// The sums of one window, in the order of [`Sums`], with columns and rows counted from its corner.
+/// The sums of one window in the order of [`Sums`], with columns and rows relative to its corner.
 #[derive(Clone, Copy)]
 pub(super) struct WindowSums([f64; 9]);
 
 impl WindowSums {
-    /// Sums up columns, given by n, Σv, Σv², Σw and Σvw of each.
+    /// Sums columns, given by n, Σv, Σv², Σw and Σvw of each.
     #[inline(always)]
     pub(super) fn of_columns<const N: usize>(
         n: &[u32; N],
@@ -372,7 +379,9 @@ impl WindowSums {
         Self([n, u, v, uu, uv, vv, w, uw, vw])
     }
 
-    /// Returns the normal at the pixel (u, v), which lies at `at` in the window; it faces the camera, and is zero if there is none.
+    /// Returns the normal at pixel (u, v), which lies at `at` in the window.
+    ///
+    /// It faces the camera, and is zero if there is none.
     #[inline(always)]
     pub(super) fn normal(
         self,
@@ -391,7 +400,7 @@ impl WindowSums {
 pub(super) struct Rays {
     fx: f64,
     fy: f64,
-    /// With zeros after the last column, as many as lanes.
+    /// Followed by as many zeros as there are lanes.
     x: Vec<f64>,
     y: Vec<f64>,
 }

@@ -28,12 +28,12 @@ fn pitfall_22_every_pixel_unprojects_and_projects_to_itself() {
 }
 
 #[test]
-fn pitfall_22_what_is_not_in_front_of_the_camera_has_no_image() {
+fn pitfall_22_points_not_in_front_of_the_camera_have_no_image() {
     let camera = camera();
     for z in [0.0, -0.0, -1e-9, -1.0, f64::NEG_INFINITY, f64::NAN] {
         assert_eq!(camera.project(&Point3::new(0.1, 0.2, z)), None, "{z}");
     }
-    // Outside the image is still an image position.
+    // A position outside the image is still an image position.
     let outside = camera.project(&Point3::new(-10.0, 0.0, 1.0)).unwrap();
     assert!(outside.x < 0.0);
 }
@@ -62,13 +62,14 @@ fn centers_at_halves_shift_the_principal_point_by_half_a_pixel() {
     };
     assert_eq!(with(PixelCenters::AtIntegers), integers(320.0, 240.0));
     assert_eq!(with(PixelCenters::AtHalves), integers(319.5, 239.5));
-    // The ray through the image's middle (between pixels 319 and 320) is the axis when cx = W/2 with centres at halves.
+    // With centers at halves and cx = W/2, the ray through the middle of the image (between pixels
+    // 319 and 320) is the optical axis.
     let middle = with(PixelCenters::AtHalves).unproject(319.5, 239.5, 1.0);
     assert_eq!(middle, Point3::new(0.0, 0.0, 1.0));
 }
 
 #[test]
-fn impossible_focal_lengths_and_centers_are_named() {
+fn errors_name_the_invalid_focal_length_or_center() {
     let beyond = MAX_FOCAL_LENGTH * (1.0 + f64::EPSILON);
     let below = MIN_FOCAL_LENGTH * (1.0 - f64::EPSILON);
     for value in [
@@ -113,7 +114,7 @@ fn impossible_focal_lengths_and_centers_are_named() {
 }
 
 #[test]
-fn the_longest_focal_length_is_accepted_and_the_message_states_it() {
+fn the_longest_focal_length_is_accepted_and_stated_in_errors() {
     let far = MAX_FOCAL_LENGTH;
     for (cx, cy) in [(far, -far), (-far, far)] {
         assert!(PinholeCamera::new(far, far, cx, cy, 1, 1).is_ok());
@@ -140,7 +141,7 @@ fn the_longest_focal_length_is_accepted_and_the_message_states_it() {
 }
 
 #[test]
-fn impossible_sides_are_named_and_the_largest_is_accepted() {
+fn errors_name_the_invalid_side_and_the_largest_is_accepted() {
     for value in [0, MAX_IMAGE_SIDE + 1, u32::MAX] {
         let width = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, value, 1);
         assert_eq!(
@@ -163,7 +164,7 @@ fn impossible_sides_are_named_and_the_largest_is_accepted() {
 }
 
 #[test]
-fn a_calibration_matrix_is_read_and_any_other_matrix_named() {
+fn calibration_matrices_are_accepted_and_others_refused() {
     let k = Matrix3::new(572.4, 0.0, 325.3, 0.0, 573.6, 242.0, 0.0, 0.0, 1.0);
     let camera = PinholeCamera::from_matrix(&k, 640, 480).unwrap();
     assert_eq!(
@@ -192,19 +193,19 @@ fn a_calibration_matrix_is_read_and_any_other_matrix_named() {
         assert_eq!((r, c, found.to_bits()), (row, column, value.to_bits()));
         assert_eq!(expected, if row == 2 && column == 2 { 1.0 } else { 0.0 });
     }
-    // Rounding passes up to 1e-6, which is what a calibration's printed digits leave.
+    // Rounding up to 1e-6 passes: a printed calibration has no more digits.
     let mut rounded = k;
     rounded[(0, 1)] = 1e-6;
     assert_eq!(PinholeCamera::from_matrix(&rounded, 640, 480), Ok(camera));
     rounded[(0, 1)] = 1e-6_f64.next_up();
     assert!(PinholeCamera::from_matrix(&rounded, 640, 480).is_err());
-    // A transposed matrix, the most common slip, does not pass.
+    // A transposed matrix, the most common mistake, is refused.
     assert!(PinholeCamera::from_matrix(&k.transpose(), 640, 480).is_err());
 }
 
-/// Values of BOP's reference code; the unit is whatever the depth's is.
+/// Values of BOP's reference code; the unit is that of the depth.
 #[test]
-fn depth_becomes_distance_as_in_the_reference() {
+fn distances_equal_those_of_the_reference() {
     let camera = PinholeCamera::new(10.0, 12.0, 3.0, 2.5, 7, 6).unwrap();
     let mut depth = vec![0.0; 42];
     depth[2 * 7 + 4] = 480.0;
@@ -217,13 +218,13 @@ fn depth_becomes_distance_as_in_the_reference() {
     assert_eq!(distance.get(0, 0), Some(0.0));
     assert_eq!(distance.get(7, 0), None);
     assert!((distance.get(2, 3).unwrap() - 507.954_724_100_594_55).abs() < 1e-12);
-    // The norm of the point at that pixel is what "distance" means.
+    // By definition, the distance is the norm of the point at that pixel.
     let norm = camera.unproject(2.0, 3.0, 505.0).coords.norm();
     assert!((distance.get(2, 3).unwrap() - norm).abs() < 1e-12);
 }
 
 #[test]
-fn the_camera_of_another_image_is_refused() {
+fn a_camera_of_another_size_is_refused() {
     let depth = DepthImage::from_meters(3, 2, vec![1.0; 6]).unwrap();
     let camera = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, 2, 3).unwrap();
     assert!(matches!(
@@ -239,7 +240,7 @@ fn the_camera_of_another_image_is_refused() {
 }
 
 #[test]
-fn every_nth_pixel_of_a_camera_looks_along_the_same_ray() {
+fn a_scaled_down_camera_keeps_the_rays_of_every_nth_pixel() {
     let camera = PinholeCamera::new(500.0, 510.0, 321.5, 238.25, 641, 480).unwrap();
     assert_eq!(camera.scaled_down(0), camera);
     assert_eq!(camera.scaled_down(1), camera);

@@ -1,4 +1,4 @@
-//! The list that associations write and metrics read.
+//! Tests of the list that associations write and metrics read.
 
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3};
 
@@ -11,7 +11,7 @@ fn pair(x: f32) -> Pair {
 }
 
 #[test]
-fn beginning_anew_notes_the_pose_and_the_candidates_and_forgets_the_pairs() {
+fn begin_stores_pose_and_candidates_and_removes_the_pairs() {
     let mut pairs = Correspondences::new();
     pairs.push(pair(1.0));
     let pose = Isometry3::translation(0.1, 0.2, 0.3);
@@ -21,7 +21,7 @@ fn beginning_anew_notes_the_pose_and_the_candidates_and_forgets_the_pairs() {
         (pairs.camera_from_object(), pairs.n_candidates()),
         (&pose, 7)
     );
-    // An association the other way round has as many candidates as there are observed points.
+    // An association from the observation has as many candidates as observed points.
     pairs.set_candidates(9);
     assert_eq!(
         (pairs.camera_from_object(), pairs.n_candidates()),
@@ -30,7 +30,7 @@ fn beginning_anew_notes_the_pose_and_the_candidates_and_forgets_the_pairs() {
 }
 
 #[test]
-fn room_that_was_made_is_used_and_kept() {
+fn reserved_memory_is_used_and_kept() {
     let mut pairs = Correspondences::new();
     pairs.reserve(100);
     pairs.push(pair(0.0));
@@ -47,9 +47,9 @@ fn room_that_was_made_is_used_and_kept() {
     assert_eq!(pairs.as_slice().as_ptr(), place);
 }
 
-/// Two lists that grow by turns would move, for each is in the way of the other.
+/// Two lists that grow in alternation would move, because each blocks the other.
 #[test]
-fn room_that_was_made_spares_the_pairs_from_moving() {
+fn reserved_memory_avoids_moving_the_pairs() {
     let mut lists = [Correspondences::new(), Correspondences::new()];
     for list in &mut lists {
         list.reserve(1000);
@@ -65,13 +65,13 @@ fn room_that_was_made_spares_the_pairs_from_moving() {
 }
 
 #[test]
-fn pairs_are_reweighted_kept_and_added_in_their_order() {
+fn reweighting_retaining_and_extending_keep_the_order() {
     let xs = |pairs: &Correspondences| -> Vec<f32> {
         let x = |p: &Pair| p.source.point.x;
         pairs.as_slice().iter().map(x).collect()
     };
     let mut pairs: Correspondences = [4.0, 1.0, 3.0, 2.0].map(pair).into_iter().collect();
-    // All that were collected have asked for a pair; nothing moved them.
+    // All collected pairs count as candidates, at the identity pose.
     assert_eq!((pairs.n_candidates(), pairs.len()), (4, 4));
     assert_eq!(pairs.camera_from_object(), &Isometry3::identity());
     assert_eq!(xs(&pairs), [4.0, 1.0, 3.0, 2.0]);

@@ -1,11 +1,12 @@
-//! Observations at a lower resolution, against the pixels that they are made of.
+//! Tests of observations at a lower resolution, against the pixels that they are made of.
 
 use std::sync::Arc;
 
 use crate::support::Numbers;
 use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
 
-/// A tilted wall with a depth of its own at every pixel, holes, and a ragged mask away from the borders.
+/// A tilted wall with a different depth at every pixel, holes, and a ragged mask away from the
+/// borders.
 fn fine() -> Observation {
     let (width, height) = (53, 47);
     let camera = PinholeCamera::new(80.0, 84.0, 25.3, 21.9, width, height).unwrap();
@@ -51,7 +52,7 @@ fn a_coarse_observation_is_every_nth_pixel_of_the_fine_one() {
         }
         assert_eq!(coarse.n_measured(), n_measured, "{factor}");
         assert_eq!(coarse.n_surfels(), surfels.len(), "{factor}");
-        // Indices are those of the coarse image.
+        // Indices refer to the coarse image.
         let indexed: Vec<_> = coarse
             .surfels(1)
             .map(|(index, surfel)| {
@@ -65,13 +66,13 @@ fn a_coarse_observation_is_every_nth_pixel_of_the_fine_one() {
 }
 
 #[test]
-fn a_resolution_is_made_once_and_is_an_observation_of_its_own() {
+fn a_resolution_is_built_once_and_is_a_separate_observation() {
     let fine = fine();
     let (half, third) = (fine.decimated(2), fine.decimated(3));
     assert!(Arc::ptr_eq(&half, &fine.decimated(2)));
     assert!(!Arc::ptr_eq(&half, &third));
     assert!(half.id() != third.id() && half.id() != fine.id());
-    // No factor counts as 1, and what was derived of the fine observation is not the coarse one's.
+    // A factor of 0 counts as 1. The coarse observation does not share derived values.
     assert!(Arc::ptr_eq(&fine.decimated(0), &fine.decimated(1)));
     assert!(fine.decimated(1).surfels(1).eq(fine.surfels(1)));
     assert_eq!(*fine.derived().get_or_build(9, || 1_u8), 1);

@@ -1,4 +1,4 @@
-//! Values derived once and shared.
+//! Tests of values that are derived once and shared.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier};
@@ -6,7 +6,7 @@ use std::sync::{Arc, Barrier};
 use hicp_core::{DepthImage, Derived, Mask, Model, Observation, PinholeCamera, Point3, TriMesh};
 
 #[test]
-fn a_derived_value_is_built_once_by_however_many_threads() {
+fn a_derived_value_is_built_once_for_all_threads() {
     let derived = Derived::default();
     let (built, barrier) = (AtomicUsize::new(0), Barrier::new(8));
     let values: Vec<Arc<usize>> = std::thread::scope(|scope| {
@@ -32,19 +32,19 @@ fn a_derived_value_is_built_once_by_however_many_threads() {
 }
 
 #[test]
-fn derived_values_are_told_apart_by_type_and_key() {
+fn derived_values_are_keyed_by_type_and_key() {
     let derived = Derived::default();
     assert_eq!(*derived.get_or_build(1, || 10_u32), 10);
     assert_eq!(*derived.get_or_build(2, || 20_u32), 20);
     assert_eq!(*derived.get_or_build(1, || 30_u64), 30);
     assert_eq!(*derived.get_or_build(1, || 99_u32), 10);
     assert_eq!(*derived.get_or_build(1, || 99_u64), 30);
-    // A clone starts afresh.
+    // A clone starts empty.
     assert_eq!(*derived.clone().get_or_build(1, || 40_u32), 40);
 }
 
 #[test]
-fn what_is_derived_of_a_model_or_an_observation_is_theirs_and_not_their_clones() {
+fn clones_of_models_and_observations_do_not_share_derived_values() {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
     let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap());
     let camera = PinholeCamera::new(10.0, 10.0, 1.0, 1.0, 3, 3).unwrap();

@@ -1,4 +1,4 @@
-//! The largest distance between two points, against all pairs.
+//! Tests of the largest distance between two points, against all pairs.
 
 use crate::support::Numbers;
 use hicp_core::{Point3, diameter};
@@ -15,7 +15,8 @@ fn brute_force(points: &[Point3<f32>]) -> f64 {
 }
 
 fn cloud() -> impl Strategy<Value = Vec<Point3<f32>>> {
-    // Balls, boxes stretched a thousandfold, planes, lines and heaps of duplicates: coordinates on a coarse grid.
+    // Balls, boxes stretched a thousandfold, planes, lines, and duplicates, with coordinates on a
+    // coarse grid.
     (
         0_usize..400,
         1_i32..60,
@@ -40,16 +41,16 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
 
     #[test]
-    fn diameter_is_the_brute_force_one(points in cloud()) {
+    fn the_diameter_equals_that_of_brute_force(points in cloud()) {
         let (found, expected) = (diameter(&points), brute_force(&points));
-        // The promise: a relative 1e-7, and never more than there is.
+        // The promised accuracy: a relative 1e-7, and never more than the true diameter.
         prop_assert!(found <= expected * (1.0 + 4.0 * f64::EPSILON));
         prop_assert!(found >= expected * (1.0 - 1.1e-7), "{} of {}", found, expected);
     }
 }
 
 #[test]
-fn no_points_and_one_point_have_no_diameter() {
+fn the_diameter_of_no_points_and_of_one_point_is_zero() {
     assert_eq!(diameter(&[]), 0.0);
     assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0)]), 0.0);
     assert_eq!(diameter(&[Point3::new(1.0, 2.0, 3.0); 100]), 0.0);
@@ -60,10 +61,10 @@ fn no_points_and_one_point_have_no_diameter() {
     assert_eq!(diameter(&points), 2.0);
 }
 
-/// On a sphere nearly every point has a partner nearly as far as the farthest, so that going from point to farthest point ends at
-/// a pair that is not the farthest of all.
+/// On a sphere, nearly every point has a partner nearly at the diameter. Repeated steps to the
+/// farthest point then end at a pair that is not the farthest of all.
 #[test]
-fn the_farthest_pair_is_found_where_many_are_nearly_as_far() {
+fn the_farthest_pair_is_found_among_many_nearly_as_far() {
     let mut numbers = Numbers(61);
     let mut misled = 0;
     for case in 0..200 {
@@ -74,7 +75,7 @@ fn the_farthest_pair_is_found_where_many_are_nearly_as_far() {
         let expected = brute_force(&points);
         misled += usize::from(sweeps(&points) < expected * (1.0 - 1e-6));
         assert!((diameter(&points) - expected).abs() < 1.1e-7 * expected);
-        // Nor does it matter how often one of the two is there.
+        // Duplicates of one of the two points do not change the result.
         let end = *points
             .iter()
             .max_by(|a, b| reach(&points, a).total_cmp(&reach(&points, b)))
@@ -85,7 +86,7 @@ fn the_farthest_pair_is_found_where_many_are_nearly_as_far() {
     assert!(misled > 50, "{misled}");
 }
 
-/// The distance from a point to the farthest.
+/// The distance from a point to the farthest one.
 fn reach(points: &[Point3<f32>], from: &Point3<f32>) -> f64 {
     points
         .iter()
@@ -93,7 +94,7 @@ fn reach(points: &[Point3<f32>], from: &Point3<f32>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Where going from the first point to the farthest, and on from there, ends.
+/// The distance at which repeated steps to the farthest point end, from the first point on.
 fn sweeps(points: &[Point3<f32>]) -> f64 {
     let (mut from, mut best) = (points[0], 0.0);
     loop {
@@ -110,15 +111,15 @@ fn sweeps(points: &[Point3<f32>]) -> f64 {
     }
 }
 
-/// As many points as a scanned mesh has, of which all pairs would be 5e11.
+/// As many points as in a scanned mesh; comparing all pairs would take 5e11 steps.
 #[test]
-fn a_million_points_of_a_surface_are_no_hardship() {
+fn a_million_points_on_a_surface_are_fast() {
     let axes = [0.05_f64, 0.04, 0.03];
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let count = 1_000_000;
     let points: Vec<Point3<f32>> = (0..count)
         .map(|i| {
-            // Both ends of the first axis are among them.
+            // They include both ends of the first axis.
             let along = 1.0 - 2.0 * f64::from(i) / f64::from(count - 1);
             let across = (1.0 - along * along).sqrt();
             let (sin, cos) = (f64::from(i) * golden).sin_cos();

@@ -1,4 +1,4 @@
-//! Meshes: what is accepted, and which way they face.
+//! Tests of accepted and refused meshes, and of their facing.
 
 use crate::support::{Numbers, cuboid, cuboid_triangles, wedge};
 use hicp_core::{Facing, MAX_COORDINATE_METERS, MeshError, Point3, TriMesh};
@@ -29,20 +29,20 @@ fn join(a: &TriMesh, b: &TriMesh) -> TriMesh {
 }
 
 #[test]
-fn closed_meshes_know_their_outside() {
+fn closed_meshes_determine_their_facing() {
     for mesh in [cuboid(0.1, 0.2, 0.3), wedge()] {
         assert_eq!(mesh.facing(), Facing::Outward);
         assert!(mesh.is_closed());
         assert_eq!(inverted(&mesh).facing(), Facing::Inward);
         assert!(inverted(&mesh).is_closed());
-        // The volume does not depend on where the origin is, even where f32 has no digits to spare.
+        // The volume does not depend on the origin, even if f32 has no digits to spare.
         let far = TriMesh::new(moved(&mesh, 1000.0), mesh.triangles().to_vec()).unwrap();
         assert_eq!(far.facing(), Facing::Outward);
     }
 }
 
 #[test]
-fn open_and_inconsistent_meshes_tell_nothing() {
+fn open_and_inconsistent_meshes_have_unknown_facing() {
     let mesh = cuboid(0.1, 0.2, 0.3);
     for missing in 0..12 {
         let mut triangles = mesh.triangles().to_vec();
@@ -56,7 +56,7 @@ fn open_and_inconsistent_meshes_tell_nothing() {
         let inconsistent = TriMesh::new(mesh.vertices().to_vec(), triangles).unwrap();
         assert_eq!(inconsistent.facing(), Facing::Unknown);
 
-        // A doubled triangle makes edges that are walked three times.
+        // A duplicated triangle adds a third use to its edges.
         let mut triangles = mesh.triangles().to_vec();
         triangles.push(triangles[missing]);
         let doubled = TriMesh::new(mesh.vertices().to_vec(), triangles).unwrap();
@@ -65,34 +65,35 @@ fn open_and_inconsistent_meshes_tell_nothing() {
 }
 
 #[test]
-fn two_walks_each_way_are_not_one() {
-    // The same box twice: every edge is walked twice each way.
+fn two_uses_of_an_edge_in_each_direction_differ_from_one() {
+    // The same box twice: every edge has two uses in each direction.
     let mesh = cuboid(0.1, 0.1, 0.1);
     let mut triangles = mesh.triangles().to_vec();
     triangles.extend(cuboid_triangles());
     let twice = TriMesh::new(mesh.vertices().to_vec(), triangles).unwrap();
     assert_eq!(twice.facing(), Facing::Unknown);
-    // And a sheet with a front and a back is closed but has no inside.
+    // A sheet with a front and a back is closed but has no inside.
     let corners = mesh.vertices()[..3].to_vec();
     let sheet = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 1]]).unwrap();
     assert_eq!(sheet.facing(), Facing::Unknown);
 }
 
 #[test]
-fn parts_must_agree() {
+fn parts_must_agree_on_the_facing() {
     let a = cuboid(0.1, 0.1, 0.1);
     let b = TriMesh::new(moved(&wedge(), 0.5), wedge().triangles().to_vec()).unwrap();
     assert_eq!(join(&a, &b).facing(), Facing::Outward);
     assert_eq!(join(&inverted(&a), &inverted(&b)).facing(), Facing::Inward);
-    // A small part turned inside out beside a large one: the total volume would still be positive.
+    // A small inverted part next to a large one: the total volume would still be positive.
     assert_eq!(join(&a, &inverted(&b)).facing(), Facing::Unknown);
     assert_eq!(join(&inverted(&a), &b).facing(), Facing::Unknown);
 }
 
 #[test]
-fn seams_with_vertices_of_their_own_do_not_open_a_mesh() {
+fn seams_with_separate_vertices_do_not_open_a_mesh() {
     let mesh = cuboid(0.1, 0.2, 0.3);
-    // Every triangle with three vertices of its own, as exporters write texture seams; and −0 beside +0.
+    // Give every triangle separate vertices, as exporters do for texture seams, and use −0 as well
+    // as +0.
     let mut vertices: Vec<Point3<f32>> = Vec::new();
     for t in 0..12 {
         vertices.extend(mesh.corners(t).map(|p| {
@@ -109,7 +110,7 @@ fn seams_with_vertices_of_their_own_do_not_open_a_mesh() {
             .iter()
             .any(|p| p.x.to_bits() == (-0.0_f32).to_bits())
     );
-    // But a seam that gapes is open.
+    // A seam with a gap is open.
     vertices[0].x += 1e-4;
     assert_eq!(
         TriMesh::new(vertices, triangles).unwrap().facing(),
@@ -118,8 +119,8 @@ fn seams_with_vertices_of_their_own_do_not_open_a_mesh() {
 }
 
 #[test]
-fn slivers_that_close_on_themselves_do_not_matter() {
-    // A triangle with a doubled corner has no area and no say.
+fn triangles_with_a_repeated_corner_do_not_affect_the_facing() {
+    // A triangle with a repeated corner has no area and does not affect the facing.
     let mesh = cuboid(0.1, 0.2, 0.3);
     let mut triangles = mesh.triangles().to_vec();
     triangles.push([0, 0, 1]);
@@ -131,14 +132,14 @@ fn slivers_that_close_on_themselves_do_not_matter() {
 }
 
 #[test]
-fn areas_and_normals_are_those_of_the_winding() {
+fn areas_and_normals_follow_the_winding() {
     let mesh = cuboid(0.1, 0.2, 0.3);
     let expected = 2.0 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1);
     assert!((mesh.area() - expected).abs() < 1e-7 * expected);
     for t in 0..12 {
         let normal = mesh.normal(t).unwrap();
         let [a, b, c] = mesh.corners(t);
-        // Outward of a convex body around the origin.
+        // The normal points out of a convex body around the origin.
         assert!(normal.dot(&(a.coords + b.coords + c.coords)) > 0.0, "{t}");
         assert!((normal.norm() - 1.0).abs() < 2e-7);
     }
@@ -159,7 +160,7 @@ fn areas_and_normals_are_those_of_the_winding() {
 }
 
 #[test]
-fn unused_vertices_are_known() {
+fn unused_vertices_are_found() {
     let mut vertices = wedge().vertices().to_vec();
     vertices.insert(2, Point3::new(9.0, 9.0, 9.0));
     let triangles = wedge()
@@ -177,7 +178,7 @@ fn unused_vertices_are_known() {
 }
 
 #[test]
-fn what_is_no_mesh_is_refused_and_named() {
+fn invalid_meshes_are_refused_with_the_reason() {
     let corners = || {
         vec![
             Point3::origin(),
@@ -242,16 +243,16 @@ fn what_is_no_mesh_is_refused_and_named() {
 }
 
 #[test]
-fn far_from_the_origin_coordinates_are_stated_coarsely() {
+fn the_coordinate_step_grows_far_from_the_origin() {
     let at = |x: f32| {
         let corner = |x, y| Point3::new(x, y, 0.0);
         let mut vertices = vec![corner(x, 0.0), corner(x + 1.0, 0.0), corner(x, 1.0)];
-        // What no triangle uses is no part of the shape.
+        // A vertex that no triangle uses does not belong to the shape.
         vertices.push(corner(9e6, 0.0));
         let mesh = TriMesh::new(vertices, vec![[0, 1, 2]]).unwrap();
         mesh.coordinate_step()
     };
     assert!(at(0.0) < 1e-6);
-    // Between 2²⁰ and 2²¹ the 24 bits of a number end at an eighth.
+    // Between 2²⁰ and 2²¹, the resolution of a 24-bit number is an eighth.
     assert_eq!(at(1.5e6), 0.125);
 }

@@ -1,11 +1,11 @@
-//! What is odd about a mesh, on shapes where it is known, and counted anew from the definitions.
+//! Tests of mesh defects: on shapes with known defects, and against counts by definition.
 
 use std::collections::BTreeSet;
 
 use crate::support::{Numbers, cuboid, wedge};
 use hicp_core::{MeshSurvey, Point3, TriMesh};
 
-/// Of a closed mesh of one part.
+/// The survey of a clean closed mesh of one part.
 const CLEAN: MeshSurvey = MeshSurvey {
     degenerate_triangles: 0,
     duplicate_triangles: 0,
@@ -25,7 +25,7 @@ fn changed(change: impl FnOnce(&mut Vec<Point3<f32>>, &mut Vec<[u32; 3]>)) -> Me
 }
 
 #[test]
-fn closed_meshes_have_nothing_odd() {
+fn closed_meshes_have_no_defects() {
     for mesh in [cuboid(0.1, 0.2, 0.3), wedge()] {
         assert_eq!(mesh.survey(), CLEAN);
         assert!(mesh.survey().is_watertight());
@@ -33,7 +33,7 @@ fn closed_meshes_have_nothing_odd() {
 }
 
 #[test]
-fn each_oddity_is_counted_for_what_it_is() {
+fn each_defect_has_its_own_count() {
     for t in 0..12 {
         let missing = changed(|_, triangles| {
             triangles.remove(t);
@@ -45,7 +45,7 @@ fn each_oddity_is_counted_for_what_it_is() {
         assert_eq!(missing, expected);
         assert!(!missing.is_watertight());
 
-        // The winding does not matter to water.
+        // Watertightness ignores the winding.
         let turned = changed(|_, triangles| triangles[t].swap(1, 2));
         let expected = MeshSurvey {
             misoriented_edges: 3,
@@ -71,7 +71,7 @@ fn each_oddity_is_counted_for_what_it_is() {
 }
 
 #[test]
-fn triangles_without_area_count_and_those_that_close_on_themselves_have_no_edges() {
+fn triangles_without_area_count_and_repeated_corners_give_no_edges() {
     let survey = changed(|_, triangles| triangles.extend([[0, 0, 1], [3, 2, 2], [5, 4, 5]]));
     let expected = MeshSurvey {
         degenerate_triangles: 3,
@@ -79,7 +79,8 @@ fn triangles_without_area_count_and_those_that_close_on_themselves_have_no_edges
     };
     assert_eq!(survey, expected);
     assert!(survey.is_watertight());
-    // Three corners on a line have edges: two of its own here, and the third is one of the box.
+    // Three corners on a line have edges. Two of them are new here, and the third is one of the
+    // box.
     let survey = changed(|vertices, triangles| {
         vertices.push(nalgebra::center(&vertices[0], &vertices[1]));
         triangles.push([0, 8, 1]);
@@ -94,8 +95,8 @@ fn triangles_without_area_count_and_those_that_close_on_themselves_have_no_edges
 }
 
 #[test]
-fn vertices_are_told_apart_by_where_they_are_and_parts_by_their_vertices() {
-    // Each triangle with vertices of its own, zeros of either sign, and two vertices that nobody uses.
+fn vertices_differ_by_position_and_parts_by_vertices() {
+    // Separate vertices for each triangle, zeros of either sign, and two unused vertices.
     let seamed = changed(|vertices, triangles| {
         let corners = triangles.iter().flatten();
         let mut own: Vec<_> = corners.map(|i| vertices[*i as usize]).collect();
@@ -115,7 +116,7 @@ fn vertices_are_told_apart_by_where_they_are_and_parts_by_their_vertices() {
     };
     assert_eq!(seamed, expected);
 
-    // Beside each other two boxes are two parts, corner to corner one.
+    // Two boxes next to each other are two parts; corner to corner they are one.
     for (gap, components) in [(0.05, 2), (0.0, 1)] {
         let pair = changed(|vertices, triangles| {
             let mesh = cuboid(0.1, 0.2, 0.3);
@@ -133,7 +134,7 @@ fn vertices_are_told_apart_by_where_they_are_and_parts_by_their_vertices() {
 }
 
 #[test]
-fn what_has_no_edge_holds_no_water() {
+fn a_mesh_without_edges_is_not_watertight() {
     let nothing = MeshSurvey {
         components: 0,
         ..CLEAN
@@ -148,7 +149,7 @@ fn what_has_no_edge_holds_no_water() {
     }
 }
 
-/// The counts by their definitions, each with a search of its own over all triangles.
+/// The counts by their definitions, each with a separate search over all triangles.
 fn by_definition(mesh: &TriMesh) -> MeshSurvey {
     let positions: Vec<[i32; 3]> = mesh
         .vertices()
@@ -213,11 +214,11 @@ fn by_definition(mesh: &TriMesh) -> MeshSurvey {
 }
 
 #[test]
-fn heaps_of_triangles_are_counted_by_definition() {
+fn random_triangles_are_counted_as_by_definition() {
     let mut numbers = Numbers(71);
     let (mut surveyed, mut odd) = (0, [0; 7]);
     for _ in 0..400 {
-        // Corners of a grid, some of them more than once.
+        // Vertices on a grid, some of them more than once.
         let wide = 2 + numbers.below(3);
         let vertices: Vec<Point3<f32>> = (0..6 + numbers.below(20))
             .map(|_| {

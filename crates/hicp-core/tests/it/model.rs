@@ -1,4 +1,4 @@
-//! Models: size and samples.
+//! Tests of models: size and samples.
 
 use crate::support::{Numbers, cuboid, wedge};
 use hicp_core::{
@@ -23,13 +23,15 @@ proptest! {
         let Ok(mesh) = TriMesh::new(vertices, triangles) else { return Ok(()) };
         let samples = sample_surface(&mesh, count);
         prop_assert_eq!(samples.len(), count);
-        // Samples come in the order of the triangles, so the shares of every prefix of the mesh are known.
+        // Samples are in the order of the triangles, so the share of every prefix of the mesh is
+        // known.
         let share = |t: usize| mesh.triangle_area(t) / mesh.area() * count as f64;
         let mut before = 0.0_f64;
         let mut next = 0;
         for t in 0..mesh.triangles().len() {
             let until = before + share(t);
-            // The i-th sample, at i + ½, belongs here when it lies between; rounding of the sums decides ties.
+            // The i-th sample, at i + ½, belongs to this triangle if it lies between. Rounding of
+            // the sums decides ties.
             let mut here = 0.0;
             while next < count && (next as f64 + 0.5) < until - 1e-9 {
                 on_triangle(&mesh, t, &samples[next])?;
@@ -42,7 +44,8 @@ proptest! {
     }
 }
 
-/// The point is a convex combination of the corners, and the normal that of the winding.
+/// Checks that the point is a convex combination of the corners, and that the normal is that of the
+/// winding.
 fn on_triangle(mesh: &TriMesh, t: usize, sample: &hicp_core::Surfel) -> Result<(), TestCaseError> {
     let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
     let p = sample.point.cast::<f64>();
@@ -50,7 +53,8 @@ fn on_triangle(mesh: &TriMesh, t: usize, sample: &hicp_core::Surfel) -> Result<(
     let parts = (b - p).cross(&(c - p)).norm()
         + (c - p).cross(&(a - p)).norm()
         + (a - p).cross(&(b - p)).norm();
-    // Off the triangle by a rounding of f32 (coordinates below 1 m: 6e-8 m), the parts exceed the whole by that times the perimeter.
+    // A point off the triangle by the rounding of f32 (6e-8 m below 1 m) makes the sum of the parts
+    // exceed the whole by that times the perimeter.
     let perimeter = (b - a).norm() + (c - b).norm() + (a - c).norm();
     prop_assert!(
         parts - whole <= 2e-7 * perimeter,
@@ -63,7 +67,7 @@ fn on_triangle(mesh: &TriMesh, t: usize, sample: &hicp_core::Surfel) -> Result<(
 }
 
 #[test]
-fn samples_of_a_closed_mesh_point_outward_however_it_is_wound() {
+fn sample_normals_of_a_closed_mesh_point_outward_for_either_winding() {
     let outward = wedge();
     let triangles = outward
         .triangles()
@@ -76,14 +80,14 @@ fn samples_of_a_closed_mesh_point_outward_however_it_is_wound() {
         let samples = sample_surface(&mesh, 300);
         assert_eq!(samples.len(), 300);
         for sample in samples {
-            // The wedge is convex and holds the origin.
+            // The wedge is convex and contains the origin.
             assert!(sample.normal.dot(&sample.point.coords) > 0.0);
         }
     }
 }
 
 #[test]
-fn samples_have_a_limit() {
+fn the_number_of_samples_is_limited() {
     let corners = vec![
         Point3::origin(),
         Point3::new(1.0, 0.0, 0.0),
@@ -103,11 +107,13 @@ fn samples_cover_a_triangle_evenly() {
     let mesh = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
     let n = 4000;
     let samples = sample_surface(&mesh, n);
-    // Each of 16 congruent parts (a 4 × 4 grid of the triangle) gets its sixteenth: 250, to a tenth.
+    // Each of 16 congruent parts (a 4 × 4 grid of the triangle) receives a sixteenth, 250, within a
+    // tenth.
     let mut counts = [0; 16];
     for s in &samples {
         let (x, y) = (4.0 * s.point.x, 4.0 * s.point.y);
-        // Points on the longest side (the first sample is its middle) belong to the last part of their row.
+        // Points on the longest side, such as the first sample in its middle, belong to the last
+        // part of their row.
         let row = y.floor();
         let column = x.floor().min(3.0 - row);
         let upper = usize::from(row + column < 3.0 && x.fract() + y.fract() > 1.0);
@@ -120,8 +126,8 @@ fn samples_cover_a_triangle_evenly() {
 }
 
 #[test]
-fn samples_follow_robertss_sequence_and_fall_into_the_later_triangle_on_a_border() {
-    // The plastic number, g³ = g + 1: the step has a slope of a third there.
+fn samples_follow_robertss_sequence_and_border_samples_belong_to_the_later_triangle() {
+    // The plastic number, g³ = g + 1: the iteration has a slope of a third there.
     let g = (0..60).fold(1.3_f64, |g, _| (g + 1.0).cbrt());
     let corner = |x: f32, y: f32| Point3::new(x, y, 0.0);
     let square = vec![
@@ -137,11 +143,12 @@ fn samples_follow_robertss_sequence_and_fall_into_the_later_triangle_on_a_border
             [s, t] if s + t > 1.0 => [1.0 - s, 1.0 - t],
             inside => inside,
         };
-        // Rounded to f32 below 1; the reference's steps are off by 1e-16, 500 times.
+        // Rounded to f32 below 1; the error of the reference's steps, 1e-16, accumulates 500 times.
         let expected = Point3::new(s, t, 0.0);
         assert!((sample.point.cast::<f64>() - expected).norm() < 1e-7, "{i}");
     }
-    // Half of the area is where the two halves meet; the first place, (½, ½), is the middle of the edge across.
+    // The two halves meet at half of the area. The first point, (½, ½), is the middle of the
+    // opposite edge.
     for triangles in [vec![[0, 1, 2], [0, 2, 3]], vec![[0, 2, 3], [0, 1, 2]]] {
         let [_, b, c] = triangles[1].map(|i: u32| square[i as usize]);
         let mesh = TriMesh::new(square.clone(), triangles).unwrap();
@@ -150,9 +157,9 @@ fn samples_follow_robertss_sequence_and_fall_into_the_later_triangle_on_a_border
 }
 
 #[test]
-fn a_model_knows_its_size() {
+fn a_model_reports_its_size() {
     let mut vertices = cuboid(0.03, 0.04, 0.12).vertices().to_vec();
-    // A vertex that no triangle uses counts for nothing.
+    // A vertex that no triangle uses does not count.
     vertices.push(Point3::new(5.0, 5.0, 5.0));
     let vertices = vertices
         .iter()
@@ -160,7 +167,7 @@ fn a_model_knows_its_size() {
         .collect();
     let mesh = TriMesh::new(vertices, crate::support::cuboid_triangles()).unwrap();
     let model = Model::new(mesh.clone());
-    // f32 near 1 m: 6e-8 m.
+    // The resolution of f32 near 1 m is 6e-8 m.
     assert!((model.diameter() - 0.13).abs() < 2e-7);
     assert!((model.radius() - 0.065).abs() < 2e-7);
     assert!((model.center() - Point3::new(1.0, 0.0, 0.0)).norm() < 2e-7);

@@ -1,16 +1,18 @@
-//! Surface normals against the normals of analytic surfaces (pitfall 21).
+//! Tests of surface normals against the normals of analytic surfaces (pitfall 21).
 
 use crate::support::{
     Numbers, degrees_between, depth_image, median, observe_depth, plane_depth, sphere_depth,
 };
 use hicp_core::{DepthImage, Mask, Observation, PinholeCamera, Vector3};
 
-/// Non-integer principal point, focal lengths that differ.
+/// A camera with a non-integer principal point and two different focal lengths.
 fn camera() -> PinholeCamera {
     PinholeCamera::new(590.3, 611.7, 63.37, 55.81, 128, 112).unwrap()
 }
 
-/// A plane at 0.6 m on the axis, tilted about an axis in the image, its normal toward the camera.
+/// Returns the normal, toward the camera, of a tilted plane at 0.6 m on the optical axis.
+///
+/// The plane is tilted around an axis in the image.
 fn tilted(degrees: f64, about: f64) -> Vector3<f64> {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     Vector3::new(sine * about.cos(), sine * about.sin(), -cosine)
@@ -20,7 +22,7 @@ fn plane(normal: &Vector3<f64>) -> DepthImage {
     depth_image(&camera(), |ray| plane_depth(normal, 0.6 * normal.z, &ray))
 }
 
-/// Angles in degrees between the normals found and those of the surface, over all surfels.
+/// Angles in degrees between the estimated normals and those of the surface, over all surfels.
 fn errors(observation: &Observation, truth: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vec<f64> {
     observation
         .surfels(1)
@@ -57,7 +59,7 @@ fn sphere_normal(point: &Vector3<f64>) -> Vector3<f64> {
 }
 
 #[test]
-fn pitfall_21_planes_at_every_tilt_have_their_normals() {
+fn pitfall_21_normals_of_planes_are_accurate_at_every_tilt() {
     for tilt in [0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 70.0, 75.0] {
         for about in [0.0, 0.7, 1.9, 3.3, 5.0] {
             let normal = tilted(tilt, about);
@@ -69,38 +71,44 @@ fn pitfall_21_planes_at_every_tilt_have_their_normals() {
             );
             let mut errors = errors(&observation, |_| normal);
             let (median, worst) = (median(&mut errors), errors[errors.len() - 1]);
-            // f32 rounds depth by up to 6e-8 of itself. A 5×5 window's slope, f Σ u δ / 50 with Σ|u| = 30, is then off by at
-            // most 2.2e-5 per axis, 1.8e-3° in both; a corner's 3×3 window (6/6) by 3e-3°. Independent roundings
-            // (3.5e-8 RMS) give f · 3.5e-8/√50 per axis, a median of 1.18 times that: 2e-4°.
+            // f32 rounds depth by up to 6e-8 of its value. The slope of a 5×5 window is f Σ u δ /
+            // 50 with Σ|u| = 30. It is off by at most 2.2e-5 per axis, 1.8e-3° in both. That of a
+            // corner's 3×3 window (6/6) is off by at most 3e-3°. Independent roundings (3.5e-8 RMS)
+            // give f · 3.5e-8/√50 per axis, and a median of 1.18 times that: 2e-4°.
             assert!(median < 4e-4 && worst < 3e-3, "{tilt}°: {median} {worst}");
         }
     }
 }
 
 #[test]
-fn pitfall_21_a_sphere_has_its_normals() {
+fn pitfall_21_normals_of_a_sphere_are_accurate() {
     let observation = observe_depth(sphere(), &camera());
     let mut errors = errors(&observation, sphere_normal);
     assert!(errors.len() > 6000, "{}", errors.len());
     let middle = median(&mut errors);
     assert!(middle < 0.5, "{middle}");
-    // Curvature tilts the one-sided windows of the silhouette; nine in ten pixels are inside of it.
+    // Curvature tilts the one-sided windows of the silhouette. Nine in ten pixels are inside of it.
     let ninety = errors[errors.len() * 9 / 10];
     assert!(ninety < 2.0, "{ninety}");
 }
 
-/// Depth noise of `relative` over a window of half side `radius` turns a frontal normal by a vector whose components have a
-/// deviation of f · relative/√Σu²; the length of such a vector has a median of 1.18 of that.
+/// The expected median error of a frontal normal.
+///
+/// Depth noise of `relative` over a window of half side `radius` changes a frontal normal by a
+/// vector whose components have a deviation of f · relative/√Σu². The median length of such a
+/// vector is 1.18 times that.
 fn expected_median(relative: f64, radius: f64) -> f64 {
     let side = 2.0 * radius + 1.0;
     let sum_of_squares = side * side * radius * (radius + 1.0) / 3.0;
     (1.18 * 601.0 * relative / sum_of_squares.sqrt()).to_degrees()
 }
 
-/// Windows grow with the noise until the slope's deviation is 0.1, to 15 × 15 at 1 % and to the largest, 21 × 21, at 3 %.
-/// Measured medians, frontal: 6.6° and 10.8°, where the theory of full windows says 6.3° and 9.6°.
+/// Windows grow with the noise until the deviation of the slope is 0.1.
+///
+/// They are 15 × 15 at 1 % and 21 × 21, the largest, at 3 %. The measured frontal medians are 6.6°
+/// and 10.8°; the theory of full windows gives 6.3° and 9.6°.
 #[test]
-fn normals_of_a_noisy_plane_are_as_good_as_their_windows_allow() {
+fn normals_of_a_noisy_plane_are_as_accurate_as_their_windows_allow() {
     for (relative, radius) in [(0.01, 7.0), (0.03, 10.0)] {
         let expected = expected_median(relative, radius);
         for tilt in [0.0, 30.0, 60.0] {
@@ -108,19 +116,21 @@ fn normals_of_a_noisy_plane_are_as_good_as_their_windows_allow() {
             let observation = observe_depth(noisy(&plane(&normal), relative, 41), &camera());
             let mut errors = errors(&observation, |_| normal);
             let middle = median(&mut errors);
-            // A fifth is for the windows that the image's border clips. Tilt makes depth fall faster per pixel, and normals better.
+            // A fifth is allowed for the windows that the image's border clips. On a tilted plane,
+            // depth changes faster per pixel, and normals become better.
             assert!(
                 middle < 1.2 * expected,
                 "{tilt}° {relative}: {middle}, expected {expected}"
             );
-            assert_eq!(observation.n_surfels(), 128 * 112, "noise is no edge");
+            assert_eq!(observation.n_surfels(), 128 * 112, "noise is not an edge");
         }
     }
 }
 
-/// Measured medians: 6.0° and 12.0°; beyond the plane's because the windows bend with a sphere of 49 pixels' radius.
+/// The measured medians are 6.0° and 12.0°. They exceed the plane's because a sphere of 49 pixels'
+/// radius is curved within a window.
 #[test]
-fn normals_of_a_noisy_sphere_stay_near_those_of_a_plane() {
+fn normals_of_a_noisy_sphere_are_nearly_as_accurate() {
     for (relative, radius) in [(0.01, 7.0), (0.03, 10.0)] {
         let observation = observe_depth(noisy(&sphere(), relative, 42), &camera());
         let mut errors = errors(&observation, sphere_normal);
@@ -130,16 +140,21 @@ fn normals_of_a_noisy_sphere_stay_near_those_of_a_plane() {
             middle < 1.4 * expected,
             "{relative}: {middle}, expected {expected}"
         );
-        assert_eq!(errors.len(), observation.n_measured(), "noise is no edge");
+        assert_eq!(
+            errors.len(),
+            observation.n_measured(),
+            "noise is not an edge"
+        );
     }
 }
 
-/// Two walls that face the camera askew, one in front of the other: no window may take from both.
+/// Two oblique walls, one in front of the other. A window must not use both.
 #[test]
 fn pitfall_21_no_normal_mixes_the_two_sides_of_a_depth_edge() {
     let camera = camera();
     let (near, far) = (tilted(25.0, 0.4), tilted(15.0, 2.0));
-    // The edge threshold is tan(85°)/f, about 1.9 % of the depth: jumps just above it, and far above.
+    // The edge threshold is tan(85°)/f, about 1.9 % of the depth: jumps just above it, and far
+    // above.
     for jump in [0.022, 0.03, 0.036, 0.05, 0.2, 2.0] {
         for slanted in [false, true] {
             let front = |ray: &Vector3<f64>| ray.x < if slanted { 0.4 * ray.y } else { 0.001 };
@@ -159,7 +174,7 @@ fn pitfall_21_no_normal_mixes_the_two_sides_of_a_depth_edge() {
             assert_eq!(observation.n_surfels(), 128 * 112);
         }
     }
-    // Tilted walls with a jump of 5 cm.
+    // Tilted walls with a step of 5 cm.
     let depth = depth_image(&camera, |ray| {
         if ray.x < 0.001 {
             plane_depth(&near, 0.6 * near.z, &ray)
@@ -174,9 +189,9 @@ fn pitfall_21_no_normal_mixes_the_two_sides_of_a_depth_edge() {
 }
 
 #[test]
-fn a_flying_pixel_has_no_normal_and_spoils_none() {
+fn a_flying_pixel_has_no_normal_and_does_not_affect_others() {
     let mut pixels = vec![0.5; 128 * 112];
-    // In the middle of the jump, and a speck a hair in front of the lens.
+    // In the middle of the step, and a speck directly in front of the lens.
     for (u, v, z) in [
         (40, 50, 0.43),
         (90, 30, 1e-12),

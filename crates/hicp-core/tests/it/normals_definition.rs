@@ -1,25 +1,26 @@
-//! Normals against their definition, pixel by pixel, without sums that slide: where an edge is, who is joined to whom, and the least squares.
+//! Tests of normals against their definition, pixel by pixel, without sliding sums.
 
 use crate::support::Numbers;
 use hicp_core::{DepthImage, Mask, Matrix3, Observation, PinholeCamera, Vector3};
 
-/// What [`Observation`] fits to, by definition. Pixels count from the corner of the region.
+/// The depths and edges that [`Observation`] fits to, by definition. Pixels are relative to the
+/// corner of the region.
 struct Definition<'a> {
     camera: &'a PinholeCamera,
     corner: (f64, f64),
     width: usize,
     height: usize,
-    /// Metres, 0 where the mask is not set.
+    /// In meters; 0 if the pixel is not masked.
     depth: Vec<f64>,
-    /// Half side of the windows away from edges.
+    /// Half side of the windows away from edges, pixels.
     radius: usize,
-    /// A step between neighbours beyond this share of the nearer depth is an edge.
+    /// A step between neighbors beyond this share of the nearer depth is an edge.
     edge_step: f64,
     /// Pixels on either side of an edge.
     beside: Vec<(usize, usize)>,
 }
 
-/// Pixels nearer than this many metres are not fitted.
+/// Pixels nearer than this, in meters, are not fitted.
 const MIN_DEPTH: f64 = 1e-4;
 
 impl<'a> Definition<'a> {
@@ -45,7 +46,7 @@ impl<'a> Definition<'a> {
             beside: Vec::new(),
         };
         let (focal, noise) = (camera.fx().min(camera.fy()), definition.noise());
-        // The smallest window of which noise turns the slope by a deviation of at most 0.1.
+        // The smallest window in which noise changes the slope by a deviation of at most 0.1.
         let suffices = |r: &usize| {
             let n = (2 * r + 1) as f64;
             let squares: f64 = (1..=*r).map(|u| 2.0 * n * (u * u) as f64).sum();
@@ -70,7 +71,8 @@ impl<'a> Definition<'a> {
         self.depth[v * self.width + u]
     }
 
-    /// The median second difference along rows, over depth, as the deviation of white noise that has it.
+    /// The deviation of white noise that has the measured median second difference along rows, over
+    /// depth.
     fn noise(&self) -> f64 {
         let mut differences: Vec<f64> = self
             .depth
@@ -97,7 +99,7 @@ impl<'a> Definition<'a> {
         .filter(move |(u, v)| *u < width && *v < height)
     }
 
-    /// The step between two neighbours over the nearer depth; `None` where one has no depth.
+    /// The step between two neighbors over the nearer depth; `None` if one has no depth.
     fn step(&self, a: (usize, usize), b: (usize, usize)) -> Option<f64> {
         let (a, b) = (self.at(a), self.at(b));
         (a > 0.0 && b > 0.0).then(|| (a - b).abs() / a.min(b))
@@ -108,7 +110,7 @@ impl<'a> Definition<'a> {
             .any(|other| self.step(pixel, other).is_some_and(|s| s > self.edge_step))
     }
 
-    /// Within `radius` rows and columns of one that lies on either side of an edge.
+    /// Returns whether a pixel on either side of an edge is within `radius` rows and columns.
     fn is_near_an_edge(&self, pixel: (usize, usize)) -> bool {
         self.beside
             .iter()
@@ -124,8 +126,11 @@ impl<'a> Definition<'a> {
             .collect()
     }
 
-    /// The pixels that a plane is fitted to: the window's, or near an edge those of a 7 × 7 window to which steps that are no edges
-    /// lead without leaving it, as far as they are no further away in depth than half a step and half a step per pixel.
+    /// The pixels that a plane is fitted to.
+    ///
+    /// Away from edges they are the window's. Near an edge they are those of a 7 × 7 window that
+    /// are connected inside it by steps that are not edges. Their depth must differ by at most half
+    /// a step plus half a step per pixel.
     fn support(&self, pixel: (usize, usize)) -> Vec<(usize, usize)> {
         if !self.is_near_an_edge(pixel) {
             return self.window(pixel, self.radius);
@@ -150,7 +155,9 @@ impl<'a> Definition<'a> {
         joined
     }
 
-    /// The plane m · X = 1 for which the squares of m · (x, y, 1) − 1/z are least over the rays (x, y, 1) of the support.
+    /// Returns the normal of the plane m · X = 1 that fits the support best.
+    ///
+    /// It minimizes the squares of m · (x, y, 1) − 1/z over the rays (x, y, 1) of the support.
     fn normal(&self, pixel: (usize, usize)) -> Option<Vector3<f64>> {
         if self.at(pixel) < MIN_DEPTH {
             return None;
@@ -160,7 +167,7 @@ impl<'a> Definition<'a> {
         if support.len() < 6 || on_one_line(&support) {
             return None;
         }
-        // Rays count from the pixel's own, in pixels, which spares the sums' digits.
+        // Rays are relative to the pixel's own, in pixels, which saves digits of the sums.
         let (mut squares, mut products) = (Matrix3::zeros(), Vector3::zeros());
         for p in support {
             let ray = Vector3::new(
@@ -180,18 +187,19 @@ impl<'a> Definition<'a> {
         );
         let m_z = m.z - m.x * fx * ray.x - m.y * fy * ray.y;
         let plane = Vector3::new(m.x * fx, m.y * fy, m_z);
-        // In front of the camera where it is seen; from there the plane is seen from the side that m points away from.
+        // The plane must be in front of the camera. The camera is on the side that m points away
+        // from.
         (m.z > 0.0).then(|| -plane.normalize())
     }
 }
 
-/// Along the longer of rows and columns.
+/// The distance in the maximum norm of rows and columns.
 fn distance(a: (usize, usize), b: (usize, usize)) -> usize {
     a.0.abs_diff(b.0).max(a.1.abs_diff(b.1))
 }
 
 fn on_one_line(pixels: &[(usize, usize)]) -> bool {
-    // Small whole numbers: every product is exact.
+    // Small integers: every product is exact.
     let from_first = |p: &(usize, usize)| {
         let first = pixels[0];
         (p.0 as f64 - first.0 as f64, p.1 as f64 - first.1 as f64)
@@ -203,19 +211,20 @@ fn on_one_line(pixels: &[(usize, usize)]) -> bool {
         .all(|p| p.0 * other.1 - p.1 * other.0 == 0.0)
 }
 
-/// What the images of [`scene`] are made of.
+/// The parameters of the images of [`scene`].
 #[derive(Clone, Copy, Debug)]
 struct Recipe {
     size: (u32, u32),
     focal: f64,
-    /// Side of the patches of surface, pixels, and their steepest slope and the jumps between them, in edge steps.
+    /// Side of the patches of surface in pixels, their steepest slope, and the jumps between them
+    /// in edge steps.
     patch: usize,
     slope: f64,
     jump: f64,
-    /// Relative noise of depth, everywhere or in the right half alone.
+    /// Relative noise of depth, either everywhere or only in the right half.
     noise: f64,
     right_half: bool,
-    /// Share of pixels that are not masked, and that have no depth.
+    /// Shares of pixels that are not masked, and that have no depth.
     unmasked: f64,
     holes: f64,
 }
@@ -232,7 +241,8 @@ const PLAIN: Recipe = Recipe {
     holes: 0.0,
 };
 
-/// Patches of surface with slopes and offsets of their own; a border of the image is not masked.
+/// Creates patches of surface with different slopes and offsets; a border of the image is not
+/// masked.
 fn scene(recipe: &Recipe, seed: u64) -> Observation {
     let mut numbers = Numbers(seed);
     let (width, height) = recipe.size;
@@ -269,7 +279,7 @@ fn scene(recipe: &Recipe, seed: u64) -> Observation {
     Observation::new(depth, Mask::new(width, height, mask).unwrap(), camera).unwrap()
 }
 
-/// What the images must have had, for the comparison to say something.
+/// Cases that the images must contain, so that the comparison means something.
 #[derive(Default)]
 struct Seen {
     normals: usize,
@@ -288,7 +298,7 @@ fn compare(recipe: &Recipe, seed: u64, seen: &mut Seen) {
         let expected = definition.normal((u, v));
         let surfel = observation.surfel_at(region.u_min + u as u32, region.v_min + v as u32);
         let found = surfel.map(|s| s.normal.into_inner().cast::<f64>());
-        // Components are rounded to f32 by up to 6e-8 each.
+        // Components are rounded to f32, by up to 6e-8 each.
         let agree = match (found, expected) {
             (Some(found), Some(expected)) => (found - expected).norm() < 3e-7,
             (found, expected) => found.is_none() && expected.is_none(),
@@ -305,7 +315,7 @@ fn compare(recipe: &Recipe, seed: u64, seen: &mut Seen) {
 }
 
 #[test]
-fn normals_beside_edges_are_those_of_the_definition() {
+fn normals_near_edges_equal_the_definition() {
     let mut seen = Seen::default();
     let jumps = Recipe { jump: 3.0, ..PLAIN };
     let steep = Recipe {
@@ -333,7 +343,7 @@ fn normals_beside_edges_are_those_of_the_definition() {
 }
 
 #[test]
-fn normals_in_noise_are_those_of_the_definition() {
+fn normals_in_noise_equal_the_definition() {
     let mut seen = Seen::default();
     for (seed, noise) in (200..).zip([0.0003, 0.001, 0.002, 0.004, 0.007, 0.012, 0.025]) {
         compare(
@@ -356,9 +366,10 @@ fn normals_in_noise_are_those_of_the_definition() {
     assert!(seen.normals > 10_000 && seen.beside_edges > 1000);
 }
 
-/// Second differences across holes, or from one row to the next, are no noise; those of every column count.
+/// Second differences across holes, or from one row to the next, are not noise. Those of every
+/// column count.
 #[test]
-fn noise_is_measured_within_rows_where_there_is_depth() {
+fn noise_is_measured_within_rows_and_not_across_holes() {
     let mut seen = Seen::default();
     let noise = 0.004;
     for recipe in [

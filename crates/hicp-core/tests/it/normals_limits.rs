@@ -1,4 +1,4 @@
-//! Normals where something is just enough, or just not: steps, depths, supports, and cameras.
+//! Tests of normals at limits: steps, depths, supports, and cameras.
 
 use crate::support::{Numbers, degrees_between};
 use hicp_core::{
@@ -26,7 +26,9 @@ fn worst(observation: &Observation) -> f64 {
     angles.fold(0.0, f64::max)
 }
 
-/// Two walls with a step of exactly tan 85° per pixel are one surface, and with the next number two.
+/// Two walls with a step of exactly tan 85° per pixel are one surface.
+///
+/// With the next larger number they are two.
 #[test]
 fn an_edge_is_steeper_than_85_degrees() {
     let focal = 32.0 * 85_f64.to_radians().tan();
@@ -46,14 +48,14 @@ fn an_edge_is_steeper_than_85_degrees() {
             walls((1.0_f32 + 1.0 / 32.0).next_up()),
         );
         assert_eq!((surface.n_surfels(), edge.n_surfels()), (1024, 1024));
-        // A window of five across the step has a slope of 0.3 of the step's.
+        // A window of five across the step has 0.3 times the slope of the step.
         assert!(worst(&surface) > 70.0, "{}", worst(&surface));
         assert!(worst(&edge) < 1e-5, "{}", worst(&edge));
     }
 }
 
 #[test]
-fn a_depth_of_a_tenth_of_a_millimetre_has_a_normal_and_less_has_none() {
+fn depths_from_a_tenth_of_a_millimeter_on_have_a_normal() {
     let camera = PinholeCamera::new(60.0, 60.0, 4.0, 4.0, 9, 9).unwrap();
     for (depth, expected) in [(1e-4, 81), (1e-4_f32.next_down(), 0)] {
         let observation = image(&camera, |_, _| depth);
@@ -61,16 +63,18 @@ fn a_depth_of_a_tenth_of_a_millimetre_has_a_normal_and_less_has_none() {
             (observation.n_surfels(), observation.n_measured()),
             (expected, 81)
         );
-        // In the midst of such pixels, one that is measured well stands alone.
+        // Among such pixels, a pixel with a valid depth has no usable neighbors.
         let one = image(&camera, |u, v| if (u, v) == (4, 4) { 0.5 } else { depth });
         assert_eq!(one.surfel_at(4, 4), None);
     }
 }
 
-/// Least squares of 1/z over 3 × 3 pixels are at a corner (8a + 5(b + b′) + 2(c + c′ + d) − e − e′ − 4f)/18, here 0 where the three
-/// far pixels are at 1/4 m: the plane goes through the camera, which does not see it.
+/// A corner of 3 × 3 pixels whose plane passes through the camera, which does not see it.
+///
+/// There, least squares of 1/z gives (8a + 5(b + b′) + 2(c + c′ + d) − e − e′ − 4f)/18. It is 0 if
+/// the three far pixels are at 1/4 m.
 #[test]
-fn a_plane_through_the_camera_is_not_seen() {
+fn a_plane_through_the_camera_has_no_normal() {
     let camera = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, 3, 3).unwrap();
     let corner = |far: f32| {
         let observation = image(&camera, |u, v| if u + v < 3 { 1.0 } else { far });
@@ -81,7 +85,8 @@ fn a_plane_through_the_camera_is_not_seen() {
     assert_eq!(corner(0.25_f32.next_down()), None);
 }
 
-/// In noise, which makes windows of 21 × 21 pixels, so that lines of every slope have enough pixels in one.
+/// The noise gives windows of 21 × 21 pixels, so that lines of every slope have enough pixels in
+/// one.
 #[test]
 fn lines_of_every_slope_determine_no_normal() {
     let (width, height) = (128, 64);
@@ -98,7 +103,7 @@ fn lines_of_every_slope_determine_no_normal() {
         (3, 2),
         (2, 3),
     ] {
-        // Downwards and upwards, away from a wall on which the noise is measured.
+        // Lines upward and downward, next to a wall on which the noise is measured.
         for upwards in [false, true] {
             let line: Vec<(u32, u32)> = (0..64)
                 .map(|k| (k * p, k * q))
@@ -110,7 +115,7 @@ fn lines_of_every_slope_determine_no_normal() {
                 for u in 0..width {
                     let on_line = line.contains(&(u, v));
                     let wall = 0.6 * (1.0 + 0.03 * numbers.normal());
-                    // The line is as rough as can be, so that its sums are rounded.
+                    // The line is as rough as possible, so that its sums are rounded.
                     let z = if on_line {
                         numbers.between(0.2, 3.0)
                     } else {
@@ -136,15 +141,15 @@ fn lines_of_every_slope_determine_no_normal() {
     }
 }
 
-/// The widest and the narrowest rays there are, along one axis or both, of the nearest and furthest surfaces: points, the squares of
-/// their distances and normals are still numbers.
+/// Checks the widest and the narrowest rays, along one axis or both, for the nearest and the
+/// farthest surfaces. Points, their squared distances and normals must stay finite.
 #[test]
 fn a_camera_at_its_limits_has_finite_surfels() {
     for focal in [MIN_FOCAL_LENGTH, MAX_FOCAL_LENGTH] {
         let mut n_surfels = 0;
         for (cx, cy) in [(-1e9, 0.0), (0.0, 1e9), (1e9, 1e9), (-1e9, 1e9), (4.0, 4.0)] {
             let camera = PinholeCamera::new(focal, focal, cx, cy, 9, 9).unwrap();
-            // No steeper than pixels are wide.
+            // The slope is at most one pixel width per pixel.
             let slope = (1.0 / focal).min(1.0) as f32;
             for scale in [2e-4, 1.0, 1.5 * MAX_DEPTH_METERS] {
                 let observation = image(&camera, |u, v| {

@@ -1,4 +1,4 @@
-//! Observations and the images they are made of.
+//! Tests of observations and the images they are made of.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ fn ragged(width: u32, height: u32, seed: u64) -> Observation {
 }
 
 #[test]
-fn sizes_that_differ_are_refused_and_named() {
+fn errors_name_the_sizes_that_differ() {
     let depth = || DepthImage::from_meters(4, 3, vec![1.0; 12]).unwrap();
     let wrong_mask = Observation::new(depth(), Mask::full(3, 4), camera(4, 3)).unwrap_err();
     assert_eq!(
@@ -93,7 +93,7 @@ fn depths_that_no_camera_measures_are_missing() {
 }
 
 #[test]
-fn pixels_are_row_major_and_there_are_none_outside() {
+fn pixels_are_row_major_and_none_outside() {
     let depth = DepthImage::from_meters(3, 2, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
     for v in 0..4 {
         for u in 0..5 {
@@ -119,7 +119,7 @@ fn observations_of_one_image_share_its_depth() {
         assert!(Arc::ptr_eq(observation.shared_depth(), &depth));
         assert!(std::ptr::eq(observation.depth(), &raw const *depth));
     }
-    // A clone shares it too, and the maps are those of an observation with a depth of its own.
+    // A clone shares it too. The maps equal those of an observation with a separate depth image.
     assert_eq!(Arc::strong_count(&depth), 3);
     assert!(Arc::ptr_eq(seen[0].clone().shared_depth(), &depth));
     assert!(seen[0].surfels(1).eq(apart.surfels(1)));
@@ -127,7 +127,7 @@ fn observations_of_one_image_share_its_depth() {
 }
 
 #[test]
-fn the_box_of_a_full_mask_is_the_image_and_that_of_no_pixels_is_empty() {
+fn bounding_regions_of_full_and_empty_masks() {
     for (width, height) in [(5, 4), (1, 1), (0, 0), (0, 3), (3, 0)] {
         let area = (width * height) as usize;
         let full = Mask::full(width, height);
@@ -151,7 +151,7 @@ fn an_empty_mask_and_an_image_of_zeros_have_no_surfels() {
 }
 
 #[test]
-fn a_surfel_stands_where_its_pixel_was_measured_and_nowhere_else() {
+fn surfels_exist_only_at_measured_pixels_and_at_their_depth() {
     let observation = ragged(40, 30, 31);
     let (mut measured, mut surfels) = (0, 0);
     for v in 0..30 {
@@ -210,7 +210,8 @@ fn surfels_of_a_stride_are_the_brute_force_grid_in_row_major_order() {
     }
 }
 
-/// Pixel squares are half-open and reach half a pixel to every side: floor(x + ½), computed in f64.
+/// Pixel squares are half-open and extend half a pixel to every side: floor(x + ½), computed in
+/// f64.
 fn reference(observation: &Observation, u: f32, v: f32) -> Option<hicp_core::Surfel> {
     let (column, row) = ((f64::from(u) + 0.5).floor(), (f64::from(v) + 0.5).floor());
     let (width, height) = (observation.depth().width(), observation.depth().height());
@@ -228,7 +229,7 @@ fn pitfall_22_rounding_at_the_borders_of_pixels_and_image() {
     let observation = Observation::new(depth, Mask::full(16, 12), camera(16, 12)).unwrap();
     let at = |u: f32, v: f32| observation.surfel_near(u, v);
     let pixel = |u, v| observation.surfel_at(u, v);
-    // The image reaches from −½ (included) to W − ½ (excluded); truncation would let (−1, 0) in.
+    // The image extends from −½ (included) to W − ½ (excluded). Truncation would accept (−1, 0).
     assert_eq!(at(-0.5, -0.5), pixel(0, 0));
     assert_eq!(at(-0.500_001, 3.0), None);
     assert_eq!(at(-0.999, 3.0), None);
@@ -263,7 +264,7 @@ fn pitfall_22_surfel_near_is_its_reference_everywhere() {
             numbers.between(-3.0, 43.0) as f32,
             numbers.between(-3.0, 33.0) as f32,
         );
-        // Within one rounding of a border either side may be taken.
+        // Within one rounding of a border, either side is valid.
         let border = |x: f32| ((x + 0.5).round() - (x + 0.5)).abs() < 1e-5;
         if border(u) || border(v) {
             continue;
@@ -273,7 +274,7 @@ fn pitfall_22_surfel_near_is_its_reference_everywhere() {
         hits += usize::from(found.is_some());
     }
     assert!(hits > 5000, "{hits}");
-    // Exact halves and integers are exact in f32.
+    // Halves and integers are exact in f32.
     for v in -4..=64_i16 {
         for u in -4..=84_i16 {
             let (u, v) = (f32::from(u) / 2.0, f32::from(v) / 2.0);
@@ -315,7 +316,7 @@ proptest! {
     }
 
     #[test]
-    fn intersection_holds_what_both_hold(a in region(), b in region()) {
+    fn an_intersection_contains_the_common_pixels(a in region(), b in region()) {
         let common = a.intersection(&b);
         let mut count = 0;
         for v in 0..8 {

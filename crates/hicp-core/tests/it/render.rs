@@ -1,4 +1,4 @@
-//! Rendered views, what they say of a pixel, and the cache that keeps renders from being repeated.
+//! Tests of rendered views and the cache that avoids repeated renders.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ fn region(u_min: u32, v_min: u32, u_max: u32, v_max: u32) -> PixelRegion {
     }
 }
 
-/// What the ray caster makes of a pose, in a view of its own.
+/// Renders a pose into a new view with the ray caster.
 fn fresh(
     mesh: &TriMesh,
     camera: &PinholeCamera,
@@ -48,7 +48,7 @@ fn poses(count: usize) -> Vec<Isometry3<f64>> {
 }
 
 #[test]
-fn a_view_is_empty_until_it_is_filled_and_again_when_it_is_reset() {
+fn a_view_is_empty_before_it_is_filled_and_after_a_reset() {
     let mut view = RenderedView::default();
     assert_eq!(view.region(), PixelRegion::default());
     for area in [
@@ -62,7 +62,7 @@ fn a_view_is_empty_until_it_is_filled_and_again_when_it_is_reset() {
         assert_eq!(view.triangles(), vec![NO_TRIANGLE; area.area()]);
         assert_eq!(view.n_rendered(), 0);
 
-        // Every third pixel shows something; more than 2¹⁶ of the largest region are shown or not.
+        // Fill every third pixel. The largest region has more than 2¹⁶ pixels.
         let (depth, triangles) = view.buffers_mut();
         for (index, (z, triangle)) in depth.iter_mut().zip(triangles).enumerate() {
             if index % 3 == 0 {
@@ -94,7 +94,7 @@ fn a_view_is_empty_until_it_is_filled_and_again_when_it_is_reset() {
 }
 
 #[test]
-fn a_copy_is_equal_whatever_it_was_before() {
+fn a_copy_is_equal_for_every_previous_content() {
     let (mesh, camera) = (wedge(), camera());
     let mut copy = RenderedView::default();
     for (pose, area) in poses(3).iter().zip([
@@ -111,12 +111,12 @@ fn a_copy_is_equal_whatever_it_was_before() {
 }
 
 #[test]
-fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_the_camera() {
+fn a_surfel_lies_on_its_pixels_ray_with_the_triangles_normal_facing_the_camera() {
     let (outward, camera) = (wedge(), camera());
     let turned = |[a, b, c]: &[u32; 3]| [*a, *c, *b];
     let inward = outward.triangles().iter().map(turned).collect();
     let inward = TriMesh::new(outward.vertices().to_vec(), inward).unwrap();
-    // Of which a view of the whole shows triangles that are not there.
+    // A view of the whole mesh shows triangles that this mesh does not have.
     let one = TriMesh::new(
         outward.vertices().to_vec(),
         outward.triangles()[..1].to_vec(),
@@ -126,7 +126,7 @@ fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_t
     for pose in poses(6) {
         for mesh in [&outward, &inward] {
             let whole = fresh(mesh, &camera, &pose, &camera.region());
-            // A view of a part says the same of its pixels.
+            // A view of a part agrees with the view of the whole.
             let part = region(15, 9, 33, 30);
             let view = fresh(mesh, &camera, &pose, &part);
             for (u, v) in (0..36).flat_map(|v| (0..48).map(move |u| (u, v))) {
@@ -140,7 +140,7 @@ fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_t
                 assert_eq!(of_part, surfel.filter(|_| part.contains(u, v)));
                 let Some(surfel) = surfel else { continue };
                 judged += 1;
-                // Half a metre away f32 carries 3e-8 m.
+                // At half a meter, the resolution of f32 is 3e-8 m.
                 let point = surfel.point.cast::<f64>();
                 let pixel = camera.project(&point).unwrap();
                 let off = (pixel.x - f64::from(u)).hypot(pixel.y - f64::from(v));
@@ -154,7 +154,8 @@ fn a_surfel_is_the_point_on_the_pixels_ray_with_the_triangles_normal_turned_to_t
                     .corners(whole.triangles()[index] as usize)
                     .map(|p| pose * p.cast::<f64>());
                 for corner in corners {
-                    // In the triangle's plane: the roundings of point and normal, over a decimetre.
+                    // Corners are in the plane of the point, up to the rounding of point and normal
+                    // over a decimeter.
                     let off = normal.dot(&(corner - point));
                     assert!(off.abs() < 2e-7, "{off} m");
                 }
@@ -176,7 +177,7 @@ fn a_boxed_renderer_renders() {
     }
 }
 
-/// The ray caster, with a count of its renders; it breaks down half-way in the `broken` one.
+/// A ray caster that counts its renders and panics in the middle of the `broken` one.
 #[derive(Default)]
 struct Counted {
     renders: Arc<AtomicU64>,
@@ -202,7 +203,7 @@ impl Renderer for Counted {
     }
 }
 
-/// A cache, and the number of renders that its renderer was asked for.
+/// Returns a cache, and the number of renders requested from its renderer.
 fn counted(broken: Option<u64>) -> (RenderCache, Arc<AtomicU64>) {
     let renderer = Counted {
         broken,
@@ -213,7 +214,7 @@ fn counted(broken: Option<u64>) -> (RenderCache, Arc<AtomicU64>) {
 }
 
 #[test]
-fn the_four_renders_used_last_are_remembered() {
+fn the_four_most_recently_used_renders_are_cached() {
     let (model, camera, poses) = (Model::new(wedge()), camera(), poses(7));
     let (mut cache, renders) = counted(None);
     let expected: Vec<RenderedView> = poses
@@ -243,7 +244,7 @@ fn the_four_renders_used_last_are_remembered() {
 }
 
 #[test]
-fn a_render_is_remembered_for_its_model_its_camera_and_every_bit_of_its_pose() {
+fn the_cache_key_is_model_camera_and_every_bit_of_the_pose() {
     let (model, camera) = (Model::new(wedge()), camera());
     let truth = pose(0.01, -0.02, 0.4, 0.3, -0.2, 0.1);
     let (mut cache, _) = counted(None);
@@ -254,7 +255,7 @@ fn a_render_is_remembered_for_its_model_its_camera_and_every_bit_of_its_pose() {
     };
     assert_eq!(renders(&model, &camera, &truth), 1);
     assert_eq!(renders(&model, &camera, &truth), 0);
-    // A clone is the same object; another model of the same mesh need not be.
+    // A clone is the same object. Another model of the same mesh is not.
     assert_eq!(renders(&model.clone(), &camera, &truth), 0);
     assert_eq!(renders(&Model::new(wedge()), &camera, &truth), 1);
     let other = PinholeCamera::new(90.0, 92.0, 23.0, 17.5, 47, 36).unwrap();
@@ -275,9 +276,9 @@ fn a_render_is_remembered_for_its_model_its_camera_and_every_bit_of_its_pose() {
 }
 
 #[test]
-fn a_render_that_broke_down_is_not_remembered() {
+fn a_render_that_panicked_is_not_cached() {
     let (model, camera, poses) = (Model::new(wedge()), camera(), poses(5));
-    // The fifth render takes the place of the first and spoils it.
+    // The fifth render replaces the first and panics.
     let (mut cache, _) = counted(Some(5));
     for pose in &poses[..4] {
         cache.view(&model, &camera, pose);

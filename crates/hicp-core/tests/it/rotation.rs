@@ -1,4 +1,4 @@
-//! Rotations from matrices that somebody wrote down (pitfall 17).
+//! Tests of rotations from rounded matrices (pitfall 17).
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ fn rounded(matrix: &Matrix3<f64>, digits: i32) -> Matrix3<f64> {
 }
 
 #[test]
-fn exact_rotations_come_back() {
+fn exact_rotations_are_returned() {
     let mut numbers = Numbers(21);
     for _ in 0..200 {
         let rotation = numbers.rotation();
@@ -24,14 +24,15 @@ fn exact_rotations_come_back() {
 }
 
 #[test]
-fn roundings_to_nine_and_to_five_digits_are_accepted_and_stay_as_near() {
+fn rounding_to_nine_and_to_five_digits_is_accepted() {
     let mut numbers = Numbers(22);
     for digits in [5, 9] {
         for _ in 0..200 {
             let rotation = numbers.rotation();
             let matrix = rounded(rotation.to_rotation_matrix().matrix(), digits);
             let found = rotation_from_matrix(&matrix).unwrap();
-            // Nine entries off by at most half a digit: |ΔR|_F ≤ 1.5 · 10⁻ᵈ, and |ΔR|_F = √2 · angle for the nearest rotation.
+            // Nine entries are off by at most half a digit: |ΔR|_F ≤ 1.5 · 10⁻ᵈ, and |ΔR|_F = √2 ·
+            // angle for the nearest rotation.
             let angle = so3::angle(&(found * rotation.inverse()));
             assert!(angle <= 1.5 * 10_f64.powi(-digits), "{angle}");
             assert!((found.norm() - 1.0).abs() < 4.0 * f64::EPSILON);
@@ -40,7 +41,7 @@ fn roundings_to_nine_and_to_five_digits_are_accepted_and_stay_as_near() {
 }
 
 #[test]
-fn the_rotation_found_is_the_nearest() {
+fn the_result_is_the_nearest_rotation() {
     let mut numbers = Numbers(23);
     for _ in 0..50 {
         let noise = Matrix3::from_fn(|_, _| numbers.between(-1e-4, 1e-4));
@@ -51,7 +52,8 @@ fn the_rotation_found_is_the_nearest() {
         };
         let best = distance(&found);
         for _ in 0..20 {
-            // A turn by h costs h² · 2 more; 1e-5 is far above the rounding of `best` (1e-8 · ε).
+            // A rotation by h adds 2 h². With 1e-5 this is far above the rounding of `best` (1e-8 ·
+            // ε).
             let nudged = so3::exp(&(numbers.direction() * 1e-5)) * found;
             assert!(distance(&nudged) > best);
         }
@@ -65,7 +67,7 @@ fn pitfall_17_half_turns_and_nearly_half_turns_are_exact() {
     axes.extend((0..100).map(|_| numbers.direction()));
     for axis in axes {
         for angle in [PI, PI - 1e-9, PI - 1e-7, PI - 1e-4, PI - 0.01] {
-            // From the definition R = I + sin a P + (1 − cos a) P², not through a quaternion.
+            // Uses the definition R = I + sin a P + (1 − cos a) P² instead of a quaternion.
             let p = so3::hat(&axis);
             let matrix = Matrix3::identity() + p * angle.sin() + p * p * (1.0 - angle.cos());
             let found = rotation_from_matrix(&matrix).unwrap();
@@ -73,7 +75,7 @@ fn pitfall_17_half_turns_and_nearly_half_turns_are_exact() {
             assert!(error < 8.0 * f64::EPSILON, "{axis} {angle}: {error}");
         }
     }
-    // nalgebra's report: an entry a rounding below −1.
+    // The case reported for nalgebra: an entry one rounding below −1.
     let matrix = Matrix3::from_diagonal(&Vector3::new(-1.0 - 2.3e-16, -1.0, 1.0));
     let found = rotation_from_matrix(&matrix).unwrap();
     assert!((so3::angle(&found) - PI).abs() < 1e-15);
@@ -115,12 +117,12 @@ fn pitfall_17_shears_of_determinant_one_and_scales_are_refused() {
 }
 
 #[test]
-fn the_tolerance_is_still_tolerated() {
+fn a_deviation_equal_to_the_tolerance_is_accepted() {
     // Rows (1, s, 0) and (0, 1, 0) have the product s, to the bit.
     let shear = |s: f64| Matrix3::new(1.0, s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
     for sign in [-1.0, 1.0] {
         let found = rotation_from_matrix(&shear(sign * ROTATION_TOLERANCE)).unwrap();
-        // The polar factor of a shear by s turns by atan(s/2).
+        // The polar factor of a shear by s rotates by atan(s/2).
         let angle = so3::angle(&found) - (0.5 * ROTATION_TOLERANCE).atan();
         assert!(angle.abs() < 4.0 * f64::EPSILON, "{angle}");
         let beyond = ROTATION_TOLERANCE.next_up();
@@ -133,7 +135,7 @@ fn the_tolerance_is_still_tolerated() {
 }
 
 #[test]
-fn what_is_not_finite_is_named() {
+fn errors_name_the_entry_that_is_not_finite() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for row in 0..3 {
             for column in 0..3 {
@@ -154,7 +156,7 @@ fn what_is_not_finite_is_named() {
 }
 
 #[test]
-fn poses_come_from_matrices_and_transposed_ones_are_refused() {
+fn poses_are_read_from_matrices_and_transposed_ones_refused() {
     let mut numbers = Numbers(77);
     let pose = Isometry3::new(
         Vector3::new(numbers.unit(), numbers.unit(), 0.9),

@@ -1,4 +1,4 @@
-//! The group of rigid motions against its definitions.
+//! Tests of the group of rigid motions against its definitions.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ const ANGLES: [f64; 12] = [
     PI - 1e-9,
 ];
 
-/// Twists of every angle, with translations of a metre.
+/// Twists of every angle, with translations of about a meter.
 fn twists() -> Vec<Vector6<f64>> {
     let mut numbers = Numbers(11);
     let mut twists = Vec::new();
@@ -38,7 +38,8 @@ fn angle(xi: &Vector6<f64>) -> f64 {
     xi.fixed_rows::<3>(3).norm()
 }
 
-/// Σ Mⁿ / (n + skip)!; terms for |φ| ≤ π reach π³/3! · few ≈ 30 before they cancel.
+/// Returns Σ Mⁿ / (n + skip)!. For |φ| ≤ π, terms reach π³/3! times a few, about 30, before they
+/// cancel.
 fn series(m: &Matrix6<f64>, skip: u32) -> Matrix6<f64> {
     let mut term = Matrix6::identity() / f64::from((1..=skip).product::<u32>().max(1));
     let mut sum = Matrix6::zeros();
@@ -71,7 +72,7 @@ fn exp_is_the_matrix_exponential() {
 fn log_of_exp_is_the_identity() {
     for xi in twists() {
         let error = (se3::log(&se3::exp(&xi)) - xi).norm();
-        // |ρ| up to about 4, and J⁻¹ has a norm of up to π/2.
+        // |ρ| is up to about 4, and the norm of J⁻¹ is up to π/2.
         assert!(error < 2e-14, "{}: {error}", angle(&xi));
     }
 }
@@ -99,7 +100,7 @@ fn adjoint_of_exp_is_the_exponential_of_the_curly_hat() {
 }
 
 #[test]
-fn adjoint_carries_twists_through_a_motion() {
+fn adjoint_transforms_twists() {
     let mut numbers = Numbers(13);
     for xi in twists() {
         let motion = numbers.pose(0.7);
@@ -127,22 +128,23 @@ fn left_jacobian_is_its_series_and_its_inverse_inverts_it() {
     for xi in twists() {
         let jacobian = se3::left_jacobian(&xi);
         let error = (jacobian - series(&se3::curly_hat(&xi), 1)).amax();
-        // Above the series' end the closed m₂, m₃ keep 1.4e-11 and 9e-11 of their digits at 0.1, times a² and a³.
+        // Just above the series' end at 0.1, the closed m₂ and m₃ have errors of 1.4e-11 and 9e-11,
+        // times a² and a³.
         assert!(error < 1e-13, "{}: {error}", angle(&xi));
         let error = (jacobian * se3::left_jacobian_inverse(&xi) - Matrix6::identity()).amax();
         assert!(error < 1e-13, "{}: {error}", angle(&xi));
     }
 }
 
-/// Q has no closed form to be exact in, but along the axes its series is summed to the last digit.
+/// Q is not exact in any closed form, but along the axes its series is summed to the last digit.
 #[test]
-fn the_coefficients_of_q_keep_their_digits_to_the_end_of_their_series() {
+fn the_coefficients_of_q_are_accurate_to_the_end_of_the_series() {
     for (turn, shift) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
         for angle in [0.02, 0.05, 0.09, so3::SERIES_ANGLE * (1.0 - 1e-9)] {
             let mut xi = Vector6::zeros();
             (xi[shift], xi[3 + turn]) = (1.0, angle);
             let error = se3::left_jacobian(&xi) - series(&se3::curly_hat(&xi), 1);
-            // The largest entry is ½: two of its roundings.
+            // The largest entry is ½; the tolerance is two of its roundings.
             let error = error.fixed_view::<3, 3>(0, 3).amax();
             assert!(error < f64::EPSILON, "{turn} {shift} {angle}: {error}");
         }
@@ -150,7 +152,7 @@ fn the_coefficients_of_q_keep_their_digits_to_the_end_of_their_series() {
 }
 
 #[test]
-fn log_and_jacobian_together_are_those_alone() {
+fn log_and_jacobian_together_equal_the_separate_ones() {
     for xi in twists() {
         let motion = se3::exp(&xi);
         let (log, d, b) = se3::log_and_left_jacobian_inverse(&motion);
@@ -164,7 +166,7 @@ fn log_and_jacobian_together_are_those_alone() {
 }
 
 #[test]
-fn nothing_jumps_where_the_series_ends() {
+fn functions_are_continuous_at_the_end_of_the_series() {
     let mut numbers = Numbers(15);
     for _ in 0..50 {
         let (rho, axis) = (numbers.direction(), numbers.direction());
@@ -176,7 +178,8 @@ fn nothing_jumps_where_the_series_ends() {
             at(so3::SERIES_ANGLE * (1.0 - 1e-14)),
             at(so3::SERIES_ANGLE * (1.0 + 1e-14)),
         );
-        // The closed m₂ is off by 1.4e-11/24, m₃ by 9e-11/120, times a² and a³ (a = 0.1) and a few products: 3e-14.
+        // The error of the closed m₂ is 1.4e-11/24, that of m₃ is 9e-11/120, times a² and a³ (a =
+        // 0.1) and a few products: 3e-14.
         let jump = (se3::left_jacobian(&below) - se3::left_jacobian(&above)).amax();
         assert!(jump < 3e-14, "{jump}");
         let inverse = se3::left_jacobian_inverse;
@@ -189,7 +192,7 @@ fn nothing_jumps_where_the_series_ends() {
 
 /// ln(exp(δ^) exp(ξ^)) = ξ + 𝓙(ξ)⁻¹ δ + O(|δ|²): a tenth of δ leaves a hundredth of the error.
 #[test]
-fn bch_holds_to_first_order_and_its_error_is_of_second() {
+fn the_first_order_bch_formula_has_a_second_order_error() {
     let mut numbers = Numbers(16);
     let mut judged = 0;
     for _ in 0..50 {
@@ -206,12 +209,13 @@ fn bch_holds_to_first_order_and_its_error_is_of_second() {
             "{}",
             coarse / fine
         );
-        // The right Jacobian in its place (the sign that facts warn of) leaves a first-order error.
+        // The right Jacobian instead (the sign error of some references) leaves a first-order
+        // error.
         let wrong = se3::left_jacobian_inverse(&-xi);
         let ratio = error(1e-3, &xi, &wrong) / error(1e-4, &xi, &wrong);
         judged += usize::from(ratio < 20.0);
     }
-    assert_eq!(judged, 50, "the test must be able to tell left from right");
+    assert_eq!(judged, 50, "the test must distinguish left from right");
 }
 
 #[test]
@@ -227,7 +231,7 @@ fn pose_distance_is_bops_re_and_te() {
 }
 
 #[test]
-fn pose_distance_is_blind_to_the_common_frame() {
+fn pose_distance_does_not_depend_on_the_common_frame() {
     let mut numbers = Numbers(17);
     for _ in 0..50 {
         let (a, b, m) = (numbers.pose(1.0), numbers.pose(1.0), numbers.pose(1.0));
@@ -239,7 +243,7 @@ fn pose_distance_is_blind_to_the_common_frame() {
 }
 
 #[test]
-fn finite_means_every_number() {
+fn a_pose_is_finite_if_every_number_is() {
     let mut numbers = Numbers(18);
     let pose = numbers.pose(1.0);
     assert!(se3::is_finite(&pose));

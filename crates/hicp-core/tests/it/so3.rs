@@ -1,11 +1,12 @@
-//! The rotation group against its definitions (pitfall 17).
+//! Tests of the rotation group against its definitions (pitfall 17).
 
 use std::f64::consts::PI;
 
 use crate::support::Numbers;
 use hicp_core::{Matrix3, Quaternion, UnitQuaternion, Vector3, so3};
 
-/// Every scale at which an implementation may switch formulas, both sides of the series' end, and the half turn.
+/// Every scale at which an implementation may switch formulas, both sides of the series' end, and
+/// the half turn.
 const ANGLES: [f64; 16] = [
     0.0,
     1e-150,
@@ -32,7 +33,7 @@ fn axes() -> Vec<Vector3<f64>> {
     axes
 }
 
-/// Σ Mⁿ / (n + skip)!, by its definition.
+/// Returns Σ Mⁿ / (n + skip)! by its definition.
 fn series(m: &Matrix3<f64>, skip: u32) -> Matrix3<f64> {
     let mut term = Matrix3::identity() / f64::from((1..=skip).product::<u32>().max(1));
     let mut sum = Matrix3::zeros();
@@ -62,7 +63,7 @@ fn exp_is_the_matrix_exponential() {
             let phi = axis * angle;
             let rotation = so3::exp(&phi).to_rotation_matrix().into_inner();
             let error = (rotation - series(&so3::hat(&phi), 0)).amax();
-            // The series sums terms of aⁿ/n!, e^a together, each rounded: a few ε e^a.
+            // The series adds terms aⁿ/n!, with a sum of e^a, each rounded: a few ε e^a.
             assert!(
                 error < 4.0 * f64::EPSILON * f64::exp(angle),
                 "{angle}: {error}"
@@ -77,7 +78,7 @@ fn pitfall_17_log_of_exp_is_the_identity_at_every_angle_below_a_half_turn() {
         for angle in ANGLES {
             let phi = axis * angle;
             let error = (so3::log(&so3::exp(&phi)) - phi).norm();
-            // Relative to the angle: a tiny rotation keeps all of its digits.
+            // The tolerance is relative to the angle: a tiny rotation keeps all of its digits.
             assert!(error <= 8.0 * f64::EPSILON * angle, "{angle}: {error}");
             let measured = so3::angle(&so3::exp(&phi));
             assert!(
@@ -88,9 +89,11 @@ fn pitfall_17_log_of_exp_is_the_identity_at_every_angle_below_a_half_turn() {
     }
 }
 
-/// Where the logarithm leaves atan2 for its series the second term still counts: at a sine of 1e-7 it is 15 units of the last place.
+/// Checks the sine of 1e-7, where the logarithm switches from atan2 to its series.
+///
+/// The second term of the series still counts there: it is 15 units in the last place.
 #[test]
-fn log_keeps_its_digits_where_its_series_ends() {
+fn log_is_accurate_at_the_end_of_its_series() {
     let mut numbers = Numbers(5);
     for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
         for _ in 0..200 {
@@ -98,7 +101,8 @@ fn log_keeps_its_digits_where_its_series_ends() {
             let (sin, cos) = half.sin_cos();
             let rotation = UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, axis * sin));
             let error = (so3::log(&rotation) - axis * (2.0 * half)).norm();
-            // Roundings of sine, cosine, quotient, difference and product: half an ε each at the most.
+            // Sine, cosine, quotient, difference and product each have a rounding of at most half
+            // an ε.
             assert!(
                 error <= 2.5 * f64::EPSILON * (2.0 * half),
                 "{half}: {error}"
@@ -108,13 +112,13 @@ fn log_keeps_its_digits_where_its_series_ends() {
 }
 
 #[test]
-fn pitfall_17_a_half_turn_has_an_angle_of_pi_about_one_of_its_two_axes() {
+fn pitfall_17_a_half_turn_has_an_angle_of_pi_around_one_of_its_two_axes() {
     for axis in axes() {
         let phi = axis * PI;
         let found = so3::log(&so3::exp(&phi));
         let error = (found - phi).norm().min((found + phi).norm());
         assert!(error < 8.0 * f64::EPSILON * PI, "{axis}: {error}");
-        // A quaternion whose real part is zero to the bit.
+        // A quaternion whose real part is exactly zero.
         let exact = UnitQuaternion::from_quaternion(Quaternion::from_parts(0.0, axis));
         let found = so3::log(&exact);
         assert!((found.norm() - PI).abs() < 8.0 * f64::EPSILON * PI);
@@ -123,9 +127,10 @@ fn pitfall_17_a_half_turn_has_an_angle_of_pi_about_one_of_its_two_axes() {
 }
 
 #[test]
-fn log_takes_the_short_way_round() {
+fn log_selects_the_angle_of_at_most_half_a_turn() {
     for axis in axes() {
-        // 4 radians about an axis are 2π − 4 the other way, and q and −q are one rotation.
+        // 4 radians around an axis are 2π − 4 around the opposite axis, and q and −q are one
+        // rotation.
         let rotation = so3::exp(&(axis * 4.0));
         let expected = -axis * (2.0 * PI - 4.0);
         assert!((so3::log(&rotation) - expected).norm() < 1e-14);
@@ -156,7 +161,7 @@ fn left_jacobian_is_the_derivative_of_exp() {
     for _ in 0..20 {
         let phi = numbers.vector();
         let delta = numbers.direction() * 1e-6;
-        // exp((φ + δ)^) = exp((J δ)^) exp(φ^) to first order; the rest is of the order of |δ|².
+        // exp((φ + δ)^) = exp((J δ)^) exp(φ^) to first order; the error is O(|δ|²).
         let left = so3::exp(&(phi + delta)) * so3::exp(&phi).inverse();
         let error = (so3::log(&left) - so3::left_jacobian(&phi) * delta).norm();
         assert!(error < 1e-11, "{error}");
@@ -164,14 +169,15 @@ fn left_jacobian_is_the_derivative_of_exp() {
 }
 
 #[test]
-fn nothing_jumps_where_the_series_ends() {
+fn functions_are_continuous_at_the_end_of_the_series() {
     let switch = so3::SERIES_ANGLE;
     for axis in axes() {
         let (below, above) = (
             axis * (switch * (1.0 - 1e-14)),
             axis * (switch * (1.0 + 1e-14)),
         );
-        // The functions themselves change by 1e-15; (1 − cos a)/a² carries ε/a² ≈ 2e-14, times |φ^| = 0.1.
+        // The functions themselves change by 1e-15. The error of (1 − cos a)/a² is ε/a² ≈ 2e-14,
+        // times |φ^| = 0.1.
         let jump = (so3::left_jacobian(&below) - so3::left_jacobian(&above)).amax();
         assert!(jump < 1e-14, "{jump}");
         let inverse = so3::left_jacobian_inverse;
@@ -188,7 +194,8 @@ fn pitfall_17_long_products_stay_rotations() {
     for _ in 0..100_000 {
         rotation *= step;
     }
-    // Rounding walks: √100000 · ε ≈ 7e-14; a systematic drift would give 1e5 · ε ≈ 2e-11.
+    // Roundings accumulate like a random walk: √100000 · ε ≈ 7e-14. A systematic drift would give
+    // 1e5 · ε ≈ 2e-11.
     assert!((rotation.norm() - 1.0).abs() < 3e-11);
     let expected = so3::log(&step).norm() * 1e5 % (2.0 * PI);
     let expected = expected.min(2.0 * PI - expected);

@@ -1,4 +1,4 @@
-//! Symmetries as BOP declares and expands them.
+//! Tests of symmetries as BOP declares and expands them.
 
 use crate::support::Numbers;
 use hicp_core::{
@@ -32,7 +32,7 @@ fn symmetries_expand_as_in_bop() {
         assert_eq!(motions[0], Isometry3::identity());
         assert_eq!(symmetries.is_empty(), expected == 1);
     }
-    // continuous ∘ discrete: first flipped, then turned. The steps are 2πi/315.
+    // continuous ∘ discrete: first flipped, then rotated. The steps are 2πi/315.
     let motions = symmetries(1, 1).motions();
     for step in [1, 100, 314] {
         let turn = axis.rotation(std::f64::consts::TAU * step as f64 / 315.0);
@@ -42,13 +42,13 @@ fn symmetries_expand_as_in_bop() {
 }
 
 #[test]
-fn the_motions_of_a_cylinder_leave_it_where_it_is() {
+fn the_symmetry_motions_of_a_cylinder_leave_it_unchanged() {
     let mut numbers = Numbers(61);
     for _ in 0..10 {
         let (offset, direction) = (Point3::from(numbers.vector()), numbers.direction());
         let axis = SymmetryAxis::new(direction * numbers.between(1e-3, 1e3), offset).unwrap();
         assert!((axis.direction().norm() - 1.0).abs() < 1e-15);
-        // A half turn about a line that crosses the axis at right angles swaps the ends.
+        // A half turn around a line that crosses the axis at a right angle swaps the ends.
         let across = UnitVector3::new_normalize(direction.cross(&numbers.direction()));
         let half_turn = UnitQuaternion::from_axis_angle(&across, std::f64::consts::PI);
         let swap = Isometry3::from_parts(
@@ -73,7 +73,7 @@ fn the_motions_of_a_cylinder_leave_it_where_it_is() {
 }
 
 #[test]
-fn an_axis_has_a_direction() {
+fn an_axis_needs_a_direction() {
     let (x, origin) = (Vector3::x(), Point3::origin());
     for bad in [
         Vector3::zeros(),
@@ -93,7 +93,7 @@ fn an_axis_has_a_direction() {
             Err(SymmetryError::Offset { .. })
         ));
     }
-    // Whatever its length.
+    // The length does not matter.
     for length in [1e-300, 1e-12, 1.0, 1e200, f64::MAX] {
         let axis = SymmetryAxis::new(x * length, origin).unwrap();
         assert_eq!(axis.direction().into_inner(), x, "{length}");

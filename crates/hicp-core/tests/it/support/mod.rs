@@ -1,4 +1,5 @@
-//! What the tests of several crates share: a renderer by definition, analytic images, shapes, and seeded numbers.
+//! Helpers shared by the tests of several crates: a renderer by definition, analytic images,
+//! shapes, and seeded numbers.
 
 #![allow(
     dead_code,
@@ -15,7 +16,8 @@ use hicp_core::{
     RenderCache, RenderedView, Renderer, Translation3, TriMesh, UnitQuaternion, Vector3,
 };
 
-/// Casts a ray through every pixel of the region and intersects it with every triangle: the renderer's contract, word by word.
+/// A renderer that intersects the ray of every pixel with every triangle, by the definition of the
+/// contract.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RayCaster;
 
@@ -62,7 +64,7 @@ impl Renderer for RayCaster {
     }
 }
 
-/// The depth at which a ray (x, y, 1) from the origin meets a triangle in front of the camera.
+/// Returns the depth of a triangle along a ray (x, y, 1) from the origin, if it is in front.
 fn intersect(ray: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> Option<f64> {
     if a.z <= 0.0 || b.z <= 0.0 || c.z <= 0.0 {
         return None;
@@ -88,7 +90,7 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a number, uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -97,12 +99,12 @@ impl Numbers {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in 0..n.
+    /// Returns an integer, uniform in 0..n.
     pub fn below(&mut self, n: usize) -> usize {
         usize::try_from(self.bits() % n as u64).unwrap()
     }
 
-    /// Standard normal (Box–Muller).
+    /// Returns a standard normal number (Box–Muller).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.unit()).cos()
@@ -121,7 +123,7 @@ impl Numbers {
         UnitQuaternion::new(axis * self.between(0.0, std::f64::consts::PI))
     }
 
-    /// Any rotation, and a translation of `size` metres per axis.
+    /// Returns any rotation, with a translation of `size` meters per axis.
     pub fn pose(&mut self, size: f64) -> Isometry3<f64> {
         Isometry3::from_parts(Translation3::from(self.vector() * size), self.rotation())
     }
@@ -131,13 +133,13 @@ pub fn pose(x: f64, y: f64, z: f64, rx: f64, ry: f64, rz: f64) -> Isometry3<f64>
     Isometry3::new(Vector3::new(x, y, z), Vector3::new(rx, ry, rz))
 }
 
-/// The pose's seven numbers, to be compared bit by bit.
+/// Returns the seven numbers of a pose, for comparison bit by bit.
 pub fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
     let (t, q) = (&pose.translation.vector, &pose.rotation.coords);
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }
 
-/// A box centred at the origin, wound counter-clockwise seen from outside.
+/// A box centered at the origin, wound counter-clockwise as seen from outside.
 pub fn cuboid(x: f32, y: f32, z: f32) -> TriMesh {
     let corner = |i: u32| {
         let side = |bit: u32, s: f32| if i >> bit & 1 == 1 { s / 2.0 } else { -s / 2.0 };
@@ -163,7 +165,7 @@ pub fn cuboid_triangles() -> Vec<[u32; 3]> {
     ]
 }
 
-/// Six boxes' worth of asymmetry: a wedge whose every face has another direction.
+/// A wedge without symmetry: every face has another direction.
 pub fn wedge() -> TriMesh {
     let p = |x: f32, y: f32, z: f32| Point3::new(x, y, z);
     let vertices = vec![
@@ -187,7 +189,7 @@ pub fn wedge() -> TriMesh {
     TriMesh::new(vertices, triangles).unwrap()
 }
 
-/// A rendered image of a model alone, masked by its silhouette.
+/// Renders an image of a model alone, masked by its silhouette.
 pub fn observe(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> Observation {
     let depth = render_depth(model, camera, pose);
     let mask = depth.pixels().iter().map(|z| *z > 0.0).collect();
@@ -195,7 +197,7 @@ pub fn observe(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> 
     Observation::new(depth, mask, *camera).unwrap()
 }
 
-/// The model's depth over the whole image.
+/// Renders the model's depth over the whole image, in meters.
 pub fn render_depth(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> DepthImage {
     let mut cache = RenderCache::new(RayCaster);
     let view = cache.view(model, camera, pose);
@@ -207,7 +209,7 @@ pub fn render_depth(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>
     DepthImage::from_meters(width, height, depth).unwrap()
 }
 
-/// A depth image given by a function of the ray (x, y, 1).
+/// Creates a depth image from a function of the ray (x, y, 1).
 pub fn depth_image(camera: &PinholeCamera, mut z: impl FnMut(Vector3<f64>) -> f64) -> DepthImage {
     let (width, height) = (camera.width(), camera.height());
     let mut depth = Vec::new();
@@ -219,12 +221,14 @@ pub fn depth_image(camera: &PinholeCamera, mut z: impl FnMut(Vector3<f64>) -> f6
     DepthImage::from_meters(width, height, depth).unwrap()
 }
 
-/// The depth of the plane n · X = d along a ray (x, y, 1).
+/// Returns the depth of the plane n · X = d along a ray (x, y, 1).
 pub fn plane_depth(normal: &Vector3<f64>, d: f64, ray: &Vector3<f64>) -> f64 {
     d / normal.dot(ray)
 }
 
-/// The depth of the near side of a sphere along a ray (x, y, 1); 0 where the ray misses.
+/// Returns the depth of the near side of a sphere along a ray (x, y, 1).
+///
+/// If the ray misses, returns 0.
 pub fn sphere_depth(center: &Vector3<f64>, radius: f64, ray: &Vector3<f64>) -> f64 {
     let (a, b) = (ray.norm_squared(), ray.dot(center));
     let discriminant = b * b - a * (center.norm_squared() - radius * radius);
@@ -235,14 +239,14 @@ pub fn sphere_depth(center: &Vector3<f64>, radius: f64, ray: &Vector3<f64>) -> f
     }
 }
 
-/// An observation of the whole image, masked where there is depth.
+/// Creates an observation of the whole image, masked where depth is present.
 pub fn observe_depth(depth: DepthImage, camera: &PinholeCamera) -> Observation {
     let mask = depth.pixels().iter().map(|z| *z > 0.0).collect();
     let mask = Mask::new(camera.width(), camera.height(), mask).unwrap();
     Observation::new(depth, mask, *camera).unwrap()
 }
 
-/// The angle between two directions, degrees, without the cancellation of acos.
+/// Returns the angle between two directions in degrees, without the cancellation of acos.
 pub fn degrees_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b)).to_degrees()
 }
