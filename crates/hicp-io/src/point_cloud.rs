@@ -35,18 +35,18 @@ pub fn read_point_cloud_ply(
     let path = path.as_ref();
     let limits = &ReadLimits::DEFAULT;
     let reading = Reading { path, unit, limits };
-    let vertices = ply::read_vertices(&reading, &limits.read_bytes(path)?)?;
-    let position = |v: &[f64; 6]| Point3::from_slice(&v[..3]) / unit.units_per_meter();
-    let points = vertices.iter().map(|v| position(v).cast::<f32>()).collect();
+    let raw = ply::parse_points(&reading, &limits.read_bytes(path)?)?;
+    let in_meters = |p: &Point3<f64>| (p / unit.units_per_meter()).cast::<f32>();
+    let points = raw.vertices.iter().map(in_meters).collect();
     // A file states normals for all vertices or for none.
-    if vertices.iter().all(|v| v[3..].iter().all(|x| x.is_nan())) {
+    if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
         return Ok(PointCloud {
             points,
             normals: None,
         });
     }
-    let normal = |(number, vertex): (usize, &[f64; 6])| {
-        let normal = Vector3::from_column_slice(&vertex[3..]).cast::<f32>();
+    let normal = |(number, normal): (usize, &Vector3<f64>)| {
+        let normal = normal.cast::<f32>();
         let unit = UnitVector3::try_new(normal, 1e-6).filter(|n| n.iter().all(|x| x.is_finite()));
         unit.ok_or_else(|| {
             let (x, y, z) = (normal.x, normal.y, normal.z);
@@ -54,7 +54,7 @@ pub fn read_point_cloud_ply(
             IoError::new(path, None, found, "finite numbers that are not all 0")
         })
     };
-    let normals = vertices.iter().enumerate().map(normal);
+    let normals = raw.normals.iter().enumerate().map(normal);
     let normals = Some(normals.collect::<Result<_, _>>()?);
     Ok(PointCloud { points, normals })
 }

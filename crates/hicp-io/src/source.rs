@@ -1,5 +1,6 @@
 //! Whole files into memory, within limits.
 
+use std::borrow::Cow;
 use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::Path;
@@ -151,6 +152,11 @@ impl ReadLimits {
             IoError::new(path, place, "a byte that is not UTF-8", "text in UTF-8")
         })
     }
+}
+
+/// Returns the text after a byte order mark, if there is one. Bytes that are not UTF-8, as in comments, are replaced by U+FFFD.
+pub(crate) fn lossy_text<'a>(path: &Path, content: &'a [u8]) -> Result<Cow<'a, str>, IoError> {
+    Ok(String::from_utf8_lossy(text_bytes(path, content)?))
 }
 
 /// Returns the bytes after a UTF-8 byte order mark, if there is one; refuses UTF-16 and UTF-32.

@@ -1,27 +1,30 @@
-//! Lines of text files, whatever ends each of them.
+//! Lines of text files, with any line ending.
 
-/// The lines of a text, without what ends them: a line feed, a carriage return, or both in this order.
+use super::raw::Reading;
+use crate::error::{END_OF_FILE, IoError, Place, quote};
+
+/// The lines of a text without their ends: a line feed, a carriage return, or both in this order.
 ///
 /// Files that several programs have written to mix them.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<'a> {
-    rest: &'a [u8],
+    rest: &'a str,
     taken: usize,
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(text: &'a [u8]) -> Self {
+    pub(super) fn new(text: &'a str) -> Self {
         Self::after(0, text)
     }
 
-    /// The lines of a text that follows so many other lines of its file.
-    pub(super) fn after(taken: usize, rest: &'a [u8]) -> Self {
+    /// Returns the lines of a text that follows `taken` other lines of its file.
+    pub(super) fn after(taken: usize, rest: &'a str) -> Self {
         Self { rest, taken }
     }
 
-    /// Returns the number of the last line taken, from 1.
-    pub(super) fn number(&self) -> usize {
-        self.taken.max(1)
+    /// Returns the place of the last line taken.
+    pub(super) fn place(&self) -> Place {
+        Place::Line(self.taken.max(1))
     }
 
     /// Returns the bytes that are left.
@@ -29,33 +32,44 @@ impl<'a> Lines<'a> {
         self.rest.len() as u64
     }
 
-    /// Returns the next line that is not blank, without what follows a `#`.
-    pub(super) fn next_without_comment(&mut self) -> Option<String> {
-        self.find_map(|line| {
-            let line = String::from_utf8_lossy(line);
-            let line = line.split('#').next().unwrap_or_default().trim();
-            (!line.is_empty()).then(|| line.to_owned())
-        })
+    /// Returns the next line that is not blank, without its comment. At the end, the line is empty.
+    pub(super) fn record(&mut self) -> &'a str {
+        let mut lines = self.map(without_comment);
+        lines.find(|line| !line.is_empty()).unwrap_or_default()
+    }
+
+    /// Returns the error for the last line taken, or for the end of the file if that line is empty.
+    pub(super) fn refuse(&self, reading: &Reading<'_>, line: &str, expected: String) -> IoError {
+        let found = match line {
+            "" => END_OF_FILE.to_owned(),
+            line => quote(line),
+        };
+        reading.refuse(self.place(), found, expected)
     }
 }
 
 impl<'a> Iterator for Lines<'a> {
-    type Item = &'a [u8];
+    type Item = &'a str;
 
-    fn next(&mut self) -> Option<&'a [u8]> {
+    fn next(&mut self) -> Option<&'a str> {
         if self.rest.is_empty() {
             return None;
         }
         self.taken += 1;
-        let ends = |byte: &u8| matches!(byte, b'\n' | b'\r');
-        let end = self.rest.iter().position(ends).unwrap_or(self.rest.len());
+        let end = self.rest.find(['\n', '\r']).unwrap_or(self.rest.len());
         let (line, rest) = self.rest.split_at(end);
-        self.rest = match rest {
-            [b'\r', b'\n', rest @ ..] | [_, rest @ ..] => rest,
-            [] => rest,
-        };
+        let ends = ["\r\n", "\n", "\r"].into_iter();
+        self.rest = ends
+            .filter_map(|end| rest.strip_prefix(end))
+            .next()
+            .unwrap_or_default();
         Some(line)
     }
+}
+
+/// Returns a line without its comment and the spaces around it.
+pub(super) fn without_comment(line: &str) -> &str {
+    line.split('#').next().unwrap_or_default().trim()
 }
 
 #[cfg(test)]
@@ -71,9 +85,8 @@ mod tests {
             ("a\n\nb\r\r\n\r\n", &["a", "", "b", "", ""]),
             ("\n\r", &["", ""]),
         ] {
-            let found: Vec<_> = Lines::new(text.as_bytes()).collect();
-            let wanted: Vec<_> = lines.iter().map(|line| line.as_bytes()).collect();
-            assert_eq!(found, wanted, "{text:?}");
+            let found: Vec<_> = Lines::new(text).collect();
+            assert_eq!(found, lines, "{text:?}");
         }
     }
 }

@@ -134,10 +134,10 @@ mod tests {
 
     #[test]
     fn a_concave_polygon_beyond_the_budget_is_refused_where_it_stands() {
-        let mut mesh = RawMesh::new(Place::Line(1));
+        let reading = reading("a.obj");
+        let mut mesh = RawMesh::new(reading.refuse(Place::Line(1), "", ""));
         let dart = [[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]];
         mesh.vertices = dart.map(|p| Point3::new(p[0], p[1], 0.0)).to_vec();
-        let reading = reading("a.obj");
         for spent in [false, true] {
             if spent {
                 mesh.clipping_budget = 0;

@@ -1,67 +1,60 @@
 //! Wavefront OBJ, parsed by `tobj`.
 //!
-//! The text is decoded for it: continued lines are joined, and only the records of a mesh get through, on their own lines and
-//! without what it does not forgive (broken colors of vertices, normals that are not there). So its lines are those of the file.
+//! Continued lines are joined first. Only positions and faces are passed on, on their own lines: `tobj` refuses files with
+//! colors on some of the vertices or without the normals that they name, divides positions by a fourth number, and splits
+//! vertices that groups share.
 
 use hicp_core::Point3;
 use tobj::{LoadError, LoadOptions};
 
-use super::lines::Lines;
-use super::raw::{RawMesh, Reading, position};
-use crate::error::{IoError, Place, quote};
+use super::lines::{Lines, without_comment};
+use super::raw::{FACE, RawMesh, Reading, position};
+use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
-use crate::source::text_bytes;
+use crate::source::lossy_text;
 
 /// Parses an OBJ file. Vertices that no face uses are dropped.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let records = Records::of(reading, text_bytes(reading.path, &content)?)?;
+    let records = Records::of(reading, &lossy_text(reading.path, &content)?)?;
     drop(content);
-    let options = LoadOptions {
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
-    let mut rest = records.text.as_bytes();
-    // No `mtllib` gets through.
-    let models = tobj::load_obj_buf(&mut rest, &options, |_| Err(LoadError::ReadError));
-    let models = models.map_err(|error| {
-        let parsed = &records.text[..records.text.len() - rest.len()];
-        records.refuse(reading, parsed.lines().count(), error)
+    let no_materials = |_: &_| Err(LoadError::ReadError);
+    let loaded = tobj::load_obj_buf(
+        &mut records.text.as_bytes(),
+        &LoadOptions::default(),
+        no_materials,
+    );
+    let (models, _) = loaded.map_err(|error| {
+        let unknown = || IoError::unusable(reading.path, "OBJ mesh", error);
+        records.fault(reading).unwrap_or_else(unknown)
     })?;
 
     let end = Place::Line(records.text.lines().count().max(1));
-    let mut mesh = RawMesh::new(end.clone());
+    let mut mesh = RawMesh::new(reading.refuse(end.clone(), END_OF_FILE, FACE));
+    // Without groups there is one model. It has the faces in their order.
+    for tobj::Model { mesh: part, .. } in models {
+        let positions = part.positions.chunks_exact(3);
+        mesh.vertices = positions.map(Point3::from_slice).collect();
+        let arities = match part.face_arities.is_empty() {
+            true => vec![3; records.faces.len()],
+            false => part.face_arities,
+        };
+        let mut rest = part.indices.as_slice();
+        for (arity, line) in arities.iter().zip(&records.faces) {
+            let (corners, others) = rest.split_at(*arity as usize);
+            mesh.add_face(reading, Place::Line(*line), corners)?;
+            rest = others;
+        }
+    }
     let fits = |p: &Point3<f64>| {
         reading
             .check_position(end.clone(), p.coords.as_slice())
             .is_ok()
     };
-    // As many faces come back, in their order. One model comes back, as no record that starts another gets through.
-    let mut lines = records.faces.iter();
-    for tobj::Model { mesh: part, .. } in models.0 {
-        let positions = part.positions.chunks_exact(3);
-        mesh.vertices
-            .extend(positions.map(|p| Point3::new(p[0], p[1], p[2])));
-        // The line of a vertex is sought only if one does not fit. Vertices that no face uses do not come back.
-        if mesh.vertices.len() < records.vertices || !mesh.vertices.iter().all(fits) {
-            records.check_positions(reading)?;
-        }
-        let triangles = part.indices.len() / 3;
-        let arities = match part.face_arities.is_empty() {
-            true => vec![3; triangles],
-            false => part.face_arities,
-        };
-        let mut rest = part.indices.as_slice();
-        for arity in arities {
-            let (corners, others) = rest.split_at((arity as usize).min(rest.len()));
-            let place = lines
-                .next()
-                .map_or(end.clone(), |line| Place::Line(*line as usize));
-            mesh.add_face(reading, place, corners)?;
-            rest = others;
-        }
+    // Vertices that no face uses are checked, too.
+    if mesh.vertices.len() == records.vertices && mesh.vertices.iter().all(fits) {
+        return Ok(mesh);
     }
-    Ok(mesh)
+    records.fault(reading).map_or(Ok(mesh), Err)
 }
 
 /// The `v` and `f` records of a file, each on its last line, and blank lines for all others.
@@ -71,21 +64,18 @@ struct Records {
     vertices: usize,
     triangles: usize,
     /// The lines of the faces.
-    faces: Vec<u32>,
+    faces: Vec<usize>,
 }
 
 impl Records {
-    fn of(reading: &Reading<'_>, content: &[u8]) -> Result<Self, IoError> {
+    fn of(reading: &Reading<'_>, text: &str) -> Result<Self, IoError> {
         let mut records = Self::default();
         let mut joined = String::new();
-        let mut lines = Lines::new(content).peekable();
-        let mut number = 0;
-        while let Some(line) = lines.next() {
-            number += 1;
-            let line = String::from_utf8_lossy(line);
-            let line = line.split('#').next().unwrap_or_default().trim();
+        let mut lines = (1..).zip(Lines::new(text)).peekable();
+        while let Some((number, line)) = lines.next() {
+            let line = without_comment(line);
             joined.push_str(line.strip_suffix('\\').unwrap_or(line));
-            // The last line may promise another that does not come.
+            // A continued last line ends with the file.
             if line.ends_with('\\') && lines.peek().is_some() {
                 joined.push(' ');
             } else {
@@ -97,21 +87,21 @@ impl Records {
         Ok(records)
     }
 
-    fn add(&mut self, reading: &Reading<'_>, line: &str, number: u32) -> Result<(), IoError> {
-        let place = Place::Line(number as usize);
+    fn add(&mut self, reading: &Reading<'_>, line: &str, number: usize) -> Result<(), IoError> {
+        let place = Place::Line(number);
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
                 self.vertices += 1;
                 reading.check(Limit::Vertices, place, self.vertices)?;
                 self.text.push('v');
-                // A color, or a fourth number: a weight, which is for rational curves and not for faces, or a confidence.
+                // Colors follow, or one number: the weight of a curve, or a confidence.
                 for word in words.take(3) {
                     self.text.push(' ');
                     self.text.push_str(word);
                 }
             }
-            // Fewer corners make no face: they are dropped, because any number of such records would pass the limit.
+            // Fewer corners do not make a face. They are dropped, because any number of such records would pass the limit.
             Some("f") if words.clone().nth(2).is_some() => {
                 self.triangles += words.clone().count() - 2;
                 reading.check(Limit::Triangles, place, self.triangles)?;
@@ -128,55 +118,33 @@ impl Records {
         Ok(())
     }
 
-    /// Refuses the first vertex whose coordinates no mesh can have.
-    fn check_positions(&self, reading: &Reading<'_>) -> Result<(), IoError> {
-        for (line, record) in (1..).zip(self.text.lines()) {
-            if let Some(position) = record
-                .strip_prefix('v')
-                .and_then(|v| position(v.split_whitespace()))
-            {
-                reading.check_position(Place::Line(line), &position)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn refuse(&self, reading: &Reading<'_>, line: usize, error: LoadError) -> IoError {
-        let (line, expected) = match error {
-            LoadError::PositionParseError => (line, "`v` and three numbers".to_owned()),
-            LoadError::FaceParseError => (line, "`f` and vertex indices".to_owned()),
-            LoadError::FaceVertexOutOfBounds => {
-                let expected = format!(
-                    "vertex indices from 1 to {}, or negative ones that count back no further than the first vertex",
-                    self.vertices
-                );
-                (self.first_missing_vertex(), expected)
-            }
-            other => (line, format!("a readable record ({other})")),
-        };
-        let found = self
-            .text
-            .lines()
-            .nth(line.saturating_sub(1))
-            .unwrap_or_default();
-        reading.refuse(Place::Line(line), quote(found), expected)
-    }
-
-    /// Returns the line of the first face that names a vertex that is not there.
-    fn first_missing_vertex(&self) -> usize {
+    /// Returns the error for the first bad record with its line, which `tobj` does not report.
+    fn fault(&self, reading: &Reading<'_>) -> Option<IoError> {
         let mut seen = 0;
-        let is_missing = |word: &str, seen: usize| match word.parse::<isize>() {
-            Ok(index) if index < 0 => index.unsigned_abs() > seen,
-            Ok(index) => index == 0 || index.unsigned_abs() > self.vertices,
-            Err(_) => true,
+        let is_vertex = |word: &str, seen: usize| match word.parse::<isize>() {
+            Ok(index) if index < 0 => index.unsigned_abs() <= seen,
+            Ok(index) => (1..=self.vertices).contains(&index.unsigned_abs()),
+            Err(_) => false,
         };
-        let mut lines = (1..).zip(self.text.lines());
-        let line = lines.find(|(_, record)| {
-            seen += usize::from(record.starts_with('v'));
-            let face = record.strip_prefix('f').unwrap_or_default();
-            face.split_whitespace().any(|word| is_missing(word, seen))
-        });
-        line.map_or(1, |(line, _)| line)
+        (1..).zip(self.text.lines()).find_map(|(line, record)| {
+            let place = Place::Line(line);
+            let mut words = record.split_whitespace();
+            let expected = match words.next() {
+                Some("v") => {
+                    seen += 1;
+                    if let Some(position) = position(words) {
+                        return reading.check_position(place, &position).err();
+                    }
+                    "`v` and three numbers".to_owned()
+                }
+                Some("f") if !words.all(|word| is_vertex(word, seen)) => format!(
+                    "`f` and vertex indices from 1 to {}, or negative ones that count back no further than the first vertex",
+                    self.vertices
+                ),
+                _ => return None,
+            };
+            Some(reading.refuse(place, quote(record), expected))
+        })
     }
 }
 
@@ -285,7 +253,7 @@ mod tests {
     #[test]
     fn faces_of_fewer_than_three_corners_are_not_kept() {
         let text = format!("v 0 0 0\n{}f 1 1 1\nf\n", "f 9 9\nf\n".repeat(100));
-        let records = Records::of(&reading("a.obj"), text.as_bytes()).unwrap();
+        let records = Records::of(&reading("a.obj"), &text).unwrap();
         let kept: Vec<&str> = records.text.split_whitespace().collect();
         assert_eq!(kept, ["v", "0", "0", "0", "f", "1", "1", "1"]);
         assert_eq!((records.triangles, records.text.lines().count()), (1, 203));

@@ -3,104 +3,90 @@
 use hicp_core::Point3;
 
 use super::lines::Lines;
-use super::raw::{RawMesh, Reading, position};
-use crate::error::{END_OF_FILE, IoError, Place, quote};
+use super::raw::{FACE, RawMesh, Reading, position};
+use crate::error::{IoError, quote};
 use crate::limits::Limit;
-use crate::source::text_bytes;
+use crate::source::lossy_text;
 
-/// Parses an OFF file. What follows three coordinates, or the corners of a face, is a normal or a color and skipped.
+/// Parses an OFF file. Skips normals and colors, which follow three coordinates or the corners of a face.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let mut lines = Lines::new(text_bytes(reading.path, &content)?);
+    let text = lossy_text(reading.path, &content)?;
+    let mut lines = Lines::new(&text);
     let (line, vertices, faces) = parse_counts(reading, &mut lines)?;
-    let place = Place::Line(lines.number());
-    reading.check(Limit::Vertices, place.clone(), vertices)?;
-    reading.check(Limit::Triangles, place.clone(), faces)?;
+    reading.check(Limit::Vertices, lines.place(), vertices)?;
+    reading.check(Limit::Triangles, lines.place(), faces)?;
 
-    let mut mesh = RawMesh::new(place);
-    mesh.found = quote(&line);
+    let mut mesh = RawMesh::new(reading.refuse(lines.place(), quote(line), FACE));
     mesh.vertices.reserve_exact(vertices);
     for vertex in 0..vertices {
-        let expected = || format!("three coordinates of vertex {vertex} of {vertices}");
-        let line = next(reading, &mut lines, expected)?;
-        let place = Place::Line(lines.number());
-        let Some(position) = position(line.split_whitespace()) else {
-            return Err(reading.refuse(place, quote(&line), expected()));
-        };
-        reading.check_position(place, &position)?;
+        let line = lines.record();
+        let position = position(line.split_whitespace()).ok_or_else(|| {
+            let expected = format!("three coordinates of vertex {vertex} of {vertices}");
+            lines.refuse(reading, line, expected)
+        })?;
+        reading.check_position(lines.place(), &position)?;
         mesh.vertices.push(Point3::from(position));
     }
-    let mut corners = Vec::new();
+    let mut line = "";
     for face in 0..faces {
-        let expected =
-            || format!("the number of corners of face {face} of {faces} and as many vertices");
-        let line = next(reading, &mut lines, expected)?;
-        let place = Place::Line(lines.number());
-        let mut words = line
-            .split_whitespace()
-            .map_while(|word| word.parse::<i64>().ok());
-        let count = words.next().and_then(|count| usize::try_from(count).ok());
-        corners.clear();
-        for index in words.take(count.unwrap_or(0)) {
-            corners.push(reading.corner(place.clone(), face, index as f64, vertices)?);
-        }
+        line = lines.record();
+        let words = line.split_whitespace();
+        let mut numbers = words.map_while(|word| word.parse::<i64>().ok());
+        let count = numbers.next().and_then(|count| usize::try_from(count).ok());
+        let corners = numbers.take(count.unwrap_or(0)).map(|index| index as f64);
+        let corners: Vec<f64> = corners.collect();
         if count != Some(corners.len()) {
-            return Err(reading.refuse(place, quote(&line), expected()));
+            let expected =
+                format!("the number of corners of face {face} of {faces} and as many vertices");
+            return Err(lines.refuse(reading, line, expected));
         }
-        mesh.add_face(reading, place.clone(), &corners)?;
-        (mesh.end, mesh.found) = (place, quote(&line));
+        mesh.add_numbered_face(reading, lines.place(), face, &corners)?;
+    }
+    if faces > 0 {
+        mesh.empty = reading.refuse(lines.place(), quote(line), FACE);
     }
     Ok(mesh)
 }
 
-/// Parses the keyword and the line with the numbers of vertices and faces; refuses what the rest of the file cannot hold.
-fn parse_counts(
+/// Parses the keyword and the line with the numbers of vertices and faces; refuses numbers that the rest of the file cannot hold.
+fn parse_counts<'a>(
     reading: &Reading<'_>,
-    lines: &mut Lines<'_>,
-) -> Result<(String, usize, usize), IoError> {
-    let keyword = || "`OFF`, with `ST`, `C` and `N` in this order before it or not".to_owned();
-    let line = next(reading, lines, keyword)?;
-    // Texture coordinates, colors and normals of the vertices, which stand behind their positions.
-    let rest = line.strip_prefix("ST").unwrap_or(&line);
-    let rest = rest.strip_prefix('C').unwrap_or(rest);
-    let Some(rest) = rest.strip_prefix('N').unwrap_or(rest).strip_prefix("OFF") else {
-        let place = Place::Line(lines.number());
-        return Err(reading.refuse(place, quote(&line), keyword()));
+    lines: &mut Lines<'a>,
+) -> Result<(&'a str, usize, usize), IoError> {
+    let first = lines.record();
+    // Texture coordinates, colors and normals of the vertices, which follow their positions.
+    let mut rest = first;
+    for letters in ["ST", "C", "N"] {
+        rest = rest.strip_prefix(letters).unwrap_or(rest);
+    }
+    let Some(rest) = rest.strip_prefix("OFF") else {
+        let expected = "`OFF`, with `ST`, `C` and `N` in this order before it or not";
+        return Err(lines.refuse(reading, first, expected.to_owned()));
     };
-    let expected = || "the numbers of vertices, faces and edges".to_owned();
     let line = match rest.trim() {
-        "" => next(reading, lines, expected)?,
+        "" => lines.record(),
         // Some files have the counts behind the keyword, even without a space.
-        counts => counts.to_owned(),
+        counts => counts,
     };
-    let place = Place::Line(lines.number());
-    let counts: Option<Vec<usize>> = line
-        .split_whitespace()
-        .map(|word| word.parse().ok())
-        .collect();
+    let words = line.split_whitespace();
+    let counts: Option<Vec<usize>> = words.map(|word| word.parse().ok()).collect();
     let Some(&([vertices, faces] | [vertices, faces, _])) = counts.as_deref() else {
-        return Err(reading.refuse(place, quote(&line), expected()));
+        let expected = "the numbers of vertices, faces and edges";
+        return Err(lines.refuse(reading, line, expected.to_owned()));
     };
     // The last line may have no end. A vertex takes three digits with a separator each, a face at least one.
     let left = lines.left() + 1;
     for (what, count, bytes) in [("vertices", vertices as u64, 6), ("faces", faces as u64, 2)] {
         let needed = count.saturating_mul(bytes);
-        IoError::check_promise(reading.path, place.clone(), (count, what), needed, left)?;
+        IoError::check_promise(reading.path, lines.place(), (count, what), needed, left)?;
     }
     Ok((line, vertices, faces))
-}
-
-fn next(
-    reading: &Reading<'_>,
-    lines: &mut Lines<'_>,
-    expected: impl Fn() -> String,
-) -> Result<String, IoError> {
-    let line = lines.next_without_comment();
-    line.ok_or_else(|| reading.refuse(Place::Line(lines.number()), END_OF_FILE, expected()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
     use crate::mesh::tests::reading;
 
     fn read(text: &str) -> Result<RawMesh, IoError> {

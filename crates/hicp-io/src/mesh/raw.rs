@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh};
+use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh, Vector3};
 
 use super::polygon;
-use crate::error::{END_OF_FILE, IoError, Place};
+use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
 use crate::unit::LengthUnit;
 
@@ -42,54 +42,60 @@ impl Reading<'_> {
         let expected = format!("finite coordinates within ±{MAX_COORDINATE_METERS} m (in {unit})");
         Err(self.refuse(place, format!("the position {position:?}"), expected))
     }
-
-    /// Returns a corner of a face; refuses an index that is not one of so many vertices.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the range is checked"
-    )]
-    pub(super) fn corner(
-        &self,
-        place: Place,
-        face: usize,
-        index: f64,
-        vertices: usize,
-    ) -> Result<u32, IoError> {
-        if index >= 0.0 && index < vertices as f64 {
-            return Ok(index as u32);
-        }
-        let expected = match vertices.checked_sub(1) {
-            None => "no face, because there are no vertices".to_owned(),
-            Some(last) => format!("vertices from 0 to {last}"),
-        };
-        Err(self.refuse(place, format!("vertex {index} in face {face}"), expected))
-    }
 }
 
 /// A mesh in the unit of its file.
 #[derive(Debug)]
 pub(crate) struct RawMesh {
-    pub(super) vertices: Vec<Point3<f64>>,
+    pub(crate) vertices: Vec<Point3<f64>>,
+    /// The normals of a point cloud.
+    pub(crate) normals: Vec<Vector3<f64>>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// If there are no faces, where they are expected, what is there, and what is expected.
-    pub(super) end: Place,
-    pub(super) found: String,
-    pub(super) expected: &'static str,
-    /// What cutting polygons may still cost.
+    /// The error if there are no triangles.
+    pub(super) empty: IoError,
+    /// The steps that cutting polygons may still cost.
     pub(super) clipping_budget: u64,
 }
 
+/// The expected text of a file without triangles.
+pub(super) const FACE: &str = "a face of three corners or more";
+
 impl RawMesh {
-    pub(super) fn new(end: Place) -> Self {
+    pub(super) fn new(empty: IoError) -> Self {
         Self {
             vertices: Vec::new(),
+            normals: Vec::new(),
             triangles: Vec::new(),
-            end,
-            found: END_OF_FILE.to_owned(),
-            expected: "a face of three corners or more",
+            empty,
             clipping_budget: polygon::CLIPPING_BUDGET,
         }
+    }
+
+    /// Adds a face by its corners, counted from 0; refuses a corner that is not a vertex. Messages name the number of the face.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the range is checked"
+    )]
+    pub(super) fn add_numbered_face(
+        &mut self,
+        reading: &Reading<'_>,
+        place: Place,
+        face: usize,
+        corners: &[f64],
+    ) -> Result<(), IoError> {
+        let count = self.vertices.len();
+        let mut indices = corners.iter();
+        if let Some(index) = indices.find(|index| !(0.0..count as f64).contains(*index)) {
+            let expected = match count.checked_sub(1) {
+                None => "no face, because there are no vertices".to_owned(),
+                Some(last) => format!("vertices from 0 to {last}"),
+            };
+            let found = format!("vertex {index} in face {face}");
+            return Err(reading.refuse(place, found, expected));
+        }
+        let corners: Vec<u32> = corners.iter().map(|index| *index as u32).collect();
+        self.add_face(reading, place, &corners)
     }
 
     /// Adds a face. Its corners must be vertices that are there.
@@ -119,9 +125,7 @@ impl RawMesh {
         let mesh = TriMesh::new(vertices.collect(), self.triangles);
         mesh.map_err(|error| {
             let expected = match error {
-                MeshError::NoTriangles { .. } => {
-                    return reading.refuse(self.end, self.found, self.expected);
-                }
+                MeshError::NoTriangles { .. } => return self.empty,
                 MeshError::NoArea { .. } => "a triangle that has an area",
                 _ => "a usable one",
             };

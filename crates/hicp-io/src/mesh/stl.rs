@@ -1,11 +1,11 @@
 //! STL, ASCII and binary.
 //!
 //! Parsed here because other readers stop at the first `endsolid`, refuse `solid` without a name and facet normals that are
-//! not finite, take binary files for text by the first word of their header, and do not say where a file is broken. All of
-//! these occur in files that people have. Normals are not read: the winding says the same.
+//! not finite, take binary files for text by the first word of their header, and do not report where a file is broken. All of
+//! these occur in files that people have. Normals are not read: the winding of the corners gives them.
 
 use super::lines::Lines;
-use super::raw::{RawMesh, Reading};
+use super::raw::{FACE, RawMesh, Reading};
 use super::weld::Welder;
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
@@ -13,9 +13,9 @@ use crate::source::text_bytes;
 
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
-/// Where a binary file says how many triangles it has.
+/// The place of the number of triangles in a binary file.
 const COUNT: Place = Place::Byte(80);
-/// What is expected where a file is neither text nor binary.
+/// The expected text of a file that is neither text nor binary.
 const START: &str = "`solid`, or a binary header of 84 bytes";
 
 /// Refuses a binary file by its header, if it has the triangles that it promises and they are too many.
@@ -28,7 +28,7 @@ pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Resu
 
 /// Parses an STL file; vertices at the same position become one.
 pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    // By size first: any 80 bytes may start a binary file, `solid` and what looks like UTF-16 among them.
+    // By size first: any 80 bytes may start a binary file, `solid` and bytes that look like UTF-16 among them.
     if triangle_count(&content).is_some_and(|count| fits(count, content.len() as u64)) {
         return parse_binary(reading, &content);
     }
@@ -39,10 +39,9 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
         filled if filled.len() > HEADER_BYTES => filled,
         _ => text,
     };
-    if is_text(text) {
-        parse_ascii(reading, text)
-    } else {
-        parse_binary(reading, &content)
+    match is_text(text) {
+        true => parse_ascii(reading, &String::from_utf8_lossy(text)),
+        false => parse_binary(reading, &content),
     }
 }
 
@@ -56,8 +55,8 @@ fn is_text(content: &[u8]) -> bool {
 }
 
 fn triangle_count(content: &[u8]) -> Option<u32> {
-    let bytes = content.get(HEADER_BYTES - 4..HEADER_BYTES)?;
-    Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    let bytes = content[..content.len().min(HEADER_BYTES)].last_chunk()?;
+    (content.len() >= HEADER_BYTES).then_some(u32::from_le_bytes(*bytes))
 }
 
 /// Returns whether a file has the bytes of a binary one: a few bytes of padding are harmless, another triangle is not.
@@ -73,13 +72,8 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
     };
     let body = &content[HEADER_BYTES..];
     let (needed, left) = (u64::from(count) * TRIANGLE_BYTES as u64, body.len() as u64);
-    IoError::check_promise(
-        reading.path,
-        COUNT,
-        (count.into(), "triangles"),
-        needed,
-        left,
-    )?;
+    let promise = (count.into(), "triangles");
+    IoError::check_promise(reading.path, COUNT, promise, needed, left)?;
     let there = body.len() / TRIANGLE_BYTES;
     let found = format!("a count of {count} triangles");
     if there > count as usize {
@@ -87,19 +81,21 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
         return Err(reading.refuse(COUNT, found, expected));
     }
     reading.check(Limit::Triangles, COUNT, there)?;
-    let mut mesh = RawMesh::new(COUNT);
-    mesh.found = found;
+    let mut mesh = RawMesh::new(reading.refuse(COUNT, found, FACE));
     mesh.triangles.reserve_exact(there);
     let mut welder = Welder::default();
-    for (number, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
+    for (start, triangle) in (HEADER_BYTES..)
+        .step_by(TRIANGLE_BYTES)
+        .zip(body.chunks_exact(TRIANGLE_BYTES))
+    {
         let mut corners = [0; 3];
         // The normal comes first.
-        for (corner, index) in (1..).zip(&mut corners) {
+        for (offset, index) in [12, 24, 36].into_iter().zip(&mut corners) {
             let position = [0, 4, 8].map(|axis| {
-                let bytes = &triangle[12 * corner + axis..];
+                let bytes = &triangle[offset + axis..];
                 f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
             });
-            let place = Place::Byte((HEADER_BYTES + number * TRIANGLE_BYTES + 12 * corner) as u64);
+            let place = Place::Byte((start + offset) as u64);
             *index = welder.add(reading, place, position, &mut mesh.vertices)?;
         }
         mesh.triangles.push(corners);
@@ -107,9 +103,13 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
     Ok(mesh)
 }
 
-fn parse_ascii(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
-    let mut words = Words::new(reading, content);
-    let mut mesh = RawMesh::new(Place::Line(1));
+fn parse_ascii(reading: &Reading<'_>, text: &str) -> Result<RawMesh, IoError> {
+    let mut words = Words {
+        reading,
+        lines: Lines::new(text),
+        rest: "",
+    };
+    let mut mesh = RawMesh::new(reading.refuse(Place::Line(1), END_OF_FILE, FACE));
     let mut welder = Welder::default();
     words.expect("solid", START)?;
     words.skip_name();
@@ -120,11 +120,7 @@ fn parse_ascii(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError
             open = true;
             let corners = parse_facet(&mut words, &mut mesh, &mut welder)?;
             mesh.triangles.push(corners);
-            reading.check(
-                Limit::Triangles,
-                Place::Line(word.line),
-                mesh.triangles.len(),
-            )?;
+            reading.check(Limit::Triangles, word.place, mesh.triangles.len())?;
         } else if word.is("solid") || word.is("endsolid") {
             open = word.is("solid");
             words.skip_name();
@@ -135,67 +131,76 @@ fn parse_ascii(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError
     if open {
         return Err(words.refuse(None, "`endsolid`"));
     }
-    mesh.end = Place::Line(words.lines.number());
+    mesh.empty = words.refuse(None, FACE);
     Ok(mesh)
 }
 
-/// Parses what follows `facet`.
+/// The keywords that follow `facet`, and the expected texts.
+const FACET: [(&str, &str); 8] = [
+    ("normal", "`normal` and three components"),
+    ("outer", "`outer loop`"),
+    ("loop", "`outer loop`"),
+    (
+        "vertex",
+        "the first `vertex` of three and its three numbers",
+    ),
+    (
+        "vertex",
+        "the second `vertex` of three and its three numbers",
+    ),
+    (
+        "vertex",
+        "the third `vertex` of three and its three numbers",
+    ),
+    ("endloop", "`endloop` after three vertices"),
+    ("endfacet", "`endfacet`"),
+];
+
+/// Parses the words after `facet`.
 fn parse_facet(
     words: &mut Words<'_>,
     mesh: &mut RawMesh,
     welder: &mut Welder,
 ) -> Result<[u32; 3], IoError> {
-    let normal = "`normal` and three components";
-    words.expect("normal", normal)?;
-    for _ in 0..3 {
-        // Some programs write what C prints for a normal without a direction: any word will do, but the next keyword.
-        match words.next() {
-            Some(component) if !component.is("outer") => {}
-            other => return Err(words.refuse(other, normal)),
+    let (mut corners, mut corner) = ([0; 3], 0);
+    for (keyword, expected) in FACET {
+        let word = words.expect(keyword, expected)?;
+        match keyword {
+            "normal" => {
+                // Some programs write any words for a normal without a direction.
+                for _ in 0..3 {
+                    match words.next() {
+                        Some(component) if !component.is("outer") => {}
+                        other => return Err(words.refuse(other, expected)),
+                    }
+                }
+            }
+            "vertex" => {
+                let mut position = [0.0; 3];
+                for value in &mut position {
+                    let number = words.next().and_then(|word| word.text.parse().ok());
+                    *value = number.ok_or_else(|| words.refuse(Some(word.clone()), expected))?;
+                }
+                corners[corner] =
+                    welder.add(words.reading, word.place, position, &mut mesh.vertices)?;
+                corner += 1;
+            }
+            _ => {}
         }
     }
-    words.expect("outer", "`outer loop`")?;
-    words.expect("loop", "`outer loop`")?;
-    let mut corners = [0; 3];
-    for (index, which) in corners.iter_mut().zip(["first", "second", "third"]) {
-        let expected = format!("the {which} `vertex` of three and its three numbers");
-        let word = words.expect("vertex", &expected)?;
-        let mut position = [0.0; 3];
-        for value in &mut position {
-            let number = words.next().and_then(|word| word.number());
-            *value = number.ok_or_else(|| words.refuse(Some(word), &expected))?;
-        }
-        *index = welder.add(
-            words.reading,
-            Place::Line(word.line),
-            position,
-            &mut mesh.vertices,
-        )?;
-    }
-    words.expect("endloop", "`endloop` after three vertices")?;
-    words.expect("endfacet", "`endfacet`")?;
     Ok(corners)
 }
 
-/// The words of a text: to this format a line end is a space like any other, but behind a name.
+/// The words of a text. In this format a line end is a space like any other, except after a name.
 #[derive(Clone, Debug)]
 struct Words<'a> {
     reading: &'a Reading<'a>,
     lines: Lines<'a>,
-    /// What is left of the last line taken.
-    rest: &'a [u8],
+    /// The rest of the last line taken.
+    rest: &'a str,
 }
 
 impl<'a> Words<'a> {
-    fn new(reading: &'a Reading<'a>, content: &'a [u8]) -> Self {
-        let lines = Lines::new(content);
-        Self {
-            reading,
-            lines,
-            rest: &[],
-        }
-    }
-
     fn next(&mut self) -> Option<Word<'a>> {
         loop {
             if let Some(word) = self.next_of_line() {
@@ -206,19 +211,14 @@ impl<'a> Words<'a> {
     }
 
     fn next_of_line(&mut self) -> Option<Word<'a>> {
-        let from = self.rest.iter().position(|byte| !is_space(*byte))?;
-        let from = &self.rest[from..];
-        let end = from.iter().position(|byte| is_space(*byte));
-        let (text, rest) = from.split_at(end.unwrap_or(from.len()));
-        self.rest = rest;
-        Some(Word {
-            text,
-            from,
-            line: self.lines.number(),
-        })
+        let from = self.rest.trim_start();
+        let text = from.split_whitespace().next()?;
+        self.rest = &from[text.len()..];
+        let place = self.lines.place();
+        Some(Word { text, from, place })
     }
 
-    /// Skips the rest of the line, which is a name, up to a facet or `endsolid` that some programs write behind it.
+    /// Skips the rest of the line, which is a name, up to a facet or `endsolid` that some programs write after it.
     fn skip_name(&mut self) {
         let mut ahead = self.clone();
         while let Some(word) = ahead.next_of_line() {
@@ -240,35 +240,24 @@ impl<'a> Words<'a> {
 
     /// Returns the error for a word, or for the end of the file.
     fn refuse(&self, found: Option<Word<'_>>, expected: &str) -> IoError {
-        let (line, found) = match found {
-            Some(word) => (word.line, quote(&String::from_utf8_lossy(word.from))),
-            None => (self.lines.number(), END_OF_FILE.to_owned()),
-        };
-        self.reading.refuse(Place::Line(line), found, expected)
+        let end = || (self.lines.place(), END_OF_FILE.to_owned());
+        let (place, found) = found.map_or_else(end, |word| (word.place, quote(word.from)));
+        self.reading.refuse(place, found, expected)
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Word<'a> {
-    text: &'a [u8],
-    /// The rest of its line, from it on.
-    from: &'a [u8],
-    line: usize,
+    text: &'a str,
+    /// The rest of its line, starting with it.
+    from: &'a str,
+    place: Place,
 }
 
 impl Word<'_> {
     fn is(&self, keyword: &str) -> bool {
-        self.text.eq_ignore_ascii_case(keyword.as_bytes())
+        self.text.eq_ignore_ascii_case(keyword)
     }
-
-    fn number(&self) -> Option<f64> {
-        std::str::from_utf8(self.text).ok()?.parse().ok()
-    }
-}
-
-/// White space of the C library, except for line ends.
-fn is_space(byte: u8) -> bool {
-    matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@ use crate::source::text_bytes;
 /// The longest header that is read. Its elements take a multiple of its size, so the size of the file is not a bound.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// The properties of a vertex that are read: its position and its normal.
-pub(crate) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+/// The properties of a vertex that are read, by slot: its position and its normal.
+const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -19,54 +19,61 @@ pub(super) enum Encoding {
 }
 
 /// A type of numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
+#[derive(Debug)]
+pub(super) struct Scalar {
+    names: [&'static str; 2],
+    pub(super) bytes: usize,
+    /// Returns the number that the first bytes state, in little-endian order.
+    pub(super) number: fn([u8; 8]) -> f64,
 }
+
+const fn scalar(names: [&'static str; 2], bytes: usize, number: fn([u8; 8]) -> f64) -> Scalar {
+    Scalar {
+        names,
+        bytes,
+        number,
+    }
+}
+
+static SCALARS: [Scalar; 8] = [
+    scalar(["char", "int8"], 1, |[a, ..]| i8::from_le_bytes([a]).into()),
+    scalar(["uchar", "uint8"], 1, |[a, ..]| a.into()),
+    scalar(["short", "int16"], 2, |[a, b, ..]| {
+        i16::from_le_bytes([a, b]).into()
+    }),
+    scalar(["ushort", "uint16"], 2, |[a, b, ..]| {
+        u16::from_le_bytes([a, b]).into()
+    }),
+    scalar(["int", "int32"], 4, |[a, b, c, d, ..]| {
+        i32::from_le_bytes([a, b, c, d]).into()
+    }),
+    scalar(["uint", "uint32"], 4, |[a, b, c, d, ..]| {
+        u32::from_le_bytes([a, b, c, d]).into()
+    }),
+    scalar(["float", "float32"], 4, |[a, b, c, d, ..]| {
+        f32::from_le_bytes([a, b, c, d]).into()
+    }),
+    scalar(["double", "float64"], 8, f64::from_le_bytes),
+];
 
 impl Scalar {
-    fn parse(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
+    fn parse(name: &str) -> Result<&'static Self, String> {
+        let scalar = SCALARS.iter().find(|scalar| scalar.names.contains(&name));
+        scalar.ok_or_else(grammar)
     }
 
-    pub(super) fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
-    }
-
-    pub(super) fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
+    pub(super) fn is_integer(&self) -> bool {
+        !self.names[1].starts_with("float")
     }
 }
 
-/// What each element of a kind states: a number, or a list of numbers.
+/// A value of each element of a kind: a number, or a list of numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Property {
     pub(super) name: String,
-    /// Of a list, the type of its length.
-    pub(super) count: Option<Scalar>,
-    pub(super) scalar: Scalar,
+    /// The type of the length of a list.
+    pub(super) count: Option<&'static Scalar>,
+    pub(super) scalar: &'static Scalar,
     line: usize,
 }
 
@@ -81,62 +88,53 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Returns the name under which a property is read, if it is.
-    pub(super) fn read_name(&self, property: &Property) -> Option<&'static str> {
-        match (self.name.as_str(), property.name.as_str(), property.count) {
-            ("vertex", name, None) => VERTEX_NAMES.into_iter().find(|known| *known == name),
-            ("face", "vertex_indices" | "vertex_index", Some(_)) => Some("vertex_indices"),
+    /// Returns the slot of a property that can be read: the axis of a vertex or its normal, or 0 for the corners of a face.
+    pub(super) fn slot(&self, property: &Property) -> Option<usize> {
+        match (&*self.name, &*property.name, property.count) {
+            ("vertex", name, None) => VERTEX_NAMES.iter().position(|known| *known == name),
+            ("face", "vertex_indices" | "vertex_index", Some(_)) => Some(0),
             _ => None,
         }
     }
 
-    /// Refuses elements without the properties that they cannot do without.
-    pub(super) fn require(
-        &self,
-        path: &Path,
-        needed: &[&str],
-        expected: &str,
-    ) -> Result<(), IoError> {
-        let read = |name| {
-            self.properties
-                .iter()
-                .any(|p| self.read_name(p) == Some(name))
-        };
-        if self.count == 0 || needed.iter().all(|name| read(*name)) {
+    /// Refuses elements without the properties of the first slots.
+    pub(super) fn require(&self, path: &Path, slots: usize, expected: &str) -> Result<(), IoError> {
+        let properties = &self.properties;
+        let has = |slot| properties.iter().any(|p| self.slot(p) == Some(slot));
+        if self.count == 0 || (0..slots).all(has) {
             return Ok(());
         }
-        let names: Vec<&str> = self.properties.iter().map(|p| p.name.as_str()).collect();
+        let names: Vec<&str> = properties.iter().map(|p| &*p.name).collect();
         let found = format!("an element `{}` with properties {names:?}", self.name);
         Err(IoError::new(path, Place::Line(self.line), found, expected))
     }
 
     fn declare(&mut self, property: Property) -> Result<(), String> {
-        if let Some(name) = self.read_name(&property) {
-            let same = |other: &&Property| self.read_name(other) == Some(name);
-            if let Some(Property { line, .. }) = self.properties.iter().find(same) {
+        if let Some(slot) = self.slot(&property) {
+            let mut others = self.properties.iter();
+            if let Some(first) = others.find(|other| self.slot(other) == Some(slot)) {
+                let (name, line) = (property.name, first.line);
                 return Err(format!(
                     "no second `{name}` of a {}: line {line} declares one",
                     self.name
                 ));
             }
-            if property
-                .count
-                .is_some_and(|count| !count.is_integer() || !property.scalar.is_integer())
-            {
-                return Err("integer types for the number of a face's corners and for each of them, as in `property list \
-                     uchar int vertex_indices`"
-                    .to_owned());
+            let is_integer = |count: &Scalar| count.is_integer() && property.scalar.is_integer();
+            if !property.count.is_none_or(is_integer) {
+                let expected = "integer types for the number of a face's corners and for each of them, \
+                    as in `property list uchar int vertex_indices`";
+                return Err(expected.to_owned());
             }
         }
         self.properties.push(property);
         Ok(())
     }
 
-    /// The bytes that an element takes at least.
+    /// Returns the bytes that an element takes at least.
     fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |p: &Property| match encoding {
             Encoding::Ascii => 2,
-            _ => p.count.unwrap_or(p.scalar).bytes() as u64,
+            _ => p.count.unwrap_or(p.scalar).bytes as u64,
         };
         self.properties.iter().map(least).sum::<u64>().max(1)
     }
@@ -164,23 +162,22 @@ impl Header {
         let (mut bytes, mut lines) = (content.len() - text.len(), 0);
         for line in text.split_inclusive(|byte| *byte == end) {
             (bytes, lines) = (bytes + line.len(), lines + 1);
-            // What is not a PLY file need not have lines.
+            // Other files need not have lines.
             let shown = quote(&String::from_utf8_lossy(&line[..line.len().min(256)]));
-            let refuse = |expected: &str| IoError::new(path, Place::Line(lines), &*shown, expected);
+            let refuse = |expected| IoError::new(path, Place::Line(lines), &*shown, expected);
             if lines == 1 && line.trim_ascii() != b"ply" {
-                return Err(refuse("`ply`"));
+                return Err(refuse("`ply`".to_owned()));
             }
             if bytes > MAX_HEADER_BYTES {
                 let expected = format!("`end_header` within the first {MAX_HEADER_BYTES} bytes");
-                return Err(refuse(&expected));
+                return Err(refuse(expected));
             }
             let line = String::from_utf8_lossy(line);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
-            let declared = declare(&words, lines, &mut encoding, &mut elements);
-            declared.map_err(|expected| refuse(&expected))?;
+            declare(&words, lines, &mut encoding, &mut elements).map_err(refuse)?;
             if words == ["end_header"] {
                 let expected = "a line `format ascii 1.0`, or another PLY format, before it";
-                let encoding = encoding.ok_or_else(|| refuse(expected))?;
+                let encoding = encoding.ok_or_else(|| refuse(expected.to_owned()))?;
                 let header = Self {
                     encoding,
                     elements,
@@ -212,60 +209,52 @@ impl Header {
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|element| element.name == name)
     }
-
-    /// Returns what is found instead of an element; their names are case-sensitive.
-    pub(super) fn names(&self) -> String {
-        let names: Vec<&str> = self.elements.iter().map(|e| e.name.as_str()).collect();
-        format!("the elements {names:?}")
-    }
 }
 
-/// Parses a line of a header; an error is what was expected instead.
+fn grammar() -> String {
+    "a line of a PLY 1.0 header".to_owned()
+}
+
+/// Parses a line of a header. The error is the expected text.
 fn declare(
     words: &[&str],
     line: usize,
     encoding: &mut Option<Encoding>,
     elements: &mut Vec<Element>,
 ) -> Result<(), String> {
-    let grammar = || "a line of a PLY 1.0 header".to_owned();
-    let scalar = |name: &str| Scalar::parse(name).ok_or_else(grammar);
-    let mut property = None;
-    match *words {
-        [] | ["ply" | "comment" | "obj_info", ..] | ["end_header"] => {}
-        ["format", "ascii", "1.0"] => *encoding = Some(Encoding::Ascii),
-        ["format", "binary_little_endian", "1.0"] => *encoding = Some(Encoding::LittleEndian),
-        ["format", "binary_big_endian", "1.0"] => *encoding = Some(Encoding::BigEndian),
+    let (name, count, scalar) = match *words {
+        ["format", format, "1.0"] => {
+            *encoding = Some(match format {
+                "ascii" => Encoding::Ascii,
+                "binary_little_endian" => Encoding::LittleEndian,
+                "binary_big_endian" => Encoding::BigEndian,
+                _ => return Err(grammar()),
+            });
+            return Ok(());
+        }
         ["element", name, count] => {
-            if let Some(first) = elements.iter().find(|element| element.name == name) {
-                let first = first.line;
+            if let Some(Element { line, .. }) = elements.iter().find(|e| e.name == name) {
                 return Err(format!(
-                    "no second element `{name}`: line {first} declares one"
+                    "no second element `{name}`: line {line} declares one"
                 ));
             }
-            let count = count.parse().map_err(|_| grammar())?;
-            let (name, properties) = (name.to_owned(), Vec::new());
             elements.push(Element {
-                name,
-                count,
-                properties,
+                name: name.to_owned(),
+                count: count.parse().map_err(|_| grammar())?,
+                properties: Vec::new(),
                 line,
             });
+            return Ok(());
         }
-        ["property", "list", count, kind, name] => {
-            property = Some((name, Some(scalar(count)?), scalar(kind)?));
-        }
-        ["property", kind, name] => property = Some((name, None, scalar(kind)?)),
+        ["property", "list", count, scalar, name] => (name, Some(count), scalar),
+        ["property", scalar, name] => (name, None, scalar),
+        [] | ["ply" | "comment" | "obj_info", ..] | ["end_header"] => return Ok(()),
         _ => return Err(grammar()),
-    }
-    let Some((name, count, scalar)) = property else {
-        return Ok(());
     };
-    let name = name.to_owned();
-    let element = elements.last_mut().ok_or_else(grammar)?;
-    element.declare(Property {
-        name,
-        count,
-        scalar,
+    elements.last_mut().ok_or_else(grammar)?.declare(Property {
+        name: name.to_owned(),
+        count: count.map(Scalar::parse).transpose()?,
+        scalar: Scalar::parse(scalar)?,
         line,
     })
 }
@@ -341,9 +330,9 @@ mod tests {
         let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n";
         let header = parse(text).unwrap();
         let vertex = header.element("vertex").unwrap();
-        let require = |names| vertex.require(Path::new("a"), names, "a position");
-        assert!(require(&["x", "y"]).is_ok());
-        let error = require(&["x", "z"]).unwrap_err();
+        let require = |slots| vertex.require(Path::new("a"), slots, "a position");
+        assert!(require(2).is_ok());
+        let error = require(3).unwrap_err();
         assert!(error.found.contains("properties [\"x\", \"y\"]"), "{error}");
     }
 

@@ -4,4 +4,4 @@ mod header;
 mod parse;
 mod rows;
 
-pub(crate) use parse::{check_head, parse_mesh, read_vertices};
+pub(crate) use parse::{check_head, parse_mesh, parse_points};

@@ -1,12 +1,12 @@
 //! PLY files into meshes and point clouds.
 
-use hicp_core::Point3;
+use hicp_core::{Point3, Vector3};
 
-use super::header::{Element, Header, Property, VERTEX_NAMES};
+use super::header::{Element, Encoding, Header};
 use super::rows::Rows;
 use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
-use crate::mesh::raw::{RawMesh, Reading};
+use crate::mesh::raw::{FACE, RawMesh, Reading};
 
 /// Refuses a file by its header, if it may have the elements that it promises and they are too many.
 ///
@@ -29,34 +29,60 @@ fn check_counts(reading: &Reading<'_>, header: &Header) -> Result<(), IoError> {
 
 /// Parses the vertices and faces of a PLY file.
 pub(crate) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let header = Header::parse(reading.path, &content, content.len() as u64)?;
+    parse(reading, &content, true)
+}
+
+/// Parses the vertices of a PLY file with their normals, which are NaN if the file has none.
+pub(crate) fn parse_points(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
+    parse(reading, content, false)
+}
+
+fn parse(reading: &Reading<'_>, content: &[u8], with_faces: bool) -> Result<RawMesh, IoError> {
+    let header = Header::parse(reading.path, content, content.len() as u64)?;
     check_counts(reading, &header)?;
     if let Some(Element {
         line, count: 1.., ..
     }) = header.element("tristrips")
+        && with_faces
     {
         return Err(reading.refuse(Place::Line(*line), "triangle strips", "an element `face`"));
     }
-    let vertex_line = vertices_of(reading, &header)?.line;
-    let mut mesh = without_faces(&header);
-    let mut rows = Rows::new(&content, &header);
+    // The names of elements are case-sensitive.
+    let names: Vec<&str> = header.elements.iter().map(|e| &*e.name).collect();
+    let names = format!("the elements {names:?}");
+    let end = Place::Line(header.lines);
+    let Some(vertex) = header.element("vertex") else {
+        return Err(reading.refuse(end, names, "an element `vertex`"));
+    };
+    vertex.require(reading.path, 3, "properties `x`, `y` and `z`")?;
+
+    const POINTS: &str = "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh";
+    let mut mesh = RawMesh::new(match header.element("face") {
+        None => reading.refuse(end, names, POINTS),
+        Some(Element { line, count, .. }) => {
+            let found = quote(&format!("element face {count}"));
+            let expected = if *count == 0 { POINTS } else { FACE };
+            reading.refuse(Place::Line(*line), found, expected)
+        }
+    });
+    let text = match header.encoding {
+        Encoding::Ascii => String::from_utf8_lossy(&content[header.bytes..]),
+        _ => "".into(),
+    };
+    let mut rows = Rows::new(content, &text, &header);
     // Faces may come before the vertices that they name.
     let mut early = None;
     for element in &header.elements {
-        match element.name.as_str() {
-            "vertex" => {
-                let vertices = &mut mesh.vertices;
-                let take = |[x, y, z]: [f64; 3]| vertices.push(Point3::new(x, y, z));
-                read_points(reading, &mut rows, element, take)?;
-            }
-            "face" if element.line > vertex_line => {
+        match &*element.name {
+            "vertex" => read_vertices(reading, &mut rows, element, with_faces, &mut mesh)?,
+            "face" if with_faces && element.line > vertex.line => {
                 read_faces(reading, &mut rows, element, &mut mesh)?;
             }
             name => {
-                if name == "face" {
+                if name == "face" && with_faces {
                     early = Some((rows.clone(), element));
                 }
-                rows.read(reading, element, |_| false, |_, _| Ok(()))?;
+                rows.read(reading, element, 0, |_, _| Ok(()))?;
             }
         }
     }
@@ -66,75 +92,28 @@ pub(crate) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawM
     Ok(mesh)
 }
 
-/// Parses the vertices of a PLY file: x, y, z and the normal nx, ny, nz; NaN where the file says nothing.
-pub(crate) fn read_vertices(
-    reading: &Reading<'_>,
-    content: &[u8],
-) -> Result<Vec<[f64; 6]>, IoError> {
-    let header = Header::parse(reading.path, content, content.len() as u64)?;
-    check_counts(reading, &header)?;
-    let vertex_line = vertices_of(reading, &header)?.line;
-    let mut vertices = Vec::new();
-    let mut rows = Rows::new(content, &header);
-    for element in &header.elements {
-        if element.line == vertex_line {
-            read_points(reading, &mut rows, element, |vertex| vertices.push(vertex))?;
-        } else {
-            rows.read(reading, element, |_| false, |_, _| Ok(()))?;
-        }
-    }
-    Ok(vertices)
-}
-
-fn vertices_of<'a>(reading: &Reading<'_>, header: &'a Header) -> Result<&'a Element, IoError> {
-    let place = Place::Line(header.lines);
-    let missing = || reading.refuse(place, header.names(), "an element `vertex`");
-    let element = header.element("vertex").ok_or_else(missing)?;
-    element.require(
-        reading.path,
-        &["x", "y", "z"],
-        "properties `x`, `y` and `z`",
-    )?;
-    Ok(element)
-}
-
-/// Creates a mesh that knows why it has no faces.
-fn without_faces(header: &Header) -> RawMesh {
-    let mut mesh = RawMesh::new(Place::Line(header.lines));
-    mesh.found = header.names();
-    mesh.expected = "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh";
-    if let Some(Element { line, count, .. }) = header.element("face") {
-        (mesh.end, mesh.found) = (Place::Line(*line), quote(&format!("element face {count}")));
-        mesh.expected = match count {
-            0 => "a face of three corners or more: vertices alone are a point cloud, no mesh",
-            _ => "a face of three corners or more among them",
-        };
-    }
-    mesh
-}
-
-/// Reads the first N of [`VERTEX_NAMES`] of every vertex.
-fn read_points<const N: usize>(
+fn read_vertices(
     reading: &Reading<'_>,
     rows: &mut Rows<'_>,
     element: &Element,
-    mut take: impl FnMut([f64; N]),
+    with_faces: bool,
+    mesh: &mut RawMesh,
 ) -> Result<(), IoError> {
-    let index_of = |property: &Property| {
-        let name = element.read_name(property);
-        VERTEX_NAMES[..N]
-            .iter()
-            .position(|known| name == Some(known))
-    };
-    let indices: Vec<usize> = element.properties.iter().filter_map(index_of).collect();
-    let is_kept = |property: &Property| index_of(property).is_some();
-    rows.read(reading, element, is_kept, |place, numbers| {
-        let mut vertex = [f64::NAN; N];
-        for (index, number) in indices.iter().zip(numbers) {
-            vertex[*index] = *number;
+    let slots = if with_faces { 3 } else { 6 };
+    let properties = element.properties.iter();
+    let order = properties.filter_map(|p| element.slot(p).filter(|slot| *slot < slots));
+    let order: Vec<usize> = order.collect();
+    rows.read(reading, element, slots, |place, numbers| {
+        let mut vertex = [f64::NAN; 6];
+        for (slot, number) in order.iter().zip(numbers) {
+            vertex[*slot] = *number;
         }
-        reading.check_position(place, &vertex[..3])?;
-        take(vertex);
+        let [x, y, z, nx, ny, nz] = vertex;
+        reading.check_position(place, &[x, y, z])?;
+        mesh.vertices.push(Point3::new(x, y, z));
+        if !with_faces {
+            mesh.normals.push(Vector3::new(nx, ny, nz));
+        }
         Ok(())
     })
 }
@@ -146,16 +125,11 @@ fn read_faces(
     mesh: &mut RawMesh,
 ) -> Result<(), IoError> {
     let needed = "a list property `vertex_indices` or `vertex_index`";
-    element.require(reading.path, &["vertex_indices"], needed)?;
-    let (mut face, mut corners) = (0, Vec::new());
-    let is_kept = |property: &Property| element.read_name(property).is_some();
-    rows.read(reading, element, is_kept, |place, indices| {
-        corners.clear();
-        for index in indices {
-            corners.push(reading.corner(place.clone(), face, *index, mesh.vertices.len())?);
-        }
+    element.require(reading.path, 1, needed)?;
+    let mut face = 0;
+    rows.read(reading, element, 1, |place, corners| {
         face += 1;
-        mesh.add_face(reading, place, &corners)
+        mesh.add_numbered_face(reading, place, face - 1, corners)
     })
 }
 

@@ -7,10 +7,15 @@ use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::mesh::lines::Lines;
 use crate::mesh::raw::Reading;
 
-/// The rest of a file: a line per element, or bytes.
+/// The rest of a file.
 #[derive(Clone)]
 pub(super) enum Rows<'a> {
-    Ascii(Lines<'a>),
+    /// A line per element: the current line, and its words that are not read yet.
+    Ascii {
+        lines: Lines<'a>,
+        line: &'a str,
+        words: SplitAsciiWhitespace<'a>,
+    },
     Binary {
         rest: &'a [u8],
         file_bytes: usize,
@@ -19,93 +24,80 @@ pub(super) enum Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    pub(super) fn new(content: &'a [u8], header: &Header) -> Self {
-        let rest = &content[header.bytes..];
+    /// Starts at the end of a header; `text` is the rest of the file if it is text.
+    pub(super) fn new(content: &'a [u8], text: &'a str, header: &Header) -> Self {
         match header.encoding {
-            Encoding::Ascii => Self::Ascii(Lines::after(header.lines, rest)),
+            Encoding::Ascii => Self::Ascii {
+                lines: Lines::after(header.lines, text),
+                line: "",
+                words: "".split_ascii_whitespace(),
+            },
             encoding => Self::Binary {
-                rest,
+                rest: &content[header.bytes..],
                 file_bytes: content.len(),
                 big_endian: encoding == Encoding::BigEndian,
             },
         }
     }
 
-    /// Reads all elements of a kind. Passes the place of each to `take`, and the numbers that are kept.
+    /// Reads all elements of a kind. Calls `take` with the place of each and the numbers of the properties in the first slots.
     pub(super) fn read(
         &mut self,
         reading: &Reading<'_>,
         element: &Element,
-        keep: impl Fn(&Property) -> bool,
+        slots: usize,
         mut take: impl FnMut(Place, &[f64]) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
-        let properties: Vec<_> = element.properties.iter().map(|p| (p, keep(p))).collect();
+        let is_kept = |p| element.slot(p).is_some_and(|slot| slot < slots);
+        let properties: Vec<_> = element.properties.iter().map(|p| (p, is_kept(p))).collect();
         let mut numbers = Vec::new();
         for row in 0..element.count {
             numbers.clear();
-            let place = match self {
-                Self::Ascii(lines) => {
-                    let is_blank = |line: &[u8]| line.trim_ascii().is_empty();
-                    let Some(line) = lines.find(|line| !is_blank(line)) else {
-                        let (count, name) = (element.count, &element.name);
-                        let expected =
-                            format!("{count} elements `{name}`, of which {row} are there");
-                        return Err(reading.refuse(
-                            Place::Line(lines.number()),
-                            END_OF_FILE,
-                            expected,
-                        ));
-                    };
-                    let place = Place::Line(lines.number());
-                    // What is not text is not a number either.
-                    let line = std::str::from_utf8(line).unwrap_or("not text");
-                    let mut words = line.split_ascii_whitespace();
-                    for (property, kept) in &properties {
-                        let next = |scalar, kept| next_word(&mut words, scalar, kept);
-                        if property.read(*kept, &mut numbers, next).is_none() {
-                            let expected = property.expected(element, *kept);
-                            return Err(reading.refuse(place, quote(line), expected));
-                        }
-                    }
-                    place
+            let place = self.start();
+            for (property, kept) in &properties {
+                if self.property(property, *kept, &mut numbers).is_some() {
+                    continue;
                 }
-                Self::Binary {
-                    rest,
-                    file_bytes,
-                    big_endian,
-                } => {
-                    let place = Place::Byte((*file_bytes - rest.len()) as u64);
-                    for (property, kept) in &properties {
-                        let next = |scalar, _| next_bytes(rest, scalar, *big_endian);
-                        if property.read(*kept, &mut numbers, next).is_none() {
-                            let (count, name) = (element.count, &element.name);
-                            let expected = format!("element {row} of {count} elements `{name}`");
-                            return Err(reading.refuse(place, END_OF_FILE, expected));
-                        }
+                let (count, name) = (element.count, &element.name);
+                let (found, expected) = match self {
+                    Self::Ascii { line, .. } if !line.is_empty() => {
+                        (quote(line), property.expected(name, *kept))
                     }
-                    place
-                }
-            };
+                    _ => {
+                        let expected = format!("element {row} of {count} elements `{name}`");
+                        (END_OF_FILE.to_owned(), expected)
+                    }
+                };
+                return Err(reading.refuse(place, found, expected));
+            }
             take(place, &numbers)?;
         }
         Ok(())
     }
-}
 
-impl Property {
-    /// Reads the property of one element; `next` returns the next number, which is of no interest if it is not kept.
-    fn read(
-        &self,
-        kept: bool,
-        numbers: &mut Vec<f64>,
-        mut next: impl FnMut(Scalar, bool) -> Option<f64>,
-    ) -> Option<()> {
-        let mut left = match self.count {
-            Some(count) => next(count, true).filter(|count| *count >= 0.0)?,
+    /// Starts the next element, and returns its place. At the end of a text, the line is empty.
+    fn start(&mut self) -> Place {
+        match self {
+            Self::Ascii { lines, line, words } => {
+                let next = lines.find(|line| !line.trim_ascii().is_empty());
+                *line = next.unwrap_or_default();
+                *words = line.split_ascii_whitespace();
+                lines.place()
+            }
+            Self::Binary {
+                rest, file_bytes, ..
+            } => Place::Byte((*file_bytes - rest.len()) as u64),
+        }
+    }
+
+    /// Reads a property of the current element.
+    fn property(&mut self, property: &Property, kept: bool, numbers: &mut Vec<f64>) -> Option<()> {
+        let mut left = match property.count {
+            Some(count) => self.number(count, true).filter(|count| *count >= 0.0)?,
             None => 1.0,
         };
         while left >= 1.0 {
-            let number = next(self.scalar, kept)?;
+            let number = self.number(property.scalar, kept)?;
             if kept {
                 numbers.push(number);
             }
@@ -114,7 +106,35 @@ impl Property {
         Some(())
     }
 
-    fn expected(&self, element: &Element, kept: bool) -> String {
+    fn number(&mut self, scalar: &Scalar, kept: bool) -> Option<f64> {
+        match self {
+            Self::Ascii { words, .. } => {
+                let word = words.next()?;
+                match scalar.is_integer() {
+                    // A number that is not kept may be any word: exporters write what does not fit the type.
+                    _ if !kept => Some(0.0),
+                    true => word.parse::<i64>().ok().map(|integer| integer as f64),
+                    false => word.parse().ok(),
+                }
+            }
+            Self::Binary {
+                rest, big_endian, ..
+            } => {
+                let (bytes, others) = rest.split_at_checked(scalar.bytes)?;
+                *rest = others;
+                let mut little = [0; 8];
+                little[..bytes.len()].copy_from_slice(bytes);
+                if *big_endian {
+                    little[..bytes.len()].reverse();
+                }
+                Some((scalar.number)(little))
+            }
+        }
+    }
+}
+
+impl Property {
+    fn expected(&self, element: &str, kept: bool) -> String {
         let form = match (self.count, kept) {
             (None, false) => "a word",
             (None, true) if self.scalar.is_integer() => "an integer",
@@ -122,42 +142,8 @@ impl Property {
             (Some(_), false) => "a count and that many words",
             (Some(_), true) => "a count and that many integers",
         };
-        format!(
-            "property `{}` of element `{}` as {form}",
-            self.name, element.name
-        )
+        format!("property `{}` of element `{element}` as {form}", self.name)
     }
-}
-
-/// Parses the next word. A word that is not kept may say anything: exporters write what does not fit the type.
-fn next_word(words: &mut SplitAsciiWhitespace<'_>, scalar: Scalar, kept: bool) -> Option<f64> {
-    let word = words.next()?;
-    match (kept, scalar.is_integer()) {
-        (false, _) => Some(0.0),
-        (true, true) => word.parse::<i64>().ok().map(|integer| integer as f64),
-        (true, false) => word.parse().ok(),
-    }
-}
-
-fn next_bytes(rest: &mut &[u8], scalar: Scalar, big_endian: bool) -> Option<f64> {
-    let (bytes, others) = rest.split_at_checked(scalar.bytes())?;
-    *rest = others;
-    let mut little = [0; 8];
-    little[..bytes.len()].copy_from_slice(bytes);
-    if big_endian {
-        little[..bytes.len()].reverse();
-    }
-    let [a, b, c, d, ..] = little;
-    Some(match scalar {
-        Scalar::I8 => i8::from_le_bytes([a]).into(),
-        Scalar::U8 => a.into(),
-        Scalar::I16 => i16::from_le_bytes([a, b]).into(),
-        Scalar::U16 => u16::from_le_bytes([a, b]).into(),
-        Scalar::I32 => i32::from_le_bytes([a, b, c, d]).into(),
-        Scalar::U32 => u32::from_le_bytes([a, b, c, d]).into(),
-        Scalar::F32 => f32::from_le_bytes([a, b, c, d]).into(),
-        Scalar::F64 => f64::from_le_bytes(little),
-    })
 }
 
 #[cfg(test)]
