@@ -42,17 +42,28 @@ pub(crate) struct CameraRecord {
     pub(crate) translation_mm: Option<Numbers<3>>,
 }
 
-/// A calibration matrix in pixels, and the width and height of the images if stated.
-type Calibration = (Matrix3<f64>, Option<(u32, u32)>);
+/// A calibration matrix in pixels, the width and height of the images if stated, and the key of the matrix after a dot.
+type Calibration = (Matrix3<f64>, Option<(u32, u32)>, &'static str);
 
 impl CameraRecord {
-    /// Returns the calibration of `cam_K` or `cam_model`, if one of them is there.
-    pub(crate) fn calibration(&self) -> Result<Option<Calibration>, &'static str> {
-        match (&self.cam_k, &self.cam_model) {
-            (Some(_), Some(_)) => Err("`cam_K` and `cam_model`"),
-            (Some(Numbers(numbers)), None) => Ok(Some((Matrix3::from_row_slice(numbers), None))),
-            (None, Some(model)) => Ok(Some((model.matrix(), model.image_size()))),
-            (None, None) => Ok(None),
+    /// Returns the calibration. The error is the found and the expected text.
+    pub(crate) fn calibration(&self) -> Result<Calibration, (&'static str, &'static str)> {
+        let size = self.width.zip(self.height);
+        let flat = [self.fx, self.fy, self.cx, self.cy];
+        match (&self.cam_k, &self.cam_model, flat, size) {
+            (Some(_), Some(_), ..) => Err(("`cam_K` and `cam_model`", "one of them")),
+            (Some(Numbers(k)), None, ..) => Ok((Matrix3::from_row_slice(k), size, ".cam_K")),
+            (None, Some(model), ..) => {
+                Ok((model.matrix(), model.image_size().or(size), ".cam_model"))
+            }
+            (None, None, [Some(fx), Some(fy), Some(cx), Some(cy)], Some(_)) => {
+                let matrix = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+                Ok((matrix, size, ""))
+            }
+            _ => Err((
+                "an object without a camera",
+                "the key `cam_K` or `cam_model`, or all of `fx`, `fy`, `cx`, `cy`, `width` and `height`",
+            )),
         }
     }
 }
@@ -120,35 +131,16 @@ fn camera_of(
         IoError::new(path, Place::Field(format!("{key}{name}")), found, expected)
     };
     let calibration = record.calibration();
-    let calibration = calibration.map_err(|both| refuse(".cam_model", both, "one of them"))?;
-    let size = record.width.zip(record.height);
-    let sizes = [size, calibration.and_then(|(_, size)| size)];
-    if let Some((w, h)) = sizes.into_iter().flatten().find(|s| *s != (width, height)) {
+    let (matrix, size, name) =
+        calibration.map_err(|(found, expected)| refuse("", found, expected))?;
+    if let Some((w, h)) = size.filter(|size| *size != (width, height)) {
         let found = format!("a camera for {w}x{h} images");
         let error = refuse("", &found, &format!("one for {width}x{height}"));
         return Err(error.with_kind(IoErrorKind::CameraSize));
     }
-    let (name, camera) = match calibration {
-        Some((matrix, _)) => {
-            let name = record.cam_k.map_or(".cam_model", |_| ".cam_K");
-            (name, PinholeCamera::from_matrix(&matrix, width, height))
-        }
-        None => {
-            let intrinsics = [record.fx, record.fy, record.cx, record.cy];
-            let ([Some(fx), Some(fy), Some(cx), Some(cy)], Some(_)) = (intrinsics, size) else {
-                let expected = "the key `cam_K` or `cam_model`, or all of `fx`, `fy`, `cx`, `cy`, `width` and `height`";
-                return Err(refuse("", "an object without a camera", expected));
-            };
-            ("", PinholeCamera::new(fx, fy, cx, cy, width, height))
-        }
-    };
-    let camera = camera.map_err(|error| {
-        refuse(
-            name,
-            "numbers that are not a camera",
-            "those of a pinhole camera",
-        )
-        .with_source(error)
+    let camera = PinholeCamera::from_matrix(&matrix, width, height).map_err(|error| {
+        let (found, expected) = ("numbers that are not a camera", "those of a pinhole camera");
+        refuse(name, found, expected).with_source(error)
     })?;
     let depth_scale = record.depth_scale.map(|Positive(scale)| scale);
     Ok(CameraFile {
@@ -230,11 +222,10 @@ mod tests {
         );
         let (key, ..) = refused(&MODEL.replace("\"PinholePlane\"", "7"));
         assert_eq!(key, "$.cam_model.projection_model_type");
-        let (key, _, expected) = refused(&MODEL.replacen('{', &format!("{{{K}, "), 1));
-        assert_eq!(
-            (key.as_str(), expected.as_str()),
-            ("$.cam_model", "one of them")
-        );
+        let both = refused(&MODEL.replacen('{', &format!("{{{K}, "), 1));
+        let (key, found, expected) = both;
+        assert_eq!((&*key, &*expected), ("$", "one of them"));
+        assert_eq!(found, "`cam_K` and `cam_model`");
         assert!(matches!(
             read(&MODEL.replace("640", "1408")),
             Err(IoError { kind: IoErrorKind::CameraSize, found, .. })

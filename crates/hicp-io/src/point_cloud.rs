@@ -1,11 +1,9 @@
 //! Point clouds from and to PLY files.
 
-use std::io::Write;
 use std::path::Path;
 
 use hicp_core::{Point3, UnitVector3, Vector3};
 
-use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 use crate::mesh::ply;
@@ -63,7 +61,7 @@ pub fn read_point_cloud_ply(
 ///
 /// # Errors
 ///
-/// [`IoError`] if there is not one normal per point; otherwise as [`write_atomically`].
+/// [`IoError`] if there is not one normal per point; otherwise as [`write_atomically`](crate::write_atomically).
 pub fn write_point_cloud_ply(
     path: impl AsRef<Path>,
     points: &[Point3<f32>],
@@ -77,33 +75,14 @@ pub fn write_point_cloud_ply(
         let expected = format!("{}, one per point", points.len());
         return Err(IoError::new(path, None, found, expected));
     }
-    write_atomically(path, |writer| {
-        writeln!(
-            writer,
-            "ply\nformat binary_little_endian 1.0\ncomment units m"
-        )?;
-        writeln!(writer, "element vertex {}", points.len())?;
-        let names: &[&str] = match normals {
-            Some(_) => &["x", "y", "z", "nx", "ny", "nz"],
-            None => &["x", "y", "z"],
-        };
-        for name in names {
-            writeln!(writer, "property float {name}")?;
-        }
-        writeln!(writer, "end_header")?;
-        let put = |writer: &mut dyn Write, values: [f32; 3]| {
-            values
-                .iter()
-                .try_for_each(|value| writer.write_all(&value.to_le_bytes()))
-        };
-        for (index, point) in points.iter().enumerate() {
-            put(writer, (*point).into())?;
-            if let Some(normals) = normals {
-                put(writer, normals[index].into_inner().into())?;
-            }
-        }
-        Ok(())
-    })
+    let positions = points.iter().map(|p| [p.x, p.y, p.z]);
+    let Some(normals) = normals else {
+        return ply::write(path, LengthUnit::Meters, positions, None);
+    };
+    let with_normals = positions
+        .zip(normals)
+        .map(|([x, y, z], n)| [x, y, z, n.x, n.y, n.z]);
+    ply::write(path, LengthUnit::Meters, with_normals, None)
 }
 
 #[cfg(test)]

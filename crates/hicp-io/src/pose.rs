@@ -5,7 +5,7 @@ use std::path::Path;
 use hicp_core::{
     Isometry3, Matrix3, RotationError, Translation3, UnitQuaternion, rotation_from_matrix,
 };
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::Deserialize;
 
 use crate::error::IoError;
 use crate::json::{self, Numbers};
@@ -50,7 +50,8 @@ pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
 }
 
 /// A rotation of a JSON file, and the very numbers that state it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "Numbers<9>")]
 pub(crate) struct Rotation {
     numbers: [f64; 9],
     nearest: UnitQuaternion<f64>,
@@ -63,15 +64,13 @@ impl Rotation {
     }
 }
 
-impl<'de> Deserialize<'de> for Rotation {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Numbers(numbers) = Numbers::deserialize(deserializer)?;
+impl TryFrom<Numbers<9>> for Rotation {
+    type Error = String;
+
+    fn try_from(Numbers(numbers): Numbers<9>) -> Result<Self, String> {
         match rotation_from_matrix(&Matrix3::from_row_slice(&numbers)) {
             Ok(nearest) => Ok(Self { numbers, nearest }),
-            Err(error) => {
-                let text = format!("numbers that are not a rotation: {error}");
-                Err(D::Error::custom(text))
-            }
+            Err(error) => Err(format!("numbers that are not a rotation: {error}")),
         }
     }
 }
@@ -87,7 +86,7 @@ pub struct PoseFile {
     pub translation_mm: [f64; 3],
 }
 
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
 struct PoseRecord {
     #[serde(rename = "cam_R_m2c")]
     rotation: Rotation,

@@ -23,14 +23,10 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Metres in one of this unit.
+    /// Returns the meters in one of this unit.
     #[must_use]
     pub fn meters_per_unit(self) -> f64 {
-        match self {
-            Self::Meters => 1.0,
-            Self::Millimeters => 0.001,
-            Self::Centimeters => 0.01,
-        }
+        1.0 / self.units_per_meter()
     }
 
     /// Units in one metre: a whole number for every unit, so that converting by it rounds once.
@@ -57,14 +53,10 @@ impl FromStr for LengthUnit {
     type Err = UnknownUnit;
 
     fn from_str(text: &str) -> Result<Self, UnknownUnit> {
-        match text {
-            "m" => Ok(Self::Meters),
-            "mm" => Ok(Self::Millimeters),
-            "cm" => Ok(Self::Centimeters),
-            _ => Err(UnknownUnit {
-                found: text.to_owned(),
-            }),
-        }
+        let mut units = [Self::Meters, Self::Millimeters, Self::Centimeters].into_iter();
+        let found = text.to_owned();
+        let named = units.find(|unit| unit.to_string() == text);
+        named.ok_or(UnknownUnit { found })
     }
 }
 
@@ -90,6 +82,8 @@ mod tests {
             assert_eq!(unit.to_string().parse(), Ok(unit));
             assert_eq!(unit.meters_per_unit() * unit.units_per_meter(), 1.0);
         }
+        assert_eq!(LengthUnit::Millimeters.meters_per_unit(), 0.001);
+        assert_eq!(LengthUnit::Centimeters.meters_per_unit(), 0.01);
         let error = "inch".parse::<LengthUnit>().unwrap_err();
         assert_eq!(error.to_string(), r#"unit is "inch", expected m, mm or cm"#);
     }

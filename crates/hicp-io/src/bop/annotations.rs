@@ -20,7 +20,7 @@ use crate::source::is_absent;
 pub struct SceneCamera {
     /// Calibration matrix K, pixels; pixel centers at integers.
     pub matrix: Matrix3<f64>,
-    /// Width and height of its images, if stated: a `cam_model` may, a `cam_K` does not.
+    /// Width and height of its images, if stated.
     pub image_size: Option<(u32, u32)>,
     /// Millimeters per unit of the depth image, if stated.
     pub depth_scale: Option<f64>,
@@ -33,9 +33,8 @@ impl TryFrom<CameraRecord> for SceneCamera {
 
     fn try_from(record: CameraRecord) -> Result<Self, String> {
         let calibration = record.calibration();
-        let calibration = calibration.map_err(|both| format!("{both}, expected one of them"))?;
-        let (matrix, image_size) = calibration
-            .ok_or("no key `cam_K`, expected an object with the key `cam_K` or `cam_model`")?;
+        let (matrix, image_size, _) =
+            calibration.map_err(|(found, expected)| format!("{found}, expected {expected}"))?;
         let camera_from_world = match (&record.rotation, &record.translation_mm) {
             (None, None) => None,
             (Some(rotation), Some(translation)) => Some(rotation.with_translation(translation)),

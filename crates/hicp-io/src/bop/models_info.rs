@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::error::IoError;
 use crate::json::{self, ById, Numbers, Positive};
 use crate::limits::{Limit, ReadLimits};
-use crate::pose::pose_from_bop;
+use crate::pose::Rotation;
 
 /// What a dataset states about an object besides its mesh.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
@@ -71,10 +71,9 @@ impl TryFrom<Numbers<16>> for Motion {
             ));
         }
         let rotation = [m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]];
-        let motion = pose_from_bop(&rotation, &[m[3], m[7], m[11]]);
-        motion
-            .map(Self)
-            .map_err(|e| format!("numbers that are not a rotation: {e}"))
+        let translation_mm = Numbers([m[3], m[7], m[11]]);
+        let rotation = Rotation::try_from(Numbers(rotation))?;
+        Ok(Self(rotation.with_translation(&translation_mm)))
     }
 }
 

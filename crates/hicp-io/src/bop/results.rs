@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use csv::StringRecord;
+use hicp_core::RotationError;
 
 use super::result_row::{COLUMNS, ResultRow};
 use crate::atomic::write_atomically;
@@ -31,7 +32,7 @@ pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
 ///
 /// As [`read_results`].
 pub fn results_from_csv(content: &[u8], path: &Path) -> Result<Vec<ResultRow>, IoError> {
-    Table::new(path, content)?.rows(&ReadLimits::DEFAULT)
+    parse(&ReadLimits::DEFAULT, path, content)
 }
 
 impl ReadLimits {
@@ -42,7 +43,7 @@ impl ReadLimits {
     /// As [`read_results`].
     pub fn read_results(&self, path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
         let path = path.as_ref();
-        Table::new(path, &self.read_bytes(path)?)?.rows(self)
+        parse(self, path, &self.read_bytes(path)?)
     }
 }
 
@@ -73,134 +74,116 @@ pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), I
     })
 }
 
-/// The text of a result file.
-struct Table<'a> {
-    path: &'a Path,
-    text: &'a [u8],
+fn parse(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Vec<ResultRow>, IoError> {
+    let text = text_bytes(path, content)?;
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(text);
+    let (mut rows, mut header) = (Vec::new(), None);
+    for record in reader.records() {
+        // Rows of any length and bytes in memory leave one possible error.
+        let record = record.map_err(|error| {
+            let place = Place::Line(line_of(text, error.position()));
+            let expected = "comma-separated values in UTF-8";
+            IoError::new(path, place, "bytes that are not UTF-8", expected)
+        })?;
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
+        let Some((columns, fields)) = &header else {
+            header = Some((columns_of(path, &record)?, record.len()));
+            continue;
+        };
+        let line = || line_of(text, record.position());
+        if record.len() != *fields {
+            let found = format!("{} fields", record.len());
+            let expected = format!("{fields} as in the header");
+            return Err(IoError::new(path, Place::Line(line()), found, expected));
+        }
+        let row = row_of(&record, columns).map_err(|(column, source)| {
+            let (name, expected) = COLUMNS[column];
+            let place = Place::Field(format!("line {}, column {name:?}", line()));
+            let error = IoError::new(path, place, quote(cell(&record, columns, column)), expected);
+            match source {
+                None => error,
+                Some(source) => error.with_source(source),
+            }
+        });
+        rows.push(row?);
+        if rows.len() as u64 > limits.max_rows {
+            limits.check_rows(path, line(), rows.len() as u64)?;
+        }
+    }
+    if header.is_none() {
+        columns_of(path, &StringRecord::new())?;
+    }
+    Ok(rows)
 }
 
-impl<'a> Table<'a> {
-    fn new(path: &'a Path, content: &'a [u8]) -> Result<Self, IoError> {
-        let text = text_bytes(path, content)?;
-        Ok(Self { path, text })
-    }
-
-    fn rows(&self, limits: &ReadLimits) -> Result<Vec<ResultRow>, IoError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .has_headers(false)
-            .from_reader(self.text);
-        let mut rows = Vec::new();
-        let mut header = None;
-        for record in reader.records() {
-            // Rows of any length and bytes in memory leave one possible error.
-            let record = record.map_err(|error| {
-                let line = self.line_of(error.position());
-                self.refuse(
-                    line,
-                    "bytes that are not UTF-8",
-                    "comma-separated values in UTF-8",
-                )
-            })?;
-            if record.iter().all(str::is_empty) {
-                continue;
-            }
-            let line = || self.line_of(record.position());
-            let Some((columns, fields)) = &header else {
-                header = Some((self.columns(&record)?, record.len()));
-                continue;
-            };
-            if record.len() != *fields {
-                let found = format!("{} fields", record.len());
-                return Err(self.refuse(line(), found, format!("{fields} as in the header")));
-            }
-            rows.push(self.row(&record, columns)?);
-            if rows.len() as u64 > limits.max_rows {
-                limits.check_rows(self.path, line(), rows.len() as u64)?;
-            }
-        }
-        if header.is_none() {
-            self.columns(&StringRecord::new())?;
-        }
-        Ok(rows)
-    }
-
-    /// Returns the index of each of [`COLUMNS`].
-    fn columns(&self, header: &StringRecord) -> Result<[usize; 7], IoError> {
-        let mut columns = [0; 7];
-        for (column, (name, _)) in columns.iter_mut().zip(COLUMNS) {
-            *column = header
-                .iter()
-                .position(|found| found == name)
-                .unwrap_or_default();
-            let times = header.iter().filter(|found| *found == name).count();
-            if times != 1 {
-                let text = quote(&header.iter().collect::<Vec<_>>().join(","));
-                let found =
-                    format!("a header in which column {name:?} appears {times} times: {text}");
-                return Err(self.refuse(1, found, "it once"));
-            }
-        }
-        Ok(columns)
-    }
-
-    fn row(&self, record: &StringRecord, columns: &[usize; 7]) -> Result<ResultRow, IoError> {
-        let cell = |column: usize| record.get(columns[column]).unwrap_or_default();
-        let refuse = |column: usize| {
-            let (name, expected) = COLUMNS[column];
-            let line = self.line_of(record.position());
-            let place = Place::Field(format!("line {line}, column {name:?}"));
-            IoError::new(self.path, place, quote(cell(column)), expected)
-        };
-        let integer = |column| cell(column).parse().map_err(|_| refuse(column));
-        let number = |column| {
-            numbers(cell(column))
-                .map(|[x]| x)
-                .ok_or_else(|| refuse(column))
-        };
-        let rotation = numbers(cell(4)).ok_or_else(|| refuse(4))?;
-        let translation_mm = numbers(cell(5)).ok_or_else(|| refuse(5))?;
-        let camera_from_object = pose_from_bop(&rotation, &translation_mm)
-            .map_err(|error| refuse(4).with_source(error))?;
-        let time = number(6)?;
-        Ok(ResultRow {
-            scene_id: integer(0)?,
-            im_id: integer(1)?,
-            obj_id: integer(2)?,
-            score: number(3)?,
-            time_s: (time >= 0.0).then_some(time),
-            rotation,
-            translation_mm,
-            camera_from_object,
-        })
-    }
-
-    fn refuse(
-        &self,
-        line: usize,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> IoError {
-        IoError::new(self.path, Place::Line(line), found, expected)
-    }
-
-    /// Returns the line of a record, from 1. The position of the reader is in front of the blank lines before the record.
-    fn line_of(&self, position: Option<&csv::Position>) -> usize {
-        let start = position.map_or(0, |position| position.byte());
-        let (before, rest) = self.text.split_at(usize::try_from(start).unwrap_or(0));
-        let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
-        let end_of_line = if self.text.contains(&b'\n') {
-            b'\n'
-        } else {
-            b'\r'
-        };
-        1 + before
+/// Returns the index of each of [`COLUMNS`].
+fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError> {
+    let mut columns = [0; 7];
+    for (column, (name, _)) in columns.iter_mut().zip(COLUMNS) {
+        let found = header
             .iter()
-            .chain(blank)
-            .filter(|byte| **byte == end_of_line)
-            .count()
+            .enumerate()
+            .filter(|(_, found)| *found == name);
+        let found: Vec<usize> = found.map(|(index, _)| index).collect();
+        let [index] = found[..] else {
+            let text = quote(&header.iter().collect::<Vec<_>>().join(","));
+            let times = found.len();
+            let found = format!("a header in which column {name:?} appears {times} times: {text}");
+            return Err(IoError::new(path, Place::Line(1), found, "it once"));
+        };
+        *column = index;
     }
+    Ok(columns)
+}
+
+fn cell<'a>(record: &'a StringRecord, columns: &[usize; 7], column: usize) -> &'a str {
+    record.get(columns[column]).unwrap_or_default()
+}
+
+/// Parses a row. The error is the column at fault, and the reason if its numbers are not a rotation.
+fn row_of(
+    record: &StringRecord,
+    columns: &[usize; 7],
+) -> Result<ResultRow, (usize, Option<RotationError>)> {
+    let integer = |column| {
+        cell(record, columns, column)
+            .parse()
+            .map_err(|_| (column, None))
+    };
+    let rotation = numbers(cell(record, columns, 4)).ok_or((4, None))?;
+    let translation_mm = numbers(cell(record, columns, 5)).ok_or((5, None))?;
+    let [score] = numbers(cell(record, columns, 3)).ok_or((3, None))?;
+    let [time] = numbers(cell(record, columns, 6)).ok_or((6, None))?;
+    let pose = pose_from_bop(&rotation, &translation_mm);
+    Ok(ResultRow {
+        scene_id: integer(0)?,
+        im_id: integer(1)?,
+        obj_id: integer(2)?,
+        score,
+        time_s: (time >= 0.0).then_some(time),
+        rotation,
+        translation_mm,
+        camera_from_object: pose.map_err(|error| (4, Some(error)))?,
+    })
+}
+
+/// Returns the line of a record, from 1. The position of the reader is in front of the blank lines before the record.
+fn line_of(text: &[u8], position: Option<&csv::Position>) -> usize {
+    let start = position.map_or(0, |position| position.byte());
+    let (before, rest) = text.split_at(usize::try_from(start).unwrap_or(0));
+    let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    let end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+    1 + before
+        .iter()
+        .chain(blank)
+        .filter(|byte| **byte == end)
+        .count()
 }
 
 /// Parses N finite numbers separated by spaces.

@@ -1,6 +1,9 @@
 //! Run-length codes of masks, as in COCO.
 
+use std::iter::repeat_n;
+
 use hicp_core::Mask;
+use hicp_core::internal::index;
 use serde::de::{Deserialize, Deserializer, Error as _};
 use serde_json::Value;
 use thiserror::Error;
@@ -27,75 +30,36 @@ pub struct Rle {
 
 /// A run-length code that does not describe a mask.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("{found}, expected {expected}")]
 #[non_exhaustive]
-pub enum RleError {
-    /// The runs do not fill the image, or overrun it.
-    #[error("runs cover {found} pixels, expected {expected} for {width}x{height}")]
-    Coverage {
-        /// Sum of the runs, up to the one that overran.
-        found: u64,
-        /// width × height.
-        expected: u64,
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
-    /// More pixels than an image may have.
-    #[error(
-        "mask of {width}x{height} pixels, expected at most {}",
-        MAX_IMAGE_PIXELS
-    )]
-    TooLarge {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
-    /// A character that no compressed code contains.
-    #[error("character {found:?} at byte {offset}, expected '0' to 'o'")]
-    Character {
-        /// Offset in the text, bytes.
-        offset: usize,
-        /// The character.
-        found: char,
-    },
-    /// A compressed number that is negative, too large, or cut off.
-    #[error(
-        "run {index} of the compressed code is negative, too large or cut off, expected a number of pixels"
-    )]
-    Number {
-        /// Index of the run.
-        index: usize,
-    },
+pub struct RleError {
+    /// The fault.
+    pub found: String,
+    /// The requirement.
+    pub expected: String,
+}
+
+fn refuse<T>(found: String, expected: impl Into<String>) -> Result<T, RleError> {
+    let expected = expected.into();
+    Err(RleError { found, expected })
 }
 
 impl Rle {
-    /// Makes a code from the lengths of its runs.
+    /// Creates a code from the lengths of its runs.
     ///
     /// # Errors
     ///
-    /// [`RleError::Coverage`] when they do not sum to width × height, [`RleError::TooLarge`] for more than
-    /// [`MAX_IMAGE_PIXELS`].
+    /// [`RleError`] if they do not sum to width × height, or if there are more than [`MAX_IMAGE_PIXELS`].
     pub fn from_counts(width: u32, height: u32, counts: Vec<u32>) -> Result<Self, RleError> {
-        let expected = u64::from(width) * u64::from(height);
-        if expected > MAX_IMAGE_PIXELS {
-            return Err(RleError::TooLarge { width, height });
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > MAX_IMAGE_PIXELS {
+            let found = format!("a mask of {width}x{height} pixels");
+            return refuse(found, format!("at most {MAX_IMAGE_PIXELS}"));
         }
-        let mut found = 0;
-        for count in &counts {
-            found += u64::from(*count);
-            if found > expected {
-                break;
-            }
-        }
-        if found != expected {
-            return Err(RleError::Coverage {
-                found,
-                expected,
-                width,
-                height,
-            });
+        let sum: u64 = counts.iter().map(|count| u64::from(*count)).sum();
+        if sum != pixels {
+            let found = format!("runs cover {sum} pixels");
+            return refuse(found, format!("{pixels} for {width}x{height}"));
         }
         Ok(Self {
             width,
@@ -104,22 +68,29 @@ impl Rle {
         })
     }
 
-    /// Makes a code from COCO's compressed text: numbers of five bits per character, from the fourth on as differences to the last but one.
+    /// Creates a code from COCO's compressed text: numbers of five bits per character, from the fourth on as differences to the last but one.
     ///
     /// # Errors
     ///
-    /// [`RleError`] for text that is no such code, and as [`Rle::from_counts`].
+    /// [`RleError`] for other text, and as [`Rle::from_counts`].
     pub fn from_compressed(width: u32, height: u32, text: &str) -> Result<Self, RleError> {
         let mut counts: Vec<u32> = Vec::new();
+        let bad_run = |index| {
+            let found =
+                format!("run {index} of the compressed code is negative, too large or cut off");
+            refuse(found, "a number of pixels")
+        };
         let (mut value, mut shift) = (0_i64, 0_u32);
         for (offset, found) in text.char_indices() {
-            let code = u32::from(found)
-                .checked_sub(48)
-                .filter(|code| *code < 64)
-                .ok_or(RleError::Character { offset, found })?;
+            let Some(code @ 0..64) = u32::from(found).checked_sub(48) else {
+                return refuse(
+                    format!("character {found:?} at byte {offset}"),
+                    "'0' to 'o'",
+                );
+            };
             let index = counts.len();
             if shift > 50 {
-                return Err(RleError::Number { index });
+                return bad_run(index);
             }
             value |= i64::from(code & 0x1f) << shift;
             shift += 5;
@@ -132,38 +103,32 @@ impl Rle {
             if index > 2 {
                 value += i64::from(counts[index - 2]);
             }
-            counts.push(u32::try_from(value).map_err(|_| RleError::Number { index })?);
+            let Ok(count) = u32::try_from(value) else {
+                return bad_run(index);
+            };
+            counts.push(count);
             (value, shift) = (0, 0);
         }
         if shift > 0 {
-            let index = counts.len();
-            return Err(RleError::Number { index });
+            return bad_run(counts.len());
         }
         Self::from_counts(width, height, counts)
     }
 
-    /// Makes the code of a mask.
+    /// Creates the code of a mask.
     #[must_use]
     pub fn of_mask(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
-        let mut counts = vec![0];
-        let mut current = false;
-        for u in 0..width {
-            for v in 0..height {
-                let set = mask.get(u, v).unwrap_or(false);
-                if set != current {
-                    counts.push(0);
-                    current = set;
-                }
-                if let Some(last) = counts.last_mut() {
-                    *last += 1;
-                }
-            }
-        }
+        let column = |u| (0..height).map(move |v| mask.get(u, v) == Some(true));
+        let pixels: Vec<bool> = (0..width).flat_map(column).collect();
+        // The first run is background, which may be empty.
+        let empty = pixels.first().is_none_or(|first| *first).then_some(0);
+        let runs = pixels.chunk_by(|a, b| a == b);
+        let counts = empty.into_iter().chain(runs.map(|run| index(run.len())));
         Self {
             width,
             height,
-            counts,
+            counts: counts.collect(),
         }
     }
 
@@ -189,27 +154,24 @@ impl Rle {
     #[must_use]
     pub fn to_mask(&self) -> Mask {
         let (width, height) = (self.width as usize, self.height as usize);
-        let mut pixels = vec![false; width * height];
-        let mut at = 0;
-        for (index, count) in self.counts.iter().enumerate() {
-            let end = at + *count as usize;
-            // Column by column.
-            while index % 2 == 1 && at < end {
-                let (column, row) = (at / height, at % height);
-                let rows = (height - row).min(end - at);
-                for row in row..row + rows {
-                    pixels[row * width + column] = true;
-                }
-                at += rows;
-            }
-            at = end;
-        }
-        // The number of pixels is that of the image, so this is always the mask.
-        Mask::new(self.width, self.height, pixels).unwrap_or_else(|_| Mask::full(0, 0))
+        let runs = self.counts.iter().enumerate();
+        let runs = runs.map(|(index, count)| repeat_n(index % 2 == 1, *count as usize));
+        let columns: Vec<bool> = runs.flatten().collect();
+        let row = |v| (0..width).map(move |u| u * height + v);
+        let pixels = (0..height).flat_map(row).map(|at| columns[at]);
+        let Ok(mask) = Mask::new(self.width, self.height, pixels.collect()) else {
+            unreachable!("the runs cover the image");
+        };
+        mask
     }
 
     /// Returns COCO's compressed text.
     #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "five bits fit"
+    )]
     pub fn to_compressed(&self) -> String {
         let mut text = String::new();
         for (index, count) in self.counts.iter().enumerate() {
@@ -218,7 +180,7 @@ impl Rle {
                 value -= i64::from(self.counts[index - 2]);
             }
             loop {
-                let bits = u8::try_from(value & 0x1f).unwrap_or(0);
+                let bits = (value & 0x1f) as u8;
                 value >>= 5;
                 // The sign of the last five bits must be that of the number.
                 let done = value == if bits & 0x10 == 0 { 0 } else { -1 };
@@ -303,30 +265,16 @@ mod tests {
     #[test]
     fn codes_that_do_not_fit_are_refused() {
         for counts in [vec![], vec![3], vec![5, 2], vec![u32::MAX, u32::MAX]] {
-            assert!(matches!(
-                Rle::from_counts(3, 2, counts),
-                Err(RleError::Coverage { expected: 6, .. })
-            ));
+            let error = Rle::from_counts(3, 2, counts).unwrap_err();
+            assert_eq!(error.expected, "6 for 3x2", "{error}");
         }
-        assert!(matches!(
-            Rle::from_counts(u32::MAX, u32::MAX, vec![]),
-            Err(RleError::TooLarge { .. })
-        ));
-        assert!(matches!(
-            Rle::from_compressed(3, 2, "1 2"),
-            Err(RleError::Character {
-                offset: 1,
-                found: ' '
-            })
-        ));
+        let error = Rle::from_counts(u32::MAX, u32::MAX, vec![]).unwrap_err();
+        assert_eq!(error.expected, "at most 33554432");
+        let error = Rle::from_compressed(3, 2, "1 2").unwrap_err();
+        assert_eq!(error.found, "character ' ' at byte 1");
         for text in ["1X", "N", "oooooooooooooooooooo", "ooooooo?"] {
-            assert!(
-                matches!(
-                    Rle::from_compressed(3, 2, text),
-                    Err(RleError::Number { .. })
-                ),
-                "{text}"
-            );
+            let error = Rle::from_compressed(3, 2, text).unwrap_err();
+            assert!(error.found.starts_with("run "), "{text}: {error}");
         }
     }
 }

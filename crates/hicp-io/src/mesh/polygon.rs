@@ -63,79 +63,48 @@ fn clip_ears(
     triangles: &mut Vec<[u32; 3]>,
     budget: &mut u64,
 ) -> bool {
-    let n = points.len();
-    let mut remainder = Remainder {
-        points,
-        left: (0..n).collect(),
-        is_left: vec![true; n],
-        last_blocking: (0..n).collect(),
-    };
+    let mut left: Vec<usize> = (0..points.len()).collect();
     let (mut at, mut misses) = (0, 0);
-    while remainder.left.len() > 3 && misses < remainder.left.len() {
+    while left.len() > 3 && misses < left.len() {
         if *budget == 0 {
             return false;
         }
-        let left = &remainder.left;
         let n = left.len();
         at %= n;
         let ear = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]];
-        if remainder.is_ear(ear, budget) {
+        if is_ear(points, &left, ear, budget) {
             triangles.push(ear.map(|i| corners[i]));
-            remainder.left.remove(at);
-            remainder.is_left[ear[1]] = false;
+            left.remove(at);
             misses = 0;
         } else {
             misses += 1;
             at += 1;
         }
     }
-    let rest: Vec<u32> = remainder.left.iter().map(|i| corners[*i]).collect();
+    let rest: Vec<u32> = left.iter().map(|i| corners[*i]).collect();
     fan(&rest, triangles);
     true
 }
 
-/// What is left of a polygon whose ears are clipped.
-struct Remainder<'a> {
-    points: &'a [Point2<f64>],
-    /// The corners left, in order.
-    left: Vec<usize>,
-    /// The same by corner.
-    is_left: Vec<bool>,
-    /// By corner, what last kept it from being an ear; itself at first, which never does.
-    last_blocking: Vec<usize>,
-}
-
-impl Remainder<'_> {
-    fn is_ear(&mut self, ear: [usize; 3], budget: &mut u64) -> bool {
-        let [a, b, c] = ear.map(|i| self.points[i]);
-        *budget = budget.saturating_sub(1);
-        // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbour on the line.
-        if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
-            return false;
-        }
-        let blocks = |i: &usize| {
-            let p = self.points[*i];
-            // Corners are visited twice where a hole is bridged: equal positions do not block.
-            let outside = p == a
-                || p == b
-                || p == c
-                || turn(&a, &b, &p) < 0.0
-                || turn(&b, &c, &p) < 0.0
-                || turn(&c, &a, &p) < 0.0;
-            !outside
-        };
-        // What blocked the corner when it was last looked at mostly does so still: a long search is saved.
-        let last = self.last_blocking[ear[1]];
-        if self.is_left[last] && blocks(&last) {
-            return false;
-        }
-        let blocking = self.left.iter().position(blocks);
-        *budget = budget.saturating_sub(blocking.unwrap_or(self.left.len()) as u64);
-        if let Some(position) = blocking {
-            self.last_blocking[ear[1]] = self.left[position];
-        }
-        blocking.is_none()
+/// Returns whether three neighbors make a triangle that none of the corners left is in.
+fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3], budget: &mut u64) -> bool {
+    let [a, b, c] = ear.map(|i| points[i]);
+    *budget = budget.saturating_sub(1);
+    // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbor on the line.
+    if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
+        return false;
     }
+    let blocking = left.iter().position(|i| {
+        let p = points[*i];
+        // Corners are visited twice where a hole is bridged: equal positions do not block.
+        let is_outside = [a, b, c].contains(&p)
+            || turn(&a, &b, &p) < 0.0
+            || turn(&b, &c, &p) < 0.0
+            || turn(&c, &a, &p) < 0.0;
+        !is_outside
+    });
+    *budget = budget.saturating_sub(blocking.unwrap_or(left.len()) as u64);
+    blocking.is_none()
 }
 
 #[cfg(test)]

@@ -4,42 +4,22 @@ use std::path::Path;
 
 use hicp_core::{Point3, TriMesh};
 
+use super::ply;
 use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::unit::LengthUnit;
 
-/// Writes a mesh as binary little-endian PLY with coordinates in `unit`; in metres they are written exactly.
+/// Writes a mesh as binary little-endian PLY with coordinates in `unit`; in meters they are written exactly.
 ///
 /// # Errors
 ///
 /// As [`write_atomically`].
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh, unit: LengthUnit) -> Result<(), IoError> {
-    write_atomically(path, |writer| {
-        write!(
-            writer,
-            "ply\nformat binary_little_endian 1.0\ncomment units {unit}\nelement vertex {}\n\
-             property float x\nproperty float y\nproperty float z\nelement face {}\n\
-             property list uchar int vertex_indices\nend_header\n",
-            mesh.vertices().len(),
-            mesh.triangles().len(),
-        )?;
-        for vertex in mesh.vertices() {
-            for coordinate in in_unit(vertex, unit).iter() {
-                writer.write_all(&coordinate.to_le_bytes())?;
-            }
-        }
-        for triangle in mesh.triangles() {
-            writer.write_all(&[3])?;
-            for index in triangle {
-                // Core limits meshes to 50 million vertices, so a signed index has the same bytes.
-                writer.write_all(&index.to_le_bytes())?;
-            }
-        }
-        Ok(())
-    })
+    let vertices = mesh.vertices().iter().map(|v| in_unit(v, unit).into());
+    ply::write::<3>(path.as_ref(), unit, vertices, Some(mesh.triangles()))
 }
 
-/// Writes a mesh as OBJ with coordinates in `unit`; in metres they are read back exactly.
+/// Writes a mesh as OBJ with coordinates in `unit`; in meters they are read back exactly.
 ///
 /// # Errors
 ///

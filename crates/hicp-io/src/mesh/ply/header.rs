@@ -9,7 +9,7 @@ use crate::source::text_bytes;
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
 /// The properties of a vertex that are read, by slot: its position and its normal.
-const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+pub(super) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -21,13 +21,14 @@ pub(super) enum Encoding {
 /// A type of numbers.
 #[derive(Debug)]
 pub(super) struct Scalar {
-    names: [&'static str; 2],
+    /// Its two names, with a space between them.
+    names: &'static str,
     pub(super) bytes: usize,
     /// Returns the number that the first bytes state, in little-endian order.
     pub(super) number: fn([u8; 8]) -> f64,
 }
 
-const fn scalar(names: [&'static str; 2], bytes: usize, number: fn([u8; 8]) -> f64) -> Scalar {
+const fn scalar(names: &'static str, bytes: usize, number: fn([u8; 8]) -> f64) -> Scalar {
     Scalar {
         names,
         bytes,
@@ -35,35 +36,30 @@ const fn scalar(names: [&'static str; 2], bytes: usize, number: fn([u8; 8]) -> f
     }
 }
 
+fn first<const N: usize>(bytes: [u8; 8]) -> [u8; N] {
+    std::array::from_fn(|index| bytes[index])
+}
+
 static SCALARS: [Scalar; 8] = [
-    scalar(["char", "int8"], 1, |[a, ..]| i8::from_le_bytes([a]).into()),
-    scalar(["uchar", "uint8"], 1, |[a, ..]| a.into()),
-    scalar(["short", "int16"], 2, |[a, b, ..]| {
-        i16::from_le_bytes([a, b]).into()
-    }),
-    scalar(["ushort", "uint16"], 2, |[a, b, ..]| {
-        u16::from_le_bytes([a, b]).into()
-    }),
-    scalar(["int", "int32"], 4, |[a, b, c, d, ..]| {
-        i32::from_le_bytes([a, b, c, d]).into()
-    }),
-    scalar(["uint", "uint32"], 4, |[a, b, c, d, ..]| {
-        u32::from_le_bytes([a, b, c, d]).into()
-    }),
-    scalar(["float", "float32"], 4, |[a, b, c, d, ..]| {
-        f32::from_le_bytes([a, b, c, d]).into()
-    }),
-    scalar(["double", "float64"], 8, f64::from_le_bytes),
+    scalar("char int8", 1, |b| i8::from_le_bytes(first(b)).into()),
+    scalar("uchar uint8", 1, |b| u8::from_le_bytes(first(b)).into()),
+    scalar("short int16", 2, |b| i16::from_le_bytes(first(b)).into()),
+    scalar("ushort uint16", 2, |b| u16::from_le_bytes(first(b)).into()),
+    scalar("int int32", 4, |b| i32::from_le_bytes(first(b)).into()),
+    scalar("uint uint32", 4, |b| u32::from_le_bytes(first(b)).into()),
+    scalar("float float32", 4, |b| f32::from_le_bytes(first(b)).into()),
+    scalar("double float64", 8, f64::from_le_bytes),
 ];
 
 impl Scalar {
     fn parse(name: &str) -> Result<&'static Self, String> {
-        let scalar = SCALARS.iter().find(|scalar| scalar.names.contains(&name));
+        let mut scalars = SCALARS.iter();
+        let scalar = scalars.find(|scalar| scalar.names.split(' ').any(|known| known == name));
         scalar.ok_or_else(grammar)
     }
 
     pub(super) fn is_integer(&self) -> bool {
-        !self.names[1].starts_with("float")
+        !self.names.contains("float")
     }
 }
 

@@ -3,5 +3,7 @@
 mod header;
 mod parse;
 mod rows;
+mod write;
 
 pub(crate) use parse::{check_head, parse_mesh, parse_points};
+pub(crate) use write::write;
