@@ -33,7 +33,7 @@ pub fn read_point_cloud_ply(
     let path = path.as_ref();
     let limits = &ReadLimits::DEFAULT;
     let reading = Reading { path, unit, limits };
-    let raw = ply::parse_points(&reading, &limits.read_bytes(path)?)?;
+    let raw = ply::parse_points(reading, &limits.read_bytes(path)?)?;
     let in_meters = |p: &Point3<f64>| (p / unit.units_per_meter()).cast::<f32>();
     let points = raw.vertices.iter().map(in_meters).collect();
     // A file states normals for all vertices or for none.

@@ -1,7 +1,5 @@
 //! Run-length codes of masks, as in COCO.
 
-use std::iter::repeat_n;
-
 use hicp_core::Mask;
 use hicp_core::internal::index;
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -154,9 +152,10 @@ impl Rle {
     #[must_use]
     pub fn to_mask(&self) -> Mask {
         let (width, height) = (self.width as usize, self.height as usize);
-        let runs = self.counts.iter().enumerate();
-        let runs = runs.map(|(index, count)| repeat_n(index % 2 == 1, *count as usize));
-        let columns: Vec<bool> = runs.flatten().collect();
+        let mut columns = Vec::with_capacity(width * height);
+        for (index, count) in self.counts.iter().enumerate() {
+            columns.resize(columns.len() + *count as usize, index % 2 == 1);
+        }
         let row = |v| (0..width).map(move |u| u * height + v);
         let pixels = (0..height).flat_map(row).map(|at| columns[at]);
         let Ok(mask) = Mask::new(self.width, self.height, pixels.collect()) else {

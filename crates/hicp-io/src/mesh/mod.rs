@@ -16,7 +16,6 @@ pub(crate) mod ply;
 mod polygon;
 pub(crate) mod raw;
 mod stl;
-mod weld;
 mod write;
 
 use raw::{RawMesh, Reading};
@@ -80,12 +79,12 @@ impl ReadLimits {
         // Counts are refused by the first bytes, before a large file is read for nothing.
         let (head, bytes) = read_head(path)?;
         check_head(&reading, &head, bytes)?;
-        parse(&reading, self.read_bytes(path)?)?.finish(&reading)
+        parse(reading, self.read_bytes(path)?)?.finish()
     }
 }
 
 type CheckHead = fn(&Reading<'_>, &[u8], u64) -> Result<(), IoError>;
-type Parse = fn(&Reading<'_>, Vec<u8>) -> Result<RawMesh, IoError>;
+type Parse = for<'a> fn(Reading<'a>, Vec<u8>) -> Result<RawMesh<'a>, IoError>;
 
 #[cfg(test)]
 mod tests {
@@ -94,7 +93,7 @@ mod tests {
     use hicp_core::Point3;
 
     /// What the parsers' own tests read with.
-    pub(super) fn reading(name: &str) -> Reading<'_> {
+    pub(super) fn reading(name: &'static str) -> Reading<'static> {
         Reading {
             path: Path::new(name),
             unit: LengthUnit::Meters,
@@ -135,16 +134,16 @@ mod tests {
     #[test]
     fn a_concave_polygon_beyond_the_budget_is_refused_where_it_stands() {
         let reading = reading("a.obj");
-        let mut mesh = RawMesh::new(reading.refuse(Place::Line(1), "", ""));
+        let mut mesh = RawMesh::new(reading, reading.refuse(Place::Line(1), "", ""));
         let dart = [[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]];
         mesh.vertices = dart.map(|p| Point3::new(p[0], p[1], 0.0)).to_vec();
         for spent in [false, true] {
             if spent {
                 mesh.clipping_budget = 0;
             }
-            let convex = mesh.add_face(&reading, Place::Line(7), &[0, 1, 3]);
+            let convex = mesh.add_face(Place::Line(7), &[0, 1, 3]);
             assert!(convex.is_ok());
-            let concave = mesh.add_face(&reading, Place::Line(8), &[0, 1, 2, 3]);
+            let concave = mesh.add_face(Place::Line(8), &[0, 1, 2, 3]);
             match (spent, concave) {
                 (false, Ok(())) => {}
                 (

@@ -14,8 +14,8 @@ use crate::limits::Limit;
 use crate::source::lossy_text;
 
 /// Parses an OBJ file. Vertices that no face uses are dropped.
-pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
-    let records = Records::of(reading, &lossy_text(reading.path, &content)?)?;
+pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
+    let records = Records::of(&reading, &lossy_text(reading.path, &content)?)?;
     drop(content);
     let no_materials = |_: &_| Err(LoadError::ReadError);
     let loaded = tobj::load_obj_buf(
@@ -25,11 +25,11 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
     );
     let (models, _) = loaded.map_err(|error| {
         let unknown = || IoError::unusable(reading.path, "OBJ mesh", error);
-        records.fault(reading).unwrap_or_else(unknown)
+        records.fault(&reading).unwrap_or_else(unknown)
     })?;
 
     let end = Place::Line(records.text.lines().count().max(1));
-    let mut mesh = RawMesh::new(reading.refuse(end.clone(), END_OF_FILE, FACE));
+    let mut mesh = RawMesh::new(reading, reading.refuse(end.clone(), END_OF_FILE, FACE));
     // Without groups there is one model. It has the faces in their order.
     for tobj::Model { mesh: part, .. } in models {
         let positions = part.positions.chunks_exact(3);
@@ -41,7 +41,7 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
         let mut rest = part.indices.as_slice();
         for (arity, line) in arities.iter().zip(&records.faces) {
             let (corners, others) = rest.split_at(*arity as usize);
-            mesh.add_face(reading, Place::Line(*line), corners)?;
+            mesh.add_face(Place::Line(*line), corners)?;
             rest = others;
         }
     }
@@ -54,7 +54,7 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
     if mesh.vertices.len() == records.vertices && mesh.vertices.iter().all(fits) {
         return Ok(mesh);
     }
-    records.fault(reading).map_or(Ok(mesh), Err)
+    records.fault(&reading).map_or(Ok(mesh), Err)
 }
 
 /// The `v` and `f` records of a file, each on its last line, and blank lines for all others.
@@ -154,8 +154,8 @@ mod tests {
     use crate::error::IoErrorKind;
     use crate::mesh::tests::reading;
 
-    fn read(text: &str) -> Result<RawMesh, IoError> {
-        parse(&reading("a.obj"), text.as_bytes().to_vec())
+    fn read(text: &str) -> Result<RawMesh<'static>, IoError> {
+        parse(reading("a.obj"), text.as_bytes().to_vec())
     }
 
     #[test]
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn old_line_endings_and_latin_comments() {
         let text = b"# M\xfcller\rv 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r";
-        let mesh = parse(&reading("a.obj"), text.to_vec()).unwrap();
+        let mesh = parse(reading("a.obj"), text.to_vec()).unwrap();
         assert_eq!(mesh.triangles.len(), 1);
     }
 
@@ -271,9 +271,9 @@ mod tests {
             ..reading("a.obj")
         };
         let text = "v 0 0 0\nf 1 1 1\nf 1 1 1 1\n";
-        assert!(parse(&reading, text.into()).is_ok());
+        assert!(parse(reading, text.into()).is_ok());
         assert!(matches!(
-            parse(&reading, format!("{text}f 1 1\nf 1 1 1\n").into()),
+            parse(reading, format!("{text}f 1 1\nf 1 1 1\n").into()),
             Err(IoError { kind: IoErrorKind::Limit, place: Some(Place::Line(5)), found, .. })
             if found == "4 triangles"
         ));

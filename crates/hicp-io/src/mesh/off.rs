@@ -1,7 +1,5 @@
 //! Object File Format (Geomview): a count of vertices and faces, then a line for each.
 
-use hicp_core::Point3;
-
 use super::lines::Lines;
 use super::raw::{FACE, RawMesh, Reading, position};
 use crate::error::{IoError, quote};
@@ -9,23 +7,22 @@ use crate::limits::Limit;
 use crate::source::lossy_text;
 
 /// Parses an OFF file. Skips normals and colors, which follow three coordinates or the corners of a face.
-pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
     let text = lossy_text(reading.path, &content)?;
     let mut lines = Lines::new(&text);
-    let (line, vertices, faces) = parse_counts(reading, &mut lines)?;
+    let (line, vertices, faces) = parse_counts(&reading, &mut lines)?;
     reading.check(Limit::Vertices, lines.place(), vertices)?;
     reading.check(Limit::Triangles, lines.place(), faces)?;
 
-    let mut mesh = RawMesh::new(reading.refuse(lines.place(), quote(line), FACE));
+    let mut mesh = RawMesh::new(reading, reading.refuse(lines.place(), quote(line), FACE));
     mesh.vertices.reserve_exact(vertices);
     for vertex in 0..vertices {
         let line = lines.record();
         let position = position(line.split_whitespace()).ok_or_else(|| {
             let expected = format!("three coordinates of vertex {vertex} of {vertices}");
-            lines.refuse(reading, line, expected)
+            lines.refuse(&reading, line, expected)
         })?;
-        reading.check_position(lines.place(), &position)?;
-        mesh.vertices.push(Point3::from(position));
+        mesh.add_vertex(lines.place(), position)?;
     }
     let mut line = "";
     for face in 0..faces {
@@ -38,9 +35,9 @@ pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, 
         if count != Some(corners.len()) {
             let expected =
                 format!("the number of corners of face {face} of {faces} and as many vertices");
-            return Err(lines.refuse(reading, line, expected));
+            return Err(lines.refuse(&reading, line, expected));
         }
-        mesh.add_numbered_face(reading, lines.place(), face, &corners)?;
+        mesh.add_corners(lines.place(), face, &corners)?;
     }
     if faces > 0 {
         mesh.empty = reading.refuse(lines.place(), quote(line), FACE);
@@ -88,9 +85,10 @@ mod tests {
     use super::*;
     use crate::error::Place;
     use crate::mesh::tests::reading;
+    use hicp_core::Point3;
 
-    fn read(text: &str) -> Result<RawMesh, IoError> {
-        parse(&reading("a.off"), text.as_bytes().to_vec())
+    fn read(text: &str) -> Result<RawMesh<'static>, IoError> {
+        parse(reading("a.off"), text.as_bytes().to_vec())
     }
 
     const BODY: &str =
@@ -140,7 +138,7 @@ mod tests {
             ("OFF 1 0 0 # none\n0 0 0\n", 1, "\"1 0 0\""),
             ("OFF\n1 1 0\n0 0 0\n2 0 0\nmore", 4, "\"2 0 0\""),
         ] {
-            match read(text).unwrap().finish(&reading("a.off")) {
+            match read(text).unwrap().finish() {
                 Err(IoError {
                     found,
                     expected,

@@ -1,5 +1,6 @@
 //! A mesh while its file is parsed.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh, Vector3};
@@ -46,13 +47,16 @@ impl Reading<'_> {
 
 /// A mesh in the unit of its file.
 #[derive(Debug)]
-pub(crate) struct RawMesh {
+pub(crate) struct RawMesh<'a> {
+    pub(super) reading: Reading<'a>,
     pub(crate) vertices: Vec<Point3<f64>>,
     /// The normals of a point cloud.
     pub(crate) normals: Vec<Vector3<f64>>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// The error if there are no triangles.
     pub(super) empty: IoError,
+    /// The welded vertices by position.
+    index_at: HashMap<[u64; 3], u32>,
     /// The steps that cutting polygons may still cost.
     pub(super) clipping_budget: u64,
 }
@@ -60,28 +64,49 @@ pub(crate) struct RawMesh {
 /// The expected text of a file without triangles.
 pub(super) const FACE: &str = "a face of three corners or more";
 
-impl RawMesh {
-    pub(super) fn new(empty: IoError) -> Self {
+impl<'a> RawMesh<'a> {
+    pub(super) fn new(reading: Reading<'a>, empty: IoError) -> Self {
         Self {
+            reading,
             vertices: Vec::new(),
             normals: Vec::new(),
             triangles: Vec::new(),
             empty,
+            index_at: HashMap::new(),
             clipping_budget: polygon::CLIPPING_BUDGET,
         }
     }
 
-    /// Adds a face by its corners, counted from 0; refuses a corner that is not a vertex. Messages name the number of the face.
+    pub(super) fn add_vertex(&mut self, place: Place, position: [f64; 3]) -> Result<(), IoError> {
+        self.reading.check_position(place.clone(), &position)?;
+        self.vertices.push(position.into());
+        self.reading
+            .check(Limit::Vertices, place, self.vertices.len())
+    }
+
+    /// Adds a vertex if there is none at the position, and returns its index. For files that repeat vertices with every facet.
+    pub(super) fn weld(&mut self, place: Place, position: [f64; 3]) -> Result<u32, IoError> {
+        // Adding 0 turns -0 into +0.
+        let key = position.map(|value| (value + 0.0).to_bits());
+        // More vertices than that are refused by the mesh.
+        let next = u32::try_from(self.vertices.len()).unwrap_or(u32::MAX);
+        let index = *self.index_at.entry(key).or_insert(next);
+        if index == next {
+            self.add_vertex(place, position)?;
+        }
+        Ok(index)
+    }
+
+    /// Adds the face `number` by its corners, counted from 0. Refuses a corner that is not a vertex.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "the range is checked"
     )]
-    pub(super) fn add_numbered_face(
+    pub(super) fn add_corners(
         &mut self,
-        reading: &Reading<'_>,
         place: Place,
-        face: usize,
+        number: usize,
         corners: &[f64],
     ) -> Result<(), IoError> {
         let count = self.vertices.len();
@@ -91,22 +116,17 @@ impl RawMesh {
                 None => "no face, because there are no vertices".to_owned(),
                 Some(last) => format!("vertices from 0 to {last}"),
             };
-            let found = format!("vertex {index} in face {face}");
-            return Err(reading.refuse(place, found, expected));
+            let found = format!("vertex {index} in face {number}");
+            return Err(self.reading.refuse(place, found, expected));
         }
         let corners: Vec<u32> = corners.iter().map(|index| *index as u32).collect();
-        self.add_face(reading, place, &corners)
+        self.add_face(place, &corners)
     }
 
     /// Adds a face. Its corners must be vertices that are there.
-    pub(super) fn add_face(
-        &mut self,
-        reading: &Reading<'_>,
-        place: Place,
-        corners: &[u32],
-    ) -> Result<(), IoError> {
+    pub(super) fn add_face(&mut self, place: Place, corners: &[u32]) -> Result<(), IoError> {
         let count = self.triangles.len() + corners.len().saturating_sub(2);
-        reading.check(Limit::Triangles, place.clone(), count)?;
+        self.reading.check(Limit::Triangles, place.clone(), count)?;
         let budget = &mut self.clipping_budget;
         if polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget) {
             return Ok(());
@@ -116,11 +136,11 @@ impl RawMesh {
             "one that is cut into triangles within {} steps, together with those before it: cut it beforehand",
             polygon::CLIPPING_BUDGET
         );
-        Err(reading.refuse(place, found, expected))
+        Err(self.reading.refuse(place, found, expected))
     }
 
-    pub(super) fn finish(self, reading: &Reading<'_>) -> Result<TriMesh, IoError> {
-        let scale = reading.unit.units_per_meter();
+    pub(super) fn finish(self) -> Result<TriMesh, IoError> {
+        let scale = self.reading.unit.units_per_meter();
         let vertices = self.vertices.iter().map(|p| (p / scale).cast::<f32>());
         let mesh = TriMesh::new(vertices.collect(), self.triangles);
         mesh.map_err(|error| {
@@ -129,7 +149,7 @@ impl RawMesh {
                 MeshError::NoArea { .. } => "a triangle that has an area",
                 _ => "a usable one",
             };
-            IoError::new(reading.path, None, "no usable mesh", expected).with_source(error)
+            IoError::new(self.reading.path, None, "no usable mesh", expected).with_source(error)
         })
     }
 }

@@ -6,7 +6,6 @@
 
 use super::lines::Lines;
 use super::raw::{FACE, RawMesh, Reading};
-use super::weld::Welder;
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
 use crate::source::text_bytes;
@@ -27,7 +26,7 @@ pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Resu
 }
 
 /// Parses an STL file; vertices at the same position become one.
-pub(super) fn parse(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
     // By size first: any 80 bytes may start a binary file, `solid` and bytes that look like UTF-16 among them.
     if triangle_count(&content).is_some_and(|count| fits(count, content.len() as u64)) {
         return parse_binary(reading, &content);
@@ -65,7 +64,7 @@ fn fits(count: u32, bytes: u64) -> bool {
     (needed..needed + TRIANGLE_BYTES as u64).contains(&bytes)
 }
 
-fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
+fn parse_binary<'a>(reading: Reading<'a>, content: &[u8]) -> Result<RawMesh<'a>, IoError> {
     let Some(count) = triangle_count(content) else {
         let end = Place::Byte(content.len() as u64);
         return Err(reading.refuse(end, END_OF_FILE, START));
@@ -81,9 +80,8 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
         return Err(reading.refuse(COUNT, found, expected));
     }
     reading.check(Limit::Triangles, COUNT, there)?;
-    let mut mesh = RawMesh::new(reading.refuse(COUNT, found, FACE));
+    let mut mesh = RawMesh::new(reading, reading.refuse(COUNT, found, FACE));
     mesh.triangles.reserve_exact(there);
-    let mut welder = Welder::default();
     for (start, triangle) in (HEADER_BYTES..)
         .step_by(TRIANGLE_BYTES)
         .zip(body.chunks_exact(TRIANGLE_BYTES))
@@ -96,21 +94,20 @@ fn parse_binary(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoErro
                 f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
             });
             let place = Place::Byte((start + offset) as u64);
-            *index = welder.add(reading, place, position, &mut mesh.vertices)?;
+            *index = mesh.weld(place, position)?;
         }
         mesh.triangles.push(corners);
     }
     Ok(mesh)
 }
 
-fn parse_ascii(reading: &Reading<'_>, text: &str) -> Result<RawMesh, IoError> {
+fn parse_ascii<'a>(reading: Reading<'a>, text: &str) -> Result<RawMesh<'a>, IoError> {
     let mut words = Words {
         reading,
         lines: Lines::new(text),
         rest: "",
     };
-    let mut mesh = RawMesh::new(reading.refuse(Place::Line(1), END_OF_FILE, FACE));
-    let mut welder = Welder::default();
+    let mut mesh = RawMesh::new(reading, reading.refuse(Place::Line(1), END_OF_FILE, FACE));
     words.expect("solid", START)?;
     words.skip_name();
     // Without its last line a file may have lost any number of facets.
@@ -118,7 +115,7 @@ fn parse_ascii(reading: &Reading<'_>, text: &str) -> Result<RawMesh, IoError> {
     while let Some(word) = words.next() {
         if word.is("facet") {
             open = true;
-            let corners = parse_facet(&mut words, &mut mesh, &mut welder)?;
+            let corners = parse_facet(&mut words, &mut mesh)?;
             mesh.triangles.push(corners);
             reading.check(Limit::Triangles, word.place, mesh.triangles.len())?;
         } else if word.is("solid") || word.is("endsolid") {
@@ -157,11 +154,7 @@ const FACET: [(&str, &str); 8] = [
 ];
 
 /// Parses the words after `facet`.
-fn parse_facet(
-    words: &mut Words<'_>,
-    mesh: &mut RawMesh,
-    welder: &mut Welder,
-) -> Result<[u32; 3], IoError> {
+fn parse_facet(words: &mut Words<'_>, mesh: &mut RawMesh<'_>) -> Result<[u32; 3], IoError> {
     let (mut corners, mut corner) = ([0; 3], 0);
     for (keyword, expected) in FACET {
         let word = words.expect(keyword, expected)?;
@@ -181,8 +174,7 @@ fn parse_facet(
                     let number = words.next().and_then(|word| word.text.parse().ok());
                     *value = number.ok_or_else(|| words.refuse(Some(word.clone()), expected))?;
                 }
-                corners[corner] =
-                    welder.add(words.reading, word.place, position, &mut mesh.vertices)?;
+                corners[corner] = mesh.weld(word.place, position)?;
                 corner += 1;
             }
             _ => {}
@@ -194,7 +186,7 @@ fn parse_facet(
 /// The words of a text. In this format a line end is a space like any other, except after a name.
 #[derive(Clone, Debug)]
 struct Words<'a> {
-    reading: &'a Reading<'a>,
+    reading: Reading<'a>,
     lines: Lines<'a>,
     /// The rest of the last line taken.
     rest: &'a str,
@@ -267,8 +259,8 @@ mod tests {
 
     use crate::mesh::tests::reading;
 
-    fn read(content: &[u8]) -> Result<RawMesh, IoError> {
-        parse(&reading("a.stl"), content.to_vec())
+    fn read(content: &[u8]) -> Result<RawMesh<'static>, IoError> {
+        parse(reading("a.stl"), content.to_vec())
     }
 
     fn binary(title: &[u8], count: u32, triangles: usize) -> Vec<u8> {
@@ -337,7 +329,7 @@ mod tests {
         }
         let text = "\u{feff}solid".encode_utf16().flat_map(u16::to_le_bytes);
         assert!(matches!(
-            parse(&reading("a.stl"), text.collect()),
+            parse(reading("a.stl"), text.collect()),
             Err(IoError {
                 kind: IoErrorKind::Encoding,
                 ..
@@ -347,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_count_of_0_is_told_where_it_stands() {
-        match read(&binary(b"x", 0, 0)).unwrap().finish(&reading("a.stl")) {
+        match read(&binary(b"x", 0, 0)).unwrap().finish() {
             Err(IoError {
                 found,
                 expected,

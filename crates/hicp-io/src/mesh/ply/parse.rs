@@ -1,6 +1,6 @@
 //! PLY files into meshes and point clouds.
 
-use hicp_core::{Point3, Vector3};
+use hicp_core::Vector3;
 
 use super::header::{Element, Encoding, Header};
 use super::rows::Rows;
@@ -28,18 +28,25 @@ fn check_counts(reading: &Reading<'_>, header: &Header) -> Result<(), IoError> {
 }
 
 /// Parses the vertices and faces of a PLY file.
-pub(crate) fn parse_mesh(reading: &Reading<'_>, content: Vec<u8>) -> Result<RawMesh, IoError> {
+pub(crate) fn parse_mesh(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
     parse(reading, &content, true)
 }
 
 /// Parses the vertices of a PLY file with their normals, which are NaN if the file has none.
-pub(crate) fn parse_points(reading: &Reading<'_>, content: &[u8]) -> Result<RawMesh, IoError> {
+pub(crate) fn parse_points<'a>(
+    reading: Reading<'a>,
+    content: &[u8],
+) -> Result<RawMesh<'a>, IoError> {
     parse(reading, content, false)
 }
 
-fn parse(reading: &Reading<'_>, content: &[u8], with_faces: bool) -> Result<RawMesh, IoError> {
+fn parse<'a>(
+    reading: Reading<'a>,
+    content: &[u8],
+    with_faces: bool,
+) -> Result<RawMesh<'a>, IoError> {
     let header = Header::parse(reading.path, content, content.len() as u64)?;
-    check_counts(reading, &header)?;
+    check_counts(&reading, &header)?;
     if let Some(Element {
         line, count: 1.., ..
     }) = header.element("tristrips")
@@ -57,14 +64,17 @@ fn parse(reading: &Reading<'_>, content: &[u8], with_faces: bool) -> Result<RawM
     vertex.require(reading.path, 3, "properties `x`, `y` and `z`")?;
 
     const POINTS: &str = "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh";
-    let mut mesh = RawMesh::new(match header.element("face") {
-        None => reading.refuse(end, names, POINTS),
-        Some(Element { line, count, .. }) => {
-            let found = quote(&format!("element face {count}"));
-            let expected = if *count == 0 { POINTS } else { FACE };
-            reading.refuse(Place::Line(*line), found, expected)
-        }
-    });
+    let mut mesh = RawMesh::new(
+        reading,
+        match header.element("face") {
+            None => reading.refuse(end, names, POINTS),
+            Some(Element { line, count, .. }) => {
+                let found = quote(&format!("element face {count}"));
+                let expected = if *count == 0 { POINTS } else { FACE };
+                reading.refuse(Place::Line(*line), found, expected)
+            }
+        },
+    );
     let text = match header.encoding {
         Encoding::Ascii => String::from_utf8_lossy(&content[header.bytes..]),
         _ => "".into(),
@@ -74,62 +84,60 @@ fn parse(reading: &Reading<'_>, content: &[u8], with_faces: bool) -> Result<RawM
     let mut early = None;
     for element in &header.elements {
         match &*element.name {
-            "vertex" => read_vertices(reading, &mut rows, element, with_faces, &mut mesh)?,
+            "vertex" => read_vertices(&mut rows, element, with_faces, &mut mesh)?,
             "face" if with_faces && element.line > vertex.line => {
-                read_faces(reading, &mut rows, element, &mut mesh)?;
+                read_faces(&mut rows, element, &mut mesh)?;
             }
             name => {
                 if name == "face" && with_faces {
                     early = Some((rows.clone(), element));
                 }
-                rows.read(reading, element, 0, |_, _| Ok(()))?;
+                rows.read(&reading, element, 0, |_, _| Ok(()))?;
             }
         }
     }
     if let Some((mut rows, element)) = early {
-        read_faces(reading, &mut rows, element, &mut mesh)?;
+        read_faces(&mut rows, element, &mut mesh)?;
     }
     Ok(mesh)
 }
 
 fn read_vertices(
-    reading: &Reading<'_>,
     rows: &mut Rows<'_>,
     element: &Element,
     with_faces: bool,
-    mesh: &mut RawMesh,
+    mesh: &mut RawMesh<'_>,
 ) -> Result<(), IoError> {
     let slots = if with_faces { 3 } else { 6 };
     let properties = element.properties.iter();
     let order = properties.filter_map(|p| element.slot(p).filter(|slot| *slot < slots));
     let order: Vec<usize> = order.collect();
-    rows.read(reading, element, slots, |place, numbers| {
+    let reading = mesh.reading;
+    rows.read(&reading, element, slots, |place, numbers| {
         let mut vertex = [f64::NAN; 6];
         for (slot, number) in order.iter().zip(numbers) {
             vertex[*slot] = *number;
         }
         let [x, y, z, nx, ny, nz] = vertex;
-        reading.check_position(place, &[x, y, z])?;
-        mesh.vertices.push(Point3::new(x, y, z));
         if !with_faces {
             mesh.normals.push(Vector3::new(nx, ny, nz));
         }
-        Ok(())
+        mesh.add_vertex(place, [x, y, z])
     })
 }
 
 fn read_faces(
-    reading: &Reading<'_>,
     rows: &mut Rows<'_>,
     element: &Element,
-    mesh: &mut RawMesh,
+    mesh: &mut RawMesh<'_>,
 ) -> Result<(), IoError> {
+    let reading = mesh.reading;
     let needed = "a list property `vertex_indices` or `vertex_index`";
     element.require(reading.path, 1, needed)?;
-    let mut face = 0;
-    rows.read(reading, element, 1, |place, corners| {
-        face += 1;
-        mesh.add_numbered_face(reading, place, face - 1, corners)
+    let mut faces = 0;
+    rows.read(&reading, element, 1, |place, corners| {
+        faces += 1;
+        mesh.add_corners(place, faces - 1, corners)
     })
 }
 
@@ -137,9 +145,10 @@ fn read_faces(
 mod tests {
     use super::*;
     use crate::mesh::tests::reading;
+    use hicp_core::Point3;
 
-    fn mesh(content: &[u8]) -> Result<RawMesh, IoError> {
-        parse_mesh(&reading("a.ply"), content.to_vec())
+    fn mesh(content: &[u8]) -> Result<RawMesh<'static>, IoError> {
+        parse_mesh(reading("a.ply"), content.to_vec())
     }
 
     const CORNERS: [[f32; 3]; 4] = [
@@ -321,7 +330,7 @@ mod tests {
                  {elements}end_header\n0 0 0\n{rows}"
             );
             let mesh = mesh(content.as_bytes());
-            let mesh = mesh.and_then(|mesh| mesh.finish(&reading("a.ply")));
+            let mesh = mesh.and_then(|mesh| mesh.finish());
             let error = mesh.unwrap_err().to_string();
             assert!(
                 error.contains(&format!("line {at}: found {found}, ")),

@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn numbers_as_people_write_them() {
         let text = format!("{HEAD}.5 1. +1e0\r\n\n  -.5\t0 0 99\n1 1 1E-3\n\n3 0 1 2 255");
-        let mesh = parse_mesh(&reading("a.ply"), text.into_bytes()).unwrap();
+        let mesh = parse_mesh(reading("a.ply"), text.into_bytes()).unwrap();
         assert_eq!(mesh.vertices[0].coords.as_slice(), [0.5, 1.0, 1.0]);
         assert_eq!(mesh.vertices[2].z, 0.001);
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
@@ -180,7 +180,7 @@ mod tests {
             ("0 0 0\n1 0 0\n0 1 -1e9\n3 0 1 2 0\n", 13),
             ("0 0 0\n1 0 0\n0 1 0\n3\n0 1 2 0\n", 14),
         ] {
-            match parse_mesh(&reading("a.ply"), format!("{HEAD}{body}").into_bytes()) {
+            match parse_mesh(reading("a.ply"), format!("{HEAD}{body}").into_bytes()) {
                 Err(IoError {
                     place: Some(Place::Line(line)),
                     ..
@@ -198,7 +198,7 @@ mod tests {
         ] {
             for head in [HEAD.to_owned(), HEAD.replace('\n', "\r")] {
                 let text = format!("{head}{body}");
-                let mesh = parse_mesh(&reading("a.ply"), text.into_bytes()).unwrap();
+                let mesh = parse_mesh(reading("a.ply"), text.into_bytes()).unwrap();
                 assert_eq!(mesh.vertices[1].coords.as_slice(), [1.0, 0.0, 0.0]);
                 assert_eq!(mesh.triangles, [[0, 1, 2]]);
             }
@@ -212,7 +212,7 @@ mod tests {
             element face 1\nproperty list uchar uint rgba\nproperty list uchar int vertex_indices\n\
             property uchar a%1\nend_header\n";
         let body = "2 4294967295 x\n-nan(ind) 256 0 0 0\nnan 0.5 1 0 0\n1,5 red 0 1 0\n1 4294967295 3 0 1 2 -1\n";
-        let mesh = parse_mesh(&reading("a.ply"), format!("{head}{body}").into_bytes()).unwrap();
+        let mesh = parse_mesh(reading("a.ply"), format!("{head}{body}").into_bytes()).unwrap();
         assert_eq!(mesh.vertices[1].coords.as_slice(), [1.0, 0.0, 0.0]);
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
 
@@ -224,7 +224,7 @@ mod tests {
             (" 0 1 2 -1", " 0 1 2", 20, "a%1"),
         ] {
             let text = format!("{head}{}", body.replace(given, short));
-            match parse_mesh(&reading("a.ply"), text.into_bytes()) {
+            match parse_mesh(reading("a.ply"), text.into_bytes()) {
                 Err(IoError {
                     place: Some(Place::Line(line)),
                     expected,
