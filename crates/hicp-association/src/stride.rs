@@ -4,6 +4,7 @@
 ///
 /// Accuracy hardly depends on it: every pixel and every fourth in both directions gave the same post-ICP VSD at a fifth of the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Stride {
     /// Every n-th pixel in both directions; 0 counts as 1.
     Pixels(u32),

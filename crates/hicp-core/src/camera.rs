@@ -11,6 +11,8 @@ use crate::region::PixelRegion;
 ///
 /// The two conventions differ by half a pixel. Mixing them shifts every point by `depth / (2 f)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum PixelCenters {
     /// Pixel (0, 0) has its center at (0, 0): OpenCV calibrations, BOP's distance maps, this
     /// library.
@@ -35,6 +37,8 @@ pub enum PixelCenters {
 /// # Ok(()) }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 pub struct PinholeCamera {
     fx: f64,
     fy: f64,
@@ -42,6 +46,28 @@ pub struct PinholeCamera {
     cy: f64,
     width: u32,
     height: u32,
+}
+
+/// The fields of a serialized camera, before they are checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unchecked {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    width: u32,
+    height: u32,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for PinholeCamera {
+    type Error = CameraError;
+
+    fn try_from(c: Unchecked) -> Result<Self, CameraError> {
+        Self::new(c.fx, c.fy, c.cx, c.cy, c.width, c.height)
+    }
 }
 
 /// The largest image side accepted, in pixels.

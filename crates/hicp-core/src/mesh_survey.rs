@@ -9,7 +9,9 @@ use crate::mesh::{DisjointSets, TriMesh, weld};
 /// Vertices at equal positions count as one in edges and parts, so that seams of texture
 /// coordinates and repeated vertices are not defects. Triangles with two corners at one position
 /// belong to neither.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct MeshSurvey {
     /// Triangles of zero area.
     pub degenerate_triangles: usize,

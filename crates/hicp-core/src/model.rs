@@ -12,6 +12,7 @@ use crate::symmetry::Symmetries;
 
 /// The configuration of a [`Model`], without its mesh.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConfig {
     /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES).
     ///

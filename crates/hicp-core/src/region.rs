@@ -5,6 +5,7 @@
 /// It is a region of interest, and empty if either range is empty. Buffers over a region are
 /// row-major and start at its corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PixelRegion {
     /// First column.
     pub u_min: u32,

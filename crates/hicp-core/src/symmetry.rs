@@ -14,9 +14,29 @@ pub const MAX_SYMMETRY_MOTIONS: usize = 1_000_000;
 
 /// A continuous rotational symmetry: all rotations around an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 pub struct SymmetryAxis {
     direction: UnitVector3<f64>,
     offset: Point3<f64>,
+}
+
+/// The fields of a serialized axis, before they are checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unchecked {
+    direction: Vector3<f64>,
+    offset: Point3<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for SymmetryAxis {
+    type Error = SymmetryError;
+
+    fn try_from(axis: Unchecked) -> Result<Self, SymmetryError> {
+        Self::new(axis.direction, axis.offset)
+    }
 }
 
 impl SymmetryAxis {
@@ -71,6 +91,7 @@ impl SymmetryAxis {
 /// By default there are none. A motion S is a symmetry if the object looks the same at
 /// `camera_from_object` and at `camera_from_object * S`.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Symmetries {
     /// Discrete symmetries, without the identity.
     pub discrete: Vec<Isometry3<f64>>,

@@ -36,6 +36,7 @@ impl Observer for () {}
 
 /// An evaluated pose.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct IterationEvent<'a> {
     /// Iteration within the stage, from 0.
     pub iteration: usize,
@@ -49,6 +50,7 @@ pub struct IterationEvent<'a> {
 
 /// Which branch of a switch is taken, counted from 0: the better the estimate agrees with the image, the lower.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Regime(pub usize);
 
 impl Regime {
@@ -72,6 +74,7 @@ impl Regime {
 
 /// A switcher's choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RegimeEvent {
     /// The branch taken.
     pub regime: Regime,
@@ -81,6 +84,7 @@ pub struct RegimeEvent {
 
 /// An ICP stage that ended.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct StageEvent<'a> {
     /// Name of the point selection.
     pub selection: &'static str,

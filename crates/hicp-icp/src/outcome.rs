@@ -90,6 +90,14 @@ impl Termination {
     }
 }
 
+/// Serializes the name.
+#[cfg(feature = "serde")]
+impl serde::Serialize for Termination {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 impl std::fmt::Display for Termination {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
@@ -98,6 +106,7 @@ impl std::fmt::Display for Termination {
 
 /// What was found when the pairs of a pose were evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evaluation {
     /// Number of pairs after filtering.
     pub n_pairs: usize,
@@ -107,6 +116,8 @@ pub struct Evaluation {
 
 /// How well the pairs of the returned pose fit: what is measured there and nowhere else.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Quality {
     /// Share of the points that asked for a pair and have one after filtering, 0 to 1; higher is better.
     pub fitness: f64,
@@ -115,7 +126,24 @@ pub struct Quality {
     /// Root mean square of the distances of the model points from the observed tangent planes, metres.
     pub plane_rmse: f64,
     /// The metric's normal equations there: what the pairs say about each of the six directions. `None` where it has none.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "information", serialize_with = "serialize_information")
+    )]
     pub system: Option<NormalEquations>,
+}
+
+/// Serializes normal equations as the 6×6 information of the pose.
+#[cfg(feature = "serde")]
+#[allow(clippy::ref_option)] // The signature that serde requires.
+fn serialize_information<S: serde::Serializer>(
+    system: &Option<NormalEquations>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(
+        &system.as_ref().map(NormalEquations::information),
+        serializer,
+    )
 }
 
 impl Quality {
@@ -171,6 +199,7 @@ impl Quality {
 
 /// Whether a stage moved the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Verdict {
     /// The returned pose is a new one.
     Refined,
@@ -182,6 +211,8 @@ pub enum Verdict {
 ///
 /// The pose was either evaluated (its pairs were found, counted and measured) or is the initial one.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Outcome {
     /// The pose.
     pub camera_from_object: Isometry3<f64>,
@@ -204,7 +235,16 @@ impl Outcome {
         self.evaluation.map_or(0, |e| e.n_pairs)
     }
 
-    /// Makes the outcome of a stage that does nothing.
+    /// Creates the outcome of a stage that moved the pose, without iterations or an evaluation.
+    #[must_use]
+    pub fn refined(camera_from_object: Isometry3<f64>, termination: Termination) -> Self {
+        Self {
+            verdict: Verdict::Refined,
+            ..Self::kept(&camera_from_object, termination)
+        }
+    }
+
+    /// Creates the outcome of a stage that keeps the initial pose.
     #[must_use]
     pub fn kept(init: &Isometry3<f64>, termination: Termination) -> Self {
         Self {

@@ -2,7 +2,7 @@
 
 use hicp_association::{AllSamples, DataAssociation, OutlierFilter, PointSelection, Projective};
 use hicp_core::internal::type_label;
-use hicp_icp::{Cascade, IterationLimit, Stage, StopRule};
+use hicp_icp::{BoxedStage, Cascade, IterationLimit, Stage, StopRule};
 use hicp_metric::{Minimize, PointToPoint};
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{Switcher, Threshold};
@@ -63,12 +63,24 @@ pub struct Catalog {
     entries: Vec<Entry>,
 }
 
+/// A [`PointSelection`] of a pipeline that is read from a file.
+pub type BoxedSelection = Box<dyn PointSelection + Send>;
+/// A [`DataAssociation`] of a pipeline that is read from a file.
+pub type BoxedAssociation = Box<dyn DataAssociation + Send>;
+/// An [`OutlierFilter`] of a pipeline that is read from a file.
+pub type BoxedFilter = Box<dyn OutlierFilter + Send>;
+/// An error metric of a pipeline that is read from a file.
+pub type BoxedMetric = Box<dyn Minimize + Send>;
+/// A [`StopRule`] of a pipeline that is read from a file.
+pub type BoxedStop = Box<dyn StopRule + Send>;
+/// A [`Score`] of a pipeline that is read from a file.
+pub type BoxedScore = Box<dyn Score + Send>;
+/// A [`Switcher`] of a pipeline that is read from a file.
+pub type BoxedSwitcher = Box<dyn Switcher + Send>;
+
 /// Declares, for each kind of part: its boxed type, the method that adds one, and any part of it.
 macro_rules! kinds {
-    ($($kind:ident: $boxed:ident = dyn $component:path, $add:ident, $stand_in:expr;)*) => {$(
-        #[doc = concat!("A [`", stringify!($component), "`] of a pipeline that is read from a file.")]
-        pub type $boxed = Box<dyn $component + Send>;
-
+    ($($kind:ident: $boxed:ty = dyn $component:path, $add:ident, $stand_in:expr;)*) => {$(
         impl BoxedPart for $boxed {
             const KIND: PartKind = PartKind::$kind;
 

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use hicp_icp::BoxedStage;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::build::Context;
-use crate::catalog::{BoxedStage, Catalog};
+use crate::catalog::Catalog;
 use crate::error::{PipelineError, Place};
 use crate::fields::Spot;
 use crate::limits::PipelineLimits;

@@ -49,7 +49,7 @@ mod work;
 
 pub use build::Parameters;
 pub use catalog::{
-    BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStage, BoxedStop,
+    BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStop,
     BoxedSwitcher, Catalog,
 };
 pub use error::{PipelineError, Place};

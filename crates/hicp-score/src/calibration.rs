@@ -45,6 +45,7 @@ pub fn roc_area(labeled: &[LabeledScore]) -> Option<f64> {
 /// The estimates with scores in one range: a line of a reliability table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct ReliabilityBin {
     /// Lower bound of the scores, included.
     pub lower: f64,

@@ -178,6 +178,7 @@ fn descending(values: &[f64], count: usize) -> Vec<usize> {
 /// adds their instances up.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Recalls {
     instances: usize,
     missing: usize,

@@ -84,7 +84,8 @@ impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
             }
             other = stalled;
         }
-        Outcome { iterations, ..best }
+        best.iterations = iterations;
+        best
     }
 
     fn name(&self) -> &'static str {

@@ -48,7 +48,8 @@ impl<S: Stage> Stage for AlongTheRay<S> {
                 }
             }
         }
-        Outcome { iterations, ..best }
+        best.iterations = iterations;
+        best
     }
 }
 

@@ -14,6 +14,7 @@ use crate::preset::Preset;
 /// --example calibration`). They hold for such models: with an exact model the shared error is much
 /// smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Calibration {
     /// Factor on the standard deviations of the registration.
     pub scale: f64,

@@ -82,7 +82,8 @@ pub use checks::{
     EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings, warnings_of_model,
     warnings_of_result,
 };
-pub use preset::{BoxedStage, Preset, UnknownPreset};
+pub use hicp_icp::BoxedStage;
+pub use preset::{Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};

@@ -3,14 +3,10 @@
 use std::str::FromStr;
 
 use hicp_core::internal::nearest_name;
-use hicp_icp::Stage;
+use hicp_icp::BoxedStage;
 use thiserror::Error;
 
 use crate::presets;
-
-/// A pipeline behind a box, as a name or a file selects it: the same code and the same bits as the
-/// literal.
-pub type BoxedStage = Box<dyn Stage + Send>;
 
 /// Declares the presets: per line the variant, the name, the function in [`presets`], and a summary.
 macro_rules! declare {

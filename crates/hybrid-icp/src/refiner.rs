@@ -1,16 +1,17 @@
 //! One call from an observation and a rough pose to a pose with its score.
 
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
-use hicp_icp::{Observer, Outcome, Session, Stage, Workspace};
+use hicp_icp::{BoxedStage, Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{Flatness, MeanVsd, Score};
 
 use crate::checks::warnings_of_result;
-use crate::preset::{BoxedStage, Preset};
+use crate::preset::Preset;
 use crate::warning::Warning;
 
 /// The result of a refinement: a pose, how it was found, and how well it explains the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Refinement {
     /// The pose (`outcome.camera_from_object`), the reason why the pipeline ended, and the numbers at

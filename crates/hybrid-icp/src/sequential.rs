@@ -5,12 +5,11 @@ use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
     Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
 };
-use hicp_icp::{Observer, Outcome, Quality, Session, Stage, Workspace};
+use hicp_icp::{BoxedStage, Observer, Outcome, Quality, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
 use crate::calibration::Calibration;
-use crate::preset::BoxedStage;
 use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 
 /// Estimates the pose of a static object from images along the path of a moving camera (§V).

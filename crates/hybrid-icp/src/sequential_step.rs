@@ -8,6 +8,7 @@ use hicp_score::MeanVsd;
 /// The covariance and the score of the estimates of a
 /// [`SequentialEstimator`](crate::SequentialEstimator).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SequentialConfig {
     /// Source of the covariance of an estimate.
     pub covariance: CovarianceModel,

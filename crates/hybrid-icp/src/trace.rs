@@ -4,6 +4,7 @@ use hicp_icp::{Observer, Outcome, RegimeEvent, StageEvent};
 
 /// One ICP stage that ran.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct StageRecord {
     /// Decision of the switch, if this is the first stage after one.
@@ -41,9 +42,11 @@ impl From<&StageEvent<'_>> for StageRecord {
 
 /// An observer that stores one record per ICP stage.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Trace {
     /// The stages in the order in which they ran.
     pub stages: Vec<StageRecord>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     pending: Option<RegimeEvent>,
 }
 

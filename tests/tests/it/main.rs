@@ -40,6 +40,7 @@ mod presets;
 mod resolution;
 mod room;
 mod sequential;
+mod serialization;
 mod stages;
 mod starts;
 mod ycbv;

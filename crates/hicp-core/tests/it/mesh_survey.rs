@@ -5,16 +5,13 @@ use std::collections::BTreeSet;
 use crate::support::{Numbers, cuboid, wedge};
 use hicp_core::{MeshSurvey, Point3, TriMesh};
 
-/// The survey of a clean closed mesh of one part.
-const CLEAN: MeshSurvey = MeshSurvey {
-    degenerate_triangles: 0,
-    duplicate_triangles: 0,
-    unused_vertices: 0,
-    boundary_edges: 0,
-    non_manifold_edges: 0,
-    misoriented_edges: 0,
-    components: 1,
-};
+/// Returns the survey of a closed mesh of one part, changed where `change` says so.
+fn clean_but(change: impl FnOnce(&mut MeshSurvey)) -> MeshSurvey {
+    let mut survey = MeshSurvey::default();
+    survey.components = 1;
+    change(&mut survey);
+    survey
+}
 
 /// A box with its triangles and vertices changed.
 fn changed(change: impl FnOnce(&mut Vec<Point3<f32>>, &mut Vec<[u32; 3]>)) -> MeshSurvey {
@@ -27,7 +24,7 @@ fn changed(change: impl FnOnce(&mut Vec<Point3<f32>>, &mut Vec<[u32; 3]>)) -> Me
 #[test]
 fn closed_meshes_have_no_defects() {
     for mesh in [cuboid(0.1, 0.2, 0.3), wedge()] {
-        assert_eq!(mesh.survey(), CLEAN);
+        assert_eq!(mesh.survey(), clean_but(|_| {}));
         assert!(mesh.survey().is_watertight());
     }
 }
@@ -38,19 +35,13 @@ fn each_defect_has_its_own_count() {
         let missing = changed(|_, triangles| {
             triangles.remove(t);
         });
-        let expected = MeshSurvey {
-            boundary_edges: 3,
-            ..CLEAN
-        };
+        let expected = clean_but(|survey| survey.boundary_edges = 3);
         assert_eq!(missing, expected);
         assert!(!missing.is_watertight());
 
         // Watertightness ignores the winding.
         let turned = changed(|_, triangles| triangles[t].swap(1, 2));
-        let expected = MeshSurvey {
-            misoriented_edges: 3,
-            ..CLEAN
-        };
+        let expected = clean_but(|survey| survey.misoriented_edges = 3);
         assert_eq!(turned, expected);
         assert!(turned.is_watertight());
 
@@ -59,11 +50,10 @@ fn each_defect_has_its_own_count() {
                 let triangle = triangles[t];
                 triangles.push(order.map(|corner: usize| triangle[corner]));
             });
-            let expected = MeshSurvey {
-                duplicate_triangles: 1,
-                non_manifold_edges: 3,
-                ..CLEAN
-            };
+            let expected = clean_but(|survey| {
+                survey.duplicate_triangles = 1;
+                survey.non_manifold_edges = 3;
+            });
             assert_eq!(doubled, expected);
             assert!(!doubled.is_watertight());
         }
@@ -73,10 +63,7 @@ fn each_defect_has_its_own_count() {
 #[test]
 fn triangles_without_area_count_and_repeated_corners_give_no_edges() {
     let survey = changed(|_, triangles| triangles.extend([[0, 0, 1], [3, 2, 2], [5, 4, 5]]));
-    let expected = MeshSurvey {
-        degenerate_triangles: 3,
-        ..CLEAN
-    };
+    let expected = clean_but(|survey| survey.degenerate_triangles = 3);
     assert_eq!(survey, expected);
     assert!(survey.is_watertight());
     // Three corners on a line have edges. Two of them are new here, and the third is one of the
@@ -85,12 +72,11 @@ fn triangles_without_area_count_and_repeated_corners_give_no_edges() {
         vertices.push(nalgebra::center(&vertices[0], &vertices[1]));
         triangles.push([0, 8, 1]);
     });
-    let expected = MeshSurvey {
-        degenerate_triangles: 1,
-        boundary_edges: 2,
-        non_manifold_edges: 1,
-        ..CLEAN
-    };
+    let expected = clean_but(|survey| {
+        survey.degenerate_triangles = 1;
+        survey.boundary_edges = 2;
+        survey.non_manifold_edges = 1;
+    });
     assert_eq!(survey, expected);
 }
 
@@ -110,10 +96,7 @@ fn vertices_differ_by_position_and_parts_by_vertices() {
         *vertices = own;
         *triangles = (0..12).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     });
-    let expected = MeshSurvey {
-        unused_vertices: 2,
-        ..CLEAN
-    };
+    let expected = clean_but(|survey| survey.unused_vertices = 2);
     assert_eq!(seamed, expected);
 
     // Two boxes next to each other are two parts; corner to corner they are one.
@@ -125,26 +108,17 @@ fn vertices_differ_by_position_and_parts_by_vertices() {
             vertices.extend(mesh.vertices().iter().map(beside));
             triangles.extend(mesh.triangles().iter().map(|t| t.map(|i| i + 8)));
         });
-        let expected = MeshSurvey {
-            components,
-            ..CLEAN
-        };
+        let expected = clean_but(|survey| survey.components = components);
         assert_eq!(pair, expected);
     }
 }
 
 #[test]
 fn a_mesh_without_edges_is_not_watertight() {
-    let nothing = MeshSurvey {
-        components: 0,
-        ..CLEAN
-    };
+    let nothing = clean_but(|survey| survey.components = 0);
     assert!(!nothing.is_watertight());
     for components in [1, 2, 7] {
-        let parts = MeshSurvey {
-            components,
-            ..CLEAN
-        };
+        let parts = clean_but(|survey| survey.components = components);
         assert!(parts.is_watertight());
     }
 }
@@ -176,20 +150,17 @@ fn by_definition(mesh: &TriMesh) -> MeshSurvey {
         (0..3).any(|side| triangle[side] == *from && triangle[(side + 1) % 3] == *to)
     };
     let places: Vec<[i32; 3]> = BTreeSet::from_iter(positions).into_iter().collect();
-    let mut survey = MeshSurvey {
-        degenerate_triangles: all.iter().filter(|t| collinear(t)).count(),
-        duplicate_triangles: (0..sound.len())
-            .filter(|&i| sound[..i].iter().any(|t| set(t) == set(&sound[i])))
-            .count(),
-        unused_vertices: (0..mesh.vertices().len())
-            .filter(|i| {
-                let mut used = mesh.triangles().iter().flatten();
-                used.all(|corner| *corner as usize != *i)
-            })
-            .count(),
-        components: 0,
-        ..CLEAN
-    };
+    let mut survey = MeshSurvey::default();
+    survey.degenerate_triangles = all.iter().filter(|t| collinear(t)).count();
+    survey.duplicate_triangles = (0..sound.len())
+        .filter(|&i| sound[..i].iter().any(|t| set(t) == set(&sound[i])))
+        .count();
+    survey.unused_vertices = (0..mesh.vertices().len())
+        .filter(|i| {
+            let mut used = mesh.triangles().iter().flatten();
+            used.all(|corner| *corner as usize != *i)
+        })
+        .count();
     for (i, a) in places.iter().enumerate() {
         for b in &places[..i] {
             let there = sound.iter().filter(|t| walks(t, a, b)).count();

@@ -9,6 +9,7 @@ use crate::stop::motion::Bound;
 
 /// Which rotations a search tries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Rotations {
     /// An even grid of SO(3); with a bound, as many within it.
     #[default]

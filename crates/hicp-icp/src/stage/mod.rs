@@ -16,4 +16,4 @@ pub use hypotheses::Rotations;
 pub use icp::{Icp, MAX_ITERATIONS};
 pub use resolution::AtResolution;
 pub use search::{HypothesisSearch, SearchOptions};
-pub use stage_trait::Stage;
+pub use stage_trait::{BoxedStage, Stage};

@@ -37,6 +37,9 @@ pub trait Stage {
     }
 }
 
+/// A stage behind a box, as a name or a file selects it: the same code and the same bits as the literal.
+pub type BoxedStage = Box<dyn Stage + Send>;
+
 macro_rules! forward {
     ($($pointer:ty),+) => {$(
         impl<T: Stage + ?Sized> Stage for $pointer {

@@ -7,6 +7,7 @@ use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
 /// When a rising mean loss counts as divergence (rule 3 of §IV-B).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LossRule {
     /// Whenever it rises: the rule as written.
     #[default]

@@ -12,17 +12,14 @@ fn outcome(x: f64, verdict: Verdict, iterations: usize, loss: Option<f64>) -> Ou
         Verdict::Refined => Termination::Converged,
         Verdict::KeptInitial(termination) => termination,
     };
-    Outcome {
-        camera_from_object: Isometry3::translation(x, 0.0, 0.0),
-        termination,
-        verdict,
-        iterations,
-        evaluation: loss.map(|mean_loss| Evaluation {
-            n_pairs: 10,
-            mean_loss,
-        }),
-        quality: None,
-    }
+    let mut outcome = Outcome::kept(&Isometry3::translation(x, 0.0, 0.0), termination);
+    outcome.verdict = verdict;
+    outcome.iterations = iterations;
+    outcome.evaluation = loss.map(|mean_loss| Evaluation {
+        n_pairs: 10,
+        mean_loss,
+    });
+    outcome
 }
 
 const LOST: Verdict = Verdict::KeptInitial(Termination::PairsLost);
@@ -36,16 +33,12 @@ fn an_outcome_followed_by_another() {
     assert_eq!(both, outcome(2.0, Refined, 7, Some(1.0)));
     // The second kept the first's pose: still a new pose, whose last evaluation is the second's if it made one.
     let kept = outcome(1.0, Refined, 3, Some(5.0)).then(outcome(1.0, LOST, 2, Some(9.0)));
-    let expected = Outcome {
-        termination: Termination::PairsLost,
-        ..outcome(1.0, Refined, 5, Some(9.0))
-    };
+    let mut expected = outcome(1.0, Refined, 5, Some(9.0));
+    expected.termination = Termination::PairsLost;
     assert_eq!(kept, expected);
     let kept = outcome(1.0, Refined, 3, Some(5.0)).then(outcome(1.0, NO_PAIRS, 1, None));
-    let expected = Outcome {
-        termination: Termination::NoPairs,
-        ..outcome(1.0, Refined, 4, Some(5.0))
-    };
+    let mut expected = outcome(1.0, Refined, 4, Some(5.0));
+    expected.termination = Termination::NoPairs;
     assert_eq!(kept, expected);
     // Neither moved: the last reason.
     let neither = outcome(0.0, LOST, 2, Some(5.0)).then(outcome(0.0, NO_PAIRS, 1, None));

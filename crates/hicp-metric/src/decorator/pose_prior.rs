@@ -12,6 +12,7 @@ use crate::system::normal_equations::NormalEquations;
 /// As everywhere, ξ = ln(T T₀⁻¹)^∨ = [ρ; φ] is a left perturbation in the camera frame, translation first (metres, radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // One in a pipeline.
+#[non_exhaustive]
 pub enum Prior {
     /// Anything is as likely.
     Flat,

@@ -14,6 +14,7 @@ const MIN_SCALE: f64 = 1e-12;
 
 /// The σ that a kernel measures residuals by.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Scale {
     /// A known σ of the residuals, metres.
     Meters(f64),

@@ -8,6 +8,7 @@
 /// direction open exactly, as those of a plane do. In depth images of a cylinder and a sphere, noise-free, the pixels alone lift its
 /// eigenvalues to 10⁻⁵ to 10⁻⁴, and the pose slid by 9 % and 32 % of the first step (`cargo test -p hicp-tests --test it degeneracy_scenes`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Degeneracy {
     /// Tikhonov's damping, 10⁻⁶ of the mean diagonal: free directions do not move, well-determined ones are shortened by some
     /// 10⁻⁶ to 10⁻⁵ of the step. Smooth and without a threshold; directions that only noise determines do move.

@@ -11,6 +11,7 @@ use crate::system::solve::eigen;
 /// of similar size and the ratio of eigenvalues does not depend on the unit, the distance, or the number of pairs
 /// (Zhang, Kaess & Singh 2016 for the analysis; raw eigenvalues mix m² and rad²).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Observability {
     /// Eigenvalues relative to the largest, ascending, in [0, 1]; all zero without any information.
     pub eigenvalues: [f64; 6],

@@ -16,6 +16,11 @@ pub(super) fn add(catalog: &mut Catalog) {
             Cost: O(n).";
         Ok(AllSamples)
     });
+    catalog.add_selection("none", |p| {
+        p.about = "Selects nothing, for associations that start from the observed points, such as \
+            `observation-to-model`.";
+        Ok(())
+    });
     catalog.add_selection("visible-surface", |p| {
         p.about = "Selects the points visible at the stage's initial estimate: V_O. \
             Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";

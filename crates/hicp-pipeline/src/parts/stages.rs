@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use hicp_icp::{
-    Anderson, AtResolution, Bound, Cascade, Guard, HypothesisSearch, Icp, KeepBest, MAX_ITERATIONS,
-    Repeat, Rotations, SearchOptions,
+    Anderson, AtResolution, Bound, BoxedStage, Cascade, Guard, HypothesisSearch, Icp, KeepBest,
+    MAX_ITERATIONS, Repeat, Rotations, SearchOptions,
 };
 use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
 
 use crate::build::Parameters;
 use crate::catalog::{
-    BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStage, BoxedStop,
+    BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStop,
     BoxedSwitcher, Catalog,
 };
 use crate::error::PipelineError;

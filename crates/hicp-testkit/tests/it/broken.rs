@@ -422,16 +422,12 @@ impl Stage for Rash {
             (false, false) => Isometry3::translation(0.0, 0.0, 1e-3) * init,
             _ => *init,
         };
-        let kept = Outcome::kept(init, Termination::NoPairs);
-        Outcome {
-            camera_from_object: pose,
-            verdict: if self.kept {
-                kept.verdict
-            } else {
-                Verdict::Refined
-            },
-            ..kept
+        let mut outcome = Outcome::kept(init, Termination::NoPairs);
+        outcome.camera_from_object = pose;
+        if !self.kept {
+            outcome.verdict = Verdict::Refined;
         }
+        outcome
     }
 }
 

@@ -88,6 +88,8 @@ fn observed<M>(
     convergence: Convergence,
 ) -> CloudToModelIcp<M> {
     Icp {
+        // The association ignores the selection. `()` would do, but work counts and traces of the
+        // preset list the selected points.
         selection: AllSamples,
         association: ObservationToModel {
             stride: Stride::AboutPoints(points),

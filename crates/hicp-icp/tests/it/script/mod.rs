@@ -192,9 +192,8 @@ impl Stage for Told {
         if self.by != 0.0 {
             pose.translation.vector.x += self.by;
         }
-        Outcome {
-            camera_from_object: pose,
-            ..self.outcome
-        }
+        let mut outcome = self.outcome;
+        outcome.camera_from_object = pose;
+        outcome
     }
 }

@@ -1,0 +1,64 @@
+//! Cameras, configurations and results through JSON, with the feature `serde`.
+
+use hicp_sim::{Household, rng};
+use hicp_tests::scene;
+use hybrid_icp::core::{
+    Isometry3, ModelConfig, PinholeCamera, Point3, Symmetries, SymmetryAxis, Vector3,
+};
+use hybrid_icp::{Calibration, Preset, Refiner, SequentialConfig, Trace};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Asserts that a value comes back from JSON as it was.
+fn round_trip<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(value: &T) {
+    let text = serde_json::to_string(value).unwrap();
+    assert_eq!(&serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
+}
+
+#[test]
+fn cameras_and_configurations_survive_json() {
+    round_trip(&PinholeCamera::new(600.5, 601.0, 319.5, 239.5, 640, 480).unwrap());
+    round_trip(&ModelConfig {
+        diameter: Some(0.1),
+        symmetries: Symmetries {
+            discrete: vec![Isometry3::translation(0.0, 0.1, 0.0)],
+            continuous: vec![SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap()],
+        },
+        ..ModelConfig::default()
+    });
+    round_trip(&SequentialConfig::default());
+    round_trip(&Calibration::HYBRID);
+}
+
+#[test]
+fn impossible_cameras_and_axes_are_refused() {
+    let camera = r#"{"fx":0,"fy":1,"cx":1,"cy":1,"width":2,"height":2}"#;
+    let error = serde_json::from_str::<PinholeCamera>(camera).unwrap_err();
+    assert!(
+        error.to_string().contains("focal length fx is 0"),
+        "{error}"
+    );
+    let axis = r#"{"direction":[0,0,0],"offset":[0,0,0]}"#;
+    let error = serde_json::from_str::<SymmetryAxis>(axis).unwrap_err();
+    assert!(error.to_string().contains("no direction"), "{error}");
+}
+
+#[test]
+fn results_are_written_with_their_names_and_numbers() {
+    let scene = scene(Household::Mug, 0.5, &mut rng(31));
+    let mut trace = Trace::default();
+    let mut refiner = Refiner::new(Preset::Hybrid.build());
+    let result =
+        refiner.refine_observed(&scene.model, &scene.observation, &scene.truth, &mut trace);
+    let json = serde_json::to_value(result).unwrap();
+    assert_eq!(json["mve"], result.mve);
+    assert_eq!(
+        json["outcome"]["termination"],
+        result.outcome.termination.name()
+    );
+    let information = result.outcome.quality.unwrap().information().unwrap();
+    let written = &json["outcome"]["quality"]["information"];
+    assert_eq!(*written, serde_json::to_value(information).unwrap());
+    let stages = &serde_json::to_value(&trace).unwrap()["stages"];
+    assert_eq!(stages[0]["association"], trace.stages[0].association);
+}
