@@ -1,15 +1,12 @@
-//! The masks of an image, and what each cuts out of it.
+//! The masks of an image, and its observations in them.
 
-use std::sync::Arc;
-
-use hicp_io::bop::Detection;
-use hicp_io::is_absent;
 use hybrid_icp::Refiner;
 use hybrid_icp::core::{Isometry3, Mask, Model, Observation};
 
 use crate::assignment::assign_masks;
 use crate::box_mask::BoxMask;
-use crate::fault::{Fault, FaultKind};
+use crate::covered::covered_pixels;
+use crate::fault::Fault;
 use crate::mask_file::Source;
 use crate::row_status::RowStatus;
 use crate::scenes::Image;
@@ -17,15 +14,16 @@ use crate::scenes::Image;
 /// Bytes of masks, one per pixel, that are held at once.
 const HELD_BYTES: usize = 1 << 28;
 
-/// An image while its rows are refined: its depth read once and shared by its observations, a mask read when a row of its object asks for it, an observation
-/// made when a row is refined in it.
+/// An image while its rows are refined ([`crate::MaskSource::frame`]).
+///
+/// Its observations share its depth. A mask is read when a row of its object needs it, and its observation is created when a
+/// row is refined in it.
 #[derive(Debug)]
 pub struct BopImage<'a> {
     image: Image,
     masks: Vec<Candidate<'a>>,
     faults: Vec<Fault>,
-    /// Pixels of the masks that are held, and how many may be.
-    held: usize,
+    /// Bytes of masks that may be held.
     memory: usize,
 }
 
@@ -37,82 +35,70 @@ struct Candidate<'a> {
     seen: Seen,
 }
 
-/// What is known of a mask.
+/// The state of a mask.
 #[derive(Debug)]
 enum Seen {
-    /// Nobody asked for it yet, or it was let go.
+    /// It was not needed yet, or it was released.
     Unread,
-    /// It is not there or cannot be used.
+    /// It is missing or cannot be used.
     Unusable(RowStatus),
     Read(Mask),
     Observed(Box<Observation>),
 }
 
+impl Seen {
+    /// Returns the mask if it is held.
+    fn mask(&self) -> Option<&Mask> {
+        match self {
+            Self::Read(mask) => Some(mask),
+            Self::Observed(observation) => Some(observation.mask()),
+            Self::Unread | Self::Unusable(_) => None,
+        }
+    }
+}
+
 impl<'a> BopImage<'a> {
-    /// An image whose masks are the visible masks of its ground truth; without ground truth it has none, and a fault that says so.
-    #[must_use]
-    pub fn with_visible_masks(image: Image) -> Self {
-        let truths = image.scene.ground_truth(image.im_id);
-        let unknown = truths.is_none().then(|| no_ground_truth(&image));
-        let masks = truths.unwrap_or_default().iter().enumerate();
-        let masks = masks.map(|(instance, truth)| (truth.obj_id, Source::Instance(instance)));
-        let masks = candidates(masks);
-        let mut frame = Self::new(image, masks);
-        frame.faults.extend(unknown);
-        frame
-    }
-
-    /// An image whose masks are the segmentations of detections; those without one are of no use and no harm.
-    #[must_use]
-    pub fn with_detections(image: Image, detections: &'a [Detection]) -> Self {
-        let coded = detections.iter();
-        let coded = coded.filter_map(|d| Some((d.category_id, d.segmentation.as_ref()?)));
-        let masks = candidates(coded.map(|(obj_id, code)| (obj_id, Source::Code(code))));
-        Self::new(image, masks)
-    }
-
-    /// An image without masks, for [`BopImage::observe_box`].
-    #[must_use]
-    pub fn without_masks(image: Image) -> Self {
-        Self::new(image, Vec::new())
-    }
-
-    fn new(image: Image, masks: Vec<Candidate<'a>>) -> Self {
+    /// Creates an image with the masks that rows of objects may be refined in.
+    pub(crate) fn new(image: Image, masks: Vec<(u32, Source<'a>)>, faults: Vec<Fault>) -> Self {
+        let unread = |(obj_id, source)| Candidate {
+            obj_id,
+            source,
+            seen: Seen::Unread,
+        };
         Self {
             image,
-            masks,
-            faults: Vec::new(),
-            held: 0,
+            masks: masks.into_iter().map(unread).collect(),
+            faults,
             memory: HELD_BYTES,
         }
     }
 
-    /// Limits the memory of masks that are held at once, bytes: 256 MiB unless told. One is held whatever its size.
+    /// Limits the memory of masks that are held at once, in bytes. The default is 256 MiB. One mask is always held.
     ///
-    /// A few characters of a run-length code may stand for a whole image, so a file can name far more masks than fit into memory. Beyond
-    /// the limit all are let go and read again when they are asked for, to the same results.
+    /// A few characters of a run-length code may stand for a whole image, so a file can name far more masks than fit into
+    /// memory. Beyond the limit, all masks are released and read again when they are needed, with the same results.
     #[must_use]
     pub fn with_memory(mut self, bytes: usize) -> Self {
         self.memory = bytes;
         self
     }
 
-    /// The image.
+    /// Returns the image.
     #[must_use]
     pub fn image(&self) -> &Image {
         &self.image
     }
 
-    /// Masks that are missing or could not be used, as far as rows asked for them.
+    /// Returns the faults of masks that rows needed and that are missing or cannot be used.
     #[must_use]
     pub fn into_faults(self) -> Vec<Fault> {
         self.faults
     }
 
-    /// Chooses a mask for every pose of an object, as [`assign_masks`] does; or says why a pose has none.
+    /// Chooses a mask for every pose of an object with [`assign_masks`], or returns the reason why a pose has none.
     ///
-    /// The masks returned are for [`BopImage::observation`]. Cost: a render per pose and O(silhouette) per mask. The renderer's cache
-    /// keeps the last few, so that the refinement of a single pose begins with the render that chose its mask.
+    /// The masks returned are arguments of [`BopImage::observation`]. Cost: a render per pose and O(silhouette) per mask. The
+    /// renderer's cache keeps the last few, so the refinement of a single pose reuses the render that chose its mask.
     pub fn choose(
         &mut self,
         refiner: &mut Refiner,
@@ -143,7 +129,7 @@ impl<'a> BopImage<'a> {
             .collect()
     }
 
-    /// Returns what a mask cuts out of the image, made when it is first asked for.
+    /// Returns the observation of the image in a mask, which is created when it is first needed.
     ///
     /// # Errors
     ///
@@ -151,29 +137,26 @@ impl<'a> BopImage<'a> {
     pub fn observation(&mut self, mask: usize) -> Result<&Observation, RowStatus> {
         self.read(mask)?;
         let seen = &mut self.masks[mask].seen;
-        if matches!(seen, Seen::Read(_))
-            && let Seen::Read(read) = std::mem::replace(seen, Seen::Unusable(RowStatus::Damaged))
-        {
-            match Observation::new(Arc::clone(&self.image.depth), read, self.image.camera) {
-                Ok(observation) => *seen = Seen::Observed(Box::new(observation)),
+        if let Seen::Read(read) = seen {
+            *seen = match self.image.observe(read.clone()) {
+                Ok(observation) => Seen::Observed(Box::new(observation)),
                 Err(error) => {
-                    self.held = self.held.saturating_sub(self.n_pixels());
                     self.faults.push(Fault::damaged(error.to_string()));
+                    Seen::Unusable(RowStatus::Damaged)
                 }
-            }
+            };
         }
-        match &self.masks[mask].seen {
+        match seen {
             Seen::Observed(observation) => Ok(observation),
-            Seen::Unusable(status) => Err(*status),
-            Seen::Unread | Seen::Read(_) => Err(RowStatus::NoMask),
+            _ => Err(RowStatus::Damaged),
         }
     }
 
-    /// Makes the observation of an estimate that has no mask but the box about it.
+    /// Creates the observation of an estimate in the box around it, without a segmentation.
     ///
     /// # Errors
     ///
-    /// [`RowStatus::NothingMeasured`] where the mask is empty.
+    /// [`RowStatus::NothingMeasured`] if the mask is empty.
     pub fn observe_box(
         &self,
         refiner: &mut Refiner,
@@ -185,42 +168,31 @@ impl<'a> BopImage<'a> {
         let view = refiner.workspace_mut().view(model, camera, pose);
         let mask = by.mask(view, (depth, camera), model, pose);
         let mask = mask.ok_or(RowStatus::NothingMeasured)?;
-        // The mask has the size of the depth image, and so has the camera.
-        Observation::new(Arc::clone(depth), mask, *camera).map_err(|_| RowStatus::Damaged)
+        self.image.observe(mask).map_err(|_| RowStatus::Damaged)
     }
 
-    fn n_pixels(&self) -> usize {
-        self.image.depth.pixels().len()
-    }
-
-    /// Lets all masks go that are held.
-    fn release(&mut self) {
-        for candidate in &mut self.masks {
-            if matches!(candidate.seen, Seen::Read(_) | Seen::Observed(_)) {
-                candidate.seen = Seen::Unread;
-            }
-        }
-        self.held = 0;
-    }
-
-    /// Makes sure that a mask is read.
+    /// Reads a mask that is not held. If the masks would exceed the memory, releases the others.
     fn read(&mut self, index: usize) -> Result<(), RowStatus> {
         if matches!(self.masks[index].seen, Seen::Unread) {
-            if self.held.saturating_add(self.n_pixels()) > self.memory {
-                self.release();
+            let held = self
+                .masks
+                .iter()
+                .filter(|other| other.seen.mask().is_some());
+            if (held.count() + 1) * self.image.depth.pixels().len() > self.memory {
+                let held = self
+                    .masks
+                    .iter_mut()
+                    .filter(|other| other.seen.mask().is_some());
+                held.for_each(|other| other.seen = Seen::Unread);
             }
-            let seen = match self.masks[index].source.read(&self.image) {
-                Ok(mask) => {
-                    self.held += self.n_pixels();
-                    Seen::Read(mask)
-                }
+            self.masks[index].seen = match self.masks[index].source.read(&self.image) {
+                Ok(mask) => Seen::Read(mask),
                 Err(fault) => {
                     let status = RowStatus::from(&fault);
                     self.faults.push(fault);
                     Seen::Unusable(status)
                 }
             };
-            self.masks[index].seen = seen;
         }
         match &self.masks[index].seen {
             Seen::Unusable(status) => Err(*status),
@@ -238,46 +210,20 @@ impl<'a> BopImage<'a> {
     ) -> Vec<u64> {
         let camera = self.image.camera;
         let view = refiner.workspace_mut().view(model, &camera, pose);
-        let region = view.region();
+        let covered: Vec<(u32, u32)> = covered_pixels(view).collect();
+        let overlap = |index: &usize| {
+            // If the file has changed since the mask was read, the mask covers nothing.
+            let _ = self.read(*index);
+            let mask = self.masks[*index].seen.mask()?;
+            let both = covered
+                .iter()
+                .filter(|(u, v)| mask.get(*u, *v) == Some(true));
+            Some(both.count() as u64)
+        };
         masks
             .iter()
-            .map(|index| {
-                let mask = match self.read(*index).map(|()| &self.masks[*index].seen) {
-                    Ok(Seen::Read(mask)) => mask,
-                    Ok(Seen::Observed(observation)) => observation.mask(),
-                    // It could be used a moment ago: its file has changed.
-                    _ => return 0,
-                };
-                let pixels = (region.v_min..region.v_max)
-                    .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)));
-                let covered = pixels.zip(view.depth());
-                let both =
-                    covered.filter(|((u, v), z)| **z > 0.0 && mask.get(*u, *v) == Some(true));
-                both.count() as u64
-            })
+            .map(overlap)
+            .map(Option::unwrap_or_default)
             .collect()
     }
-}
-
-/// Why nothing is known of the instances of an image, in the words of what else is missing.
-fn no_ground_truth(image: &Image) -> Fault {
-    let path = image.scene.dir().join("scene_gt.json");
-    let why = match is_absent(&path) {
-        true => "does not exist".to_owned(),
-        false => format!("does not have image {}", image.im_id),
-    };
-    Fault {
-        kind: FaultKind::MissingMask,
-        text: format!("ground truth is missing: {} {why}", path.display()),
-    }
-}
-
-fn candidates<'a>(masks: impl Iterator<Item = (u32, Source<'a>)>) -> Vec<Candidate<'a>> {
-    masks
-        .map(|(obj_id, source)| Candidate {
-            obj_id,
-            source,
-            seen: Seen::Unread,
-        })
-        .collect()
 }

@@ -1,18 +1,23 @@
-//! A mask where there is no segmentation: what was measured in a box about the estimate.
+//! Masks without a segmentation: everything that was measured in a box around the estimate.
 
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, Vector3,
 };
 
-/// How a mask is made of an estimate alone.
+use crate::covered::covered_pixels;
+
+/// Creates a mask from an estimate alone.
 ///
-/// Set are the pixels that lie in the box of the model's silhouette at the estimate, grown on every side by `margin` times its
-/// longer side, and whose measured point lies in the model's own bounding box at the estimate, grown on every side by `margin`
-/// times its diameter. Whatever else stands in that box is in the mask too, so this is for estimates that are near, of objects
-/// that stand free, and for projective pipelines; a segmentation is better where there is one (`docs/bop.md` has figures).
+/// The mask has the pixels that meet two conditions:
+///
+/// - They lie in the box of the model's silhouette at the estimate, grown on every side by `margin` times its longer side.
+/// - Their measured point lies in the model's bounding box at the estimate, grown on every side by `margin` times the diameter.
+///
+/// Anything else in that box is in the mask too. So this is for estimates that are near, for objects that stand free, and for
+/// projective pipelines. If there is a segmentation, it is better (`docs/bop.md` has figures).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
-    /// How much the boxes grow on every side.
+    /// The growth of the boxes on every side, relative to their size.
     pub margin: f64,
 }
 
@@ -24,7 +29,7 @@ impl Default for BoxMask {
 }
 
 impl BoxMask {
-    /// Makes the mask of an estimate, or returns `None` where no pixel is in it.
+    /// Returns the mask of an estimate, or `None` if it has no pixel.
     ///
     /// `view` is the render of the model at `camera_from_object`; depth image and camera are of one size. Cost: O(image) to
     /// clear, O(vertices), then O(box).
@@ -91,28 +96,18 @@ impl BoxMask {
     }
 }
 
-/// Returns the smallest box of the pixels that were rendered, or `None` where none was.
+/// Returns the smallest box of the pixels that were rendered, or `None` if there are none.
 fn silhouette_box(view: &RenderedView) -> Option<PixelRegion> {
-    let region = view.region();
-    let mut found: Option<PixelRegion> = None;
-    let rows = view.depth().chunks_exact(region.width().max(1));
-    for (v, row) in (region.v_min..).zip(rows) {
-        let Some(first) = row.iter().position(|z| *z > 0.0) else {
-            continue;
-        };
-        let last = row.iter().rposition(|z| *z > 0.0).unwrap_or(first);
-        // Columns of an image, which are numbered in u32.
-        let column = |index: usize| region.u_min + u32::try_from(index).unwrap_or(u32::MAX);
-        let (u_min, u_max) = (column(first), column(last) + 1);
-        let so_far = found.get_or_insert(PixelRegion {
-            u_min,
-            v_min: v,
-            u_max,
-            v_max: v + 1,
-        });
-        so_far.u_min = so_far.u_min.min(u_min);
-        so_far.u_max = so_far.u_max.max(u_max);
-        so_far.v_max = v + 1;
-    }
-    found
+    let pixels = covered_pixels(view).map(|(u, v)| PixelRegion {
+        u_min: u,
+        v_min: v,
+        u_max: u + 1,
+        v_max: v + 1,
+    });
+    pixels.reduce(|a, b| PixelRegion {
+        u_min: a.u_min.min(b.u_min),
+        v_min: a.v_min,
+        u_max: a.u_max.max(b.u_max),
+        v_max: b.v_max,
+    })
 }

@@ -1,32 +1,32 @@
-//! What is missing or damaged in a dataset.
+//! Faults of a dataset: missing and damaged files.
 
 use std::error::Error;
 
 use hicp_io::{IoError, IoErrorKind};
 use serde::{Deserialize, Serialize};
 
-/// What is the matter with a part of a dataset.
+/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FaultKind {
-    /// It is not there, which is no fault of the dataset: parts of one are often all that one has.
+    /// A file is missing, which is common: many users have only a part of a dataset.
     Missing,
-    /// The same, of masks of an image that is there.
+    /// A mask of an image is missing.
     MissingMask,
-    /// It is there, but cannot be used.
+    /// A file exists, but cannot be used.
     Damaged,
 }
 
-/// Why something of a dataset cannot be used; it costs the rows that need it, and no others.
+/// The reason why a file of a dataset cannot be used. It affects only the rows that need the file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// What is the matter with it.
+    /// The kind.
     pub kind: FaultKind,
-    /// What is wrong, with path, place and what was expected.
+    /// The message: path, place, the value found and what was expected.
     pub text: String,
 }
 
 impl Fault {
-    /// What an error while reading says.
+    /// Converts an error of a reader.
     #[must_use]
     pub fn of(error: &IoError) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Fault {
         }
     }
 
-    /// Something that is there, but cannot be used.
+    /// Creates the fault of a file that exists, but cannot be used.
     #[must_use]
     pub fn damaged(text: String) -> Self {
         Self {

@@ -253,8 +253,9 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Returns the most visible instances of an object in an image, as indices into its ground truth.
-fn instances(image: &Image, obj_id: u32, count: usize) -> Vec<usize> {
+/// Returns the `count` most visible instances of an object in an image, as indices into its ground truth.
+#[must_use]
+pub fn instances(image: &Image, obj_id: u32, count: usize) -> Vec<usize> {
     let truths = image.scene.ground_truth(image.im_id).unwrap_or_default();
     let infos = image.scene.ground_truth_info(image.im_id);
     let infos = infos.unwrap_or_default();

@@ -1,9 +1,8 @@
-//! Refining the rows of BOP result files, image by image: what `hybrid-icp bop refine` does, without its threads, its journal
-//! and its terminal.
+//! Refines the rows of BOP result files, image by image, as `hybrid-icp bop refine` does.
 //!
-//! **Should you use this crate?** To refine whole result files from a program of your own, a queue or a cluster: yes; it reads
-//! rows, groups them by image, gives each row a mask, refines, and enters the results into the rows. From a shell,
-//! `hybrid-icp bop refine` is the same and keeps a journal. For single poses, use `hybrid-icp`; to read datasets only, `hicp-io`.
+//! **Should you use this crate?** Yes, to refine whole result files from a custom program, a queue or a cluster. It groups rows
+//! by image, assigns a mask to each row, refines, and enters the results into the rows. From a shell, `hybrid-icp bop refine`
+//! does the same with threads and a journal. For single poses, use `hybrid-icp`; to read datasets only, use `hicp-io`.
 //!
 //! ```no_run
 //! use hicp_bop::{DatasetRefiner, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of};
@@ -28,8 +27,8 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Nothing here starts threads, prints or writes. What is missing or damaged costs the rows that need it and is told in the
-//! result ([`RowStatus`], [`Fault`]).
+//! Nothing here starts threads, prints or writes. A missing or damaged file affects only the rows that need it; the result
+//! reports it ([`RowStatus`], [`Fault`]).
 
 // Counts of pixels become floating point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
@@ -38,6 +37,7 @@ mod assignment;
 mod best_rows;
 mod bop_image;
 mod box_mask;
+mod covered;
 mod dataset_refiner;
 mod fault;
 mod frames;
@@ -54,10 +54,11 @@ pub use assignment::assign_masks;
 pub use best_rows::best_rows;
 pub use bop_image::BopImage;
 pub use box_mask::BoxMask;
+pub use covered::covered_pixels;
 pub use dataset_refiner::DatasetRefiner;
 pub use fault::{Fault, FaultKind, chain};
 pub use frames::{FrameKey, FrameRows, Targets, detections_by_frame, frames_of};
-pub use judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders};
+pub use judge::{EvaluatedObject, Judge, Judged, JudgedFrame, Renders, instances};
 pub use mask_source::MaskSource;
 pub use models::{ModelFolder, Models};
 pub use result::{FrameResult, Rescore, RowResult};

@@ -23,7 +23,13 @@ impl Source<'_> {
         match self {
             Self::Instance(instance) => {
                 let mask = scene.read_visible_mask(*im_id, instance);
-                let mask = mask.map_err(|error| missing_mask(Fault::of(&error)))?;
+                let mask = mask.map_err(|error| match Fault::of(&error) {
+                    fault if fault.kind == FaultKind::Missing => Fault {
+                        kind: FaultKind::MissingMask,
+                        ..fault
+                    },
+                    fault => fault,
+                })?;
                 let path = scene.visible_mask_path(*im_id, instance);
                 match (mask.width(), mask.height()) {
                     found if found == expected => Ok(mask),
@@ -40,15 +46,6 @@ impl Source<'_> {
             },
         }
     }
-}
-
-/// Marks the fault of an instance without a mask.
-fn missing_mask(fault: Fault) -> Fault {
-    let kind = match fault.kind {
-        FaultKind::Missing => FaultKind::MissingMask,
-        other => other,
-    };
-    Fault { kind, ..fault }
 }
 
 fn wrong_size(name: &str, (width, height): (u32, u32), image: &Image) -> Fault {

@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 
 use hicp_io::bop::Detection;
+use hicp_io::is_absent;
 
 use crate::bop_image::BopImage;
 use crate::box_mask::BoxMask;
+use crate::fault::{Fault, FaultKind};
 use crate::frames::{FrameKey, detections_by_frame};
+use crate::mask_file::Source;
 use crate::scenes::Image;
 
 /// Where the masks of a dataset's images come from.
@@ -17,27 +20,52 @@ pub enum MaskSource {
     Visible,
     /// The segmentations of detections, by image ([`MaskSource::detections`]).
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
-    /// No segmentation: every row has a mask of its own, what was measured in a box about its pose.
+    /// No segmentation: the mask of a row is everything that was measured in a box around its pose.
     Box(BoxMask),
 }
 
 impl MaskSource {
-    /// The segmentations of detections.
+    /// Creates a source of the segmentations of detections.
     #[must_use]
     pub fn detections(detections: Vec<Detection>) -> Self {
         Self::Detections(detections_by_frame(detections))
     }
 
-    /// Finds the masks of an image.
+    /// Finds the masks of an image. Without ground truth, it has no visible masks and a fault.
     #[must_use]
     pub fn frame(&self, key: FrameKey, image: Image) -> BopImage<'_> {
+        let (mut masks, mut faults) = (Vec::new(), Vec::new());
         match self {
-            Self::Visible => BopImage::with_visible_masks(image),
+            Self::Visible => match image.scene.ground_truth(image.im_id) {
+                Some(truths) => {
+                    let instances = truths.iter().enumerate();
+                    masks.extend(instances.map(|(i, truth)| (truth.obj_id, Source::Instance(i))));
+                }
+                None => faults.push(no_ground_truth(&image)),
+            },
             Self::Detections(by_frame) => {
-                let of_frame = by_frame.get(&key).map_or(&[][..], Vec::as_slice);
-                BopImage::with_detections(image, of_frame)
+                // Detections without a segmentation are ignored.
+                for detection in by_frame.get(&key).into_iter().flatten() {
+                    if let Some(code) = &detection.segmentation {
+                        masks.push((detection.category_id, Source::Code(code)));
+                    }
+                }
             }
-            Self::Box(_) => BopImage::without_masks(image),
+            Self::Box(_) => {}
         }
+        BopImage::new(image, masks, faults)
+    }
+}
+
+/// Returns the fault of an image without ground truth.
+fn no_ground_truth(image: &Image) -> Fault {
+    let path = image.scene.dir().join("scene_gt.json");
+    let why = match is_absent(&path) {
+        true => "does not exist".to_owned(),
+        false => format!("does not have image {}", image.im_id),
+    };
+    Fault {
+        kind: FaultKind::MissingMask,
+        text: format!("ground truth is missing: {} {why}", path.display()),
     }
 }

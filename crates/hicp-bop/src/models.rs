@@ -9,7 +9,7 @@ use hybrid_icp::core::{Model, ModelConfig};
 
 use crate::fault::chain;
 
-/// A folder of models, with the sizes and symmetries that it states.
+/// A folder of models, with the diameters and symmetries of its `models_info.json`.
 #[derive(Clone, Debug)]
 pub struct ModelFolder {
     dir: PathBuf,
@@ -18,7 +18,7 @@ pub struct ModelFolder {
 }
 
 impl ModelFolder {
-    /// Opens a folder: reads its `models_info.json` where there is one, and no model yet.
+    /// Opens a folder and reads its `models_info.json` if there is one.
     ///
     /// # Errors
     ///
@@ -27,7 +27,7 @@ impl ModelFolder {
         Self::open_within(ReadLimits::DEFAULT, dir)
     }
 
-    /// Opens a folder as [`ModelFolder::open`] does; sizes and models are read within these limits.
+    /// Opens a folder as [`ModelFolder::open`] does, with read limits.
     ///
     /// # Errors
     ///
@@ -43,7 +43,7 @@ impl ModelFolder {
         Ok(Self { dir, infos, limits })
     }
 
-    /// Reads the model of an object, metres; `None` if there is none.
+    /// Reads the model of an object in meters; `None` if there is none.
     ///
     /// # Errors
     ///
@@ -64,32 +64,24 @@ impl ModelFolder {
     }
 }
 
-/// Models by object id: those that can be used, and what became of the others.
+/// Models by object id, with the objects whose model is missing or broken.
 ///
-/// Collects what [`ModelFolder::read`] returned, so that a program reads models on its own threads, or when they are first needed.
+/// Collects the results of [`ModelFolder::read`], so that a program can read models on its own threads.
 #[derive(Debug, Default)]
 pub struct Models {
-    /// Those that can be used.
+    /// The models that can be used.
     pub by_id: BTreeMap<u32, Model>,
-    /// Objects that the dataset has no model of, ascending.
+    /// Objects without a model in the dataset, ascending.
     pub missing: BTreeSet<u32>,
-    /// What is wrong with the models of the other objects.
+    /// Error messages of the models that cannot be used.
     pub broken: BTreeMap<u32, String>,
 }
 
 impl Models {
-    /// Reads the models of some objects, one after the other.
+    /// Reads the models of some objects, one after another.
     #[must_use]
     pub fn read(folder: &ModelFolder, objects: &BTreeSet<u32>) -> Self {
         objects.iter().map(|id| (*id, folder.read(*id))).collect()
-    }
-
-    /// Returns whether the model of an object was asked for, whatever came of it.
-    #[must_use]
-    pub fn knows(&self, obj_id: u32) -> bool {
-        self.by_id.contains_key(&obj_id)
-            || self.missing.contains(&obj_id)
-            || self.broken.contains_key(&obj_id)
     }
 }
 

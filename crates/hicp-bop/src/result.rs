@@ -1,10 +1,10 @@
-//! What a refinement of rows returns, and how it is entered into the file's rows.
+//! The result of refining the rows of an image, and entering it into the rows of the file.
 
 use hicp_io::bop::ResultRow;
-use hybrid_icp::core::{Isometry3, UnitQuaternion};
+use hybrid_icp::core::Isometry3;
 use hybrid_icp::score::Flatness;
 use hybrid_icp::{Warning, warnings_of_result};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
 use crate::row_status::RowStatus;
@@ -17,16 +17,15 @@ pub struct RowResult {
     /// Its status.
     pub status: RowStatus,
     /// `camera_from_object` in meters, if it differs from the row's.
-    #[serde(serialize_with = "write_pose", deserialize_with = "read_pose")]
     pub pose: Option<Isometry3<f64>>,
-    /// MVE of the row's pose and of the result's; `None` if it did not get as far as the pipeline.
+    /// MVE of the row's pose and of the result's pose; `None` if the row did not reach the pipeline.
     pub mve: Option<(f64, f64)>,
     /// How flat the surfaces are at the result's pose ([`hybrid_icp::Refinement::flatness`]).
     pub flatness: Option<Flatness>,
 }
 
 impl RowResult {
-    /// Returns why the pose is not to be trusted ([`hybrid_icp::warnings_of_result`]); nothing where no score says so, or there is none.
+    /// Returns the reasons not to trust the pose ([`hybrid_icp::warnings_of_result`]); none without an MVE.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         match self.mve {
@@ -35,7 +34,7 @@ impl RowResult {
         }
     }
 
-    /// A row that did not get as far as the pipeline.
+    /// Creates the result of a row that did not reach the pipeline.
     #[must_use]
     pub fn unrefined(index: usize, status: RowStatus) -> Self {
         Self {
@@ -53,15 +52,15 @@ impl RowResult {
 pub struct FrameResult {
     /// One per row, in the order of the rows.
     pub rows: Vec<RowResult>,
-    /// Spent on its rows, seconds; `None` if none got as far as the pipeline.
+    /// Seconds spent on its rows; `None` if none reached the pipeline.
     pub seconds: Option<f64>,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
-    /// What looks wrong about the inputs ([`hybrid_icp::warnings`]), by object: of the first row of each that got as far as a mask.
+    /// Warnings about the inputs ([`hybrid_icp::warnings`]) by object, from the first row of each object that has a mask.
     pub warnings: Vec<(u32, Warning)>,
 }
 
-/// What becomes the score of a row.
+/// The score of a row in the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rescore {
     /// The row's own score.
@@ -72,10 +71,10 @@ pub enum Rescore {
 }
 
 impl FrameResult {
-    /// Enters the poses, scores and the time of an image, the same for all of its rows, into the rows that were given.
+    /// Enters the poses, scores and the time of an image, which is the same for all of its rows, into the given rows.
     ///
-    /// The time is added to the largest that these rows state; `timed` false writes it as unknown, so that the same input
-    /// gives the same bytes. Places beyond `rows` are ignored.
+    /// The time is added to the largest time of these rows. If `timed` is false, the time is unknown, so that the same input
+    /// gives the same bytes. Indices beyond `rows` are ignored.
     pub fn enter(&self, rows: &mut [ResultRow], rescore: Rescore, timed: bool) {
         let own = self
             .rows
@@ -100,20 +99,4 @@ impl FrameResult {
             }
         }
     }
-}
-
-/// Translation and quaternion (i, j, k, w) of a pose.
-type PoseParts = ([f64; 3], [f64; 4]);
-
-fn write_pose<S: Serializer>(pose: &Option<Isometry3<f64>>, to: S) -> Result<S::Ok, S::Error> {
-    let parts: Option<PoseParts> =
-        pose.map(|pose| (pose.translation.vector.into(), pose.rotation.coords.into()));
-    parts.serialize(to)
-}
-
-fn read_pose<'a, D: Deserializer<'a>>(from: D) -> Result<Option<Isometry3<f64>>, D::Error> {
-    let parts = Option::<PoseParts>::deserialize(from)?;
-    // Normalizing the quaternion again would change its last bits.
-    let rotation = |q: [f64; 4]| UnitQuaternion::new_unchecked(q.into());
-    Ok(parts.map(|(t, q)| Isometry3::from_parts(t.into(), rotation(q))))
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use hicp_io::bop::{Dataset, Scene};
-use hybrid_icp::core::{DepthImage, PinholeCamera};
+use hybrid_icp::core::{DepthImage, ImageError, Mask, Observation, PinholeCamera};
 
 use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;
@@ -33,6 +33,13 @@ pub struct Image {
     pub camera: PinholeCamera,
     /// Its depth, metres; the observations of all its masks share it.
     pub depth: Arc<DepthImage>,
+}
+
+impl Image {
+    /// Creates the observation of the image in a mask.
+    pub(crate) fn observe(&self, mask: Mask) -> Result<Observation, ImageError> {
+        Observation::new(Arc::clone(&self.depth), mask, self.camera)
+    }
 }
 
 impl Scenes {

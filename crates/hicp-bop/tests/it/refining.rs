@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use hicp_bop::{
-    BopImage, BoxMask, DatasetRefiner, Fault, FaultKind, Image, MaskSource, ModelFolder, Models,
-    Rescore, RowResult, RowStatus, Scenes, detections_by_frame,
+    BoxMask, DatasetRefiner, Fault, FaultKind, Image, MaskSource, ModelFolder, Models, Rescore,
+    RowResult, RowStatus, Scenes, detections_by_frame,
 };
 use hicp_io::bop::{
     Dataset, Detection, GroundTruth, ResultRow, Rle, SceneCamera, write_scene_camera,
@@ -128,7 +128,6 @@ fn rows_become_results() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let objects = models(&dataset, &[BLOCK, 9]);
-    assert!(objects.knows(BLOCK) && objects.knows(9) && !objects.knows(7));
     let shared = DatasetRefiner {
         models: objects,
         scenes: Scenes::new(&dataset, "test", 1),
@@ -166,10 +165,11 @@ fn masks_are_those_of_their_source() {
     let model = &models.by_id[&BLOCK];
     let mut refiner = Refiner::preset(Preset::Hybrid);
     let aside = Isometry3::translation(1.0, 0.0, 0.0) * truth();
-    let detections = [detection(None), detection(Some(&mask()))];
+    let detections = vec![detection(None), detection(Some(&mask()))];
+    let detections = MaskSource::detections(detections);
     for mut frame in [
-        BopImage::with_visible_masks(image(&dataset)),
-        BopImage::with_detections(image(&dataset), &detections),
+        MaskSource::Visible.frame(KEY, image(&dataset)),
+        detections.frame(KEY, image(&dataset)),
     ] {
         let chosen = frame.choose(&mut refiner, model, BLOCK, &[aside, estimate()]);
         assert_eq!(chosen[0], Err(RowStatus::NoOverlap));
@@ -177,7 +177,8 @@ fn masks_are_those_of_their_source() {
         assert_eq!(observation.mask(), &mask());
         assert_eq!(frame.into_faults(), []);
     }
-    let mut frame = BopImage::without_masks(image(&dataset));
+    let boxes = MaskSource::Box(BoxMask::default());
+    let mut frame = boxes.frame(KEY, image(&dataset));
     let none = frame.choose(&mut refiner, model, BLOCK, &[estimate()]);
     assert_eq!(none, [Err(RowStatus::NoMask)]);
     // The box about the estimate has all that was measured of the block, and nothing else was measured.
@@ -204,9 +205,10 @@ fn masks_that_are_let_go_are_read_again_to_the_same_results() {
     let mut detections: Vec<_> = masks.into_iter().map(|m| detection(Some(m))).collect();
     // One that cannot be used is a fault, once, however often the others are read.
     detections.push(detection(Some(&Mask::full(16, 12))));
+    let detections = MaskSource::detections(detections);
     let poses = [truth(), estimate(), truth()];
     let mut run = |memory: Option<usize>| {
-        let mut frame = BopImage::with_detections(image(&dataset), &detections);
+        let mut frame = detections.frame(KEY, image(&dataset));
         if let Some(memory) = memory {
             frame = frame.with_memory(memory);
         }
@@ -242,7 +244,7 @@ fn a_mask_that_cannot_be_used_is_a_fault_of_its_own() {
     .unwrap();
     let models = models(&dataset, &[BLOCK]);
     let mut refiner = Refiner::preset(Preset::Hybrid);
-    let mut frame = BopImage::with_visible_masks(image(&dataset));
+    let mut frame = MaskSource::Visible.frame(KEY, image(&dataset));
     let chosen = frame.choose(&mut refiner, &models.by_id[&BLOCK], BLOCK, &[truth()]);
     assert_eq!(chosen, [Err(RowStatus::Damaged)]);
     let faults = frame.into_faults();
@@ -261,7 +263,7 @@ fn a_mask_that_is_missing_is_a_fault_that_names_it() {
     let scene = dir.path().join("test/000001");
     let mut missing = |name: &str| {
         std::fs::remove_file(scene.join(name)).unwrap();
-        let mut frame = BopImage::with_visible_masks(image(&dataset));
+        let mut frame = MaskSource::Visible.frame(KEY, image(&dataset));
         let chosen = frame.choose(&mut refiner, &models.by_id[&BLOCK], BLOCK, &[truth()]);
         assert_eq!(chosen, [Err(RowStatus::NoMask)]);
         let faults = frame.into_faults();
@@ -325,7 +327,7 @@ fn the_observations_of_an_image_share_its_depth() {
     let model = &read.by_id[&BLOCK];
     let mut refiner = Refiner::preset(Preset::Hybrid);
 
-    let mut frame = BopImage::with_visible_masks(image);
+    let mut frame = MaskSource::Visible.frame(KEY, image);
     let chosen = frame.choose(&mut refiner, model, BLOCK, &[estimate()]);
     let observation = frame.observation(*chosen[0].as_ref().unwrap()).unwrap();
     assert!(Arc::ptr_eq(observation.shared_depth(), &depth));
