@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use clap::{Args, ValueEnum};
-use hicp_io::{LengthUnit, write_atomically, write_obj, write_ply};
-use hicp_sim::{Household, Proportions};
+use clap::Args;
+use hicp_io::{LengthUnit, write_atomically, write_ply};
+use hicp_sim::Household;
 use hybrid_icp::core::{
     Isometry3, Model, PinholeCamera, RenderedView, Renderer, UnitQuaternion, Vector3,
 };
@@ -17,27 +17,13 @@ use crate::terminal::say;
 
 /// Write the twenty procedural household objects as meshes in meters, with a contact sheet.
 ///
-/// Writes one mesh per object, `contact_sheet.png` (tuning objects in the upper two rows, test objects in the lower two) and
+/// Writes one binary PLY mesh per object, `contact_sheet.png` (tuning objects in the upper two rows, test objects in the lower two) and
 /// `objects.csv`, which names them in the order of the sheet, with their sizes and symmetries.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The folder to write to, which is created if it does not exist. Files of the same names are replaced.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The format of the meshes.
-    #[arg(long, value_enum, default_value_t = Format::Ply)]
-    format: Format,
-    /// Other specimens of the same categories: proportions drawn from this seed.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// Binary PLY.
-    Ply,
-    /// Wavefront OBJ.
-    Obj,
 }
 
 /// Side of a cell of the contact sheet, pixels.
@@ -53,9 +39,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let proportions = arguments
-        .seed
-        .map_or_else(Proportions::default, Proportions::from_seed);
     let objects = || Household::TUNING.into_iter().chain(Household::TEST);
     let (width, height) = (COLUMNS * CELL, ROWS * CELL);
     let mut sheet = Picture {
@@ -67,16 +50,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "row,column,object,set,file,triangles,diameter_mm,discrete_symmetries,continuous_symmetries\n",
     );
     for (object, cell) in objects().zip(0..) {
-        let model = object.model_with(proportions)?;
-        let (name, mesh, unit) = (object.name(), model.mesh(), LengthUnit::Meters);
-        let file = match arguments.format {
-            Format::Ply => format!("{name}.ply"),
-            Format::Obj => format!("{name}.obj"),
-        };
-        match arguments.format {
-            Format::Ply => write_ply(folder.join(&file), mesh, unit)?,
-            Format::Obj => write_obj(folder.join(&file), mesh, unit)?,
-        }
+        let model = object.model()?;
+        let (name, mesh) = (object.name(), model.mesh());
+        let file = format!("{name}.ply");
+        write_ply(folder.join(&file), mesh, LengthUnit::Meters)?;
         let (row, column) = (cell / COLUMNS, cell % COLUMNS);
         shade(&mut sheet, &model, column * CELL, row * CELL)?;
         let set = match Household::TUNING.contains(&object) {

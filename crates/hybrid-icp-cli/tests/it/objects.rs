@@ -2,7 +2,7 @@
 
 use crate::common::{names, run};
 use hicp_io::{LengthUnit, read_mesh};
-use hicp_sim::{Household, Proportions};
+use hicp_sim::Household;
 
 #[test]
 fn it_writes_every_object_a_sheet_and_a_table() {
@@ -45,25 +45,6 @@ fn it_writes_every_object_a_sheet_and_a_table() {
             "{count} pixels in row {row}, column {column}"
         );
     }
-}
-
-#[test]
-fn another_format_and_seed_are_other_files() {
-    let folder = tempfile::tempdir().unwrap();
-    run(
-        folder.path(),
-        ["objects", "--out", ".", "--format", "obj", "--seed", "4"],
-    )
-    .exits(0);
-    let mesh = read_mesh(folder.path().join("mug.obj"), LengthUnit::Meters).unwrap();
-    let made = Household::Mug
-        .model_with(Proportions::from_seed(4))
-        .unwrap();
-    assert_eq!(mesh.vertices(), made.mesh().vertices());
-    assert_ne!(
-        mesh.vertices(),
-        Household::Mug.model().unwrap().mesh().vertices()
-    );
 }
 
 #[test]
