@@ -15,7 +15,7 @@ use hybrid_icp::score::{Score, Vsd};
 
 use crate::choice::PipelineArguments;
 use crate::outputs::Files;
-use crate::picture::{AFTER, BEFORE, Picture};
+use crate::picture::Picture;
 use crate::refine::{report, warnings};
 use crate::terminal::{say, table, warn};
 
@@ -82,7 +82,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         MEAN_TRANSLATION_ERROR_METERS,
         MEAN_ROTATION_ERROR_DEGREES.to_radians(),
     );
-    let mut picture = Picture::of_depth(&depth);
 
     let mut refiner = pipeline.refiner();
     let mut trace = Trace::new();
@@ -112,9 +111,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             format!("{:.3}", vsd(pose)),
         ]);
     }
-    picture.outline(&mut refiner, &model, &observation, &init, BEFORE);
-    picture.outline(&mut refiner, &model, &observation, &pose, AFTER);
-    picture.write(&arguments.picture)?;
+    let poses = [&init, &pose];
+    Picture::before_and_after(&mut refiner, &model, &observation, poses)
+        .write(&arguments.picture)?;
 
     let reason = warnings::reason(&refined, &model, &observation, &init);
     say(format_args!(
@@ -125,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         truth.translation.z,
         observation.n_measured(),
         arguments.noise,
-        pipeline.name(),
+        pipeline.name,
         arguments.seed,
     ))?;
     say(table(&errors, 1))?;

@@ -1,6 +1,9 @@
 //! Outlines of silhouettes: closed paths along the sides between pixels inside and outside.
 
-use hybrid_icp::core::{PixelRegion, RenderedView};
+use std::collections::HashSet;
+
+use hicp_bop::covered_pixels;
+use hybrid_icp::core::RenderedView;
 
 /// A side between a pixel inside and a pixel outside the silhouette, as columns and rows of the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,82 +13,45 @@ pub(crate) struct Side {
     pub(crate) outside: (i64, i64),
 }
 
-/// The direction of a path, which has its inside to the right.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Heading {
-    East,
-    South,
-    West,
-    North,
-}
-
-impl Heading {
-    fn right(self) -> Self {
-        match self {
-            Self::East => Self::South,
-            Self::South => Self::West,
-            Self::West => Self::North,
-            Self::North => Self::East,
-        }
-    }
-
-    fn step(self) -> (i64, i64) {
-        match self {
-            Self::East => (1, 0),
-            Self::South => (0, 1),
-            Self::West => (-1, 0),
-            Self::North => (0, -1),
-        }
-    }
-
-    /// Returns the pixels to the right and to the left of the side that starts at a corner.
-    fn beside(self, (x, y): (i64, i64)) -> ((i64, i64), (i64, i64)) {
-        match self {
-            Self::East => ((x, y), (x, y - 1)),
-            Self::South => ((x - 1, y), (x, y)),
-            Self::West => ((x - 1, y - 1), (x - 1, y)),
-            Self::North => ((x, y - 1), (x - 1, y - 1)),
-        }
-    }
-}
+/// Steps of a path from corner to corner of the pixels: east, south, west and north. The inside is to its right.
+const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+/// The pixel to the right of a step, relative to the corner where the step starts.
+const RIGHT: [(i64, i64); 4] = [(0, 0), (-1, 0), (-1, -1), (0, -1)];
+const EAST: usize = 0;
 
 /// Returns the outlines of a view's silhouettes and of their holes; each starts at its topmost row's first side.
 ///
 /// Pixels that touch only at a corner belong to different silhouettes. Cost: the region's pixels.
 pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
-    let region = view.region();
     let pixel = |(u, v): (i64, i64)| Some((u32::try_from(u).ok()?, u32::try_from(v).ok()?));
     let shown = |place| pixel(place).filter(|(u, v)| view.depth_at(*u, *v) > 0.0);
-    let side = |heading: Heading, corner| {
-        let (right, outside) = heading.beside(corner);
-        let inside = shown(right)?;
+    let side = |heading: usize, (x, y): (i64, i64)| {
+        let right_of = |heading: usize| (x + RIGHT[heading % 4].0, y + RIGHT[heading % 4].1);
+        // The pixel to the left of a step is to the right of a step that turns left.
+        let (inside, outside) = (shown(right_of(heading))?, right_of(heading + 3));
         shown(outside).is_none().then_some(Side { inside, outside })
     };
     // Every closed path has a side toward the east, above a pixel of the region.
-    let mut passed = vec![false; region.area()];
+    let mut passed = HashSet::new();
     let mut paths = Vec::new();
-    for (u, v) in pixels(&region) {
+    for (u, v) in covered_pixels(view) {
         let start = (i64::from(u), i64::from(v));
-        let known = region.index(u, v).is_none_or(|index| passed[index]);
-        if known || side(Heading::East, start).is_none() {
+        if passed.contains(&(u, v)) || side(EAST, start).is_none() {
             continue;
         }
         let mut path = Vec::new();
-        let (mut corner, mut heading) = (start, Heading::East);
+        let (mut corner, mut heading) = (start, EAST);
         while let Some(next) = side(heading, corner) {
             path.push(next);
-            if heading == Heading::East
-                && let Some(index) = region.index(next.inside.0, next.inside.1)
-            {
-                passed[index] = true;
+            if heading == EAST {
+                passed.insert(next.inside);
             }
-            let (dx, dy) = heading.step();
-            corner = (corner.0 + dx, corner.1 + dy);
-            let right = heading.right();
-            let turns = [right, heading, right.right().right()];
-            let turn = turns.into_iter().find(|turn| side(*turn, corner).is_some());
-            heading = turn.unwrap_or(heading);
-            if (corner, heading) == (start, Heading::East) {
+            corner = (corner.0 + STEPS[heading].0, corner.1 + STEPS[heading].1);
+            let [right, left] = [heading + 1, heading + 3].map(|turn| turn % 4);
+            let turns = [right, heading, left].into_iter();
+            let mut open = turns.filter(|turn| side(*turn, corner).is_some());
+            heading = open.next().unwrap_or(heading);
+            if (corner, heading) == (start, EAST) {
                 break;
             }
         }
@@ -94,15 +60,10 @@ pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
     paths
 }
 
-/// Returns the pixels of a region, row by row.
-pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let columns = region.u_min..region.u_max;
-    let rows = region.v_min..region.v_max;
-    rows.flat_map(move |v| columns.clone().map(move |u| (u, v)))
-}
-
 #[cfg(test)]
 mod tests {
+    use hybrid_icp::core::PixelRegion;
+
     use super::*;
 
     /// A view of a picture whose hashes are shown, its corner at (3, 2).
@@ -142,7 +103,7 @@ mod tests {
         sides.dedup();
         assert_eq!(sides.len(), count);
         let mut expected = 0;
-        for (u, v) in pixels(&view.region()) {
+        for (u, v) in covered_pixels(&view) {
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1_i64)] {
                 let beside = |x: u32, d: i64| u32::try_from(i64::from(x) + d).unwrap();
                 let other = view.depth_at(beside(u, du), beside(v, dv));

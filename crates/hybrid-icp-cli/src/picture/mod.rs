@@ -13,22 +13,22 @@ use hybrid_icp::core::{
 
 use contour::contours;
 
-/// A colour, 8 bits per channel.
+/// A color, 8 bits per channel.
 pub(crate) type Rgb = [u8; 3];
 
-/// Orange: the pose before. Distinguishable from [`AFTER`] by the colour-blind.
+/// Orange: the pose before. Distinguishable from [`AFTER`] by color-blind people.
 pub(crate) const BEFORE: Rgb = [230, 159, 0];
 /// Sky blue: the pose after.
 pub(crate) const AFTER: Rgb = [86, 180, 233];
 
-/// Sides of pixels that a dash is long, and that lie between two.
+/// The length of a dash and of a gap, in sides of pixels.
 const DASH: (usize, usize) = (7, 5);
-/// How much of a line is seen where something hides the model.
+/// The opacity of a line where something hides the model.
 const FAINT: f32 = 0.4;
-/// How much darker the pixels beside a line become, so that it stands out from any colour.
+/// How much darker the pixels next to a line become, so that it stands out from any color.
 const SHADE: f32 = 0.55;
 
-/// How much darker a surface is that is seen from the side.
+/// How much darker a surface is when it is seen from the side.
 const TURNED: f32 = 0.6;
 
 /// How an outline is drawn.
@@ -46,7 +46,7 @@ impl Line {
         }
     }
 
-    /// Whether it is drawn at a place along it, pixels.
+    /// Returns whether it is drawn at a place along it, in pixels.
     pub(crate) fn draws(&self, place: usize) -> bool {
         !self.dashed || place % (DASH.0 + DASH.1) < DASH.0
     }
@@ -60,37 +60,27 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// Shows depth in grey: near is bright, nothing is black.
+    /// Shows depth in gray: near is bright, nothing is black.
     pub(crate) fn of_depth(depth: &DepthImage) -> Self {
-        let mut measured: Vec<f32> = depth
-            .pixels()
-            .iter()
-            .copied()
-            .filter(|z| *z > 0.0)
-            .collect();
+        let mut measured: Vec<f32> = depth.pixels().to_vec();
+        measured.retain(|z| *z > 0.0);
         measured.sort_by(f32::total_cmp);
         // The middle 96 % set the contrast, so that a stray pixel does not.
-        let at = |share: usize| {
-            measured
-                .get(measured.len().saturating_sub(1) * share / 100)
-                .copied()
-        };
+        let last = measured.len().saturating_sub(1);
+        let at = |share: usize| measured.get(last * share / 100).copied();
         let (near, far) = (at(2).unwrap_or(0.0), at(98).unwrap_or(1.0));
         let range = (far - near).max(1e-3);
-        let grey = |z: f32| {
+        let gray = |z: f32| {
             let t = ((z - near) / range).clamp(0.0, 1.0);
-            (210.0 - 150.0 * t) as u8
+            if z > 0.0 {
+                (210.0 - 150.0 * t) as u8
+            } else {
+                0
+            }
         };
-        let rgb = depth
-            .pixels()
-            .iter()
-            .flat_map(|z| if *z > 0.0 { [grey(*z); 3] } else { [0; 3] })
-            .collect();
-        Self {
-            width: depth.width(),
-            height: depth.height(),
-            rgb,
-        }
+        let (width, height) = (depth.width(), depth.height());
+        let rgb = depth.pixels().iter().flat_map(|z| [gray(*z); 3]).collect();
+        Self { width, height, rgb }
     }
 
     /// Shows depth as [`Picture::of_depth`] does, darker where the surface turns away from the camera.
@@ -109,20 +99,22 @@ impl Picture {
         Ok(picture)
     }
 
-    /// Draws the silhouette's outline of a model at a pose, two pixels wide.
-    pub(crate) fn outline(
-        &mut self,
+    /// Shows the depth of an observation with the model's outlines before and after a refinement.
+    pub(crate) fn before_and_after(
         refiner: &mut Refiner,
         model: &Model,
         observation: &Observation,
-        camera_from_object: &Isometry3<f64>,
-        color: Rgb,
-    ) {
-        let workspace = refiner.workspace_mut();
-        let view = workspace.view(model, observation.camera(), camera_from_object);
-        let mut ink = Ink::of(self);
-        ink.outline(view, Line::solid(color), |_, _, _| false);
-        self.draw(&ink);
+        [before, after]: [&Isometry3<f64>; 2],
+    ) -> Self {
+        let mut picture = Self::of_depth(observation.depth());
+        for (pose, color) in [(before, BEFORE), (after, AFTER)] {
+            let workspace = refiner.workspace_mut();
+            let view = workspace.view(model, observation.camera(), pose);
+            let mut ink = Ink::of(&picture);
+            ink.outline(view, Line::solid(color), |_, _, _| false);
+            picture.draw(&ink);
+        }
+        picture
     }
 
     /// Draws lines: first the shade next to all of them, then the lines in their order.

@@ -49,15 +49,14 @@ pub(crate) fn fitted(text: &str, size: i32, width: u32) -> String {
     let fits = |text: &str| font.box_size(text).is_ok_and(|(found, _)| found <= width);
     let letters: Vec<char> = text.chars().collect();
     let shortened = |kept: usize| -> String {
-        let (head, tail) = (kept / 2, letters.len() - (kept - kept / 2));
-        let head = letters[..head].iter();
-        head.chain(['…'].iter()).chain(&letters[tail..]).collect()
+        let (head, tail) = letters.split_at(kept / 2);
+        let tail = &tail[letters.len() - kept..];
+        head.iter().chain(['…'].iter()).chain(tail).collect()
     };
     if fits(text) {
         return text.to_owned();
     }
-    let kept = (0..letters.len()).rev();
-    let mut tried = kept.map(shortened);
+    let mut tried = (0..letters.len()).rev().map(shortened);
     tried.find(|text| fits(text)).unwrap_or_default()
 }
 

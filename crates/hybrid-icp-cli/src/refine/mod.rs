@@ -16,7 +16,7 @@ use self::report::Report;
 use self::trace::TraceLines;
 use crate::choice::PipelineArguments;
 use crate::outputs::Files;
-use crate::picture::{AFTER, BEFORE, Picture};
+use crate::picture::Picture;
 use crate::terminal::{say, warn};
 
 /// Refine one pose in one depth image.
@@ -80,8 +80,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         depth_scale,
     } = inputs.read()?;
     let init = init_file.camera_from_object;
-    let overlay = arguments.overlay.as_deref();
-    let picture = overlay.map(|path| (path, Picture::of_depth(&depth)));
 
     let mut refiner = pipeline.refiner();
     if let Some(header) = &mut header {
@@ -98,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut warnings = warnings::about_units(&model, &observation, &init, inputs, depth_scale);
     warnings.extend(warnings::about_result(&refined));
     let report = Report::new(
-        pipeline.name(),
+        &pipeline.name,
         &init_file,
         &refined,
         reason,
@@ -113,11 +111,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(path) = trace_path {
         trace.write(path)?;
     }
-    if let Some((path, mut picture)) = picture {
-        let after = refined.outcome.camera_from_object;
-        picture.outline(&mut refiner, &model, &observation, &init, BEFORE);
-        picture.outline(&mut refiner, &model, &observation, &after, AFTER);
-        picture.write(path)?;
+    if let Some(path) = &arguments.overlay {
+        let poses = [&init, &refined.outcome.camera_from_object];
+        Picture::before_and_after(&mut refiner, &model, &observation, poses).write(path)?;
     }
     report.warnings.iter().for_each(warn);
     match arguments.output {

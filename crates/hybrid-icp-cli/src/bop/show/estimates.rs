@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use hicp_bop::{
-    EvaluatedObject, Fault, FaultKind, Image, Judge, MaskSource, Models, Renders, Scenes,
+    EvaluatedObject, Fault, FaultKind, Image, Judge, MaskSource, Models, Renders, Scenes, instances,
 };
 use hicp_io::bop::ResultRow;
 use hybrid_icp::core::{Isometry3, Mask};
@@ -82,7 +82,7 @@ impl Inspection<'_> {
             let Some(model) = self.models.by_id.get(&obj_id) else {
                 continue;
             };
-            let truths = self.instances(obj_id);
+            let truths = instances(self.image, obj_id, usize::MAX);
             let count = self.top.unwrap_or(truths.len().max(1));
             let judged = judge.target(&mut renders, self.image, self.frame, obj_id, truths, count);
             let judged = match judged {
@@ -121,13 +121,5 @@ impl Inspection<'_> {
             .faults
             .extend(faults.filter(|fault| fault.kind == FaultKind::Damaged));
         found
-    }
-
-    /// Returns an object's instances, as indices into the ground truth.
-    fn instances(&self, obj_id: u32) -> Vec<usize> {
-        let truths = self.image.scene.ground_truth(self.image.im_id);
-        let truths = truths.unwrap_or_default().iter().enumerate();
-        let of_object = truths.filter(|(_, truth)| truth.obj_id == obj_id);
-        of_object.map(|(index, _)| index).collect()
     }
 }

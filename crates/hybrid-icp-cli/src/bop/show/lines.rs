@@ -90,8 +90,8 @@ pub(super) fn grid(files: &[Estimates], lines: &[Line]) -> Vec<Vec<String>> {
     grid
 }
 
-/// Returns the figures of an estimate: its score, its MVE, ADI in millimeters and mean VSD.
-fn cells(estimate: Option<&Estimate>) -> [String; 4] {
+/// Returns the figures of an estimate under [`HEADS`].
+pub(super) fn cells(estimate: Option<&Estimate>) -> [String; 4] {
     let dash = || "–".to_owned();
     let Some(estimate) = estimate else {
         return [dash(), dash(), dash(), dash()];

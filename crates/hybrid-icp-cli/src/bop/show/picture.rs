@@ -1,15 +1,12 @@
 //! The picture of `bop show`: outlines on the image, and a legend below it.
 
-use std::collections::HashMap;
-
-use hicp_bop::{Image, Models};
+use hicp_bop::{Image, Models, covered_pixels};
 use hybrid_icp::core::{Mask, RenderedView, Renderer};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::VISIBILITY_TOLERANCE_METERS;
 
 use super::estimates::{Estimate, Estimates};
-use super::lines::{Line, grid};
-use crate::picture::contour::pixels;
+use super::lines::{HEADS, Line, cells};
 use crate::picture::text::{Align, Text, fitted};
 use crate::picture::{self, AFTER, BEFORE, Ink, Picture, Rgb};
 
@@ -43,12 +40,12 @@ pub(super) fn outlines(
     // The second file's lines first: the first one's are drawn over them.
     for (place, (file, style)) in files.iter().zip(STYLES).enumerate().rev() {
         let views = scenery.views(&file.shown);
-        let nearest = nearest(&views);
         for (estimate, view) in file.shown.iter().zip(&views) {
             let hidden = |u: u32, v: u32, z: f32| {
-                let is_behind = |least: &f32| *least < z - OVERLAP_METERS;
-                scenery.hides(u, v, z, estimate.mask.as_ref())
-                    || nearest.get(&(u, v)).is_some_and(is_behind)
+                let others = views.iter().map(|other| other.depth_at(u, v));
+                let mut in_front =
+                    others.filter(|other| *other > 0.0 && *other < z - OVERLAP_METERS);
+                scenery.hides(u, v, z, estimate.mask.as_ref()) || in_front.next().is_some()
             };
             ink.outline(view, style, hidden);
         }
@@ -93,20 +90,6 @@ impl Scenery<'_> {
     }
 }
 
-/// Returns the depth of the nearest model at every pixel that a model covers.
-fn nearest(views: &[RenderedView]) -> HashMap<(u32, u32), f32> {
-    let mut nearest = HashMap::new();
-    for view in views {
-        for (place, z) in pixels(&view.region()).zip(view.depth()) {
-            if *z > 0.0 {
-                let least = nearest.entry(place).or_insert(*z);
-                *least = z.min(*least);
-            }
-        }
-    }
-    nearest
-}
-
 /// Half the height of the font in a picture 640 pixels wide. Letters of fonts of odd heights do not align.
 const HALF_FONT: i32 = 7;
 const WHITE: Rgb = [255; 3];
@@ -127,9 +110,7 @@ fn font(width: u32) -> i32 {
 
 /// Returns the object's tag in the middle of its silhouette, or below another tag; `None` if nothing is visible.
 fn tag(tag: &str, view: &RenderedView, picture: &Picture, others: &[Text]) -> Option<Text> {
-    let shown = pixels(&view.region()).zip(view.depth());
-    let shown = shown.filter(|(_, z)| **z > 0.0).map(|(place, _)| place);
-    let shown: Vec<(u32, u32)> = shown.collect();
+    let shown: Vec<(u32, u32)> = covered_pixels(view).collect();
     let mean = |axis: fn(&(u32, u32)) -> u32| {
         let sum: f64 = shown.iter().map(|place| f64::from(axis(place))).sum();
         (sum / shown.len() as f64).round() as i32
@@ -166,7 +147,7 @@ fn shade(tag: &Text) -> impl Iterator<Item = Text> {
 const OTHER_ROWS: i32 = 4;
 /// Height of a row in a picture 640 pixels wide.
 const ROW: i32 = 19;
-/// Left end of a file's columns, and the distance between those of both files.
+/// Left end of the columns of the first file, and the distance to those of the second.
 const COLUMNS: i32 = 88;
 const NEXT: i32 = 276;
 /// Right ends of a file's columns.
@@ -199,36 +180,35 @@ pub(super) fn with_legend(
         text(title, (12, 0), Align::Left, BLACK),
         text(notes(files, lines), (12, n_rows - 1), Align::Left, GRAY),
     ];
-    for (left, (file, style)) in (0..).map(left_of).zip(files.iter().zip(STYLES)) {
+    texts.push(text("object".to_owned(), (12, 2), Align::Left, GRAY));
+    let tags = (3..)
+        .zip(lines)
+        .map(|(row, line)| (line.tag.clone(), (12, row)));
+    texts.extend(tags.map(|(tag, at)| text(tag, at, Align::Left, BLACK)));
+    for ((place, file), style) in files.iter().enumerate().zip(STYLES) {
+        let left = COLUMNS + NEXT * i32::try_from(place)?;
         canvas.stroke((s(left), middle_of(1)), s(32), s(2), style);
         let name = fitted(&file.file, size, u32::try_from(s(NEXT - 52))?);
         texts.push(text(name, (left + 40, 1), Align::Left, BLACK));
-    }
-    for (row, cells) in (2..).zip(grid(files, lines)) {
-        let line = usize::try_from(row - 3).ok().map(|index| &lines[index]);
-        for (column, cell) in cells.into_iter().enumerate() {
-            let Some(index) = column.checked_sub(1) else {
-                let color = if line.is_some() { BLACK } else { GRAY };
-                texts.push(text(cell, (12, row), Align::Left, color));
-                continue;
+        let heads = (2, HEADS.map(str::to_owned), GRAY);
+        let figures = (3..).zip(lines).map(|(row, line)| {
+            let estimate = line.estimates[place].map(|index| &file.shown[index]);
+            let color = if estimate.is_some_and(is_far) {
+                RED
+            } else {
+                BLACK
             };
-            let (file, place) = (index / ENDS.len(), index % ENDS.len());
-            let estimate = line.and_then(|line| files[file].shown.get(line.estimates[file]?));
-            let color = match line {
-                None => GRAY,
-                Some(_) if place == 2 && estimate.is_some_and(is_far) => RED,
-                Some(_) => BLACK,
-            };
-            let end = left_of(i32::try_from(file)?) + ENDS[place];
-            texts.push(text(cell, (end, row), Align::Right, color));
+            (row, cells(estimate), color)
+        });
+        for (row, cells, color) in std::iter::once(heads).chain(figures) {
+            let cells = cells.into_iter().zip(ENDS);
+            texts.extend(
+                cells.map(|(cell, end)| text(cell, (left + end, row), Align::Right, color)),
+            );
         }
     }
     canvas.write_texts(&texts)?;
     Ok(canvas)
-}
-
-fn left_of(file: i32) -> i32 {
-    COLUMNS + NEXT * file
 }
 
 fn is_far(estimate: &Estimate) -> bool {
