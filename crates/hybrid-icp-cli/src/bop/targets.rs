@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::bail;
 use hicp_bop::{MIN_VISIBLE_FRACTION, Targets, visible_objects};
 use hicp_io::IoError;
-use hicp_io::bop::{Dataset, Target};
+use hicp_io::bop::Dataset;
 
 use crate::limits::limits;
 use crate::terminal::warn;
@@ -37,15 +37,10 @@ pub(crate) fn choose(
 /// Reads a file of targets.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
     let mut targets = Targets::new();
-    for Target {
-        scene_id,
-        im_id,
-        obj_id,
-        inst_count,
-    } in limits().read_targets(path)?
-    {
+    for target in limits().read_targets(path)? {
+        let (scene_id, im_id, obj_id) = (target.scene_id, target.im_id, target.obj_id);
         let of_frame = targets.entry((scene_id, im_id)).or_default();
-        if of_frame.insert(obj_id, inst_count).is_some() {
+        if of_frame.insert(obj_id, target.inst_count).is_some() {
             bail!(
                 "{}: object {obj_id} in image {im_id} of scene {scene_id} appears twice, expected once with its inst_count",
                 path.display()

@@ -10,7 +10,7 @@ use clap::Args;
 use hicp_bop::{MaskSource, Rescore};
 
 use self::report::Comparison;
-use super::eval::{DELTA_MM, EvalJob, Evaluation};
+use super::eval::{self, DELTA_MM, EvalJob};
 use super::options::{DatasetOptions, ThreadOptions};
 use super::refine::{RefineJob, RowOptions};
 use crate::choice::Source;
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
-    fn evaluate(&self, name: &str, results: &Path) -> anyhow::Result<Evaluation> {
+    fn evaluate(&self, name: &str, results: &Path) -> anyhow::Result<eval::Report> {
         say(format_args!("\n{name}:"))?;
         let json = self.out.join(format!("{name}.json"));
         let job = EvalJob {

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use hicp_experiments::{Table, html_escaped, html_page};
 use serde::Serialize;
 
-use crate::bop::eval::{Evaluation, Summary};
+use crate::bop::eval::{self, Summary};
 use crate::bop::options::DatasetOptions;
 
 /// Result files of one dataset: the initial one, and that of every pipeline.
@@ -43,6 +43,9 @@ struct Changes {
     worsened: f64,
 }
 
+/// A figure of a table; `None` if there is none.
+type Figure<T> = fn(&T) -> Option<f64>;
+
 /// Change of the ADI in meters from which a pose counts as improved or worsened.
 const CHANGE: f64 = 1e-4;
 
@@ -62,7 +65,7 @@ impl Comparison {
     }
 
     /// Adds an evaluation with the mean seconds per pose: the initial one first, then that of every pipeline.
-    pub(super) fn add(&mut self, name: &str, evaluation: Evaluation, seconds: Option<f64>) {
+    pub(super) fn add(&mut self, name: &str, evaluation: eval::Report, seconds: Option<f64>) {
         let ms_per_pose = seconds.map(|s| 1e3 * s);
         let first = self.entries.get(1).map_or(ms_per_pose, |e| e.ms_per_pose);
         let initial = self.entries.first();
@@ -80,47 +83,54 @@ impl Comparison {
     /// Returns the recalls, errors and times of all.
     pub(super) fn overall(&self) -> Table {
         let first = self.entries.get(1).map_or("", |entry| &entry.name);
-        let mut table = Table::new(&[
-            "pipeline",
-            "AR",
-            "VSD",
-            "MSSD",
-            "MSPD",
-            "median ADI mm",
-            "improved %",
-            "worsened %",
-            "ms per pose",
-            &format!("time / {first}"),
-        ]);
+        let ratio = format!("time / {first}");
+        let columns: [(&str, usize, Figure<Entry>); 9] = [
+            ("AR", 3, |e| Some(e.all.ar)),
+            ("VSD", 3, |e| Some(e.all.ar_vsd)),
+            ("MSSD", 3, |e| Some(e.all.ar_mssd)),
+            ("MSPD", 3, |e| Some(e.all.ar_mspd)),
+            ("median ADI mm", 2, |e| e.all.median_adi_mm),
+            ("improved %", 1, |e| Some(100.0 * e.changes?.improved)),
+            ("worsened %", 1, |e| Some(100.0 * e.changes?.worsened)),
+            ("ms per pose", 2, |e| e.ms_per_pose),
+            (&ratio, 2, |e| e.time_ratio),
+        ];
+        let mut table = Table::new(&["pipeline"]);
+        table
+            .head
+            .extend(columns.iter().map(|(head, ..)| (*head).to_owned()));
         for entry in &self.entries {
-            let all = &entry.all;
-            let percent = |share: fn(&Changes) -> f64| entry.changes.map(|c| 100.0 * share(&c));
             let mut row = vec![entry.name.clone()];
-            row.extend([all.ar, all.ar_vsd, all.ar_mssd, all.ar_mspd].map(|x| format!("{x:.3}")));
-            row.push(number(all.median_adi_mm, 2));
-            row.push(number(percent(|c| c.improved), 1));
-            row.push(number(percent(|c| c.worsened), 1));
-            row.push(number(entry.ms_per_pose, 2));
-            row.push(number(entry.time_ratio, 2));
+            row.extend(
+                columns
+                    .iter()
+                    .map(|(_, digits, figure)| number(figure(entry), *digits)),
+            );
             table.rows.push(row);
         }
         table
     }
 
     /// Returns a figure by object and, in columns, by entry.
-    fn by_object(&self, figure: impl Fn(&Summary) -> String) -> Table {
+    fn by_object(&self, digits: usize, figure: Figure<Summary>) -> Table {
         let mut table = Table::new(&["object", "targets"]);
-        let names = self.entries.iter().map(|entry| entry.name.clone());
-        table.head.extend(names);
+        table
+            .head
+            .extend(self.entries.iter().map(|entry| entry.name.clone()));
         let objects = self.entries.iter().flat_map(|entry| entry.objects.keys());
         for id in objects.collect::<BTreeSet<_>>() {
-            let of_object = |entry: &Entry, figure: &dyn Fn(&Summary) -> String| {
-                let summary = entry.objects.get(id);
-                summary.map_or_else(|| "-".to_owned(), figure)
-            };
-            let targets = of_object(&self.entries[0], &|summary| summary.targets.to_string());
-            let mut row = vec![id.to_string(), targets];
-            row.extend(self.entries.iter().map(|entry| of_object(entry, &figure)));
+            let mut summaries = self
+                .entries
+                .iter()
+                .map(|entry| entry.objects.get(id))
+                .peekable();
+            let targets = summaries
+                .peek()
+                .copied()
+                .flatten()
+                .map(|s| s.targets.to_string());
+            let mut row = vec![id.to_string(), targets.unwrap_or_else(|| "-".to_owned())];
+            row.extend(summaries.map(|summary| number(summary.and_then(figure), digits)));
             table.rows.push(row);
         }
         table
@@ -128,10 +138,7 @@ impl Comparison {
 
     /// Names the compared files.
     fn subject(&self) -> String {
-        let targets = self
-            .entries
-            .first()
-            .map_or(0, |initial| initial.all.targets);
+        let targets = self.entries.first().map_or(0, |first| first.all.targets);
         format!(
             "{} in {}, split {}: {targets} targets",
             self.init, self.dataset, self.split
@@ -140,9 +147,12 @@ impl Comparison {
 
     /// Returns the tables by object, with their headings.
     fn objects(&self) -> [(&'static str, Table); 2] {
-        let median = self.by_object(|s| number(s.median_adi_mm, 2));
+        let median = self.by_object(2, |summary| summary.median_adi_mm);
         [
-            ("AR by object", self.by_object(|s| format!("{:.3}", s.ar))),
+            (
+                "AR by object",
+                self.by_object(3, |summary| Some(summary.ar)),
+            ),
             ("Median ADI by object, mm", median),
         ]
     }

@@ -41,17 +41,9 @@ pub(crate) struct EvalJob<'a> {
     pub(crate) threads: ThreadOptions,
 }
 
-/// The result of an evaluation.
-pub(crate) struct Evaluation {
-    pub(crate) all: Summary,
-    pub(crate) objects: BTreeMap<u32, Summary>,
-    /// ADI of the evaluated estimates to the nearest instance of their target in meters, by row.
-    pub(crate) adi_m: BTreeMap<usize, f64>,
-}
-
 impl EvalJob<'_> {
     /// Evaluates the file, prints the table and writes the outputs.
-    pub(crate) fn run(&self) -> anyhow::Result<Evaluation> {
+    pub(crate) fn run(&self) -> anyhow::Result<Report> {
         let rows = limits().read_results(self.results)?;
         let dataset = self.dataset.open()?;
         let split = &self.dataset.split;
@@ -85,19 +77,23 @@ impl EvalJob<'_> {
         warnings.extend(self.misfits(&rows, &wanted));
         let missing = models::missing(&models, &models_dir);
         warnings.extend(missing.map(|text| format!("{text}; its targets are left out")));
-        let misfits: Vec<&String> = judged.iter().flat_map(|image| &image.misfits).collect();
-        warnings.extend(
-            misfits
-                .iter()
-                .take(MISFITS_SHOWN)
-                .map(|text| (*text).clone()),
-        );
-        if misfits.len() > MISFITS_SHOWN {
-            let more = misfits.len() - MISFITS_SHOWN;
+        let mut misfits: Vec<String> = Vec::new();
+        misfits.extend(judged.iter().flat_map(|image| image.misfits.clone()));
+        let more = misfits.len().saturating_sub(MISFITS_SHOWN);
+        misfits.truncate(MISFITS_SHOWN);
+        warnings.append(&mut misfits);
+        if more > 0 {
             warnings.push(format!("{more} more files that do not fit"));
         }
         warnings.iter().for_each(warn);
         let targets: Vec<&Judged> = judged.iter().flat_map(|image| &image.targets).collect();
+        let errors = targets
+            .iter()
+            .flat_map(|t| t.rows.iter().zip(&t.errors.estimates));
+        let adi_m = errors.map(|(row, against)| {
+            let adi = against.iter().map(|errors| errors.adi_m);
+            (*row, adi.fold(f64::INFINITY, f64::min))
+        });
         let report = Report {
             results: self.results.display().to_string(),
             dataset: self.dataset.root.display().to_string(),
@@ -108,6 +104,7 @@ impl EvalJob<'_> {
             objects: Summary::by_object(&targets),
             warnings,
             calibration,
+            adi_m: adi_m.collect(),
         };
         if let Some(path) = self.errors {
             errors::write(path, &targets, &rows)?;
@@ -131,18 +128,7 @@ impl EvalJob<'_> {
                 report.left_out
             );
         }
-        let rows_and_errors = targets
-            .iter()
-            .flat_map(|t| t.rows.iter().zip(&t.errors.estimates));
-        let nearest = rows_and_errors.map(|(row, against)| {
-            let adi = against.iter().map(|errors| errors.adi_m);
-            (*row, adi.fold(f64::INFINITY, f64::min))
-        });
-        Ok(Evaluation {
-            adi_m: nearest.collect(),
-            all: report.all,
-            objects: report.objects,
-        })
+        Ok(report)
     }
 
     /// Returns warnings about rows that belong to no target or exceed the instances of theirs.

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-pub(crate) use self::job::{DELTA_MM, EvalJob, Evaluation};
-pub(crate) use self::report::Summary;
+pub(crate) use self::job::{DELTA_MM, EvalJob};
+pub(crate) use self::report::{Report, Summary};
 use super::options::{DatasetOptions, ThreadOptions};
 use crate::options::positive;
 use crate::outputs::Files;
@@ -19,7 +19,11 @@ use crate::outputs::Files;
 ///
 /// The table has, per object and in all, the average recalls of VSD, MSSD and MSPD, their mean AR, the recall of ADD below a
 /// tenth of the diameter (of ADI for symmetric objects), and the median ADI. The estimates of every target with the best
-/// scores are matched greedily to the most visible instances; an instance without an estimate counts as not found.
+/// scores are matched greedily to the most visible instances; an instance without an estimate counts as not found. The models
+/// are those in models_eval/ of the dataset, or in models/ without it.
+///
+/// The exit code is 0 with warnings about targets and rows that do not fit, and 1 if a file is damaged (the rest is still
+/// reported) or nothing could be evaluated.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -58,13 +62,7 @@ hybrid-icp bop eval --dataset <DIR> [--split <NAME>]
 const EXAMPLE: &str = "\
 Example:
   hybrid-icp bop eval --dataset bop/ycbv --split test \\
-      --results cosypose_ycbv-test.csv --errors errors.csv
-
-The models are those in models_eval/ of the dataset, or in models/ without it.
-
-Exit codes: 0 done, with warnings of targets and rows that do not fit; 1 a file
-is damaged or nothing could be evaluated (the rest is still reported); 2 the
-command line is wrong.";
+      --results cosypose_ycbv-test.csv --errors errors.csv";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {

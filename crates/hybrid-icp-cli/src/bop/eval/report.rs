@@ -61,7 +61,6 @@ impl Summary {
     }
 
     fn cells(&self, name: String) -> Vec<String> {
-        let mut cells = vec![name, self.targets.to_string(), self.missing.to_string()];
         let recalls = [
             self.ar,
             self.ar_vsd,
@@ -69,6 +68,7 @@ impl Summary {
             self.ar_mspd,
             self.ad_recall,
         ];
+        let mut cells = vec![name, self.targets.to_string(), self.missing.to_string()];
         cells.extend(recalls.map(|recall| format!("{recall:.3}")));
         let median = self.median_adi_mm;
         cells.push(median.map_or("-".to_owned(), |mm| format!("{mm:.2}")));
@@ -78,7 +78,7 @@ impl Summary {
 
 /// The recalls of a dataset.
 #[derive(Debug, Serialize)]
-pub(super) struct Report {
+pub(crate) struct Report {
     pub(super) results: String,
     pub(super) dataset: String,
     pub(super) split: String,
@@ -87,12 +87,15 @@ pub(super) struct Report {
     /// Requested instances that could not be evaluated: no image, no model, or no ground truth.
     pub(super) left_out: usize,
     #[serde(flatten)]
-    pub(super) all: Summary,
-    pub(super) objects: BTreeMap<u32, Summary>,
+    pub(crate) all: Summary,
+    pub(crate) objects: BTreeMap<u32, Summary>,
     pub(super) warnings: Vec<String>,
     /// Whether the scores rank right poses first, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) calibration: Option<Calibration>,
+    /// ADI of the evaluated estimates to the nearest instance of their target in meters, by row.
+    #[serde(skip)]
+    pub(crate) adi_m: BTreeMap<usize, f64>,
 }
 
 const HEADS: [&str; 9] = [
