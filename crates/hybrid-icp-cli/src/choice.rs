@@ -94,11 +94,14 @@ impl Source {
 /// A pipeline that is known to build. Creates any number of refiners, one per thread.
 #[derive(Clone, Debug)]
 pub(crate) struct Pipeline {
-    name: String,
-    toml: String,
-    overrides: Vec<String>,
+    /// The name for reports: that of the preset or file, and the overrides.
+    pub(crate) name: String,
+    /// The text that it was parsed from, before the overrides.
+    pub(crate) toml: String,
+    pub(crate) overrides: Vec<String>,
+    /// The preset, if it is one without overrides.
+    pub(crate) preset: Option<Preset>,
     file: PipelineFile,
-    preset: Option<Preset>,
 }
 
 impl Pipeline {
@@ -120,39 +123,16 @@ impl Pipeline {
         })
     }
 
-    /// Returns the text that it was parsed from, before the overrides.
-    pub(crate) fn toml(&self) -> &str {
-        &self.toml
-    }
-
-    /// Returns the preset, if it is one without overrides.
-    pub(crate) fn preset(&self) -> Option<Preset> {
-        self.preset
-    }
-
-    /// Returns the overrides, in order.
-    pub(crate) fn overrides(&self) -> &[String] {
-        &self.overrides
-    }
-
-    /// Returns the name for reports: that of the preset or file, and the overrides.
-    pub(crate) fn name(&self) -> &str {
-        &self.name
-    }
-
     /// Creates a refiner.
     pub(crate) fn refiner(&self) -> Refiner {
-        let boxed = || Refiner::boxed(self.stage());
-        self.preset.map_or_else(boxed, Refiner::preset)
+        Refiner::new(self.stage())
     }
 
     /// Creates the stage alone.
     pub(crate) fn stage(&self) -> BoxedStage {
-        match (self.preset, self.file.build_within(&pipeline_limits())) {
-            (Some(preset), _) => preset.build(),
-            (None, Ok(stage)) => stage,
-            // It was built before, and building is pure.
-            (None, Err(error)) => unreachable!("{error}"),
-        }
+        let build = || self.file.build_within(&pipeline_limits());
+        // Building is pure, and it worked before.
+        let built = || build().unwrap_or_else(|error| unreachable!("{error}"));
+        self.preset.map_or_else(built, |preset| preset.build())
     }
 }

@@ -13,14 +13,12 @@ use crate::terminal::say;
 /// Describe a mesh file as it is read here: counts, size, whether it is closed, and warnings.
 ///
 /// Polygons are counted as the triangles they are cut into. With --json the keys are triangles, vertices, diameter_m, closed,
-/// warnings (a list of sentences, empty when nothing looks wrong) and more of the kind.
+/// warnings (a list of sentences, empty when nothing looks wrong) and more of the kind. The exit code is 0 if the file can be
+/// read, with or without warnings. Otherwise it is 1, and the message names the place of the error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  hybrid-icp inspect mug.ply --unit mm
-
-Exit codes: 0 the file can be read, with or without warnings; 1 it cannot, and
-the message says where it is broken; 2 the command line is wrong.")]
+  hybrid-icp inspect mug.ply --unit mm")]
 pub(crate) struct Arguments {
     /// The mesh: OBJ, OFF, PLY or STL.
     #[arg(value_name = "FILE")]

@@ -6,7 +6,6 @@ use std::path::Path;
 use hicp_bop::{ModelFolder, Models};
 use hicp_io::IoError;
 use hicp_io::bop::Dataset;
-use hybrid_icp::core::Model;
 use hybrid_icp::warning_of_diameter;
 use rayon::prelude::*;
 
@@ -19,27 +18,24 @@ pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoErro
     Ok(read.collect::<Vec<_>>().into_iter().collect())
 }
 
-/// Returns messages about the objects whose stated diameter differs from that of the mesh, on all threads.
-pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
-    let models = models.by_id.par_iter();
-    let wrong = models.filter_map(|(id, model)| Some((*id, wrong_diameter(*id, model, dir)?)));
-    wrong.collect()
-}
-
-/// Returns a message if the folder's `models_info.json` states another diameter of an object than its mesh has.
+/// Returns messages about the objects whose diameter in `models_info.json` differs from that of the mesh, on all threads.
 ///
 /// Masks, pairs, the MVE and recalls depend on the diameter, and none of them fails if it is wrong.
-pub(crate) fn wrong_diameter(obj_id: u32, model: &Model, dir: &Path) -> Option<String> {
+pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
     let info = dir.join("models_info.json");
     // Without the file, the diameter is that of the mesh.
     if hicp_io::is_absent(&info) {
-        return None;
+        return BTreeMap::new();
     }
-    let warning = warning_of_diameter(model)?;
-    Some(format!(
-        "{}: object {obj_id}: {warning}: poses, the MVE and recalls depend on it, check both",
-        info.display()
-    ))
+    let wrong = models.by_id.par_iter().filter_map(|(obj_id, model)| {
+        let warning = warning_of_diameter(model)?;
+        let text = format!(
+            "{}: object {obj_id}: {warning}: poses, the MVE and recalls depend on it, check both",
+            info.display()
+        );
+        Some((*obj_id, text))
+    });
+    wrong.collect()
 }
 
 /// Returns a message about the objects without a model in a folder, with the path where the first was expected.

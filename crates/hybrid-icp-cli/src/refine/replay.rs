@@ -40,12 +40,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("{}: empty, expected a trace", path.display());
     };
     let header = Header { path, line: header };
-    if header.text("event")? != "start" {
-        bail!(
-            "{}:1: \"event\" is {}, expected \"start\": the first line of a trace says what ran",
-            path.display(),
-            header.line["event"]
-        );
+    if header.line["event"] != "start" {
+        return Err(header.refuse("event", "\"start\" in the first line of a trace"));
     }
     let version = header.text("version")?;
     if version != env!("CARGO_PKG_VERSION") {

@@ -65,9 +65,9 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
     let mut line = json!({
         "event": "start",
         "version": env!("CARGO_PKG_VERSION"),
-        "pipeline": pipeline.name(),
-        "toml": pipeline.toml(),
-        "set": pipeline.overrides(),
+        "pipeline": pipeline.name,
+        "toml": pipeline.toml,
+        "set": pipeline.overrides,
         "model_unit": inputs.model_unit.to_string(),
     });
     for (option, path) in inputs.files() {

@@ -12,7 +12,7 @@ use hicp_io::bop::{Dataset, ResultRow};
 use super::job::RefineJob;
 
 /// Version of the journal's lines.
-const FORM: u32 = 4;
+const FORM: u32 = 5;
 
 /// Returns the settings of a job as a line of text, by option and by file of the dataset.
 ///
@@ -26,16 +26,16 @@ pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> 
         format!("hybrid-icp={}", env!("CARGO_PKG_VERSION")),
         format!("--dataset={}", dataset.display()),
         format!("--split={}", job.dataset.split),
-        format!("--pipeline={}", pipeline.name()),
+        format!("--pipeline={}", pipeline.name),
     ];
     let chosen = job.choice.settings().into_iter();
-    settings.extend(chosen.map(|(option, value)| match value {
-        Some(value) => format!("{option}={value}"),
-        None => format!("{option}=none"),
+    settings.extend(chosen.map(|(option, value)| {
+        let value = value.as_deref().unwrap_or("none");
+        format!("{option}={value}")
     }));
     settings.push(format!("digest-of-results={}", digest(&rows)));
     settings.push(format!("digest-of-masks={}", digest(&job.masks)));
-    let parts = (pipeline.toml(), pipeline.overrides());
+    let parts = (&pipeline.toml, &pipeline.overrides);
     settings.push(format!("digest-of-pipeline={}", digest(&parts)));
     settings.extend(files(job, rows, models_dir));
     settings.join(", ").replace('\n', " ")
@@ -62,20 +62,17 @@ fn files(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> Vec<Stri
     paths.iter().map(|path| named(path)).collect()
 }
 
-/// Describes a file by its size and the time of its last change in seconds since 1970, without spaces.
+/// Describes a file by its size and the time of its last change in nanoseconds since 1970, without spaces.
 fn state(path: &Path) -> String {
-    let metadata = match std::fs::metadata(path) {
-        Ok(metadata) => metadata,
-        Err(error) if error.kind() == ErrorKind::NotFound => return "absent".to_owned(),
-        Err(error) => return error.to_string(),
-    };
-    let changed = metadata.modified().ok();
-    let changed = changed.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-    let changed = changed.map_or_else(
-        || "unknown".to_owned(),
-        |since| format!("{}.{:09}", since.as_secs(), since.subsec_nanos()),
-    );
-    format!("{}-bytes@{changed}", metadata.len())
+    let state = std::fs::metadata(path).and_then(|metadata| {
+        let changed = metadata.modified()?.duration_since(UNIX_EPOCH);
+        let nanoseconds = changed.unwrap_or_default().as_nanos();
+        Ok(format!("{}-bytes@{nanoseconds}", metadata.len()))
+    });
+    state.unwrap_or_else(|error| match error.kind() {
+        ErrorKind::NotFound => "absent".to_owned(),
+        _ => error.to_string(),
+    })
 }
 
 /// Returns a digest of the debug form of a value, which it need not hold in memory.

@@ -65,22 +65,28 @@ impl Distrust {
         let unexplained = count(|w| matches!(w, Warning::Unexplained { .. }));
         let elsewhere = count(|w| matches!(w, Warning::FoundElsewhere { .. }));
         let flat = count(|w| matches!(w, Warning::Flat { .. }));
-        let mut texts = Vec::new();
-        if unexplained > 0 {
-            texts.push(format!(
-                "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: they are not to be trusted"
-            ));
-        }
-        if elsewhere > 0 {
-            texts.push(format!(
-                "in {elsewhere} of {rows} rows the initial pose explained nothing of the mask (MVE {EXPLAINS_NOTHING} or more): {other}"
-            ));
-        }
-        if flat > 0 {
-            texts.push(format!(
-                "in {flat} of {rows} rows the surface inside the mask is flat, and that of the model at the pose is not: {other}"
-            ));
-        }
+        let texts = [
+            (
+                unexplained,
+                format!(
+                    "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: they are not to be trusted"
+                ),
+            ),
+            (
+                elsewhere,
+                format!(
+                    "in {elsewhere} of {rows} rows the initial pose explained nothing of the mask (MVE {EXPLAINS_NOTHING} or more): {other}"
+                ),
+            ),
+            (
+                flat,
+                format!(
+                    "in {flat} of {rows} rows the surface inside the mask is flat, and that of the model at the pose is not: {other}"
+                ),
+            ),
+        ];
+        let texts = texts.into_iter().filter(|(count, _)| *count > 0);
+        let texts = texts.map(|(_, text)| text).collect();
         Self { unexplained, texts }
     }
 

@@ -37,7 +37,10 @@ use crate::terminal::{progress_bar, say, warn};
 ///
 /// The output has a line of JSON for every image: the fused pose (cam_R_m2c, cam_t_m2c in mm) with its 6x6 covariance (m and
 /// rad; translation first, left perturbation in the camera frame), under "single" the pose from this image alone with its MVE,
-/// and what became of it.
+/// and the outcome of the image.
+///
+/// The exit code is 0 with the images without an estimate in the summary, and 1 if a file is missing or damaged; the lines are
+/// still written if that is found on the way.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 #[command(mut_arg("pipeline", follows))]
@@ -97,11 +100,7 @@ const EXAMPLE: &str = "\
 Example:
   hybrid-icp bop generate --scenes 1 --images 20 --trajectory --out synthetic
   hybrid-icp bop sequence --dataset synthetic --scene 1 --object 2 \\
-      --init synthetic/initial_synthetic-test.csv --output fused.jsonl
-
-Exit codes: 0 done, with the images without an estimate in the summary; 1 a
-file is missing or damaged (lines are still written where that came up on the
-way); 2 the command line is wrong.";
+      --init synthetic/initial_synthetic-test.csv --output fused.jsonl";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -142,11 +141,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     say(format_args!(
         "{output}: {} images of scene {scene_id}, object {object}, {method} over {} in {:.1} s{}",
         lines.len(),
-        pipeline.name(),
+        pipeline.name,
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     ))?;
-    let diameter = models::wrong_diameter(object, model, &models_dir);
+    let diameter = models::wrong_diameters(&models, &models_dir).remove(&object);
     diameter.iter().for_each(warn);
     let (im_id, warnings) = tracker.warnings.unwrap_or_default();
     for warning in warnings {
@@ -195,7 +194,7 @@ impl Arguments {
         match self.uncertainty {
             Uncertainty::Mve => SequentialEstimator::for_object(stage, method, model, init),
             Uncertainty::Registration => {
-                let preset = pipeline.preset();
+                let preset = pipeline.preset;
                 let calibration = preset.map_or(Calibration::HYBRID, Calibration::of);
                 SequentialEstimator::calibrated(stage, method, &calibration, model, init)
             }

@@ -30,6 +30,8 @@ use crate::terminal::{say, table, warn};
 /// measured, or another model of the same file, is in front. The legend below has, per object, the score of the file, the MVE
 /// in the mask that `bop refine` takes, and if the dataset has ground truth, ADI and VSD (mean over the ten
 /// tolerances) against the nearest instance. The same table is printed.
+///
+/// The exit code is 0 with warnings about missing files, and 1 if a file is damaged or there is nothing to show.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -73,10 +75,7 @@ hybrid-icp bop show --dataset <DIR> [--split <NAME>] --scene <ID>
 const EXAMPLE: &str = "\
 Example:
   hybrid-icp bop show --dataset bop/ycbv --scene 50 --image 1 --out 50-1.png \\
-      --results refined_ycbv-test.csv --against cosypose_ycbv-test.csv
-
-Exit codes: 0 done, with warnings of what is missing; 1 a file is damaged or
-there is nothing to show; 2 the command line is wrong.";
+      --results refined_ycbv-test.csv --against cosypose_ycbv-test.csv";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {

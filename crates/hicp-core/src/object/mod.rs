@@ -1,8 +1,0 @@
-//! Meshes, models and symmetries.
-
-pub(crate) mod diameter;
-pub(crate) mod mesh;
-pub(crate) mod mesh_survey;
-pub(crate) mod model;
-pub(crate) mod sampling;
-pub(crate) mod symmetry;
