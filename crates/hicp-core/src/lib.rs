@@ -27,70 +27,47 @@
 // Counts and pixel coordinates are converted to floating point throughout; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
 
-mod camera;
 mod correspondences;
 mod derived;
-mod diameter;
 mod id;
-mod image;
-mod index;
-mod label;
-mod mesh;
-mod mesh_survey;
-mod model;
-mod normals;
-mod number;
-mod observation;
-mod problem;
-mod region;
-mod render;
-mod rotation;
-mod rotation_grid;
-mod sampling;
-pub mod se3;
-pub mod so3;
-mod suggest;
-mod surfel;
-mod symmetry;
-mod vectorized;
-mod work;
-
-/// Helpers that the crates of this workspace share. No stability is promised.
 #[doc(hidden)]
-pub mod internal {
-    pub use crate::index::index;
-    pub use crate::label::type_label;
-    pub use crate::suggest::nearest_name;
-    pub use crate::vectorized::{VectorLoop, vectorized};
-    pub use crate::work::Work;
-}
+pub mod internal;
+mod object;
+mod pose;
+mod problem;
+mod render;
+mod sensor;
+mod surfel;
 
-pub use camera::{
-    CameraError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters,
-};
 pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
-pub use diameter::diameter;
 pub use id::Id;
-pub use image::{DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask};
-pub use mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshError, TriMesh};
-pub use mesh_survey::MeshSurvey;
-pub use model::{Model, ModelConfig};
 pub use nalgebra;
 pub use nalgebra::{
     Isometry3, Matrix3, Matrix4, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,
     UnitVector3, Vector3, Vector6,
 };
-pub use observation::Observation;
-pub use problem::{Context, Iteration, Problem};
-pub use region::PixelRegion;
-pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
-pub use rotation::{
-    PoseMatrixError, ROTATION_TOLERANCE, RotationError, pose_from_matrix, rotation_from_matrix,
-};
-pub use rotation_grid::rotation_grid;
-pub use sampling::{MAX_SAMPLES, sample_surface};
-pub use surfel::Surfel;
-pub use symmetry::{
+pub use object::diameter::diameter;
+pub use object::mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshError, TriMesh};
+pub use object::mesh_survey::MeshSurvey;
+pub use object::model::{Model, ModelConfig};
+pub use object::sampling::{MAX_SAMPLES, sample_surface};
+pub use object::symmetry::{
     CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError,
 };
+pub use pose::rotation::{
+    PoseMatrixError, ROTATION_TOLERANCE, RotationError, pose_from_matrix, rotation_from_matrix,
+};
+pub use pose::rotation_grid::rotation_grid;
+pub use pose::{se3, so3};
+pub use problem::{Context, Iteration, Problem};
+pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
+pub use sensor::camera::{
+    CameraError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters,
+};
+pub use sensor::image::{
+    DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask,
+};
+pub use sensor::observation::Observation;
+pub use sensor::region::PixelRegion;
+pub use surfel::Surfel;

@@ -2,9 +2,9 @@
 
 use nalgebra::Isometry3;
 
-use crate::model::Model;
-use crate::observation::Observation;
+use crate::object::model::Model;
 use crate::render::{RenderCache, RenderedView};
+use crate::sensor::observation::Observation;
 
 /// The two sides of a registration: the model (source, moves) and the observation (target, stands
 /// still).

@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, UnitVector3};
 
-use crate::camera::PinholeCamera;
 use crate::id::Id;
-use crate::mesh::TriMesh;
-use crate::model::Model;
-use crate::region::PixelRegion;
+use crate::object::mesh::TriMesh;
+use crate::object::model::Model;
+use crate::sensor::camera::PinholeCamera;
+use crate::sensor::region::PixelRegion;
 use crate::surfel::Surfel;
 
 /// The triangle id of a pixel without a surface.

@@ -8,7 +8,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
 
-use crate::so3::{self, SERIES_ANGLE, hat};
+use crate::pose::so3::{self, SERIES_ANGLE, hat};
 
 /// Returns exp(ξ^), the rigid motion of a twist ξ = [ρ; φ].
 ///

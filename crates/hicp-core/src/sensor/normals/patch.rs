@@ -1,7 +1,7 @@
 //! The depth patch from which normals are estimated.
 
-use crate::camera::PinholeCamera;
-use crate::region::PixelRegion;
+use crate::sensor::camera::PinholeCamera;
+use crate::sensor::region::PixelRegion;
 
 /// Depths below this limit, in meters, have no normal.
 ///

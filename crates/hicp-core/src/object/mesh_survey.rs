@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::mesh::{DisjointSets, TriMesh, weld};
+use crate::object::mesh::{DisjointSets, TriMesh, weld};
 
 /// Counts of defects of a mesh. Except for `components`, all are 0 for a clean closed mesh.
 ///

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::lanes::Lanes;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
-use crate::vectorized::{VectorLoop, vectorized};
+use crate::internal::{VectorLoop, vectorized};
 
 /// Smallest number of pixels that determine a plane.
 const MIN_SUPPORT: f64 = 6.0;

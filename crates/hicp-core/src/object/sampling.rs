@@ -1,6 +1,6 @@
 //! Points spread uniformly over a surface.
 
-use crate::mesh::{Facing, TriMesh};
+use crate::object::mesh::{Facing, TriMesh};
 use crate::surfel::Surfel;
 
 /// The largest number of samples on a surface.

@@ -3,7 +3,7 @@
 use super::edges::Edges;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use super::window::{Rays, WindowSums};
-use crate::vectorized::VectorLoop;
+use crate::internal::VectorLoop;
 
 /// Half side of the gated window, pixels. Its rows must fit [`Joined`].
 const EDGE_RADIUS: usize = 3;

@@ -5,8 +5,8 @@
 
 use thiserror::Error;
 
-use crate::camera::PinholeCamera;
-use crate::region::PixelRegion;
+use crate::sensor::camera::PinholeCamera;
+use crate::sensor::region::PixelRegion;
 
 /// Smallest depth that counts as measured, meters. The inverse of a smaller one is not accurate in
 /// `f32`.

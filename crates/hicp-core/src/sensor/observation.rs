@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::camera::PinholeCamera;
 use crate::derived::Derived;
 use crate::id::Id;
-use crate::image::{DepthImage, ImageError, Mask, check_size};
-use crate::index;
-use crate::normals::{DepthPatch, estimate_normals};
-use crate::region::PixelRegion;
+use crate::internal;
+use crate::sensor::camera::PinholeCamera;
+use crate::sensor::image::{DepthImage, ImageError, Mask, check_size};
+use crate::sensor::normals::{DepthPatch, estimate_normals};
+use crate::sensor::region::PixelRegion;
 use crate::surfel::Surfel;
 
 /// A segmented depth image with its vertex and normal maps: the point cloud C and vertex map V_C of
@@ -265,7 +265,7 @@ impl Observation {
     #[must_use]
     pub fn pixel(&self, index: u32) -> (u32, u32) {
         // An empty region has no indices; the maximum avoids a division by zero.
-        let width = index::index(self.region.width()).max(1);
+        let width = internal::index(self.region.width()).max(1);
         (
             self.region.u_min + index % width,
             self.region.v_min + index / width,
@@ -288,7 +288,7 @@ impl Observation {
                     .step_by(step)
                     .map(move |u| row + (u - region.u_min) as usize)
             })
-            .map(|index| (index::index(index), &self.surfels[index]))
+            .map(|index| (internal::index(index), &self.surfels[index]))
             .filter(|(_, s)| s.point.z > 0.0)
     }
 

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point2, Point3};
 
 use thiserror::Error;
 
-use crate::number::Number;
-use crate::region::PixelRegion;
+use crate::internal::number::Number;
+use crate::sensor::region::PixelRegion;
 
 /// The position of the first pixel's center in the coordinates of a calibration.
 ///

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::number::Number;
+use crate::internal::number::Number;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 

@@ -21,7 +21,7 @@ use gated::FitGated;
 pub(crate) use patch::DepthPatch;
 use window::{ColumnSums, Rays, RowFits};
 
-use crate::vectorized::vectorized;
+use crate::internal::vectorized;
 
 /// Largest standard error of the slope (tangent of the tilt) that the choice of the window accepts.
 const SLOPE_ERROR: f64 = 0.1;

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::patch::DepthPatch;
-use crate::region::PixelRegion;
-use crate::vectorized::{VectorLoop, vectorized};
+use crate::internal::{VectorLoop, vectorized};
+use crate::sensor::region::PixelRegion;
 
 /// The depth edges of a patch.
 pub(super) struct Edges {

@@ -3,12 +3,12 @@
 use nalgebra::Point3;
 
 use crate::derived::Derived;
-use crate::diameter::diameter;
 use crate::id::Id;
-use crate::mesh::TriMesh;
-use crate::sampling::sample_surface;
+use crate::object::diameter::diameter;
+use crate::object::mesh::TriMesh;
+use crate::object::sampling::sample_surface;
+use crate::object::symmetry::Symmetries;
 use crate::surfel::Surfel;
-use crate::symmetry::Symmetries;
 
 /// The configuration of a [`Model`], without its mesh.
 #[derive(Clone, Debug, PartialEq)]

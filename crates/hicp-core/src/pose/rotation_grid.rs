@@ -39,7 +39,7 @@ pub fn rotation_grid(index: usize, count: usize) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::so3;
+    use crate::pose::so3;
     use nalgebra::Vector3;
 
     /// Compares rotations with the formulas of the paper's page, evaluated with thirty digits.

@@ -1,0 +1,14 @@
+//! Helpers that the crates of this workspace share. No stability is promised.
+
+mod index;
+mod label;
+pub(crate) mod number;
+mod suggest;
+mod vectorized;
+mod work;
+
+pub use index::index;
+pub use label::type_label;
+pub use suggest::nearest_name;
+pub use vectorized::{VectorLoop, vectorized};
+pub use work::Work;

@@ -1,0 +1,8 @@
+//! Meshes, models and symmetries.
+
+pub(crate) mod diameter;
+pub(crate) mod mesh;
+pub(crate) mod mesh_survey;
+pub(crate) mod model;
+pub(crate) mod sampling;
+pub(crate) mod symmetry;
