@@ -1,6 +1,10 @@
-//! The ICP engine: the trait [`Stage`], generic ICP ([`Icp`], Algorithm 1 of the paper), stop rules with rollback, and stages made of stages.
+//! The ICP engine: the trait [`Stage`], generic ICP, stop rules, and stages made of stages.
 //!
-//! **Should you use this crate?** To compose an ICP variant without the presets, yes. To refine poses with one call, use `hybrid-icp`.
+//! Generic ICP is [`Icp`], Algorithm 1 of the paper. Its stop rules can reject a candidate, so that
+//! a stage returns the pose before it.
+//!
+//! **Should you use this crate?** Yes, to compose an ICP variant without the presets. To refine
+//! poses with one call, use `hybrid-icp`.
 //!
 //! ```
 //! use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};

@@ -1,4 +1,4 @@
-//! Who is told what happens during a run.
+//! The observer of a run, and the events that it receives.
 
 use std::ops::ControlFlow;
 
@@ -6,26 +6,31 @@ use hicp_core::Isometry3;
 
 use crate::outcome::{Evaluation, Outcome};
 
-/// Sees a run from outside. Called per iteration, never per point; all methods do nothing unless overridden.
+/// Observes a run. All methods do nothing unless overridden.
+///
+/// They are called per iteration or per stage, never per point.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an observer",
     label = "this must implement `Observer`",
     note = "`Session::new` and `refine_observed` accept `&mut` of an `Observer`; `&mut ()` observes nothing"
 )]
 pub trait Observer {
-    /// An iteration evaluated a pose. `Break` ends the stage there, with [`crate::Termination::Stopped`], unless a stop rule
-    /// rejects the pose; composed stages go on with what follows, and meet the same answer.
+    /// Receives an evaluated pose. `Break` ends the stage there, with
+    /// [`crate::Termination::Stopped`].
+    ///
+    /// If a stop rule rejects the pose, its judgment takes precedence. Composed stages continue
+    /// with the next part and call the observer again.
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
         let _ = event;
         ControlFlow::Continue(())
     }
 
-    /// A switcher chose.
+    /// Receives the choice of a switcher.
     fn on_regime(&mut self, event: &RegimeEvent) {
         let _ = event;
     }
 
-    /// An ICP stage ended. Composed stages report through their parts.
+    /// Receives the outcome of an ICP stage. Composed stages report through their parts.
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {
         let _ = event;
     }
@@ -40,15 +45,17 @@ impl Observer for () {}
 pub struct IterationEvent<'a> {
     /// Iteration within the stage, from 0.
     pub iteration: usize,
-    /// The pose evaluated.
+    /// The evaluated pose.
     pub camera_from_object: &'a Isometry3<f64>,
-    /// Its pairs and loss.
+    /// Its number of pairs and loss.
     pub evaluation: Evaluation,
-    /// The increment found there.
+    /// The increment computed at this pose.
     pub increment: &'a Isometry3<f64>,
 }
 
-/// Which branch of a switch is taken, counted from 0: the better the estimate agrees with the image, the lower.
+/// The branch of a switch, counted from 0.
+///
+/// The better the estimate agrees with the image, the lower its branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Regime(pub usize);
@@ -56,10 +63,10 @@ pub struct Regime(pub usize);
 impl Regime {
     /// The estimate agrees with the image: projective association finds consistent pairs.
     pub const ALIGNED: Self = Self(0);
-    /// It does not: only nearest neighbours find pairs at all.
+    /// The estimate does not agree with the image: only nearest neighbors find pairs.
     pub const MISALIGNED: Self = Self(1);
 
-    /// Name in traces and files.
+    /// Returns the name in traces and files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.0 {
@@ -72,17 +79,17 @@ impl Regime {
     }
 }
 
-/// A switcher's choice.
+/// The choice of a switcher.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RegimeEvent {
-    /// The branch taken.
+    /// The selected branch.
     pub regime: Regime,
     /// The score that decided, if there is one.
     pub score: Option<f64>,
 }
 
-/// An ICP stage that ended.
+/// The end of an ICP stage.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct StageEvent<'a> {
@@ -96,8 +103,8 @@ pub struct StageEvent<'a> {
     pub metric: &'static str,
     /// Names of the stop rules, in order.
     pub stop_rules: &'a [&'static str],
-    /// Number of points selected.
+    /// Number of selected points.
     pub n_source: usize,
-    /// What the stage returned.
+    /// The result of the stage.
     pub outcome: &'a Outcome,
 }

@@ -1,40 +1,44 @@
-//! How a stage ended, and what it returns.
+//! The result of a stage, and the reason why it ended.
 
 use hicp_core::{Correspondences, Isometry3, Iteration, Matrix6};
 use hicp_metric::{Minimize, NormalEquations, Observability};
 
-/// Why a stage ended. Ending is not an error: whatever the data, a stage returns a pose and says why it stopped there.
+/// The reason why a stage ended.
+///
+/// Ending is not an error: for all data, a stage returns a pose and a reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Termination {
     /// The loss stopped changing.
     Converged,
-    /// The iteration limit was reached; the last evaluated pose is returned.
+    /// The iteration limit was reached. The last evaluated pose is returned.
     IterationLimit,
-    /// No pair was found, or every pair was filtered out (divergence rule 1, §IV-B).
+    /// No pairs were found, or all were filtered out (divergence rule 1, §IV-B).
     NoPairs,
-    /// Fewer pairs than at the first or the previous iteration by more than the limit (divergence rule 2).
+    /// The pairs decreased by more than the limit since the first or the previous iteration
+    /// (divergence rule 2).
     PairsLost,
     /// The mean loss rose (divergence rule 3).
     LossIncreased,
     /// The pairs did not determine a step.
     Degenerate,
-    /// The pose returned to where it had been some iterations before, and would go on doing so.
+    /// The pose returned to that of some iterations before, and would continue to do so.
     Oscillating,
-    /// The pose left the bounds set about the initial one.
+    /// The pose left the bounds around the initial one.
     OutOfBounds,
-    /// The time was up; the last evaluated pose is returned.
+    /// The time limit was reached. The last evaluated pose is returned.
     Deadline,
-    /// The observer asked to stop; the last evaluated pose is returned.
+    /// The observer requested the stop. The last evaluated pose is returned.
     Stopped,
     /// A guard's score did not improve.
     ScoreNotImproved,
-    /// A custom stop rule ended the stage for a reason of its own, named as in traces and files (`snake_case`).
+    /// A custom stop rule ended the stage for a custom reason, named as in traces and files
+    /// (`snake_case`).
     Custom(&'static str),
 }
 
 impl Termination {
-    /// Every way to end that the library knows: all but [`Termination::Custom`].
+    /// All reasons that the library defines, so all but [`Termination::Custom`].
     pub const ALL: [Self; 11] = [
         Self::Converged,
         Self::IterationLimit,
@@ -49,7 +53,7 @@ impl Termination {
         Self::ScoreNotImproved,
     ];
 
-    /// Name in traces and files.
+    /// Returns the name in traces and files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -68,22 +72,20 @@ impl Termination {
         }
     }
 
-    /// What it means for the pose that is returned, in words.
+    /// Returns the reason as a clause of a sentence.
     #[must_use]
     pub fn explain(self) -> &'static str {
         match self {
             Self::Converged => "the loss stopped changing",
             Self::IterationLimit => "the limit of iterations was reached",
-            Self::NoPairs => "no pairs of model and measured points were found",
+            Self::NoPairs => "no pairs of model and observed points were found",
             Self::PairsLost => "the next step lost too many pairs",
             Self::LossIncreased => "the next step raised the loss",
             Self::Degenerate => "the pairs did not determine a step",
-            Self::Oscillating => {
-                "the pose came back to where it had been, and would go on doing so"
-            }
-            Self::OutOfBounds => "the pose left the bounds set about the initial one",
-            Self::Deadline => "the time was up",
-            Self::Stopped => "the observer asked to stop",
+            Self::Oscillating => "the pose kept returning to earlier poses",
+            Self::OutOfBounds => "the pose left the bounds around the initial one",
+            Self::Deadline => "the time limit was reached",
+            Self::Stopped => "the observer requested the stop",
             Self::ScoreNotImproved => "the score did not improve",
             Self::Custom(name) => name,
         }
@@ -104,28 +106,32 @@ impl std::fmt::Display for Termination {
     }
 }
 
-/// What was found when the pairs of a pose were evaluated.
+/// The result of evaluating the pairs of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evaluation {
     /// Number of pairs after filtering.
     pub n_pairs: usize,
-    /// Weighted mean of the metric's squared residuals, m². Comparable within one metric only.
+    /// Weighted mean of the metric's squared residuals, m². Comparable only within one metric.
     pub mean_loss: f64,
 }
 
-/// How well the pairs of the returned pose fit: what is measured there and nowhere else.
+/// The fit of the pairs at the returned pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Quality {
-    /// Share of the points that asked for a pair and have one after filtering, 0 to 1; higher is better.
+    /// Matched share of the candidate points after filtering, 0 to 1; higher is better.
     pub fitness: f64,
-    /// Root mean square of the distances between the points of the pairs, metres.
+    /// Root mean square of the distances between the points of the pairs, meters.
     pub point_rmse: f64,
-    /// Root mean square of the distances of the model points from the observed tangent planes, metres.
+    /// Root mean square of the distances of the model points to the observed tangent planes,
+    /// meters.
     pub plane_rmse: f64,
-    /// The metric's normal equations there: what the pairs say about each of the six directions. `None` where it has none.
+    /// The metric's normal equations at the pose: the information of the pairs about its six
+    /// directions.
+    ///
+    /// `None` if the metric has none.
     #[cfg_attr(
         feature = "serde",
         serde(rename = "information", serialize_with = "serialize_information")
@@ -147,7 +153,7 @@ fn serialize_information<S: serde::Serializer>(
 }
 
 impl Quality {
-    /// Measures the pairs of an iteration by a metric; `None` without any.
+    /// Measures the pairs of an iteration with a metric, or returns `None` without pairs.
     #[must_use]
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
     pub fn of<M: Minimize + ?Sized>(
@@ -166,7 +172,7 @@ impl Quality {
             planes += pair.target.normal.cast::<f64>().dot(&difference).powi(2);
         }
         Some(Self {
-            // Several pairs per point do not make more than all of the points matched.
+            // Several pairs per point must not give a share above 1.
             fitness: (count / pairs.n_candidates().max(1) as f64).min(1.0),
             point_rmse: (points / count).sqrt(),
             plane_rmse: (planes / count).sqrt(),
@@ -174,21 +180,25 @@ impl Quality {
         })
     }
 
-    /// The 6×6 information of the pose, ξ = [ρ; φ] (translation first, metres and radians), a left perturbation in the camera
-    /// frame; see [`NormalEquations::information`].
+    /// Returns the 6×6 information of the pose; see [`NormalEquations::information`].
+    ///
+    /// It belongs to ξ = [ρ; φ] (translation first, meters and radians), a left perturbation in the
+    /// camera frame.
     #[must_use]
     pub fn information(&self) -> Option<Matrix6<f64>> {
         self.system.as_ref().map(NormalEquations::information)
     }
 
-    /// The 6×6 covariance of the pose in the same convention, if the pairs are right and their residuals independent; see
-    /// [`NormalEquations::covariance`]. `None` where a direction is not determined.
+    /// Returns the 6×6 covariance of the pose, in the same convention.
+    ///
+    /// It is valid if the pairs are right and their residuals independent; see
+    /// [`NormalEquations::covariance`]. If a direction is not determined, returns `None`.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         self.system.as_ref().and_then(NormalEquations::covariance)
     }
 
-    /// How well each direction is determined; see [`NormalEquations::observability`].
+    /// Returns how well each direction is determined; see [`NormalEquations::observability`].
     #[must_use]
     pub fn observability(&self) -> Option<Observability> {
         self.system
@@ -197,39 +207,43 @@ impl Quality {
     }
 }
 
-/// Whether a stage moved the pose.
+/// The change of the pose by a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Verdict {
-    /// The returned pose is a new one.
+    /// The returned pose is new.
     Refined,
-    /// The returned pose is the initial one, bit for bit, and this is why.
+    /// The returned pose is the initial one, bit for bit, for this reason.
     KeptInitial(Termination),
 }
 
-/// What a stage returns: a pose, and an honest account of it.
+/// The result of a stage: a pose, the reason why the stage ended, and the quality of the pose.
 ///
-/// The pose was either evaluated (its pairs were found, counted and measured) or is the initial one.
+/// The pose was either evaluated (its pairs were found, counted and measured) or is the initial
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Outcome {
-    /// The pose.
+    /// The pose `camera_from_object`.
     pub camera_from_object: Isometry3<f64>,
-    /// Why the stage ended; for a composed stage, why its last part did.
+    /// The reason why the stage ended; for a composed stage, the reason of its last part.
     pub termination: Termination,
-    /// Whether the pose is a new one.
+    /// New pose, or initial pose with the reason.
     pub verdict: Verdict,
-    /// Number of evaluations (associate, filter, minimise), rejected ones included; summed over the parts of a composed stage.
+    /// Number of evaluations (associate, filter, minimize), including rejected ones.
+    ///
+    /// For a composed stage it is the sum over its parts.
     pub iterations: usize,
-    /// Pairs and loss at the returned pose, by the last part that evaluated it; `None` if none did.
+    /// Pairs and loss at the returned pose, from the last part that evaluated it; `None` if none
+    /// did.
     pub evaluation: Option<Evaluation>,
-    /// How well the pairs at the returned pose fit, by the same part; `None` if none evaluated it.
+    /// Fit of the pairs at the returned pose, from the same part; `None` if none evaluated it.
     pub quality: Option<Quality>,
 }
 
 impl Outcome {
-    /// Returns the number of pairs at the returned pose, 0 if it was never evaluated.
+    /// Returns the number of pairs at the returned pose, or 0 if it was never evaluated.
     #[must_use]
     pub fn n_pairs(&self) -> usize {
         self.evaluation.map_or(0, |e| e.n_pairs)
@@ -244,7 +258,7 @@ impl Outcome {
         }
     }
 
-    /// Creates the outcome of a stage that keeps the initial pose.
+    /// Creates the outcome of a stage that keeps its initial pose without an evaluation.
     #[must_use]
     pub fn kept(init: &Isometry3<f64>, termination: Termination) -> Self {
         Self {
@@ -257,10 +271,10 @@ impl Outcome {
         }
     }
 
-    /// Returns the outcome of this stage followed by another that started from its pose.
+    /// Returns the outcome of this stage followed by another one that started from its pose.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
-        // A part that evaluated nothing stands at the pose where the one before it was measured.
+        // A part without an evaluation ends at the pose that the part before it measured.
         let measured = if next.evaluation.is_some() || next.verdict == Verdict::Refined {
             &next
         } else {

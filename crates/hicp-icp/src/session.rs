@@ -1,4 +1,4 @@
-//! What a run borrows: scratch memory and an observer.
+//! The scratch memory and the observer that a run borrows.
 
 use hicp_core::{
     Context, Correspondences, Isometry3, Model, PinholeCamera, Problem, RenderCache, RenderedView,
@@ -7,7 +7,9 @@ use hicp_core::{
 
 use crate::observer::Observer;
 
-/// Scratch memory and the render cache of one thread. Make one per thread and keep it: a warm run allocates nothing.
+/// The scratch memory and the render cache of one thread.
+///
+/// Create one per thread and reuse it: a warm run allocates nothing.
 #[derive(Debug)]
 pub struct Workspace {
     pub(crate) renders: RenderCache,
@@ -18,7 +20,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Makes a workspace around a renderer.
+    /// Creates a workspace around a renderer.
     pub fn new(renderer: impl Renderer + Send + 'static) -> Self {
         Self {
             renders: RenderCache::new(renderer),
@@ -28,12 +30,14 @@ impl Workspace {
         }
     }
 
-    /// Returns a problem as components see it, with this workspace's render cache.
+    /// Returns a problem as components receive it, with this workspace's render cache.
     pub fn context<'a>(&'a mut self, problem: &Problem<'a>) -> Context<'a> {
         Context::new(*problem, &mut self.renders)
     }
 
-    /// Returns a model rendered at a pose where there is no observation yet, by the cache that runs take their renders from.
+    /// Returns a model rendered at a pose, for a camera without an observation.
+    ///
+    /// The render is in the cache that runs use.
     pub fn view(
         &mut self,
         model: &Model,
@@ -43,23 +47,23 @@ impl Workspace {
         self.renders.view(model, camera, camera_from_object)
     }
 
-    /// Number of renders made so far.
+    /// Number of renders so far.
     #[must_use]
     pub fn renders(&self) -> u64 {
         self.renders.renders()
     }
 }
 
-/// One run's loan of a workspace and an observer; `&mut ()` observes nothing.
+/// The workspace and the observer of one run; `&mut ()` observes nothing.
 pub struct Session<'a> {
     /// Scratch memory.
     pub workspace: &'a mut Workspace,
-    /// Who is told what happens.
+    /// The receiver of events.
     pub observer: &'a mut dyn Observer,
 }
 
 impl<'a> Session<'a> {
-    /// Puts a workspace and an observer together.
+    /// Combines a workspace and an observer.
     pub fn new(workspace: &'a mut Workspace, observer: &'a mut dyn Observer) -> Self {
         Self {
             workspace,

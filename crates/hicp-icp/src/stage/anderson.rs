@@ -7,33 +7,38 @@ use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
 
-/// How many previous steps an extrapolation is made from.
+/// Number of previous steps that determine an extrapolation.
 const MEMORY: usize = 5;
 
-/// Extrapolates the poses of a stage that is run again and again (Anderson 1965; for ICP Pavlov et al. 2018, Zhang, Yao & Deng 2021).
+/// Extrapolates the poses of a repeated stage (Anderson acceleration).
 ///
-/// The stage is one step of a fixed-point iteration T ↦ G(T): an ICP stage that ends after one increment, such as one
-/// with `IterationLimit(2)`. From the last five residuals f = G(u) − u, as twists ln(T T₀⁻¹) about the initial pose, the next
-/// start is the combination whose residual would be smallest. An extrapolation after which the stage's mean loss is not
-/// lower than before is dropped for the plain iterate, and the memory is emptied, so the loss never rises.
+/// Sources: Anderson 1965; for ICP, Pavlov et al. 2018 and Zhang, Yao & Deng 2021. The stage is one
+/// step of a fixed-point iteration T ↦ G(T): an ICP stage that ends after one increment, such as
+/// one with `IterationLimit(2)`. The last five residuals f = G(u) − u are twists ln(T T₀⁻¹)
+/// relative to the initial pose. The next start is their combination with the smallest residual. If
+/// the stage's mean loss is not lower after an extrapolation, the plain iterate replaces it and the
+/// memory is cleared, so the loss never rises.
 ///
-/// It helps where the steps creep and the points stay the same: point-to-point over nearest neighbours of all samples took 118 steps
-/// instead of 132 to the same loss over six starts (`tests/tests/it/stages.rs`). With points chosen anew at every step the map is not
-/// smooth, and the fallbacks cost more than the extrapolations gain. Cost: a 5×5 system per step beside the stage.
+/// It helps if the steps are small and the points stay the same. Point-to-point over nearest
+/// neighbors of all samples took 118 steps instead of 132 to the same loss over six starts
+/// (`tests/tests/it/stages.rs`). If every step selects other points, the map is not smooth, and the
+/// fallbacks cost more than the extrapolations gain.
+///
+/// Cost: a 5×5 system per step, next to the stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anderson<S> {
-    /// One step: a stage that makes one increment.
+    /// One step: a stage that applies one increment.
     pub stage: S,
-    /// How often it is run at most.
+    /// Maximum number of steps.
     pub max_steps: usize,
-    /// The iteration has converged when a step moves the object's origin by less than this, metres …
+    /// The iteration has converged if a step moves the object's origin by less than this, meters …
     pub translation_meters: f64,
-    /// … and turns the object by less than this, degrees.
+    /// … and rotates the object by less than this, degrees.
     pub rotation_degrees: f64,
 }
 
 impl<S> Anderson<S> {
-    /// Makes the decorator with at most 50 steps and a tolerance of 10 µm and a thousandth of a degree.
+    /// Creates the decorator with at most 50 steps and a tolerance of 10 µm and 0.001°.
     #[must_use]
     pub fn new(stage: S) -> Self {
         Self {
@@ -55,7 +60,7 @@ impl<S: Stage> Stage for Anderson<S> {
         let object_from_init = init.inverse();
         let twist = |pose: &Isometry3<f64>| se3::log(&(pose * object_from_init));
         let mut memory = Memory::default();
-        // The plain iterate accepted last, and the loss there.
+        // The last accepted plain iterate, and its loss.
         let mut best: Option<(Outcome, f64)> = None;
         let mut start = *init;
         let mut extrapolated = false;
@@ -76,7 +81,8 @@ impl<S: Stage> Stage for Anderson<S> {
                     termination = Termination::Converged;
                     break;
                 }
-                // The extrapolation did not pay: go on from the plain iterate, and forget what led astray.
+                // The extrapolation did not help: continue from the plain iterate, and clear the
+                // memory that led to it.
                 start = plain.camera_from_object;
                 extrapolated = false;
                 memory = Memory::default();
@@ -126,7 +132,7 @@ impl<S: Stage> Stage for Anderson<S> {
     }
 }
 
-/// Differences of the last residuals and iterates, newest overwriting oldest.
+/// Differences of the last residuals and iterates; the newest overwrites the oldest.
 #[derive(Default)]
 struct Memory {
     last: Option<(Vector6<f64>, Vector6<f64>)>,
@@ -136,7 +142,7 @@ struct Memory {
 }
 
 impl Memory {
-    /// Takes u and g = G(u), and returns g − ΔG θ with θ = argmin ‖f − ΔF θ‖.
+    /// Stores u and g = G(u), and returns g − ΔG θ with θ = argmin ‖f − ΔF θ‖.
     fn extrapolate(&mut self, u: &Vector6<f64>, g: &Vector6<f64>) -> Vector6<f64> {
         let f = g - u;
         if let Some((last_f, last_g)) = self.last.replace((f, *g)) {
@@ -147,7 +153,7 @@ impl Memory {
         }
         let transposed = self.residual_differences.transpose();
         let normal = transposed * self.residual_differences;
-        // Columns not yet written are zero; the ridge gives them a coefficient of zero.
+        // Columns that were not written yet are zero; the ridge sets their coefficient to zero.
         let ridge = 1e-12 * normal.trace() + f64::MIN_POSITIVE;
         let theta: Option<Vector5<f64>> = (normal + Matrix5::identity() * ridge)
             .cholesky()
@@ -161,8 +167,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_linear_iteration_is_solved_as_soon_as_its_directions_are_known() {
-        // u ↦ A u + b with two directions: two differences determine the fixed point exactly.
+    fn a_linear_iteration_is_solved_once_its_directions_are_observed() {
+        // u ↦ A u + b in two directions: two differences determine the fixed point exactly.
         let step =
             |u: &Vector6<f64>| Vector6::new(0.9 * u[0] + 0.1, 0.5 * u[1] - 0.2, 0.0, 0.0, 0.0, 0.0);
         let mut memory = Memory::default();

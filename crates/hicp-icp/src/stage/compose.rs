@@ -6,11 +6,12 @@ use crate::outcome::{Outcome, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
 
-/// Runs stages one after the other, each from where the one before ended (Cascading ICP, §IV-B).
+/// Runs stages in sequence, each from the result of the one before (Cascading ICP, §IV-B).
 ///
-/// A stage that diverges hands on the pose that it accepted last. If the first stage diverges in its first step, the second
-/// starts from the initial pose; if it diverges later, the second starts from the last pose before the divergence. Losses are
-/// never compared across stages.
+/// A stage that diverges returns the pose that it accepted last, and the next stage starts there.
+/// If the first stage diverges in its first step, the second starts from the initial pose. If it
+/// diverges later, the second starts from the last pose before the divergence. Losses are never
+/// compared across stages.
 ///
 /// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +46,9 @@ cascade!(A, B);
 cascade!(A, B, C);
 cascade!(A, B, C, D);
 
-/// A cascade of any number of stages of one type, as read from a file. An empty one keeps the initial pose.
+/// A cascade of any number of stages of one type, as read from a file.
+///
+/// An empty one keeps the initial pose.
 impl<T: Stage> Stage for Cascade<Vec<T>> {
     fn run(
         &mut self,
@@ -67,15 +70,15 @@ impl<T: Stage> Stage for Cascade<Vec<T>> {
     }
 }
 
-/// Runs a stage a number of times, each from where the last ended: the outer iterations of Hybrid ICP (§IV-C).
+/// Repeats a stage, each time from the previous result: the outer iterations of Hybrid ICP (§IV-C).
 ///
-/// A stage is pure, so a pass that kept its initial pose would only be repeated; the loop ends there. 0 times keeps the
-/// initial pose.
+/// A stage is pure, so after a pass that kept its initial pose the loop ends: further passes would
+/// be identical. With 0 passes, it keeps the initial pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Repeat<S> {
-    /// How many times at most.
+    /// Maximum number of passes.
     pub times: usize,
-    /// What is repeated.
+    /// The repeated stage.
     pub stage: S,
 }
 

@@ -1,4 +1,4 @@
-//! Stages that answer to a score.
+//! Stages that are guarded by a score.
 
 use hicp_core::{Isometry3, Problem};
 use hicp_score::Score;
@@ -7,15 +7,15 @@ use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
 
-/// Runs a stage and accepts its pose only if a score improves; otherwise the initial pose is returned, with
-/// [`Termination::ScoreNotImproved`].
+/// Runs a stage and accepts its pose only if a score improves.
 ///
-/// With the MVE as the score this is the contract that a refinement never leaves a pose that explains the image worse.
+/// Otherwise it returns the initial pose, with [`Termination::ScoreNotImproved`]. With the MVE as
+/// the score, a refinement never returns a pose that explains the image worse.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Guard<S, C> {
-    /// What is run.
+    /// The guarded stage.
     pub stage: S,
-    /// The judge; lower is better.
+    /// The score of a pose; lower is better.
     pub score: C,
 }
 
@@ -48,16 +48,17 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
     }
 }
 
-/// Repeats a stage, each time from where it ended, and returns the best pose met, the initial one included, by a score.
+/// Repeats a stage, each time from the previous result, and returns the pose with the best score.
 ///
-/// Ends early when the stage keeps its pose. Ties go to the earlier pose, so a stage that gains nothing moves nothing.
+/// The initial pose takes part. The loop ends early if the stage keeps its pose. On a tie the
+/// earlier pose is returned, so a stage without an improvement does not move the pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KeepBest<S, C> {
-    /// How many times at most.
+    /// Maximum number of passes.
     pub times: usize,
-    /// What is repeated.
+    /// The repeated stage.
     pub stage: S,
-    /// The judge; lower is better.
+    /// The score of a pose; lower is better.
     pub score: C,
 }
 

@@ -1,4 +1,4 @@
-//! Poses from which a search starts: rotations from a set, each placed so that what it shows lies where something was observed.
+//! Hypotheses of a search: poses with rotations from a set, placed at the observed points.
 
 use hicp_core::{
     Isometry3, Model, Observation, Point3, Problem, Surfel, Translation3, UnitQuaternion,
@@ -7,37 +7,38 @@ use hicp_core::{
 
 use crate::stop::motion::Bound;
 
-/// Which rotations a search tries.
+/// The rotations that a search tries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Rotations {
-    /// An even grid of SO(3); with a bound, as many within it.
+    /// An even grid of SO(3); with a bound, the same number of rotations within it.
     #[default]
     Even,
-    /// The initial one, turned about the ray to what was observed.
+    /// The initial rotation, rotated around the ray to the observed points.
     ViewAxis,
-    /// The initial one, turned about the declared symmetries of the object: for objects that are nearly symmetric. None for an
-    /// object without.
+    /// The initial rotation, rotated around the declared symmetries of the object.
+    ///
+    /// For objects that are nearly symmetric. Without declared symmetries there are none.
     Symmetry,
 }
 
-/// Points of the model that place a hypothesis.
+/// Number of model points that determine the place of a hypothesis.
 const PLACING_SAMPLES: usize = 250;
 
-/// Makes the hypotheses of one search.
+/// The source of the hypotheses of one search.
 pub(crate) struct Hypotheses<'a> {
     model: &'a Model,
     init: Isometry3<f64>,
     bound: Option<Bound>,
-    /// Mean of the observed points.
+    /// Mean of the observed points, camera frame, meters.
     centroid: Point3<f64>,
-    /// Direction from the camera to it.
+    /// Direction from the camera to the centroid.
     ray: Vector3<f64>,
     oriented: bool,
 }
 
 impl<'a> Hypotheses<'a> {
-    /// `None` where nothing was observed or the initial pose is not finite.
+    /// Returns `None` if nothing was observed or the initial pose is not finite.
     pub(crate) fn new(
         problem: &Problem<'a>,
         init: &Isometry3<f64>,
@@ -56,8 +57,11 @@ impl<'a> Hypotheses<'a> {
         })
     }
 
-    /// The neighbours of a pose: itself, half turns about the axes of the object's frame, and quarter turns about the ray, each
-    /// placed anew; outside of the bound they are left out.
+    /// Iterates over the neighbors of a pose.
+    ///
+    /// They are the pose itself, half turns around the axes of the object frame, and quarter turns
+    /// around the ray. Each is placed at the observed points. Those outside of the bound are left
+    /// out.
     pub(crate) fn neighbors(
         &self,
         pose: &Isometry3<f64>,
@@ -75,15 +79,17 @@ impl<'a> Hypotheses<'a> {
             .filter_map(|rotation| self.place(&rotation))
     }
 
-    /// The hypotheses of a set of rotations, `None` for a rotation that is outside of the bound: whoever has a time limit looks at the clock
-    /// there too.
+    /// Iterates over the hypotheses of a set of rotations, with `None` for those outside of the
+    /// bound.
+    ///
+    /// A caller with a time limit reads the clock for those, too.
     pub(crate) fn of(
         &self,
         rotations: Rotations,
         count: usize,
     ) -> impl Iterator<Item = Option<Isometry3<f64>>> + use<'_> {
         let symmetries = self.model.symmetries();
-        // Of a bounded search as many hypotheses fall into the bound.
+        // In a bounded search, the same number of hypotheses falls into the bound.
         let grid = match (rotations, self.bound) {
             (Rotations::Even, Some(bound)) => enlarged(count, bound.rotation_degrees.to_radians()),
             (Rotations::Symmetry, _) if symmetries.continuous.is_empty() => {
@@ -129,10 +135,11 @@ impl<'a> Hypotheses<'a> {
         }
     }
 
-    /// Places a rotation so that the centroid of what it shows is that of what was observed, and within the bound; `None` where
-    /// the rotation is outside.
+    /// Places a rotation such that the visible centroid is the observed one, within the bound.
+    ///
+    /// Returns `None` if the rotation is outside of the bound.
     fn place(&self, rotation: &UnitQuaternion<f64>) -> Option<Isometry3<f64>> {
-        // Before the rotation is placed: most of a bounded search's grid ends here.
+        // Check the rotation before placing it: most of the grid of a bounded search ends here.
         if let Some(bound) = self.bound {
             let away = rotation * self.init.rotation.inverse();
             if so3::angle(&away).to_degrees() > bound.rotation_degrees {
@@ -154,7 +161,9 @@ impl<'a> Hypotheses<'a> {
         ))
     }
 
-    /// The centroid of the surface that faces the camera, as much of it as is seen, in the object frame.
+    /// Returns the centroid of the surface that faces the camera, in the object frame.
+    ///
+    /// Points are weighted by their visible area.
     fn shown(&self, rotation: &UnitQuaternion<f64>) -> Point3<f64> {
         let samples = self.model.samples();
         let toward = rotation.inverse() * self.ray;
@@ -178,7 +187,7 @@ impl<'a> Hypotheses<'a> {
     }
 }
 
-/// The mean of the observed points, about 1000 of them.
+/// Returns the mean of about 1000 of the observed points, in the camera frame.
 fn centroid(observation: &Observation) -> Option<Point3<f64>> {
     let stride = (1_u32..)
         .find(|s| observation.n_surfels() <= 1000 * (*s as usize).pow(2))
@@ -194,8 +203,9 @@ fn centroid(observation: &Observation) -> Option<Point3<f64>> {
     mean(stride).or_else(|| mean(1))
 }
 
-/// The size of a grid of which about `count` rotations lie within an angle of any one of them: the share of SO(3) there is
-/// (β − sin β) / π.
+/// Returns the grid size for which about `count` rotations lie within an angle of any rotation.
+///
+/// The share of SO(3) within the angle β is (β − sin β) / π.
 fn enlarged(count: usize, angle: f64) -> usize {
     let angle = angle.clamp(0.0, std::f64::consts::PI);
     let share = (angle - angle.sin()) / std::f64::consts::PI;
@@ -206,5 +216,5 @@ fn enlarged(count: usize, angle: f64) -> usize {
     wanted
 }
 
-/// The largest grid that is gone through to find the rotations within a bound.
+/// The largest grid that is searched for rotations within a bound.
 const MAX_GRID: f64 = 100_000.0;

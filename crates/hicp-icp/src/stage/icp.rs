@@ -10,18 +10,21 @@ use crate::session::Session;
 use crate::stage::stage_trait::Stage;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// The most evaluations that a stage makes, whatever its stop rules say.
+/// The largest number of evaluations of a stage, for all stop rules.
 pub const MAX_ITERATIONS: usize = 1000;
 
-/// Generic ICP (Algorithm 1 of the paper) from its five components, each a public field.
+/// Generic ICP (Algorithm 1 of the paper), with its five components as public fields.
 ///
-/// The points are selected once, at the initial pose. An iteration then associates at the candidate pose, filters, and
-/// minimizes, which gives the loss *there* and the next increment; the stop rule judges. A candidate is accepted only after it was
-/// evaluated, so the returned pose is the last one that the rules let stand, and rolling back costs nothing.
+/// The points are selected once, at the initial pose. An iteration then associates at the candidate
+/// pose, filters, and minimizes, which gives the loss *at the candidate* and the next increment.
+/// Then the stop rule judges. A candidate is accepted only after its evaluation. The returned pose
+/// is therefore the last one that the rules accept, and a rollback costs nothing.
 ///
-/// Whatever the stop rules say, a stage ends after [`MAX_ITERATIONS`] evaluations: a rule set without a limit may never fire.
+/// A stage ends after [`MAX_ITERATIONS`] evaluations at the latest, because a rule set without a
+/// limit may never fire.
 ///
-/// No pairs, or pairs that determine no step, end the stage with the pose accepted last.
+/// If there are no pairs, or if the pairs do not determine a step, the stage ends with the last
+/// accepted pose.
 ///
 /// ```
 /// use hicp_association::{Projective, VisibleSurface};
@@ -39,15 +42,15 @@ pub const MAX_ITERATIONS: usize = 1000;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Icp<P, A, F, M, S> {
-    /// Chooses the model points.
+    /// Selects the model points.
     pub selection: P,
-    /// Pairs them with observed points.
+    /// Pairs the selected points with observed points.
     pub association: A,
     /// Removes or re-weights pairs.
     pub filter: F,
-    /// What is minimised.
+    /// Defines the error that each iteration minimizes.
     pub metric: M,
-    /// When to end.
+    /// Decides when the stage ends.
     pub stop: S,
 }
 
@@ -87,7 +90,7 @@ where
             let iteration = Iteration::new(evaluations, init, *problem);
             pairs.begin(&candidate, source.len());
             if finite {
-                // Even without a source: an association may start from the observation.
+                // Call it even without a source: an association may start from the observation.
                 self.association
                     .associate(&mut context, source, &candidate, pairs);
                 self.filter.filter(&iteration, pairs);
@@ -136,7 +139,8 @@ where
                 break Termination::IterationLimit;
             }
             let mut next = step.increment * candidate;
-            // Products of unit quaternions drift off the unit sphere; a long run must stay in SO(3).
+            // Products of unit quaternions drift off the unit sphere. A long run must stay in
+            // SO(3).
             next.rotation.renormalize();
             if !se3::is_finite(&next) {
                 break Termination::Degenerate;
@@ -147,7 +151,7 @@ where
         let pose = accepted.map_or(*init, |a| a.camera_from_object);
         let quality = accepted.and_then(|accepted| {
             if *pairs.camera_from_object() != pose {
-                // Rolled back: the pairs in hand are those of the rejected pose.
+                // After a rollback the buffer holds the pairs of the rejected pose.
                 pairs.begin(&pose, source.len());
                 self.association
                     .associate(&mut context, source, &pose, pairs);
@@ -186,7 +190,7 @@ where
     }
 }
 
-/// The pose accepted last, and the iteration that evaluated it.
+/// The last accepted pose, and the iteration that evaluated it.
 #[derive(Clone, Copy)]
 struct Accepted<'a> {
     camera_from_object: Isometry3<f64>,
@@ -194,7 +198,8 @@ struct Accepted<'a> {
     iteration: Iteration<'a>,
 }
 
-/// Returns whether two poses are equal to the bit; by value a pose with a NaN would differ from itself.
+/// Returns whether two poses are equal to the bit. By value, a pose with a NaN would differ from
+/// itself.
 fn same_bits(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     let coordinates = |pose: &Isometry3<f64>| {
         let (t, q) = (pose.translation.vector, pose.rotation.coords);

@@ -1,4 +1,4 @@
-//! Running a stage on a coarser image.
+//! Stages at a lower image resolution.
 
 use hicp_core::{Isometry3, Problem};
 
@@ -8,14 +8,14 @@ use crate::stage::stage_trait::Stage;
 
 /// Runs a stage on every `factor`-th pixel of the observation.
 ///
-/// The coarse camera is phase-aligned with the fine one, so the pose needs no conversion. Coarse-to-fine is a cascade:
-/// `Cascade((AtResolution { factor: 4, stage }, AtResolution { factor: 2, stage }, stage))`. The coarse observation is made
-/// once per observation and shared.
+/// The coarse camera is phase-aligned with the fine one, so the pose needs no conversion.
+/// Coarse-to-fine is a cascade: `Cascade((AtResolution { factor: 4, stage }, AtResolution { factor:
+/// 2, stage }, stage))`. The coarse observation is built once per observation and shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AtResolution<S> {
-    /// Every how many pixels; 0 and 1 are the full resolution.
+    /// The distance between used pixels; 0 and 1 are the full resolution.
     pub factor: u32,
-    /// What is run.
+    /// The stage to run.
     pub stage: S,
 }
 

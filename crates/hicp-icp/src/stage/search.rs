@@ -11,37 +11,45 @@ use crate::stage::hypotheses::{Hypotheses, Rotations};
 use crate::stage::stage_trait::Stage;
 use crate::stop::motion::Bound;
 
-/// How far, how long and when a [`HypothesisSearch`] searches. Any value is valid: what is out of range searches nothing, or
-/// nothing better is found.
+/// The range, budget and conditions of a [`HypothesisSearch`].
+///
+/// Any value is valid: with a value out of range, nothing is searched or nothing better is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchOptions {
-    /// The score above which the search begins: where the local stage ends at or below it, nothing else is tried.
+    /// The score above which the search starts.
+    ///
+    /// If the local stage ends at or below it, no hypotheses are tried.
     pub threshold: f64,
-    /// The score at which no further hypothesis is refined.
+    /// The score at which no further hypotheses are refined.
     pub good_enough: f64,
-    /// By how much a hypothesis must beat the local pose to take its place: where masks are imperfect the score is no
-    /// better judge than that.
+    /// The gain in score by which a hypothesis must beat the local pose to replace it.
+    ///
+    /// With imperfect masks, the score does not separate poses better than that.
     pub min_gain: f64,
-    /// Which rotations are tried, beside the neighbours of the initial pose.
+    /// The rotations to try, next to the neighbors of the initial pose.
     pub rotations: Rotations,
-    /// How many of them.
+    /// Number of these rotations.
     pub hypotheses: usize,
-    /// How many of the best ranked are refined.
+    /// Number of best ranked hypotheses to refine.
     pub refined: usize,
-    /// How far apart the rotations of those are at least, degrees: of two that are nearer the better ranked is kept. 0 drops
-    /// what is there twice alone.
+    /// The smallest angle between the rotations of refined hypotheses, degrees.
+    ///
+    /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
     pub spacing_degrees: f64,
-    /// How far from the initial pose the result may be; `None` for anywhere.
+    /// The largest distance of the result from the initial pose; `None` for no limit.
     pub bound: Option<Bound>,
-    /// How long a run may take; the best pose so far is returned with [`Termination::Deadline`]. Results then depend on the
-    /// clock; `hypotheses` and `refined` are the budget that does not. The clock is read between hypotheses, so that a run
-    /// ends later by at most one of them.
+    /// The longest time of a run. At the limit, the best pose so far is returned with
+    /// [`Termination::Deadline`].
+    ///
+    /// Results then depend on the clock; `hypotheses` and `refined` are budgets that do not. The
+    /// clock is read between hypotheses, so a run exceeds the limit by at most one of them.
     pub time_limit: Option<Duration>,
 }
 
 impl Default for SearchOptions {
-    /// 256 rotations of SO(3), 12 refined that are at least 20° apart, above a score of 0.15, without bound; a hypothesis must be
-    /// better by 0.03.
+    /// 256 rotations of SO(3), of which 12 at least 20° apart are refined, without a bound.
+    ///
+    /// The search starts above a score of 0.15, and a hypothesis must be better by 0.03.
     fn default() -> Self {
         Self {
             threshold: 0.15,
@@ -57,39 +65,42 @@ impl Default for SearchOptions {
     }
 }
 
-/// Runs a local stage, and where its score stays bad, searches: hypotheses are ranked by a cheap score, the best of them refined
-/// by a cheap stage, and the one that ends with the lowest score by the local stage, which is kept if it is better.
+/// Runs a local stage, and searches if its score stays bad.
 ///
-/// **This is not local refinement.** Unless a bound is set it can end anywhere in the image, and on an object that looks the
-/// same from several sides it can land on an equivalent pose.
+/// The search ranks hypotheses by a cheap score and refines the best of them by a cheap stage. The
+/// local stage then refines the one with the lowest score, which is returned if it is better.
 ///
-/// Hypotheses are rotations from [`SearchOptions::rotations`] and neighbours of the initial and the local pose, each placed so
-/// that what it shows lies about the centroid of what was observed. None is refined that lies near a better ranked one.
+/// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image. On an
+/// object that looks the same from several sides, it can return an equivalent pose.
 ///
-/// **Contract**: the score of the returned pose is never above that of the local stage's: whether that is better than the initial one
-/// is the local stage's to know, see [`crate::Guard`]. With a bound no pose outside of it is returned; where the local stage's is,
-/// the initial one stands in for it.
+/// Hypotheses are rotations from [`SearchOptions::rotations`], and neighbors of the initial and the
+/// local pose. Each is placed such that its visible centroid is the observed one. A hypothesis near
+/// a better ranked one is not refined.
 ///
-/// Cost: the local stage; where its score stays above the threshold, `hypotheses` × the ranking score, `refined` × the exploring
-/// stage, and the local stage once more.
+/// **Contract**: the score of the returned pose is never above that of the local stage's pose. A
+/// local stage in a [`crate::Guard`] is never worse than the initial pose. With a bound, a pose
+/// outside of it is never returned; the initial pose replaces a local pose that is outside.
+///
+/// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
+/// score, `refined` × the exploring stage, and the local stage once more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, E, R, C> {
     /// Refines the initial pose, and the best hypothesis.
     pub stage: S,
-    /// Refines hypotheses, cheaply.
+    /// Refines hypotheses at low cost.
     pub explore: E,
     /// Ranks hypotheses; lower is better.
     pub ranking: R,
-    /// Judges poses; lower is better.
+    /// Scores poses; lower is better.
     pub score: C,
-    /// How far, how long and when.
+    /// Range, budget and conditions.
     pub options: SearchOptions,
     /// The best ranked hypotheses, best first.
     ranked: Vec<(f64, Isometry3<f64>)>,
 }
 
 impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
-    /// Makes the stage.
+    /// Creates the stage.
     #[must_use]
     pub fn new(stage: S, explore: E, ranking: R, score: C, options: SearchOptions) -> Self {
         Self {
@@ -102,8 +113,9 @@ impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
         }
     }
 
-    /// Puts a hypothesis into the list of the best, unless it is too near to a better one; one that is too near and not better
-    /// leaves the list for it.
+    /// Inserts a hypothesis into the list of the best, unless it is too near to a better one.
+    ///
+    /// Hypotheses that are too near and not better leave the list.
     fn list(&mut self, score: f64, pose: Isometry3<f64>) {
         let SearchOptions {
             refined,
@@ -131,7 +143,7 @@ impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
     }
 }
 
-/// A pose found, with its score.
+/// A refined pose with its score.
 #[derive(Clone, Copy)]
 struct Found {
     score: f64,
@@ -139,7 +151,7 @@ struct Found {
 }
 
 impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
-    /// Scores an outcome: `None` where it is the pose that it started from, which nobody evaluated, or outside of the bound.
+    /// Scores an outcome, or returns `None` if it kept its start or lies outside of the bound.
     fn found(
         &mut self,
         problem: &Problem<'_>,
@@ -156,7 +168,7 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
         })
     }
 
-    /// Ranks hypotheses into the list of the best, as many as there is time for.
+    /// Ranks hypotheses into the list of the best, within the time limit.
     fn rank(
         &mut self,
         problem: &Problem<'_>,
@@ -170,7 +182,7 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
             return;
         };
         let options = self.options;
-        // With the one that is pushed out again.
+        // One more, for the hypothesis that is removed again.
         self.ranked.reserve(options.refined.min(MAX_REFINED) + 1);
         let hypotheses = from
             .neighbors(init)
@@ -190,7 +202,9 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
         }
     }
 
-    /// Refines the ranked hypotheses and returns the best, after the local stage, and the iterations spent.
+    /// Refines the ranked hypotheses.
+    ///
+    /// Returns the best after the local stage, and the number of iterations.
     fn explore(
         &mut self,
         problem: &Problem<'_>,
@@ -234,10 +248,10 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
     }
 }
 
-/// More hypotheses than this are never refined: their list is kept in order.
+/// The largest number of refined hypotheses: their list is kept in order.
 const MAX_REFINED: usize = 10_000;
 
-/// When a run has to end.
+/// The deadline of a run.
 struct Clock(Option<(Instant, Duration)>);
 
 impl Clock {
@@ -314,7 +328,7 @@ mod tests {
 
     use super::*;
 
-    /// The scores and angles of what is refined, of hypotheses that are turned about one axis.
+    /// Returns scores and angles of the refined hypotheses, for hypotheses rotated around one axis.
     fn listed(spacing_degrees: f64, hypotheses: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let options = SearchOptions {
             refined: 3,
@@ -337,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_there_twice_takes_one_place() {
+    fn duplicate_hypotheses_are_listed_once() {
         let neighbors = [(0.5, 0.0), (0.6, 5.0), (0.7, 90.0)];
         let both = [neighbors, neighbors].concat();
         assert_eq!(listed(0.0, &both), neighbors);
@@ -345,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_are_near_the_better_stays() {
+    fn of_two_near_hypotheses_the_better_stays() {
         let hypotheses = [
             (0.5, 0.0),
             (0.6, 50.0),

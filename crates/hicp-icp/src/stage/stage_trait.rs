@@ -1,4 +1,4 @@
-//! The trait of stages: the one verb, closed under composition.
+//! The trait of stages: one verb, closed under composition.
 
 use hicp_core::internal::type_label;
 use hicp_core::{Isometry3, Problem};
@@ -8,15 +8,18 @@ use crate::session::Session;
 
 /// Refines a pose.
 ///
-/// [`crate::Icp`], [`crate::Cascade`], [`crate::Repeat`] and `Switch` are stages, and so is any composition of them:
-/// Hybrid ICP is a struct literal.
+/// [`crate::Icp`], [`crate::Cascade`], [`crate::Repeat`] and `Switch` are stages, and so is any
+/// composition of them: Hybrid ICP is a struct literal.
 ///
 /// # Contract
 ///
-/// - Never fails and never panics on data: the [`Outcome`] says how it ended, and its pose is finite when `init` is.
+/// - Never fails and never panics on data. The [`Outcome`] states how the stage ended, and its pose
+///   is finite if `init` is.
 /// - The returned pose was evaluated, or is `init` bit for bit.
-/// - Pure: equal inputs give equal bits, whatever ran before; `&mut self` and the session's workspace are scratch.
-/// - A warm run (the same stage and workspace before, on inputs no larger) makes no heap allocation.
+/// - Pure: equal inputs give equal bits, whatever ran before. `&mut self` and the session's
+///   workspace are scratch.
+/// - A warm run (the same stage and workspace before, on inputs that are not larger) allocates
+///   nothing on the heap.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a stage",
     label = "this must implement `Stage`",

@@ -5,12 +5,18 @@ use hicp_core::Iteration;
 use crate::outcome::Termination;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// Ends a stage when the mean loss has stopped changing ("terminated early if the ICP loss converges", §IV-B).
+/// Ends a stage as converged if the mean loss has stopped changing.
+///
+/// It is the rule "terminated early if the ICP loss converges" of §IV-B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convergence {
-    /// Relative change of the mean loss against the previous iteration, up or down, below which the stage has converged.
+    /// Relative change of the mean loss, up or down, below which the stage has converged.
+    ///
+    /// The change is relative to the previous iteration.
     pub relative_change: f64,
-    /// Mean loss (m²) below which there is nothing left to gain: the square of what `f32` resolves at arm's length.
+    /// Mean loss (m²) below which further iterations gain nothing.
+    ///
+    /// It is the square of the resolution of `f32` at arm's length.
     pub negligible_loss: f64,
 }
 
@@ -42,17 +48,17 @@ impl StopRule for Convergence {
     }
 }
 
-/// Ends a stage as converged when the mean loss changes by less than an absolute amount, or has fallen below one.
+/// Ends a stage as converged if the mean loss, or its change, is below an absolute limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AbsoluteLoss {
-    /// Change against the previous iteration, m².
+    /// Smallest change since the previous iteration, m².
     pub change: f64,
-    /// Loss that is good enough, m².
+    /// Loss that ends the stage, m².
     pub good_enough: f64,
 }
 
 impl Default for AbsoluteLoss {
-    /// The squares of a micrometre and of ten micrometres.
+    /// The squares of a micrometer and of ten micrometers.
     fn default() -> Self {
         Self {
             change: 1e-12,

@@ -5,33 +5,33 @@ use hicp_core::Iteration;
 use crate::outcome::Termination;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// When a rising mean loss counts as divergence (rule 3 of §IV-B).
+/// The condition under which a rising mean loss counts as divergence (rule 3 of §IV-B).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LossRule {
-    /// Whenever it rises: the rule as written.
+    /// Every rise: the rule as written.
     #[default]
     Strict,
-    /// Only when the number of pairs did not grow: pairs found anew enter with large residuals, which is progress.
+    /// A rise without more pairs. New pairs have large residuals, and finding them is progress.
     CountAware,
 }
 
-/// The paper's three rules by which a stage is judged to diverge (§IV-B):
+/// Ends a stage that diverges, by the paper's three rules (§IV-B):
 ///
-/// 1. no pairs ([`Termination::NoPairs`], which the engine itself finds);
-/// 2. fewer pairs than at the first *or* the previous iteration, by more than 5 %;
-/// 3. the mean loss rose against the previous iteration.
+/// 1. There are no pairs ([`Termination::NoPairs`], which the engine itself detects).
+/// 2. There are more than 5 % fewer pairs than at the first *or* the previous iteration.
+/// 3. The mean loss rose since the previous iteration.
 ///
-/// The stage then returns the last pose before it began to diverge.
+/// The stage then returns the last pose before it started to diverge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// Largest share of the pairs that may be lost.
     pub pairs_lost: f64,
-    /// What rule 3 demands.
+    /// The condition of rule 3.
     pub loss_rule: LossRule,
-    /// Relative rise of the mean loss that is left to the convergence rule.
-    // Deviation: rule 3 as written fires on a rise in the last digit, so every stage that converges would end as diverged;
-    // a rise within the convergence threshold is convergence.
+    /// Relative rise of the mean loss that does not count, because the convergence rule covers it.
+    // Deviation: rule 3 as written fires on a rise in the last digit. Every stage that converges
+    // would end as diverged. Here a rise within the convergence threshold is convergence.
     pub rise_tolerance: f64,
 }
 
@@ -46,7 +46,7 @@ impl Divergence {
         }
     }
 
-    /// Rule 3 only where the number of pairs did not grow.
+    /// The paper's rules, with rule 3 only if the number of pairs did not grow.
     #[must_use]
     pub fn count_aware() -> Self {
         Self {

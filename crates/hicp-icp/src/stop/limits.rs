@@ -7,7 +7,7 @@ use hicp_core::Iteration;
 use crate::outcome::Termination;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// Ends a stage after a number of evaluations, with the last one accepted.
+/// Ends a stage after a number of evaluations and accepts the last one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IterationLimit(pub usize);
 
@@ -32,18 +32,18 @@ impl StopRule for IterationLimit {
     }
 }
 
-/// Ends a stage when it has run for a time; the last evaluated pose is returned.
+/// Ends a stage after a time and accepts the last evaluated pose.
 ///
-/// The one rule whose results depend on the clock: two runs may differ.
+/// Its results depend on the clock: two runs may differ.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeLimit {
-    /// How long the stage may run.
+    /// The longest time of the stage.
     pub limit: Duration,
     started: Option<Instant>,
 }
 
 impl TimeLimit {
-    /// Makes the rule. The clock starts with every stage run.
+    /// Creates the rule. The clock starts with every run of the stage.
     #[must_use]
     pub fn new(limit: Duration) -> Self {
         Self {
@@ -72,9 +72,10 @@ impl StopRule for TimeLimit {
     }
 }
 
-/// Ends every stage that is still running at a moment: one deadline for a whole pipeline.
+/// Ends every stage that runs at a moment: one deadline for a whole pipeline.
 ///
-/// Stages that begin after it evaluate their initial pose once and return it. Results depend on the clock.
+/// Stages that start after it evaluate their initial pose once and return it. Results depend on the
+/// clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deadline(pub Instant);
 

@@ -1,22 +1,23 @@
-//! Stop rules on how the pose moves.
+//! Stop rules on the motion of the pose.
 
 use hicp_core::{Isometry3, Iteration, se3};
 
 use crate::outcome::Termination;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 
-/// Ends a stage as converged when the next increment would move the object by less than a distance *and* turn it by less
-/// than an angle, each in its own unit. The distance is that of the object's origin.
+/// Ends a stage as converged if the next increment would hardly move the object.
+///
+/// Both its distance, that of the object's origin, *and* its angle must be below their limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmallMotion {
-    /// Distance, metres.
+    /// Distance, meters.
     pub translation_meters: f64,
     /// Angle, degrees.
     pub rotation_degrees: f64,
 }
 
 impl Default for SmallMotion {
-    /// A tenth of a millimetre and a hundredth of a degree.
+    /// A tenth of a millimeter and a hundredth of a degree.
     fn default() -> Self {
         Self {
             translation_meters: 1e-4,
@@ -43,18 +44,19 @@ impl StopRule for SmallMotion {
     }
 }
 
-/// Rejects a pose further from the stage's initial one than a distance or an angle: a wrong match must not carry a good
-/// detection away. The distance is that of the object's origin.
+/// Rejects a pose that is too far from the stage's initial pose.
+///
+/// A wrong match must not move a good detection away. The distance is that of the object's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
-    /// Distance, metres.
+    /// Largest distance, meters.
     pub translation_meters: f64,
-    /// Angle, degrees.
+    /// Largest angle, degrees.
     pub rotation_degrees: f64,
 }
 
 impl Default for Bound {
-    /// Ten centimetres and 45°.
+    /// Ten centimeters and 45°.
     fn default() -> Self {
         Self {
             translation_meters: 0.1,
@@ -64,7 +66,7 @@ impl Default for Bound {
 }
 
 impl Bound {
-    /// Returns whether a pose lies within the bound about another.
+    /// Returns whether a pose lies within the bound around an initial pose.
     #[must_use]
     pub fn contains(&self, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
         let (angle, distance) = se3::pose_distance(pose, init);
@@ -86,21 +88,22 @@ impl StopRule for Bound {
     }
 }
 
-/// Ends a stage whose pose returns to where it was two or three iterations before: correspondences that flip to and fro.
+/// Ends a stage whose pose returns to that of two or three iterations before.
 ///
-/// Ends with [`Termination::Oscillating`]; the pose just evaluated is accepted. The distance is that of the object's origin.
+/// Correspondences then flip back and forth. The stage ends with [`Termination::Oscillating`] and
+/// accepts the last evaluated pose. The distance is that of the object's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillation {
-    /// Distance within which two poses are the same, metres.
+    /// Distance within which two poses are equal, meters.
     pub translation_meters: f64,
-    /// Angle within which two poses are the same, degrees.
+    /// Angle within which two poses are equal, degrees.
     pub rotation_degrees: f64,
-    /// The last poses, the newest first.
+    /// The last poses, newest first.
     recent: [Option<Isometry3<f64>>; 3],
 }
 
 impl Oscillation {
-    /// Makes the rule.
+    /// Creates the rule from a distance in meters and an angle in degrees.
     #[must_use]
     pub fn new(translation_meters: f64, rotation_degrees: f64) -> Self {
         Self {
@@ -117,7 +120,7 @@ impl Oscillation {
 }
 
 impl Default for Oscillation {
-    /// A hundredth of a millimetre and a thousandth of a degree.
+    /// A hundredth of a millimeter and a thousandth of a degree.
     fn default() -> Self {
         Self::new(1e-5, 1e-3)
     }
@@ -131,7 +134,7 @@ impl StopRule for Oscillation {
     fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let pose = progress.camera_from_object;
         let [last, older @ ..] = &self.recent;
-        // A pose that stands still is converged, not oscillating.
+        // A pose that does not move has converged and does not oscillate.
         let moved = last.is_some_and(|last| !self.same(&last, pose));
         let returned = older.iter().flatten().any(|before| self.same(before, pose));
         self.recent.rotate_right(1);
@@ -180,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_needs_both_to_be_small() {
+    fn small_motion_needs_a_small_distance_and_a_small_angle() {
         let mut rule = SmallMotion::default();
         let turn = Isometry3::rotation(hicp_core::Vector3::z() * 1e-3);
         let judge = |rule: &mut SmallMotion, increment| check(rule, &at(0.0), &increment);
@@ -193,15 +196,16 @@ mod tests {
             Judgment::Continue
         );
         assert_eq!(judge(&mut rule, turn), Judgment::Continue);
-        // The angle is judged by itself: a turn about the object's origin moves that origin nowhere.
+        // The angle counts by itself: a rotation around the object's origin does not move that
+        // origin.
         let about =
             Isometry3::translation(0.0, 0.0, 0.5) * turn * Isometry3::translation(0.0, 0.0, -0.5);
         assert_eq!(judge(&mut rule, about), Judgment::Continue);
     }
 
-    /// Lengths compared with squares of lengths, cosines with angles: thresholds that are off by orders of magnitude.
+    /// Fails if lengths are compared with squares of lengths, or cosines with angles.
     #[test]
-    fn limits_are_metres_and_degrees_not_their_squares_or_cosines() {
+    fn limits_are_meters_and_degrees_not_squares_or_cosines() {
         let origin = Isometry3::identity();
         let turn =
             |degrees: f64| Isometry3::rotation(hicp_core::Vector3::y() * degrees.to_radians());
@@ -228,7 +232,7 @@ mod tests {
                         check(&mut bound, &pose, &origin) == Judgment::Continue,
                         small
                     );
-                    // There, far away, and back to almost there.
+                    // At the origin, far away, and back near the origin.
                     oscillation.start();
                     assert_eq!(
                         check(&mut oscillation, &origin, &origin),
@@ -248,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_reject_what_is_outside() {
+    fn bounds_reject_poses_outside() {
         let mut rule = Bound::default();
         let still = Isometry3::identity();
         assert_eq!(check(&mut rule, &at(0.1), &still), Judgment::Continue);
@@ -257,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn to_and_fro_is_oscillation_and_standing_still_is_not() {
+    fn returning_poses_oscillate_and_resting_poses_do_not() {
         let still = Isometry3::identity();
         let run = |rule: &mut Oscillation, poses: &[f64]| {
             rule.start();
@@ -274,7 +278,7 @@ mod tests {
             [false, false, false, true]
         );
         assert_eq!(run(&mut rule, &[0.0, 0.0, 0.0]), [false; 3]);
-        // A new stage remembers nothing.
+        // A new run does not remember the last one.
         assert_eq!(run(&mut rule, &[0.0, 0.01, 0.0]), to_and_fro);
     }
 }

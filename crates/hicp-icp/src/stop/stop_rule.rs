@@ -1,18 +1,18 @@
-//! The trait of stop rules, and how they combine.
+//! The trait of stop rules, and their combination.
 
 use hicp_core::internal::type_label;
 use hicp_core::{Isometry3, Iteration};
 
 use crate::outcome::{Evaluation, Termination};
 
-/// The findings at the pose just evaluated: the input of a stop rule, next to the [`Iteration`].
+/// The results at the pose just evaluated: the input of a stop rule, next to the [`Iteration`].
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
     /// Pairs and loss at the pose just evaluated.
     pub current: Evaluation,
-    /// Those of the first iteration.
+    /// Pairs and loss at the first iteration.
     pub first: Evaluation,
-    /// Those of the iteration before; `None` at the first.
+    /// Pairs and loss at the previous iteration; `None` at the first.
     pub previous: Option<Evaluation>,
     /// The pose just evaluated.
     pub camera_from_object: &'a Isometry3<f64>,
@@ -24,11 +24,12 @@ pub struct Progress<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Judgment {
-    /// Accept the pose and go on.
+    /// Accept the pose and continue.
     Continue,
     /// Accept the pose and end the stage for this reason.
     Accept(Termination),
-    /// Reject the pose and end the stage for this reason: the stage returns the pose accepted before it.
+    /// Reject the pose and end the stage for this reason. The stage returns the pose accepted
+    /// before it.
     Reject(Termination),
 }
 
@@ -39,12 +40,12 @@ impl Judgment {
     }
 }
 
-/// Decides after every evaluation whether the stage goes on, and whether the pose just evaluated is accepted.
+/// Decides after every evaluation whether the stage continues and whether the pose is accepted.
 ///
-/// A tuple of up to six rules, or a `Vec` of any number, shows every iteration to all of them; the first that does not
-/// continue decides.
+/// A tuple of up to six rules, or a `Vec` of any number, passes every iteration to all of them. The
+/// first rule that does not continue decides.
 ///
-/// A rule can end a stage for a reason of its own:
+/// A rule can end a stage for a custom reason:
 ///
 /// ```
 /// use hicp_core::Iteration;
@@ -72,7 +73,7 @@ impl Judgment {
     note = "`Icp::stop` accepts a `StopRule`, a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to six of them"
 )]
 pub trait StopRule {
-    /// Starts a stage; rules with memory forget.
+    /// Starts a stage: rules with memory clear it.
     fn start(&mut self) {}
 
     /// Judges the pose that an iteration evaluated.
@@ -83,7 +84,9 @@ pub trait StopRule {
         type_label::<Self>()
     }
 
-    /// Appends the names of the rules that this one consists of, in order: its own name, or those of a list's members.
+    /// Appends the names of the rules that this one consists of, in order.
+    ///
+    /// A single rule appends its name; a list appends those of its members.
     fn names(&self, names: &mut Vec<&'static str>) {
         names.push(self.name());
     }
@@ -112,7 +115,7 @@ macro_rules! forward {
 }
 forward!(Box<T>, &mut T);
 
-/// As tuples: all see every iteration, the first that does not continue decides.
+/// Passes every iteration to all rules, as tuples do. The first that does not continue decides.
 impl<T: StopRule> StopRule for Vec<T> {
     fn start(&mut self) {
         self.iter_mut().for_each(StopRule::start);

@@ -1,7 +1,7 @@
-//! Stages made of stages, and the outcomes they add up to.
+//! Tests of stages made of stages, and of the outcomes that they combine to.
 
 use crate::script::support::{bits, pose};
-use crate::script::{Line, Told, returned, run, scripted};
+use crate::script::{Line, Scheduled, returned, run, scripted};
 use hicp_core::Isometry3;
 use hicp_icp::{
     Cascade, Divergence, Evaluation, IterationLimit, Outcome, Repeat, Stage, Termination, Verdict,
@@ -26,12 +26,13 @@ const LOST: Verdict = Verdict::KeptInitial(Termination::PairsLost);
 const NO_PAIRS: Verdict = Verdict::KeptInitial(Termination::NoPairs);
 
 #[test]
-fn an_outcome_followed_by_another() {
+fn outcomes_of_consecutive_stages_combine() {
     use Verdict::Refined;
-    // Both moved: the second's account of the second's pose.
+    // Both moved: the pose and the report are those of the second.
     let both = outcome(1.0, Refined, 3, Some(5.0)).then(outcome(2.0, Refined, 4, Some(1.0)));
     assert_eq!(both, outcome(2.0, Refined, 7, Some(1.0)));
-    // The second kept the first's pose: still a new pose, whose last evaluation is the second's if it made one.
+    // The second kept the first's pose: still a new pose. Its last evaluation is the second's, if
+    // there is one.
     let kept = outcome(1.0, Refined, 3, Some(5.0)).then(outcome(1.0, LOST, 2, Some(9.0)));
     let mut expected = outcome(1.0, Refined, 5, Some(9.0));
     expected.termination = Termination::PairsLost;
@@ -43,14 +44,14 @@ fn an_outcome_followed_by_another() {
     // Neither moved: the last reason.
     let neither = outcome(0.0, LOST, 2, Some(5.0)).then(outcome(0.0, NO_PAIRS, 1, None));
     assert_eq!(neither, outcome(0.0, NO_PAIRS, 3, Some(5.0)));
-    // Only the second moved; what was known of the first pose is not said of the new one.
+    // Only the second moved: the evaluation of the first pose does not describe the new one.
     let moved = outcome(0.0, LOST, 2, Some(5.0)).then(outcome(2.0, Refined, 1, None));
     assert_eq!(moved, outcome(2.0, Refined, 3, None));
     assert_eq!((moved.n_pairs(), neither.n_pairs()), (0, 10));
 }
 
 #[test]
-fn nothing_done_is_the_initial_pose() {
+fn a_kept_outcome_has_the_initial_pose() {
     let init = pose(0.1, 0.2, 0.3, 0.1, 0.2, 0.3);
     let kept = Outcome::kept(&init, Termination::Degenerate);
     assert_eq!(bits(&kept.camera_from_object), bits(&init));
@@ -64,7 +65,7 @@ fn nothing_done_is_the_initial_pose() {
         run(
             &mut Repeat {
                 times: 0,
-                stage: Told::new(kept, 1.0),
+                stage: Scheduled::new(kept, 1.0),
             },
             &init,
         ),
@@ -78,16 +79,16 @@ fn nothing_done_is_the_initial_pose() {
     }
 }
 
-fn refining(by: f64) -> Told {
-    Told::new(outcome(0.0, Verdict::Refined, 2, Some(1.0)), by)
+fn refining(by: f64) -> Scheduled {
+    Scheduled::new(outcome(0.0, Verdict::Refined, 2, Some(1.0)), by)
 }
 
-fn keeping() -> Told {
-    Told::new(outcome(0.0, LOST, 1, Some(3.0)), 0.0)
+fn keeping() -> Scheduled {
+    Scheduled::new(outcome(0.0, LOST, 1, Some(3.0)), 0.0)
 }
 
 #[test]
-fn a_cascade_hands_every_pose_on() {
+fn a_cascade_passes_every_pose_on() {
     let stages = [refining(1.0), keeping(), refining(10.0), refining(100.0)];
     let starts = stages.each_ref().map(|s| s.starts.clone());
     let [a, b, c, d] = stages;
@@ -105,7 +106,7 @@ fn a_cascade_rolls_back_stage_by_stage() {
     let good: [Line; 3] = [(100, Some(3.0)), (100, Some(2.0)), (100, Some(1.0))];
     let bad: [Line; 2] = [(100, Some(3.0)), (10, Some(1.0))];
     let stop = || (Divergence::strict(), IterationLimit(3));
-    // The second diverges at once: the first's pose stands, evaluated by the second.
+    // The second diverges at once: the pose is the first's, evaluated by the second.
     let later: Vec<Line> = [(0, None), (0, None)].into_iter().chain(bad).collect();
     let outcome = run(
         &mut Cascade((scripted(&good, stop()), scripted(&later, stop()))),
@@ -132,7 +133,7 @@ fn a_cascade_rolls_back_stage_by_stage() {
         (returned(&outcome), outcome.verdict),
         (2.0, Verdict::Refined)
     );
-    // Both do: the initial pose, bit for bit, and the last reason.
+    // Both diverge: the initial pose, bit for bit, and the last reason.
     let init = pose(0.0, -0.0, 0.4, 0.3, 0.2, 0.1);
     let outcome = run(
         &mut Cascade((scripted(&bad, stop()), scripted(&bad, stop()))),
@@ -143,7 +144,7 @@ fn a_cascade_rolls_back_stage_by_stage() {
 }
 
 #[test]
-fn tuples_vectors_and_boxes_of_stages_are_one() {
+fn tuples_vectors_and_boxes_of_stages_give_equal_bits() {
     let lines: Vec<Line> = (0..10_u8).map(|i| (100, Some(f64::from(20 - i)))).collect();
     let stage = || scripted(&lines, IterationLimit(3));
     let init = pose(0.0, 0.1, 0.4, 0.3, 0.2, 0.1);
@@ -197,7 +198,7 @@ fn a_repetition_ends_when_a_pass_keeps_its_pose() {
         (idle.stage.calls.get(), outcome.verdict, outcome.iterations),
         (1, LOST, 1)
     );
-    // Two passes of three evaluations, then the script runs out of pairs.
+    // Two passes of three evaluations, then the script has no more pairs.
     let lines: Vec<Line> = (0..5_u8).map(|i| (100, Some(f64::from(20 - i)))).collect();
     let mut stage = Repeat {
         times: 9,
@@ -213,7 +214,7 @@ fn a_repetition_ends_when_a_pass_keeps_its_pose() {
 }
 
 #[test]
-fn a_broken_initial_pose_passes_through_any_composition_untouched() {
+fn a_pose_that_is_not_finite_passes_unchanged_through_compositions() {
     let lines: [Line; 2] = [(100, Some(2.0)), (100, Some(1.0))];
     let stage = || scripted(&lines, IterationLimit(2));
     let init = Isometry3::translation(f64::NAN, 0.0, 0.0);
@@ -237,10 +238,13 @@ fn a_broken_initial_pose_passes_through_any_composition_untouched() {
 }
 
 #[test]
-fn what_ended_a_stage_is_told_in_words_of_its_own() {
+fn every_termination_has_a_different_explanation() {
     let ends = Termination::ALL;
     for (index, end) in ends.iter().enumerate() {
-        assert!(end.explain().contains(' '), "{end} is a name, no words");
+        assert!(
+            end.explain().contains(' '),
+            "{end}: expected a clause, found a name"
+        );
         assert!(
             ends[..index]
                 .iter()

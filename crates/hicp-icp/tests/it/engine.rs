@@ -1,4 +1,4 @@
-//! The engine of Algorithm 1 with scripted components: what it returns, and what it says about it.
+//! Tests of the engine of Algorithm 1 with scripted components: its poses and its reports.
 
 use crate::script::support::{bits, pose};
 use crate::script::{Line, Log, returned, run, run_observed, scripted};
@@ -23,7 +23,7 @@ const FALLING: [Line; 5] = [
     (100, Some(1.0)),
 ];
 
-/// A pose that no arithmetic leaves as it is: not normalised, and with a negative zero.
+/// A pose that every arithmetic operation changes: not normalized, and with a negative zero.
 fn odd_pose() -> Isometry3<f64> {
     let mut odd = pose(0.0, -0.0, 0.3, 0.1, 0.2, 0.3);
     odd.rotation.as_mut_unchecked().coords *= 1.0 + 1e-9;
@@ -55,7 +55,7 @@ fn pitfall_5_a_metric_without_a_step_is_an_outcome() {
 }
 
 #[test]
-fn pairs_lost_on_the_way_leave_the_last_evaluated_pose() {
+fn losing_all_pairs_later_returns_the_last_evaluated_pose() {
     for (last, termination) in [
         ((0, Some(1.0)), Termination::NoPairs),
         ((90, None), Termination::Degenerate),
@@ -75,7 +75,7 @@ fn pairs_lost_on_the_way_leave_the_last_evaluated_pose() {
             })
         );
         assert_eq!(outcome.iterations, 3);
-        // Straight after the first evaluation, that is the initial pose.
+        // Directly after the first evaluation, that pose is the initial one.
         let outcome = run(&mut limit(&[(100, Some(3.0)), last], 10), &odd_pose());
         assert_eq!(bits(&outcome.camera_from_object), bits(&odd_pose()));
         assert_eq!(outcome.verdict, Verdict::KeptInitial(termination));
@@ -95,7 +95,8 @@ fn the_iteration_limit_counts_evaluations() {
         let outcome = run(&mut limit(&FALLING, n), &Isometry3::identity());
         assert_eq!(outcome.iterations, evaluations, "limit {n}");
         assert_eq!(outcome.termination, Termination::IterationLimit);
-        // The last evaluated pose is returned, with its own numbers, not the step that was not evaluated.
+        // The last evaluated pose is returned with its own numbers, and not the step that was not
+        // evaluated.
         assert_eq!(returned(&outcome), (evaluations - 1) as f64);
         assert_eq!(
             outcome.evaluation.unwrap().mean_loss,
@@ -122,7 +123,7 @@ fn convergence_accepts_the_candidate() {
             IterationLimit(50),
         )
     };
-    // Down by less than 1 %, and up by less than 1 %: both have settled. By exactly 1 %: not yet.
+    // A change of less than 1 %, down or up, has settled. A change of exactly 1 % has not.
     for (before, last) in [(2.0, 1.981), (2.0, 2.019)] {
         let lines = [
             (100, Some(3.0)),
@@ -149,12 +150,12 @@ fn convergence_accepts_the_candidate() {
     assert_eq!(
         returned(&outcome),
         3.0,
-        "a change of exactly the limit is a change"
+        "a change equal to the limit counts"
     );
 }
 
 #[test]
-fn a_loss_of_nothing_has_converged() {
+fn a_loss_of_zero_has_converged() {
     let outcome = run(
         &mut scripted(&[(10, Some(0.0)), (10, Some(0.0))], Convergence::default()),
         &Isometry3::identity(),
@@ -163,7 +164,7 @@ fn a_loss_of_nothing_has_converged() {
         (outcome.termination, returned(&outcome)),
         (Termination::Converged, 1.0)
     );
-    // Noise around the floor of f32 is nothing; the step down to it is not.
+    // Noise at the resolution of f32 does not count; the step down to it does.
     let lines = [
         (10, Some(1e-3)),
         (10, Some(1e-15)),
@@ -181,7 +182,7 @@ fn a_loss_of_nothing_has_converged() {
 }
 
 #[test]
-fn pitfall_8_a_second_run_is_the_first() {
+fn pitfall_8_a_second_run_repeats_the_first() {
     let mut stage = scripted(
         &FALLING,
         (
@@ -204,7 +205,7 @@ fn pitfall_8_a_second_run_is_the_first() {
 }
 
 #[test]
-fn an_initial_pose_that_is_not_finite_is_returned_untouched() {
+fn an_initial_pose_that_is_not_finite_is_returned_unchanged() {
     let broken = |i: usize, value: f64| {
         let mut broken = odd_pose();
         if i < 3 {
@@ -226,8 +227,8 @@ fn an_initial_pose_that_is_not_finite_is_returned_untouched() {
 }
 
 #[test]
-fn steps_without_end_stop_at_the_last_finite_pose() {
-    // From the edge of f64 a metre changes nothing, and the script has run out: no pairs.
+fn unbounded_steps_end_at_the_last_finite_pose() {
+    // At the largest f64, a meter changes nothing, and the script has ended: no pairs.
     let outcome = run(
         &mut limit(&FALLING, 5),
         &Isometry3::translation(f64::MAX, 0.0, 0.0),
@@ -236,7 +237,7 @@ fn steps_without_end_stop_at_the_last_finite_pose() {
     assert_eq!(returned(&outcome), f64::MAX);
 }
 
-/// Steps by a metre until an evaluation from which on the step is not a number.
+/// Steps by a meter. From a given evaluation on, the step is not a number.
 #[derive(Clone)]
 struct Breaking {
     script: crate::script::Scripted,
@@ -258,9 +259,9 @@ impl ErrorMetric for Breaking {
     }
 }
 
-/// A step that is skipped in silence, and success reported, hides that nothing was done.
+/// A step that is skipped while success is reported would hide that nothing was done.
 #[test]
-fn a_step_that_is_not_a_number_ends_the_run_at_the_last_evaluated_pose_and_says_so() {
+fn a_step_that_is_not_a_number_ends_the_run_at_the_last_evaluated_pose() {
     for with in [f64::NAN, f64::INFINITY] {
         for from in [0.0, 1.0, 3.0] {
             let script = crate::script::Scripted::new(&FALLING);
@@ -281,7 +282,7 @@ fn a_step_that_is_not_a_number_ends_the_run_at_the_last_evaluated_pose_and_says_
 }
 
 #[test]
-fn the_observer_sees_every_evaluation_and_the_end() {
+fn the_observer_receives_every_evaluation_and_the_end() {
     let lines = [(100, Some(3.0)), (100, Some(2.0)), (100, Some(7.0))];
     let mut log = Log::default();
     let mut stage = scripted(&lines, Divergence::strict());
@@ -316,7 +317,7 @@ fn the_observer_sees_every_evaluation_and_the_end() {
     );
 }
 
-/// A rule that looks at what it is shown.
+/// A rule that checks its arguments.
 struct Checking;
 
 impl StopRule for Checking {
@@ -337,7 +338,7 @@ impl StopRule for Checking {
 }
 
 #[test]
-fn rules_are_shown_the_first_the_previous_and_the_current_evaluation() {
+fn rules_receive_the_first_the_previous_and_the_current_evaluation() {
     let outcome = run(
         &mut scripted(&FALLING, (Checking, IterationLimit(5))),
         &Isometry3::identity(),

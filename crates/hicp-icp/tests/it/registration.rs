@@ -1,4 +1,4 @@
-//! The real components together on rendered images: poses found, reports that hold, and boxes that change nothing.
+//! Tests of the real components together on rendered images: accuracy, reports, and boxes.
 
 use crate::support::{
     Numbers, RayCaster, bits, cuboid, depth_image, median, observe, observe_depth, pose, wedge,
@@ -60,7 +60,8 @@ fn nudged(numbers: &mut Numbers, degrees: f64, meters: f64) -> Isometry3<f64> {
     truth() * nudge
 }
 
-/// Nearest neighbours and points first, then pixels and planes; a pixel is 2 mm wide at the object, 5 cm of which is seen.
+/// Nearest neighbors and points first, then pixels and planes. A pixel is 2 mm wide at the object,
+/// whose visible part is 5 cm wide.
 #[test]
 fn small_errors_are_removed() {
     let model = Model::new(wedge());
@@ -93,9 +94,9 @@ fn small_errors_are_removed() {
         distances.push(distance);
     }
     let (angle, distance) = (median(&mut angles), median(&mut distances));
-    // Measured: 0.19 degrees and 0.33 mm. A fifth of the error given, and a quarter of a pixel.
+    // Measured: 0.19° and 0.33 mm, a fifth of the initial error and a quarter of a pixel.
     assert!(angle < 0.6 && distance < 0.0005, "{angle} {distance}");
-    // The medians are sorted: the last is the worst, and better than where it began.
+    // The medians are sorted, so the last is the worst. It must be better than the initial error.
     assert!(
         angles[14] < 3.0 && distances[14] < 0.004,
         "{angles:?} {distances:?}"
@@ -103,7 +104,7 @@ fn small_errors_are_removed() {
 }
 
 #[test]
-fn a_perfect_pose_stays() {
+fn a_perfect_pose_is_kept() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &truth());
     for metric in [
@@ -119,14 +120,14 @@ fn a_perfect_pose_stays() {
         };
         let outcome = run(&mut stage, &model, &observation, &truth());
         let (angle, distance) = se3::pose_distance(&outcome.camera_from_object, &truth());
-        // Pairs are their own images to 1e-7 m, and the lever is centimetres.
+        // Pairs agree to 1e-7 m, with a lever of centimeters.
         assert!(angle < 1e-5 && distance < 1e-6, "{angle} {distance}");
-        // f32 at 0.3 m, squared.
+        // The square of the resolution of f32 at 0.3 m.
         assert!(outcome.evaluation.unwrap().mean_loss < 1e-14);
     }
 }
 
-/// Selecting again would select other points; these are those of the run.
+/// Selects the points of the run, because another selection would give other points.
 #[derive(Clone)]
 struct Given(Vec<Surfel>);
 
@@ -155,9 +156,9 @@ fn metrics() -> Vec<Box<dyn ErrorMetric>> {
     vec![Box::new(PointToPoint), Box::new(PointToPlane)]
 }
 
-/// Whatever ends a stage, its numbers are those of the pose that it returns: evaluated anew there, they come out to the bit.
+/// For every reason to end, the report equals a new evaluation at the returned pose, to the bit.
 #[test]
-fn pitfall_7_the_report_is_about_the_returned_pose() {
+fn pitfall_7_the_report_describes_the_returned_pose() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &truth());
     let mut numbers = Numbers(402);
@@ -193,7 +194,7 @@ fn pitfall_7_the_report_is_about_the_returned_pose() {
                     };
                     refined += usize::from(outcome.verdict == Verdict::Refined);
 
-                    // By hand, from the components alone.
+                    // The same by hand, from the components alone.
                     let mut workspace = Workspace::new(RayCaster);
                     let problem = Problem::new(&model, &observation);
                     let mut pairs = Correspondences::new();
@@ -219,7 +220,7 @@ fn pitfall_7_the_report_is_about_the_returned_pose() {
 }
 
 #[test]
-fn pitfall_8_runs_repeat_to_the_bit_in_any_workspace() {
+fn pitfall_8_runs_repeat_to_the_bit_in_every_workspace() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &truth());
     let mut numbers = Numbers(403);
@@ -235,7 +236,7 @@ fn pitfall_8_runs_repeat_to_the_bit_in_any_workspace() {
         .iter()
         .map(|init| run(&mut stage, &model, &observation, init))
         .collect();
-    // One warm workspace for all, backwards.
+    // One warm workspace for all, in reverse order.
     let mut workspace = Workspace::new(RayCaster);
     for (init, expected) in inits.iter().zip(&alone).rev() {
         let problem = Problem::new(&model, &observation);
@@ -249,7 +250,7 @@ fn pitfall_8_runs_repeat_to_the_bit_in_any_workspace() {
 }
 
 #[test]
-fn boxed_components_are_static_ones_to_the_bit() {
+fn boxed_components_give_the_bits_of_static_ones() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &truth());
     let mut numbers = Numbers(404);
@@ -280,7 +281,8 @@ fn boxed_components_are_static_ones_to_the_bit() {
         refined += usize::from(a.verdict == Verdict::Refined);
     }
     assert!(refined >= 4, "{refined}");
-    // A box that forgot to forward `minimize` would walk by Gauss–Newton where the closed form is exact.
+    // A box that did not forward `minimize` would use Gauss–Newton instead of the exact closed
+    // form.
     let boxed: Box<dyn ErrorMetric> = Box::new(PointToPoint);
     let pairs: Correspondences = model
         .samples()
@@ -304,7 +306,7 @@ fn boxed_components_are_static_ones_to_the_bit() {
     assert_eq!(names, ["point-to-point", "point-to-plane"]);
 }
 
-/// A plate before a wall of which nothing but the plane is seen: it is pushed onto it, and does not slide along it.
+/// Only a plane is visible: a plate before a wall moves onto it and does not slide along it.
 #[test]
 fn pitfall_12_a_plane_in_view_is_approached_without_sliding() {
     let model = Model::new(cuboid(0.3, 0.2, 0.1));
@@ -320,7 +322,7 @@ fn pitfall_12_a_plane_in_view_is_approached_without_sliding() {
     let init = pose(0.02, -0.03, 0.85, 0.0, 0.0, 0.0);
     let outcome = run(&mut stage, &model, &observation, &init);
     let found = outcome.camera_from_object;
-    // The front of the plate is 5 cm before its centre; points are good to f32 of a metre.
+    // The front of the plate is 5 cm before its center. Points have the accuracy of f32 at a meter.
     assert!(
         (found.translation.vector - Vector3::new(0.02, -0.03, 0.8)).norm() < 1e-6,
         "{found}"
@@ -329,7 +331,7 @@ fn pitfall_12_a_plane_in_view_is_approached_without_sliding() {
 }
 
 #[test]
-fn nothing_to_see_and_nothing_to_pair_are_outcomes() {
+fn missing_views_and_missing_pairs_are_outcomes() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &truth());
     let behind = pose(0.0, 0.0, -0.3, 0.1, 0.2, 0.3);

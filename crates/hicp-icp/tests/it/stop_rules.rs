@@ -1,4 +1,4 @@
-//! The divergence rules of §IV-B to the pair and to the digit, and how rules combine (pitfall 10).
+//! Tests of the divergence rules of §IV-B at their limits, and of combined rules (pitfall 10).
 
 use std::sync::{Arc, Mutex};
 
@@ -19,7 +19,7 @@ fn run_with(lines: &[Line], rule: Divergence) -> Outcome {
 }
 
 fn pairs(counts: &[usize]) -> Outcome {
-    // The loss falls throughout, so that only the counts can end it.
+    // The loss falls throughout, so that only the counts can end the stage.
     let lines: Vec<Line> = counts
         .iter()
         .zip(0_u8..)
@@ -34,7 +34,7 @@ fn losses(losses: &[f64]) -> Outcome {
 }
 
 #[test]
-fn pitfall_10_five_percent_of_the_first_count_may_go_and_no_pair_more() {
+fn pitfall_10_at_most_five_percent_of_the_first_count_may_be_lost() {
     for k in [1, 5, 7, 50, 1000, 123_457] {
         // 19 of 20 are exactly 95 %.
         assert_eq!(
@@ -58,8 +58,8 @@ fn pitfall_10_five_percent_of_the_first_count_may_go_and_no_pair_more() {
 }
 
 #[test]
-fn pitfall_10_the_first_count_is_remembered_when_losses_creep() {
-    // Each step loses 3 %; together they pass 5 % of the first at the second.
+fn pitfall_10_small_losses_add_up_against_the_first_count() {
+    // Each step loses 3 %. At the second, the loss since the first exceeds 5 %.
     let outcome = pairs(&[1000, 970, 941, 913]);
     assert_eq!(
         (outcome.termination, returned(&outcome), outcome.iterations),
@@ -78,7 +78,7 @@ fn pitfall_10_the_previous_count_matters_when_the_first_was_small() {
         pairs(&[100, 1000, 950]).termination,
         Termination::IterationLimit
     );
-    // Growing and shrinking back within both limits is no loss.
+    // Growing and shrinking within both limits is accepted.
     assert_eq!(
         pairs(&[100, 104, 99, 103, 98]).termination,
         Termination::IterationLimit
@@ -86,13 +86,13 @@ fn pitfall_10_the_previous_count_matters_when_the_first_was_small() {
 }
 
 #[test]
-fn pitfall_10_a_loss_that_falls_because_bad_pairs_went_is_caught_by_their_number() {
+fn pitfall_10_a_falling_loss_with_too_few_pairs_is_rejected() {
     let outcome = run_with(&[(100, Some(4.0)), (50, Some(1.0))], Divergence::strict());
     assert_eq!(outcome.termination, Termination::PairsLost);
 }
 
 #[test]
-fn a_rising_mean_loss_rolls_back_to_the_pose_before() {
+fn a_rising_mean_loss_rolls_back_to_the_previous_pose() {
     let outcome = losses(&[4.0, 3.0, 2.0, 2.5, 1.0]);
     assert_eq!(
         (outcome.termination, returned(&outcome), outcome.iterations),
@@ -106,7 +106,7 @@ fn a_rising_mean_loss_rolls_back_to_the_pose_before() {
         })
     );
     assert_eq!(outcome.verdict, Verdict::Refined);
-    // Against the previous, not the first: 3.5 is below 4 and still a rise.
+    // Compared with the previous loss and not with the first: 3.5 is below 4 and still a rise.
     assert_eq!(returned(&losses(&[4.0, 3.0, 3.5])), 1.0);
     let outcome = losses(&[3.0, 4.0]);
     assert_eq!(
@@ -133,7 +133,7 @@ fn a_rise_within_the_tolerance_is_left_to_convergence() {
     let at = |loss: f64| run_with(&[(100, Some(1.0)), (100, Some(loss))], exact).termination;
     assert_eq!(at(1.0), Termination::IterationLimit);
     assert_eq!(at(1.0_f64.next_up()), Termination::LossIncreased);
-    // From a perfect fit anything is a rise.
+    // After a perfect fit, every loss is a rise.
     assert_eq!(
         losses(&[1.0, 0.0, 1e-300]).termination,
         Termination::LossIncreased
@@ -141,7 +141,7 @@ fn a_rise_within_the_tolerance_is_left_to_convergence() {
 }
 
 #[test]
-fn the_count_aware_rule_forgives_a_rise_that_comes_with_new_pairs() {
+fn the_count_aware_rule_accepts_a_rise_with_new_pairs() {
     let rise = |n: usize, rule| run_with(&[(100, Some(1.0)), (n, Some(2.0))], rule).termination;
     assert_eq!(rise(101, Divergence::strict()), Termination::LossIncreased);
     assert_eq!(
@@ -159,11 +159,11 @@ fn the_count_aware_rule_forgives_a_rise_that_comes_with_new_pairs() {
     assert_eq!(rise(90, Divergence::count_aware()), Termination::PairsLost);
     assert_eq!(Divergence::default(), Divergence::strict());
     assert_eq!(Divergence::count_aware().loss_rule, LossRule::CountAware);
-    // Of both faults, lost pairs are named.
+    // If both rules are violated, the reason is lost pairs.
     assert_eq!(rise(90, Divergence::strict()), Termination::PairsLost);
 }
 
-/// Notes what it sees and breaks at a given iteration.
+/// Records the iterations that it receives and ends at a given one.
 #[derive(Clone)]
 struct Noting {
     break_at: Option<usize>,
@@ -199,7 +199,7 @@ impl StopRule for Noting {
 }
 
 #[test]
-fn all_rules_of_a_tuple_see_every_iteration_and_the_first_to_end_decides() {
+fn every_rule_of_a_tuple_is_called_and_the_first_to_end_decides() {
     let lines: Vec<Line> = (0..6_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
     for (a, b, expected, at) in [
         (Some(2), Some(2), Termination::Converged, 2),
@@ -217,7 +217,7 @@ fn all_rules_of_a_tuple_see_every_iteration_and_the_first_to_end_decides() {
             assert_eq!(*rule.seen.lock().unwrap(), (0..=at).collect::<Vec<_>>());
             assert_eq!(*rule.starts.lock().unwrap(), 1);
         }
-        // A rollback returns the pose before; anything else the pose judged.
+        // A rollback returns the pose before; any other reason returns the judged pose.
         let rolled_back = expected == Termination::PairsLost;
         assert_eq!(
             returned(&outcome),
@@ -231,7 +231,7 @@ fn all_rules_of_a_tuple_see_every_iteration_and_the_first_to_end_decides() {
 }
 
 #[test]
-fn rules_start_afresh_with_every_run_also_when_boxed() {
+fn rules_restart_with_every_run_also_if_boxed() {
     let lines: Vec<Line> = (0..3_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
     let rule = Noting::new(Some(1), Judgment::Accept(Termination::Converged));
     let boxed: Box<dyn StopRule> = Box::new((rule.clone(),));
@@ -262,9 +262,10 @@ fn terminations_have_names() {
     }
 }
 
-/// A rule may name a reason of its own; whether the pose is accepted is its judgment, not a property of the reason.
+/// A rule may define a custom reason. Its judgment, and not the reason, decides whether the pose is
+/// accepted.
 #[test]
-fn custom_reasons_accept_or_reject_as_the_rule_says() {
+fn custom_reasons_accept_or_reject_as_the_rule_judges() {
     let lines: Vec<Line> = (0..6_u8).map(|i| (100, Some(f64::from(10 - i)))).collect();
     let reason = Termination::Custom("battery_low");
     for (judgment, x) in [

@@ -1,4 +1,4 @@
-//! Components that play back what they are told, so that the engine can be examined alone.
+//! Scripted components, for tests of the engine alone.
 
 pub(crate) use crate::support;
 
@@ -18,12 +18,13 @@ use hicp_icp::{
 };
 use hicp_metric::{ErrorMetric, NormalEquations, Step};
 
-/// One evaluation: so many pairs, and this mean loss; `None` for a metric that finds no step.
+/// One evaluation: its number of pairs and its mean loss; `None` for a metric without a step.
 pub type Line = (usize, Option<f64>);
 
-/// What the script has come to; shared by association and metric. Every run starts at `init`, whose x is 0.
+/// The script, shared by association and metric. Every run starts at `init`, whose x is 0.
 ///
-/// The step at evaluation k is one metre along x, so the pose of evaluation k has x = k: which pose is returned can be read off it.
+/// The step at evaluation k is one meter along x, so the pose of evaluation k has x = k. The x of a
+/// returned pose therefore identifies its evaluation.
 #[derive(Clone, Debug)]
 pub struct Scripted {
     lines: Vec<Line>,
@@ -36,7 +37,7 @@ impl Scripted {
         }
     }
 
-    /// Which evaluation a pose belongs to.
+    /// Returns the line of the evaluation to which a pose belongs.
     fn line(&self, pose: &Isometry3<f64>) -> Line {
         let x = pose.translation.vector.x.round();
         self.lines.get(x as usize).copied().unwrap_or((0, None))
@@ -68,7 +69,7 @@ impl DataAssociation for Scripted {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        // The pose's x rides in the pairs, where the metric finds it.
+        // The pairs carry the pose's x to the metric.
         let here = surfel(camera_from_object.translation.vector.x);
         let (n_pairs, _) = self.line(camera_from_object);
         pairs.extend((0..n_pairs).map(|_| Pair {
@@ -113,7 +114,7 @@ pub fn scripted<S: StopRule>(lines: &[Line], stop: S) -> Icp<Scripted, Scripted,
     }
 }
 
-/// Runs a stage on a problem of which scripts look at nothing.
+/// Runs a stage on an empty problem, which scripts do not read.
 pub fn run(stage: &mut dyn Stage, init: &Isometry3<f64>) -> Outcome {
     run_observed(stage, init, &mut ())
 }
@@ -135,12 +136,12 @@ pub fn run_observed(
     )
 }
 
-/// The number of the evaluation whose pose was returned.
+/// Returns the number of the evaluation whose pose was returned.
 pub fn returned(outcome: &Outcome) -> f64 {
     outcome.camera_from_object.translation.vector.x
 }
 
-/// Writes down everything.
+/// Records all events.
 #[derive(Default)]
 pub struct Log {
     pub iterations: Vec<(usize, f64, Evaluation)>,
@@ -165,15 +166,16 @@ impl Observer for Log {
     }
 }
 
-/// A stage that notes where it was started from, moves by a given length along x, and says what it is told to say.
-pub struct Told {
+/// A stage that records its initial pose, moves by a given length along x, and returns a given
+/// outcome.
+pub struct Scheduled {
     pub outcome: Outcome,
     pub by: f64,
     pub starts: Arc<Mutex<Vec<f64>>>,
     pub calls: Cell<usize>,
 }
 
-impl Told {
+impl Scheduled {
     pub fn new(outcome: Outcome, by: f64) -> Self {
         Self {
             outcome,
@@ -184,7 +186,7 @@ impl Told {
     }
 }
 
-impl Stage for Told {
+impl Stage for Scheduled {
     fn run(&mut self, _: &Problem<'_>, init: &Isometry3<f64>, _: &mut Session<'_>) -> Outcome {
         self.starts.lock().unwrap().push(init.translation.vector.x);
         self.calls.set(self.calls.get() + 1);
