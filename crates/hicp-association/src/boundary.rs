@@ -1,23 +1,26 @@
-//! Where a surface in a depth image ends.
+//! The boundary of a surface in a depth image.
 
 use std::sync::Arc;
 
 use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
-/// The largest width that counts, pixels.
+/// The largest effective width, pixels.
 const MAX_WIDTH: u32 = 64;
 
-/// What is taken for the boundary of a surface in an image.
+/// The definition of the boundary of a surface in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundaryRule {
     width: u32,
-    /// Largest difference in depth between neighbouring pixels of one surface, as a fraction of the depth.
+    /// Largest difference in depth between neighboring pixels of one surface, as a fraction of the
+    /// depth.
     max_step: f32,
 }
 
 impl BoundaryRule {
-    /// Makes the rule for the images of a camera: a surface on the optical axis, tilted by an angle, falls by tan(tilt)/f of
-    /// its depth from one pixel to the next, f the smaller focal length.
+    /// Creates the rule for the images of a camera.
+    ///
+    /// The depth of a tilted surface on the optical axis changes by tan(tilt)/f of its value from
+    /// one pixel to the next. f is the smaller focal length in pixels.
     pub(crate) fn new(width: u32, max_tilt_degrees: f32, camera: &PinholeCamera) -> Self {
         let focal = camera.fx().min(camera.fy());
         #[allow(clippy::cast_possible_truncation)]
@@ -30,11 +33,11 @@ impl BoundaryRule {
         Self { width, max_step }
     }
 
-    /// Returns whether pixel (u, v) of an image lies at a boundary: whether it shows no surface (`depth_at` returns 0 or
-    /// less), or a pixel at a chessboard distance of r ≤ width shows none or one that is nearer or further by more than
-    /// r·max_step of the nearer depth.
+    /// Returns whether pixel (u, v) of an image lies at a boundary.
     ///
-    /// Pixels outside `image` are not looked at.
+    /// It does if it shows no surface (`depth_at` returns 0 or less). It also does if a pixel at a
+    /// chessboard distance of r ≤ width shows no surface, or one whose depth differs by more than
+    /// r·max_step of the nearer depth. Pixels outside `image` are ignored.
     pub(crate) fn holds(
         &self,
         u: u32,
@@ -50,14 +53,16 @@ impl BoundaryRule {
             let other = depth_at(x, y);
             let reach = x.abs_diff(u).max(y.abs_diff(v)) as f32;
             let gate = self.max_step * reach * depth.min(other);
-            // The pixel itself is no step, and a NaN gate is one.
+            // The pixel itself is not a step, and a NaN gate is one.
             other > 0.0 && (reach == 0.0 || (other - depth).abs() <= gate)
         };
         !(depth > 0.0 && rows.all(|y| columns.clone().all(|x| continues(x, y))))
     }
 }
 
-/// Which pixels of an observation's region lie at a boundary. Built once per observation and rule, shared by all threads.
+/// The pixels of an observation's region that lie at a boundary.
+///
+/// Built once per observation and rule, and shared by all threads.
 pub(crate) struct BoundaryMap {
     at_boundary: Vec<bool>,
 }
@@ -73,7 +78,7 @@ impl BoundaryMap {
                 depth.get(u, v).filter(|_| masked).unwrap_or(0.0)
             };
             let width = rule.width.min(MAX_WIDTH);
-            // The measurement ends with the image.
+            // The measurement ends at the border of the image.
             let beside_border = |u: u32, v: u32| {
                 u < width || v < width || u + width >= image.u_max || v + width >= image.v_max
             };
@@ -85,7 +90,7 @@ impl BoundaryMap {
         })
     }
 
-    /// Returns whether the surfel of an index lies at a boundary; true for an index that there is not.
+    /// Returns whether the surfel of an index lies at a boundary; true for an invalid index.
     pub(crate) fn contains(&self, target_index: u32) -> bool {
         self.at_boundary
             .get(target_index as usize)

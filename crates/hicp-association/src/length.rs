@@ -1,22 +1,24 @@
-//! Lengths that are absolute or scale with the object.
+//! Lengths in meters or relative to the object.
 
 use hicp_core::Problem;
 
-/// A length in metres, or as a fraction of the model's diameter so that one value fits objects of any size.
+/// A length in meters, or as a fraction of the model's diameter.
 ///
-/// Any value is valid: a component says what it makes of negative lengths and NaN.
+/// A fraction fits objects of any size. Any value is valid: each component defines the meaning of
+/// negative lengths and NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
-    /// Metres.
+    /// A length in meters.
     Meters(f32),
     /// A fraction of the model's diameter.
     Diameters(f32),
 }
 
 impl Length {
-    /// Returns the length in meters for a problem; NaN for a fraction of the diameter if the problem has no model.
+    /// Returns the length in meters for a problem.
     ///
-    /// No distance is within NaN: a gate that is undefined keeps nothing.
+    /// If the problem has no model, a fraction of the diameter is NaN. Distances are never within
+    /// NaN, so an undefined gate rejects everything.
     #[must_use]
     pub fn meters(self, problem: &Problem<'_>) -> f32 {
         match self {

@@ -1,7 +1,9 @@
-//! Which model points are registered, to which observed points, and which pairs are kept: the traits [`PointSelection`],
-//! [`DataAssociation`] and [`OutlierFilter`] with their implementations.
+//! The traits [`PointSelection`], [`DataAssociation`] and [`OutlierFilter`], with implementations.
 //!
-//! **Should you use this crate?** To write an association, a selection or a filter of your own, yes, with
+//! They define which model points are registered, to which observed points, and which pairs are
+//! kept.
+//!
+//! **Should you use this crate?** Yes, to write a custom association, selection or filter. Set
 //! `default-features = false` if you do not want the k-d tree. To refine poses, use `hybrid-icp`.
 //!
 //! ```
@@ -18,7 +20,7 @@
 //! }
 //! ```
 //!
-//! # What there is
+//! # Components
 //!
 //! | selections | associations | filters | weights |
 //! |---|---|---|---|
@@ -33,10 +35,11 @@
 //! | [`StableSampling`] | [`ObservationToModel`] | [`MinPairs`] | |
 //! | | [`ClosestPointOnMesh`] | | |
 //!
-//! Selections from [`WithoutBoundary`] on choose among the points of another one, and [`Reciprocal`] among the pairs of
-//! another association: they nest. Filters and weights are of one trait and chain as tuples, in order.
+//! Selections from [`WithoutBoundary`] on select from the points of another selection, and
+//! [`Reciprocal`] from the pairs of another association. Filters and weights implement the same
+//! trait and chain as tuples, in order.
 
-// Image sizes and counts become floating point numbers; all are far below 2²⁴.
+// Image sizes and counts are converted to floating point; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
 
 mod association;

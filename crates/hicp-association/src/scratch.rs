@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-/// Scratch buffers: no part of a component's value. Any two are equal, and a clone starts empty.
+/// Scratch buffers, which do not belong to a component's value.
+///
+/// Any two are equal, and a clone starts empty.
 #[derive(Default)]
 pub(crate) struct Scratch<T>(pub(crate) T);
 

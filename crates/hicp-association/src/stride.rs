@@ -1,14 +1,16 @@
-//! How densely a pixel grid is sampled.
+//! The density of a pixel grid.
 
-/// The spacing of a pixel grid: given, or found from the number of points wanted.
+/// The spacing of a pixel grid: fixed, or computed from the requested number of points.
 ///
-/// Accuracy hardly depends on it: every pixel and every fourth in both directions gave the same post-ICP VSD at a fifth of the time.
+/// Accuracy hardly depends on it: every pixel, and every fourth in both directions, gave the same
+/// VSD after ICP, the latter in a fifth of the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Stride {
-    /// Every n-th pixel in both directions; 0 counts as 1.
+    /// Every n-th pixel in both directions. 0 counts as 1.
     Pixels(u32),
-    /// The stride that leaves about this many points, within a factor of two where there are that many; 0 counts as 1.
+    /// The stride for about this many points, within a factor of two if there are enough. 0 counts
+    /// as 1.
     AboutPoints(usize),
 }
 
@@ -20,7 +22,8 @@ impl Stride {
             Self::Pixels(stride) => stride.max(1),
             Self::AboutPoints(points) => {
                 let ratio = n_pixels as f64 / points.max(1) as f64;
-                // The spacing s whose share 1/s² comes nearest to 1/ratio, as a factor: s (s − 1) ≤ ratio < s (s + 1).
+                // The spacing s whose share 1/s² is nearest to 1/ratio, as a factor: s (s − 1) ≤
+                // ratio < s (s + 1).
                 let stride = ((1.0 + (1.0 + 4.0 * ratio).sqrt()) / 2.0).floor();
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
                 // At most √(2³²), not negative.

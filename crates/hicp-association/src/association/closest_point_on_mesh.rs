@@ -10,22 +10,30 @@ use crate::search::box_tree::{Bounds, BoxTree, Element};
 use crate::search::triangle::closest_point;
 use crate::stride::Stride;
 
-/// Pairs every observed point with the exact closest point on the model's triangles (Besl & McKay 1992, §III).
+/// Pairs every observed point with the exact closest point on the model's triangles.
 ///
-/// From the observation to the model, see [`crate::ObservationToModel`], without the error of a sampled surface: half the
-/// spacing of the samples, and the noise that it puts on the direction. The observed point is brought into the object
-/// frame; the closest point comes from a tree of boxes over the triangles by branch and bound, built once per model and
-/// shared by all threads; the pair's source is that point and the normal of its triangle, moved by the current estimate.
-/// Normals point out of the object where the mesh is closed, and toward the camera where nothing may be concluded from the
-/// winding. Triangles of no area are never found; of equally close triangles (a shared edge) the first is.
+/// It implements the search of Besl & McKay 1992, §III, from the observation to the model; see
+/// [`crate::ObservationToModel`]. It avoids the error of a sampled surface, half the spacing of the
+/// samples, and the noise that this adds to the direction.
 ///
-/// `source` is ignored; `source_index` is the index of the triangle, and all observed points tried are candidates.
+/// Each observed point is moved into the object frame. Branch and bound over a tree of boxes finds
+/// the closest point. The tree is built once per model and shared by all threads. The source of the
+/// pair is the closest point with the normal of its triangle, moved by the current estimate. If the
+/// mesh is closed, normals point out of the object. If the winding determines nothing, they face
+/// the camera. Triangles without area are never found. Of equally close triangles (a shared edge),
+/// the first is found.
+///
+/// `source` is ignored. `source_index` is the index of the triangle. All observed points of the
+/// stride are candidates.
+///
 /// Cost: O(n log n) once per model, then about O(log n) per observed point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClosestPointOnMesh {
-    /// Which observed pixels are paired.
+    /// The observed pixels to pair.
     pub stride: Stride,
-    /// Whether triangles of a closed mesh that face away from the camera are passed over: the camera cannot have seen them.
+    /// Whether to skip triangles of a closed mesh that face away from the camera.
+    ///
+    /// The camera cannot have measured them.
     pub visible_only: bool,
 }
 
@@ -69,14 +77,14 @@ impl DataAssociation for ClosestPointOnMesh {
     }
 }
 
-/// Triangles of a leaf: fewer than points, because the distance to a triangle costs more than that to a point.
+/// Triangles per leaf: fewer than points, because the distance to a triangle costs more.
 const LEAF_SIZE: usize = 4;
 
 /// The triangles of a mesh in the order of the tree's leaves.
 struct MeshFaces {
     tree: BoxTree<LEAF_SIZE>,
     faces: Vec<Face>,
-    /// Whether normals are known to point out of the object.
+    /// Whether normals are certain to point out of the object.
     oriented: bool,
 }
 

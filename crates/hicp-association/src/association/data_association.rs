@@ -7,21 +7,24 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel};
 ///
 /// # Contract
 ///
-/// - `source` holds the selected surfels in the object frame; `pairs` arrives empty.
-/// - Every pair pushed holds the source *moved by* `camera_from_object` and its target, both in the camera frame in metres,
-///   with finite coordinates and a finite weight that is not negative (1 unless the association knows better).
-/// - `source_index` is the index of the point in `source` and `target_index` that of the observed surfel; a point may have no
-///   pair, or several.
-/// - Pure: equal inputs give equal pairs in equal order; `&mut self` is scratch. What depends on the observation or the
-///   model alone belongs into their `derived()` caches, where all threads share it.
+/// - `source` holds the selected surfels in the object frame, and `pairs` is empty.
+/// - Every pair holds the source *moved by* `camera_from_object` and its target. Both are in the
+///   camera frame in meters, with finite coordinates.
+/// - The weight of a pair is finite and not negative: 1, unless the association has a better value.
+/// - `source_index` is the index of the point in `source`, and `target_index` that of the observed
+///   surfel. A point may have any number of pairs.
+/// - Pure: equal inputs give equal pairs in equal order. `&mut self` is scratch. Values that depend
+///   only on the observation or the model belong into their `derived()` caches, where all threads
+///   share them.
 ///
-/// Called once per iteration on the whole batch, so a boxed association costs one virtual call per iteration.
+/// It is called once per iteration on the whole batch, so a boxed association costs one virtual
+/// call per iteration.
 ///
 /// ```
 /// use hicp_association::DataAssociation;
 /// use hicp_core::{Context, Correspondences, Isometry3, RigidTransform, Pair, Surfel};
 ///
-/// /// Pairs every model point with the observed point that it would hide, if it lies on the same pixel.
+/// /// Pairs every model point with the observed point at the pixel that it projects to.
 /// #[derive(Debug)]
 /// struct SamePixel;
 ///
@@ -37,6 +40,8 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel};
 ///         let mover = RigidTransform::new(camera_from_object);
 ///         for (source_index, surfel) in (0..).zip(source) {
 ///             let source = mover.surfel(surfel);
+///             // Infinite coordinates must not enter a pair.
+///             if !source.point.iter().all(|x| x.is_finite()) { continue }
 ///             let Some(pixel) = observation.camera().project(&source.point.cast()) else { continue };
 ///             let Some(target_index) = observation.index_near(pixel.x as f32, pixel.y as f32) else { continue };
 ///             if let Some(target) = observation.surfel(target_index) {
@@ -52,7 +57,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Surfel};
     note = "`Icp::association` accepts a single `DataAssociation`, such as `Projective` or `NearestNeighbor`"
 )]
 pub trait DataAssociation {
-    /// Fills `pairs`.
+    /// Fills `pairs` at the candidate pose `camera_from_object`.
     fn associate(
         &mut self,
         context: &mut Context<'_>,

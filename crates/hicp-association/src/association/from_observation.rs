@@ -9,13 +9,16 @@ use crate::stride::Stride;
 
 /// The surface of a model, indexed in the object frame.
 pub(crate) trait IndexedSurface {
-    /// Returns the surfel closest to `query` and its number, in the object frame, as seen by a camera at `eye`.
+    /// Returns the surfel closest to `query` and its index, in the object frame.
+    ///
+    /// `eye` is the position of the camera.
     fn closest(&self, query: &Point3<f32>, eye: &Point3<f32>) -> Option<(u32, Surfel)>;
 }
 
-/// Pairs observed points with the closest surfels of a model. All observed points of the stride are candidates.
+/// Pairs observed points with the closest surfels of a model.
 ///
-/// The index stays in the object frame: each observed point is moved there, and its surfel back.
+/// All observed points of the stride are candidates. The index stays in the object frame: each
+/// observed point is moved there, and its surfel back.
 pub(crate) struct FromObservation<'a, S> {
     pub(crate) observation: &'a Observation,
     pub(crate) stride: Stride,
@@ -25,7 +28,7 @@ pub(crate) struct FromObservation<'a, S> {
 }
 
 impl<S: IndexedSurface> FromObservation<'_, S> {
-    /// Makes the pairs.
+    /// Adds the pairs.
     pub(crate) fn associate(self) {
         vectorized(self);
     }

@@ -11,21 +11,25 @@ use crate::stride::Stride;
 
 /// Pairs every model point with each of its k closest observed points, at a weight of 1/k each.
 ///
-/// The soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec (2002): the k matches
-/// average out part of the noise of single ones, at the price of a bias toward the middle of the neighborhood. A model
-/// point has a total weight of 1, also where fewer than k points were observed. Pairs of one point are in order of distance,
-/// equal distances in the order of the image. Cost: O(n log n) once per observation, then O(log n + k²) at most per point, for k is meant to be small.
+/// It is the soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec
+/// (2002). The k matches average out part of the noise of single ones, but add a bias toward the
+/// middle of the neighborhood. A model point has a total weight of 1, even if fewer than k points
+/// were observed. Pairs of one point are in order of distance, and those of equal distance in the
+/// order of the image.
+///
+/// Cost: O(n log n) once per observation, then at most O(log n + k²) per point, since k is meant to
+/// be small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KNearest {
-    /// How many observed points every model point is paired with; 0 counts as 1.
+    /// Number of observed points that every model point is paired with. 0 counts as 1.
     pub k: usize,
-    /// Which observed pixels are searched.
+    /// The observed pixels to search.
     pub targets: Stride,
     found: Scratch<Vec<Nearest>>,
 }
 
 impl KNearest {
-    /// Makes the association.
+    /// Creates the association.
     #[must_use]
     pub fn new(k: usize, targets: Stride) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Associations: which observed point each model point is paired with.
+//! Associations: the observed point for each model point.
 
 pub(crate) mod closest_point_on_mesh;
 pub(crate) mod data_association;

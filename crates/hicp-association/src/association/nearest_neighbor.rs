@@ -14,31 +14,35 @@ use crate::stride::Stride;
 
 /// Pairs every model point with the closest observed point (§III-A.1; Besl & McKay 1992).
 ///
-/// The index over the observed surfels is built once per observation, stride and kind of index, and shared by all threads
-/// and hypotheses. An observation without surfels gives no pairs. Cost: O(n log n) once per observation, then O(log n) per
-/// point.
+/// The index over the observed surfels is built once per observation, stride and kind of index. All
+/// threads and hypotheses share it. An observation without surfels gives no pairs.
+///
+/// Cost: O(n log n) once per observation, then O(log n) per point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearestNeighbor {
-    /// Observed pixels that enter the index. An index that fits the cache is searched several times faster, at hardly any
-    /// loss of accuracy.
+    /// Observed pixels that enter the index.
+    ///
+    /// An index that fits the cache is several times faster, at hardly any loss of accuracy.
     pub targets: Stride,
-    /// Index that is searched.
+    /// The index to search.
     pub index: SearchIndex,
-    /// For each source point, the element of the index that it was paired with last.
+    /// For each source point, the index element of its last pair.
     last: Scratch<Vec<u32>>,
 }
 
-/// Index that [`NearestNeighbor`] searches.
+/// The index that [`NearestNeighbor`] searches.
 ///
-/// Both find an exact nearest neighbor. They differ in time, and in which of several equally near points they return.
+/// Both find an exact nearest neighbor. They differ in time, and in the choice among equally near
+/// points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SearchIndex {
     /// A tree of bounding boxes, eight to a node. The presets use it.
     ///
-    /// A search starts from the pair of the last iteration and visits only boxes that may hold something nearer (compare
-    /// Greenspan & Godin 2001). Along a registration a point moves little, so few boxes remain. Of equally near points, the
-    /// first in the image is returned. The result does not depend on where the search starts.
+    /// A search starts from the pair of the last iteration and visits only boxes that may hold
+    /// something nearer (compare Greenspan & Godin 2001). A point moves little between iterations,
+    /// so few boxes remain. Of equally near points, the first in the image is returned. The result
+    /// does not depend on the start of the search.
     #[default]
     BoxTree,
     /// kiddo's k-d tree. Of equally near points, any may be returned.
@@ -66,7 +70,7 @@ impl NearestNeighbor {
     ) {
         let observed = ObservedPoints::<T>::of(observation, self.targets);
         let last = &mut self.last.0;
-        // Any element is a valid start, so elements that another run left behind cost time at worst.
+        // Any element is a valid start, so elements of another run cost time at worst.
         last.resize(source.len(), 0);
         pairs.reserve(source.len());
         vectorized(Search {
@@ -81,7 +85,8 @@ impl NearestNeighbor {
 
 impl Default for NearestNeighbor {
     /// About 4,000 observed points in a box tree.
-    // Deviation: §III-A.1 searches all of C; a strided C is faster to search at hardly any loss of accuracy. `Stride::Pixels(1)` searches all.
+    // Deviation: §III-A.1 searches all of C; a strided C is faster to search at hardly any loss of
+    // accuracy. `Stride::Pixels(1)` searches all.
     fn default() -> Self {
         Self::new(Stride::AboutPoints(4000), SearchIndex::default())
     }

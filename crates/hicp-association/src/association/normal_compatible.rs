@@ -1,4 +1,4 @@
-//! Nearest neighbors of a similar orientation.
+//! Nearest neighbors with a similar orientation.
 
 use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
 
@@ -10,24 +10,29 @@ use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
 
-/// Pairs every model point with the closest observed point whose normal is compatible (Godin et al. 1994; Pulli 1999).
+/// Pairs every model point with the closest observed point whose normal is compatible.
 ///
-/// Among the k closest observed points, the closest with n·m ≥ cos θ_max; no pair when none is. Where two sheets of the
-/// surface run side by side (a mug's wall, a thin plate) the plain nearest neighbor sits on the wrong one, and rejecting it
-/// afterwards leaves the point without a pair; this finds the one behind it. Cost: O(log n + k²) at most per point, for k is meant to be small.
+/// Sources: Godin et al. 1994; Pulli 1999. Among the k closest observed points, it selects the
+/// closest with n·m ≥ cos θ_max. If there is none, the point has no pair.
+///
+/// If two sheets of the surface are close to each other (a mug's wall, a thin plate), the plain
+/// nearest neighbor lies on the wrong one. Rejecting it later leaves the point without a pair; this
+/// association finds the point behind it.
+///
+/// Cost: at most O(log n + k²) per point, since k is meant to be small.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalCompatible {
-    /// Largest angle between the two normals, degrees; NaN and negative values pair nothing.
+    /// Largest angle between the two normals, degrees. NaN and negative values pair nothing.
     pub max_angle_degrees: f32,
-    /// How many of the closest observed points are looked at; 0 counts as 1.
+    /// Number of closest observed points to consider. 0 counts as 1.
     pub k: usize,
-    /// Which observed pixels are searched.
+    /// The observed pixels to search.
     pub targets: Stride,
     found: Scratch<Vec<Nearest>>,
 }
 
 impl NormalCompatible {
-    /// Makes the association.
+    /// Creates the association.
     #[must_use]
     pub fn new(max_angle_degrees: f32, k: usize, targets: Stride) -> Self {
         Self {

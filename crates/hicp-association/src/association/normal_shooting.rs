@@ -10,28 +10,35 @@ use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
 
-/// Pairs every model point with the observed point closest to the line along its normal (Chen & Medioni 1991).
+/// Pairs every model point with the observed point closest to the line along its normal.
 ///
-/// The intersection of the line (p, n) with the observed surface, in the form for point sets: among the k observed points
-/// closest to p, the one with the smallest distance |(c − p) − n (n·(c − p))| to the line; of equally distant ones the one
-/// closest to p. Both directions of the line count. Settles faster than the nearest neighbor on smooth surfaces, and is
-/// less stable on noisy or complex ones (Rusinkiewicz & Levoy 2001). Cost: O(n log n) once per observation, then O(log n +
-/// k) per point.
+/// Source: Chen & Medioni 1991. For point sets, the intersection of the line (p, n) with the
+/// observed surface becomes a search. Among the k observed points closest to p, it selects the one
+/// with the smallest distance |(c − p) − n (n·(c − p))| to the line. Of equally distant points, it
+/// selects the one closest to p. Both directions of the line count.
+///
+/// On smooth surfaces it converges faster than the nearest neighbor. On noisy or complex ones it is
+/// less stable (Rusinkiewicz & Levoy 2001).
+///
+/// Cost: O(n log n) once per observation, then O(log n + k) per point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalShooting {
-    /// How many of the closest observed points are looked at; 0 counts as 1. With too few, the line's intersection is not
-    /// among them when the surfaces are far apart.
+    /// Number of closest observed points to consider. 0 counts as 1.
+    ///
+    /// If the surfaces are far apart and k is too small, the intersection is not among these
+    /// points.
     pub k: usize,
-    /// Pairs whose target is further from the line than this are not made; `None` makes all. NaN and negative lengths make
-    /// none.
+    /// Largest distance of a target from the line; `None` for no limit.
+    ///
+    /// NaN and negative lengths pair nothing.
     pub max_offset: Option<Length>,
-    /// Which observed pixels are searched.
+    /// The observed pixels to search.
     pub targets: Stride,
     found: Scratch<Vec<Nearest>>,
 }
 
 impl NormalShooting {
-    /// Makes the association.
+    /// Creates the association.
     #[must_use]
     pub fn new(k: usize, max_offset: Option<Length>, targets: Stride) -> Self {
         Self {
@@ -94,7 +101,8 @@ impl DataAssociation for NormalShooting {
     }
 }
 
-/// Returns the distance of the target's point from the line through the source's point along its normal.
+/// Returns the distance of the target's point from the line through the source's point along its
+/// normal.
 fn distance_to_line(source: &Surfel, target: &Surfel) -> f32 {
     let (normal, difference) = (source.normal.as_ref(), target.point - source.point);
     (difference - normal * normal.dot(&difference)).norm()

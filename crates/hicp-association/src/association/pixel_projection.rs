@@ -2,7 +2,7 @@
 
 use hicp_core::{PinholeCamera, Point3};
 
-/// A pinhole camera in `f32`, which resolves 1e-3 of a pixel in any accepted image.
+/// A pinhole camera in `f32`, with a resolution of 1e-3 pixels in any accepted image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelProjection {
     fx: f32,
@@ -19,8 +19,10 @@ impl PixelProjection {
         Self { fx, fy, cx, cy }
     }
 
-    /// Returns the image position (u, v) of a point; `None` for a point at or behind the camera plane, and for
-    /// one that overflowed `f32`: it would land on the principal point.
+    /// Returns the image position (u, v) of a point.
+    ///
+    /// Returns `None` for a point at or behind the camera plane, and for one that overflowed `f32`
+    /// and would fall on the principal point.
     #[inline]
     pub(crate) fn project(&self, point: &Point3<f32>) -> Option<(f32, f32)> {
         (point.z > 0.0 && point.z.is_finite()).then(|| {
@@ -31,7 +33,9 @@ impl PixelProjection {
         })
     }
 
-    /// Returns the image positions of many points, given as `[x, y, z]` of each; of no meaning where z is not positive and finite.
+    /// Returns the image positions of many points, given as one array per coordinate.
+    ///
+    /// They are meaningless if z is not positive and finite.
     #[inline(always)]
     pub(crate) fn project_all<const N: usize>(
         &self,
@@ -48,17 +52,20 @@ impl PixelProjection {
         (us, vs)
     }
 
-    /// Returns the point seen at (u, v) at a depth of `z` metres.
+    /// Returns the point seen at (u, v) at a depth of `z` meters.
     #[inline]
     pub(crate) fn unproject(&self, u: f32, v: f32, z: f32) -> Point3<f32> {
         Point3::new((u - self.cx) / self.fx * z, (v - self.cy) / self.fy * z, z)
     }
 }
 
-/// 2²³: from here on a float has no fraction, and the last bits of one below 2²⁴ are those of an integer.
+/// 2²³: floats from here on are integers. Adding it moves the integer into the last bits of the
+/// mantissa.
 const WHOLE: f32 = 8_388_608.0;
 
-/// The whole part of a number from 0 to 2²²; anything for others. A cast would look for those, one lane at a time.
+/// Returns the whole part of a number from 0 to 2²², and anything for other numbers.
+///
+/// A cast would test for those, one lane at a time.
 #[inline(always)]
 pub(crate) fn whole(number: f32) -> u32 {
     let rounded = (number + WHOLE) - WHOLE;
@@ -76,7 +83,7 @@ mod tests {
 
     #[test]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn the_whole_part_is_that_of_a_cast() {
+    fn the_whole_part_equals_a_cast() {
         for integer in [0_u16, 1, 2, 3, 255, 639, 640, 32_767, 65_535] {
             let integer = f32::from(integer);
             for fraction in [0.0, 1e-3, 0.25, 0.4999, 0.5, 0.500_01, 0.75, 0.999] {

@@ -9,11 +9,14 @@ use hicp_core::{
 use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::{PixelProjection, whole};
 
-/// Pairs a model point with the observed point stored at the pixel that it projects to (§III-A.1; Blais & Levine 1995).
+/// Pairs a model point with the observed point at the pixel that it projects to.
 ///
-/// The model point is moved by the current estimate and projected with the observation's camera; the pixel whose square
-/// contains the projection gives the target, if it is masked and has a surfel. Points at or behind the camera plane have no pair.
-/// Cost: constant per point.
+/// Sources: §III-A.1; Blais & Levine 1995. The model point is moved by the current estimate and
+/// projected with the observation's camera. The target belongs to the pixel whose square contains
+/// the projection, if it is masked and has a surfel. Points at or behind the camera plane have no
+/// pair.
+///
+/// Cost: O(1) per point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Projective;
 
@@ -43,7 +46,7 @@ impl DataAssociation for Projective {
     }
 }
 
-/// Points projected at a time.
+/// Number of points projected at once.
 const LANES: usize = 16;
 
 struct Project<'a> {
@@ -61,7 +64,7 @@ impl VectorLoop for Project<'_> {
     fn run(self) {
         let grid = PixelGrid::new(self.observation);
         for (block, first) in self.source.chunks(LANES).zip((0_u32..).step_by(LANES)) {
-            // Lanes beyond the last point lie in the camera plane, and have no pixel.
+            // Lanes beyond the last point lie in the camera plane and have no pixel.
             let (mut points, mut normals) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             for (lane, surfel) in block.iter().enumerate() {
                 for axis in 0..3 {
@@ -93,7 +96,7 @@ impl VectorLoop for Project<'_> {
     }
 }
 
-/// The pixels of an observation's region, as [`Observation::index_near`] finds them.
+/// The pixels of an observation's region, as in [`Observation::index_near`].
 struct PixelGrid {
     u_min: f32,
     v_min: f32,
@@ -115,7 +118,7 @@ impl PixelGrid {
         }
     }
 
-    /// The index of the pixel that each point is seen at, `u32::MAX` where there is none.
+    /// Returns the pixel index of each point, `u32::MAX` if it has none.
     #[inline(always)]
     fn pixels(&self, projection: &PixelProjection, points: &[[f32; LANES]; 3]) -> [u32; LANES] {
         let (us, vs) = projection.project_all(points);
@@ -131,7 +134,7 @@ impl PixelGrid {
                 & (row >= 0.0)
                 & (column < self.width)
                 & (row < self.height);
-            // Where it is not inside, any number will do.
+            // Outside, any number is valid.
             let pixel = whole(row)
                 .wrapping_mul(self.stride)
                 .wrapping_add(whole(column));

@@ -1,4 +1,4 @@
-//! Projective association between the pixels.
+//! Projective association between pixels.
 
 use hicp_core::{
     Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel, UnitVector3,
@@ -7,18 +7,24 @@ use hicp_core::{
 use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::PixelProjection;
 
-/// Pairs a model point with the observed surface at the exact position that it projects to, interpolated between four pixels.
+/// Pairs a model point with the observed surface at the exact position that it projects to.
 ///
-/// Inverse depth is interpolated bilinearly, which is exact for a plane at any tilt, and so is the normal, which is brought
-/// back to unit length; the target lies on the ray of the model point. Not across depth edges: unless all four pixels have
-/// a surfel with a depth within `max_step` of that of the pixel that contains the projection, that pixel gives the target
-/// as in [`crate::Projective`]. So does it where the four normals cancel. The pair's `target_index` is that pixel in either
-/// case. Takes away the steps of up to half a pixel that the plain look-up makes along slanted surfaces. Cost: constant per
-/// point.
+/// Inverse depth is interpolated bilinearly between four pixels, which is exact for a plane at any
+/// tilt. The normal is interpolated and normalized. The target lies on the ray of the model point.
+/// This removes the steps of up to half a pixel that the plain look-up causes on slanted surfaces.
+///
+/// It does not interpolate across depth edges. All four pixels need a surfel whose depth is within
+/// `max_step` of that of the pixel that contains the projection. Otherwise, or if the four normals
+/// cancel, that pixel gives the target as in [`crate::Projective`]. In both cases `target_index` is
+/// that pixel.
+///
+/// Cost: O(1) per point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveInterpolated {
-    /// Largest difference in depth between neighboring pixels of one surface, as a fraction of the depth. 0, negative
-    /// values and NaN interpolate only between equal depths or nowhere.
+    /// Largest difference in depth between neighboring pixels of one surface, as a fraction of the
+    /// depth.
+    ///
+    /// With 0, only equal depths are interpolated; with negative values and NaN, none are.
     pub max_step: f32,
 }
 
@@ -65,7 +71,7 @@ impl DataAssociation for ProjectiveInterpolated {
     }
 }
 
-/// Returns the surface at (u, v), or `None` when its four pixels are not of one surface.
+/// Returns the surface at (u, v), or `None` if its four pixels are not on one surface.
 fn interpolate(
     observation: &Observation,
     projection: &PixelProjection,
@@ -89,7 +95,7 @@ fn interpolate(
         for (dv, v_share) in [(0, 1.0 - bottom_share), (1, bottom_share)] {
             let surfel = observation.surfel_at(left + du, top + dv)?;
             let step = (surfel.point.z - nearest.point.z).abs();
-            // A NaN gate parts everything.
+            // A NaN gate rejects everything.
             if gate.is_nan() || step > gate {
                 return None;
             }

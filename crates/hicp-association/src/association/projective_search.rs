@@ -6,20 +6,24 @@ use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::PixelProjection;
 use crate::search::nearest::distance_squared;
 
-/// Pairs a model point with the closest observed point within a window around the pixel that it projects to
-/// (Benjemaa & Schmitt 1997; Dorai et al. 1998).
+/// Pairs a model point with the closest observed point in a window around its projected pixel.
 ///
-/// Between [`crate::Projective`], which it equals at radius 0, and a nearest-neighbor search: a window of ±r pixels
-/// bridges misalignments and holes of r pixels and needs no tree. Closest in three dimensions; of equally close points the
-/// first in row-major order. The window is cut at the border of the observed region, but a point that projects outside the
-/// image has no pair. Cost: O((2r + 1)²) per point.
+/// Sources: Benjemaa & Schmitt 1997; Dorai et al. 1998. It is a compromise between
+/// [`crate::Projective`], which it equals at radius 0, and a nearest-neighbor search. A window of
+/// ±r pixels bridges misalignments and holes of r pixels, and does not need a tree.
+///
+/// Distances are in three dimensions. Of equally close points, the first in row-major order is
+/// used. The window is clipped at the border of the observed region. A point that projects outside
+/// the image has no pair.
+///
+/// Cost: O((2r + 1)²) per point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProjectiveSearch {
-    /// Half side r of the window, pixels; above 64 counts as 64.
+    /// Half side r of the window, pixels. Values above 64 count as 64.
     pub radius: u32,
 }
 
-/// The largest half side that counts, pixels.
+/// The largest effective half side, pixels.
 const MAX_RADIUS: u32 = 64;
 
 impl Default for ProjectiveSearch {
@@ -68,7 +72,8 @@ fn closest(
     radius: u32,
 ) -> Option<(u32, Surfel)> {
     let (width, height) = (observation.camera().width(), observation.camera().height());
-    // As in the plain projection, a pixel's square reaches half a pixel to every side. False for NaN.
+    // As in the plain projection, a pixel's square extends half a pixel to every side. False for
+    // NaN.
     let (column, row) = (u + 0.5, v + 0.5);
     if !(column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32) {
         return None;
@@ -85,7 +90,7 @@ fn closest(
         if from >= to {
             continue;
         }
-        // Fits: an accepted image has at most 2³⁰ pixels.
+        // This fits into `u32`: an accepted image has at most 2³⁰ pixels.
         let first = (row - region.v_min) * (region.u_max - region.u_min) + (from - region.u_min);
         for index in first..first + (to - from) {
             let Some(target) = observation.surfel(index) else {

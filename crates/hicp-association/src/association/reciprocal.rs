@@ -7,19 +7,22 @@ use crate::scratch::Scratch;
 use crate::search::nearest::distance_squared;
 use crate::search::point_tree::PointTree;
 
-/// Keeps those pairs of another association in which no other model point is closer to the target (Pajdla & Van Gool 1995,
-/// ε = 0).
+/// Keeps those pairs of another association whose source is the model point closest to the target.
 ///
-/// With a nearest-neighbor association inside, the pairs that are mutually nearest: model points without a counterpart (the
-/// hidden side, what the mask cut off) lose theirs to the points in front of them. Model points equally close to the target
-/// are kept alike. The distance is taken to all moved points of the selection, whether they have a pair or not; the inner
-/// association must start from these, so one that starts from the observation does not belong here.
+/// Source: Pajdla & Van Gool 1995, with ε = 0. With a nearest-neighbor association inside, the
+/// remaining pairs are mutually nearest. Model points without a counterpart (on the hidden side, or
+/// outside of the mask) lose their pairs to the points in front of them. Model points equally close
+/// to the target are all kept.
 ///
-/// Exact: the search tree over the moved points is rebuilt at every call, in memory that is kept. Cost: the inner association
-/// and O(n log n) for n selected points.
+/// The distance is compared with that of all moved points of the selection, with or without a pair.
+/// The inner association must therefore start from the selection and not from the observation. The
+/// result is exact, because the search tree over the moved points is rebuilt at every call, in
+/// reused memory.
+///
+/// Cost: the inner association, and O(n log n) for n selected points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reciprocal<A> {
-    /// The association whose pairs are examined.
+    /// The association whose pairs are filtered.
     pub inner: A,
     scratch: Scratch<Moved>,
 }
@@ -31,7 +34,7 @@ struct Moved {
 }
 
 impl<A> Reciprocal<A> {
-    /// Makes the association.
+    /// Creates the association.
     #[must_use]
     pub fn new(inner: A) -> Self {
         Self {

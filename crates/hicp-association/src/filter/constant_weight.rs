@@ -1,4 +1,4 @@
-//! The same weight for all.
+//! One weight for all pairs.
 
 use hicp_core::{Correspondences, Iteration};
 
@@ -6,16 +6,16 @@ use crate::filter::outlier_filter::OutlierFilter;
 
 /// Multiplies every weight by a constant.
 ///
-/// A step does not depend on it where one stage minimises on its own; losses do, and so does whatever adds several sets of
-/// pairs. Cost: O(pairs).
+/// The step of a single stage does not depend on it. Losses do, and so does a sum of several sets
+/// of pairs. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantWeight {
-    /// The factor; negative values, NaN and infinity count as 0.
+    /// The factor. Negative values, NaN and infinity count as 0.
     pub weight: f32,
 }
 
 impl Default for ConstantWeight {
-    /// 1: changes nothing.
+    /// 1, which changes nothing.
     fn default() -> Self {
         Self { weight: 1.0 }
     }

@@ -8,11 +8,13 @@ use crate::length::Length;
 
 /// Multiplies weights by 1 − d/d_max, and by 0 from d_max on (Godin, Rioux & Baribeau 1994).
 ///
-/// d_max is a length of its own rather than the largest distance found: with that, equal distances would all weigh nothing.
-/// Pairs of weight 0 stay in the list; only those at a distance that is not finite go. Cost: O(pairs).
+/// d_max is a fixed length and not the largest distance found, which would set the weight of equal
+/// distances to 0. Pairs of weight 0 stay in the list. Only pairs whose distance is not finite are
+/// removed. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceWeight {
-    /// Distance d_max from which on pairs weigh nothing. For 0, negative values and NaN none weighs anything.
+    /// Distance d_max from which on weights are 0. With 0, negative values and NaN, all weights are
+    /// 0.
     pub max: Length,
 }
 
@@ -31,7 +33,7 @@ impl OutlierFilter for DistanceWeight {
         keep_within(pairs, f32::INFINITY);
         for pair in pairs.as_mut_slice() {
             let distance = pair.distance();
-            // Compared first: the quotient of two zeros is no number.
+            // Compare first, because the quotient of two zeros is not a number.
             pair.weight *= if distance < max {
                 1.0 - distance / max
             } else {

@@ -2,28 +2,31 @@
 
 use hicp_core::Correspondences;
 
-/// Replaces the content of `distances` by the pairs' distances, those that are not finite left out.
+/// Replaces the content of `distances` by the finite distances of the pairs.
 pub(crate) fn collect_finite(pairs: &Correspondences, distances: &mut Vec<f32>) {
     distances.clear();
     let all = pairs.as_slice().iter().map(|pair| pair.distance());
     distances.extend(all.filter(|distance| distance.is_finite()));
 }
 
-/// Returns the value that `rank` others precede in ascending order (the largest when there are not as many); reorders `values`.
-/// `None` without values.
+/// Returns the value at position `rank` in ascending order, or the largest if there are fewer.
+///
+/// Reorders `values`. Without values, returns `None`.
 pub(crate) fn nth_smallest(values: &mut [f32], rank: usize) -> Option<f32> {
     let rank = rank.min(values.len().checked_sub(1)?);
     Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
-/// Returns the median, the upper of the two middle values of an even number; reorders `values`. `None` without values.
+/// Returns the median: of an even number of values, the upper of the two middle ones.
+///
+/// Reorders `values`. Without values, returns `None`.
 pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
     nth_smallest(values, values.len() / 2)
 }
 
 /// Returns ⌈fraction·count⌉, between 0 and `count`; 0 for NaN.
 pub(crate) fn share_of(fraction: f32, count: usize) -> usize {
-    // The f32 nearest to 0.85 lies above it, and 85 of 100 are meant.
+    // The f32 nearest to 0.85 lies above it, but 85 of 100 are meant.
     let share = (f64::from(fraction.clamp(0.0, 1.0)) * count as f64 * (1.0 - 1e-7)).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // Between 0 and `count`; NaN becomes 0.

@@ -7,27 +7,29 @@ use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
 
-/// σ of a normal distribution over its median absolute deviation.
+/// σ of a normal distribution, divided by its median absolute deviation.
 const SIGMA_PER_MAD: f32 = 1.4826;
 
-/// Removes pairs whose distance exceeds the median by more than `factor` robust standard deviations (X84, Hampel et al. 1986;
-/// for ICP Fusiello et al. 2002).
+/// Removes pairs whose distance exceeds the median by more than `factor` robust deviations.
 ///
-/// Keeps d ≤ med + factor·max(1.4826·MAD, floor), with MAD the median of |d − med|. Pairs that are closer than the median
-/// are never outliers. The floor keeps what is spread by less than the sensor resolves; without one, a well aligned object
-/// whose distances are nearly all equal would lose every pair that is a rounding error further. Distances that are not
-/// finite count for nothing and go. Cost: O(pairs).
+/// Sources: rule X84 of Hampel et al. 1986; for ICP, Fusiello et al. 2002. It keeps d ≤ med +
+/// factor·max(1.4826·MAD, floor), where MAD is the median of |d − med|. Pairs closer than the
+/// median are never outliers.
+///
+/// The floor keeps distances that differ by less than the resolution of the sensor. Without it, a
+/// well aligned object with nearly equal distances would lose every pair with a rounding error.
+/// Distances that are not finite are ignored, and their pairs are removed. Cost: O(pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MadDistance {
-    /// Standard deviations beyond the median; NaN removes every pair.
+    /// Number of standard deviations above the median. NaN removes every pair.
     pub factor: f32,
-    /// Smallest standard deviation assumed, metres; NaN and negative values count as 0.
+    /// Smallest assumed standard deviation, meters. NaN and negative values count as 0.
     pub floor: f32,
     distances: Scratch<Vec<f32>>,
 }
 
 impl MadDistance {
-    /// Makes the filter; the floor is in metres.
+    /// Creates the filter. The floor is in meters.
     #[must_use]
     pub fn new(factor: f32, floor: f32) -> Self {
         Self {

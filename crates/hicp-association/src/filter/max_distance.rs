@@ -5,24 +5,28 @@ use hicp_core::{Correspondences, Iteration};
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::length::Length;
 
-/// Removes pairs further apart than τ_max (§III-A.1; Turk & Levoy 1994), and those at a distance that is not finite.
+/// Removes pairs further apart than τ_max (§III-A.1; Turk & Levoy 1994).
+///
+/// It also removes pairs whose distance is not finite. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaxDistance(Length);
 
 impl MaxDistance {
-    /// A limit of either kind. NaN or a negative limit removes every pair.
+    /// Creates the filter with a limit of either kind. NaN or a negative limit removes every pair.
     #[must_use]
     pub fn new(limit: Length) -> Self {
         Self(limit)
     }
 
-    /// A limit in metres. NaN or a negative limit removes every pair.
+    /// Creates the filter with a limit in meters. NaN or a negative limit removes every pair.
     #[must_use]
     pub fn meters(limit: f32) -> Self {
         Self(Length::Meters(limit))
     }
 
-    /// A limit as a fraction of the model's diameter, so that it fits objects of any size.
+    /// Creates the filter with a limit as a fraction of the model's diameter.
+    ///
+    /// It then fits objects of any size.
     #[must_use]
     pub fn diameters(fraction: f32) -> Self {
         Self(Length::Diameters(fraction))
@@ -39,7 +43,7 @@ impl OutlierFilter for MaxDistance {
     }
 }
 
-/// Keeps the pairs at most `limit` metres apart, and none at a distance that is not finite.
+/// Keeps the pairs at most `limit` meters apart, and removes those whose distance is not finite.
 pub(crate) fn keep_within(pairs: &mut Correspondences, limit: f32) {
     pairs.retain(|pair| {
         let distance = pair.distance();

@@ -5,13 +5,17 @@ use hicp_core::{Correspondences, Iteration};
 use crate::filter::outlier_filter::OutlierFilter;
 
 /// Removes pairs whose normals differ by more than θ_max (§III-A.1; Pulli 1999).
+///
+/// Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaxNormalAngle {
     min_cosine: f32,
 }
 
 impl MaxNormalAngle {
-    /// A limit in degrees; 180 and more keeps everything, NaN or a negative limit removes every pair.
+    /// Creates the filter with a limit in degrees.
+    ///
+    /// A limit of 180 or more keeps every pair. NaN or a negative limit removes every pair.
     #[must_use]
     pub fn degrees(limit: f32) -> Self {
         Self {
@@ -30,10 +34,12 @@ impl OutlierFilter for MaxNormalAngle {
     }
 }
 
-/// Returns the least n·m of unit normals that differ by at most `degrees`; more than any for NaN and negative angles.
+/// Returns the least n·m of unit normals that differ by at most `degrees`.
+///
+/// For NaN and negative angles, it is greater than every product.
 pub(crate) fn min_cosine(degrees: f32) -> f32 {
     if degrees >= 180.0 {
-        // Rounding may leave the cosine of opposite normals just below −1 …
+        // Rounding may put the cosine of opposite normals just below −1 …
         -2.0
     } else if degrees >= 0.0 {
         // … and that of equal ones just below 1.

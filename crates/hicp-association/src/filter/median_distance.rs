@@ -7,20 +7,22 @@ use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
 
-/// Removes pairs further apart than `factor` times the median distance (Diebel, Reutersward, Thrun, Davis & Gupta 2004).
+/// Removes pairs further apart than `factor` times the median distance.
 ///
-/// Follows the alignment without a length to be set: generous while the object is far off, strict in the end. Pairs at the
-/// limit are kept, so that equal distances all stay at a factor of 1 and more. The median is the upper of the two middle
-/// values of an even number. Distances that are not finite count for nothing and go. Cost: O(pairs).
+/// Source: Diebel, Reutersward, Thrun, Davis & Gupta 2004. The limit follows the alignment without
+/// a length parameter: it is generous while the object is far away, and strict in the end. Pairs at
+/// the limit are kept, so with a factor of 1 or more, equal distances are all kept. Of an even
+/// number of values, the median is the upper of the two middle ones. Distances that are not finite
+/// are ignored, and their pairs are removed. Cost: O(pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MedianDistance {
-    /// Largest distance over the median; NaN and negative values remove every pair.
+    /// Largest distance, divided by the median. NaN and negative values remove every pair.
     pub factor: f32,
     distances: Scratch<Vec<f32>>,
 }
 
 impl MedianDistance {
-    /// Makes the filter.
+    /// Creates the filter.
     #[must_use]
     pub fn new(factor: f32) -> Self {
         Self {

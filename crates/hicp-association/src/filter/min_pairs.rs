@@ -1,15 +1,16 @@
-//! A floor for the number of pairs.
+//! A lower limit for the number of pairs.
 
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
-/// Removes all pairs when there are fewer than `count`, so that the stage ends with "no pairs" at the pose accepted last.
+/// Removes all pairs if there are fewer than `count`, so that the stage ends with "no pairs".
 ///
-/// Few pairs fit any pose. Goes last in a chain: it counts what the filters before it have left. Cost: constant.
+/// Few pairs fit any pose. The stage then returns the pose accepted last. Use it last in a chain,
+/// because it counts the pairs that the filters before it keep. Cost: O(1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MinPairs {
-    /// Fewest pairs that a step is taken from; 0 and 1 never remove anything.
+    /// Smallest number of pairs for a step. 0 and 1 never remove anything.
     pub count: usize,
 }
 

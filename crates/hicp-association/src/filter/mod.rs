@@ -1,4 +1,4 @@
-//! Outlier filters and weights: which pairs are kept, and how much each counts.
+//! Outlier filters and weights: the kept pairs, and the influence of each.
 
 pub(crate) mod boundary_targets;
 pub(crate) mod constant_weight;

@@ -5,10 +5,12 @@ use hicp_core::{Correspondences, Iteration};
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
 
-/// Keeps for every observed point the pair with the closest model point (Zinßer, Schmidt & Niemann 2003, Picky ICP).
+/// Keeps for every observed point the pair with the closest model point.
 ///
-/// Model points without a counterpart share the targets of others; the closest of them has the best claim. Of equally close
-/// ones the first stays. The order of the pairs is kept. Distances that are not finite go. Cost: O(n log n) for n pairs.
+/// Source: Zinßer, Schmidt & Niemann 2003, Picky ICP. Model points without a counterpart share the
+/// targets of others, and the closest one is most likely right. Of equally close ones, the first is
+/// kept. The order of the pairs does not change. Pairs whose distance is not finite are removed.
+/// Cost: O(n log n) for n pairs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OneToOne {
     scratch: Scratch<Buffers>,
@@ -22,7 +24,7 @@ struct Buffers {
 }
 
 impl OneToOne {
-    /// Makes the filter.
+    /// Creates the filter.
     #[must_use]
     pub fn new() -> Self {
         Self::default()

@@ -1,14 +1,15 @@
-//! The trait of outlier filters, and how they chain.
+//! The trait of outlier filters, and their chains.
 
 use hicp_core::internal::type_label;
 use hicp_core::{Correspondences, Iteration};
 
 /// Removes or re-weights pairs (the third and fourth ICP components, §II).
 ///
-/// `()` keeps everything. A tuple of up to eight filters applies them in order, and so does a `Vec` of any length.
+/// `()` keeps everything. A tuple of up to eight filters applies them in order, and so does a `Vec`
+/// of any length.
 ///
-/// Pure given the iteration: a filter that changes from one iteration to the next reads [`Iteration::index`], not how
-/// often it was called.
+/// A filter is pure given the iteration. If it changes from one iteration to the next, it reads
+/// [`Iteration::index`] and does not count its calls.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an outlier filter",
     label = "this must implement `OutlierFilter`",
@@ -23,7 +24,9 @@ pub trait OutlierFilter {
         type_label::<Self>()
     }
 
-    /// Appends the names of the filters that this one applies, in order: its own name, or those of a chain's members.
+    /// Appends the names of the filters that this one applies, in order.
+    ///
+    /// A single filter appends its name; a chain appends those of its members.
     fn names(&self, names: &mut Vec<&'static str>) {
         names.push(self.name());
     }

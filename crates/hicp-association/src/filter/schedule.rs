@@ -4,10 +4,11 @@ use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
-/// Applies one filter per iteration: the k-th in the k-th iteration of a stage, and the last from then on.
+/// Applies one filter per iteration: the k-th in the k-th iteration of a stage, then the last.
 ///
-/// A gate that narrows, as in `Schedule::new(vec![MaxDistance::diameters(0.5), MaxDistance::diameters(0.25), MaxDistance::diameters(0.1)])`,
-/// catches from afar and ends precisely (Zhang 1994 narrows by the distances found). Without filters all pairs are kept.
+/// A narrowing gate captures from far away and ends precisely. An example is
+/// `Schedule::new(vec![MaxDistance::diameters(0.5), MaxDistance::diameters(0.1)])`. Zhang 1994
+/// narrows by the distances found. Without filters, all pairs are kept.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Schedule<F> {
     /// The filters by iteration.

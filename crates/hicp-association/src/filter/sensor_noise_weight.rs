@@ -6,45 +6,51 @@ use hicp_core::{Correspondences, Iteration, Surfel};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
-/// Multiplies weights by 1/σ²(z, θ) of the observed point, divided by the mean over all pairs (Rusinkiewicz & Levoy 2001, §3.3:
-/// weights by the uncertainty of the sensor).
+/// Multiplies weights by 1/σ²(z, θ) of the observed point, divided by the mean over all pairs.
 ///
-/// The mean keeps weights near 1, so losses and thresholds keep their meaning. Matters where depths differ: between the front
-/// and the back of an object a tenth as deep as it is far, they differ by 20 % at 0.5 m and 35 % at 1 m. Where no σ is finite,
-/// weights stay. Cost: O(pairs).
+/// It weighs by the uncertainty of the sensor (Rusinkiewicz & Levoy 2001, §3.3). The division keeps
+/// weights near 1, so that losses and thresholds keep their meaning. If no σ is finite, weights do
+/// not change.
+///
+/// It matters if depths differ. For an object whose depth range is a tenth of its distance, the
+/// weights of front and back differ by 20 % at 0.5 m and by 35 % at 1 m. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorNoiseWeight {
     /// The standard deviation of depth.
     pub noise: SensorNoise,
 }
 
-/// Standard deviation of a measured depth: σ(z, θ) = c₀ + c₁ z + c₂ z² + t·z^1.5·Σ θᵢ/(π/2 − θᵢ)² metres, z in metres.
+/// Standard deviation of a measured depth, in meters, with z in meters.
 ///
-/// θ are the tilts of the surface about the image's two axes, radians, clamped to 75°, beyond which the last term explodes.
-/// Only ratios of σ matter to [`SensorNoiseWeight`]. σ below 1 µm, and one that is not a number, counts as 1 µm.
+/// σ(z, θ) = c₀ + c₁ z + c₂ z² + t·z^1.5·Σ θᵢ/(π/2 − θᵢ)²
+///
+/// θ are the tilts of the surface around the two image axes, in radians, clamped to 75°, because
+/// the last term diverges at 90°. [`SensorNoiseWeight`] depends only on ratios of σ. Values below 1
+/// µm, and NaN, count as 1 µm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorNoise {
-    /// c₀, metres.
+    /// c₀, meters.
     pub constant: f32,
-    /// c₁, metres per metre.
+    /// c₁, meters per meter.
     pub linear: f32,
-    /// c₂, metres per square metre.
+    /// c₂, meters per square meter.
     pub quadratic: f32,
-    /// t; 0 leaves the tilt out.
+    /// t. With 0, the tilt has no influence.
     pub tilt: f32,
 }
 
-/// Smallest standard deviation, metres.
+/// Smallest standard deviation, meters.
 const MIN_SIGMA: f32 = 1.0e-6;
-/// Largest tilt that enters the formula.
+/// Largest tilt in the formula, radians.
 const MAX_TILT: f32 = 75.0 / 180.0 * std::f32::consts::PI;
 
 impl SensorNoise {
-    /// The axial term of Ahn et al., "Analysis and Noise Modeling of the Intel RealSense D435 for Mobile Robots", UR 2019:
-    /// σ = 0.001063 + 0.0007278 z + 0.003949 z².
+    /// The axial noise of the Intel RealSense D435: σ = 0.001063 + 0.0007278 z + 0.003949 z².
     ///
-    /// Coefficients as transcribed in public implementations; the paper itself was not consulted. For surfaces that
-    /// roughly face the camera. The same implementations have a tilt term of t = 0.022, of low confidence and left out here.
+    /// Source: Ahn et al., "Analysis and Noise Modeling of the Intel RealSense D435 for Mobile
+    /// Robots", UR 2019. The coefficients are those of public implementations; the paper itself was
+    /// not consulted. They hold for surfaces that roughly face the camera. The same implementations
+    /// have a tilt term of t = 0.022. It is omitted here because its confidence is low.
     #[must_use]
     pub fn d435_ahn2019_axial() -> Self {
         Self {
@@ -55,7 +61,9 @@ impl SensorNoise {
         }
     }
 
-    /// σ ∝ z²: a stereo sensor of constant disparity error, whose size does not matter to a weight.
+    /// The noise of a stereo sensor with a constant disparity error: σ ∝ z².
+    ///
+    /// A weight does not depend on the scale.
     #[must_use]
     pub fn stereo() -> Self {
         Self {
@@ -66,7 +74,7 @@ impl SensorNoise {
         }
     }
 
-    /// Returns σ in metres at an observed surfel (camera frame).
+    /// Returns σ in meters at an observed surfel, which is in the camera frame.
     #[must_use]
     pub fn sigma(&self, observed: &Surfel) -> f32 {
         let z = observed.point.z;
@@ -79,7 +87,7 @@ impl SensorNoise {
             };
             sigma += self.tilt * z.powf(1.5) * (term(n.x) + term(n.y));
         }
-        // In this order a NaN becomes the minimum.
+        // In this order, `max` turns a NaN into the minimum.
         sigma.max(MIN_SIGMA)
     }
 

@@ -9,17 +9,20 @@ use crate::scratch::Scratch;
 
 /// Keeps the closest share of the pairs (trimmed ICP, Chetverikov, Stepanov & Krsek 2005).
 ///
-/// Keeps the pairs at most as far apart as the ⌈keep·n⌉-th smallest of the n finite distances; whatever ties with it is
-/// kept too, so the result does not depend on the order of the pairs. Distances that are not finite go. Cost: O(pairs).
+/// The limit is the ⌈keep·n⌉-th smallest of the n finite distances. Ties with it are kept, too, so
+/// the result does not depend on the order of the pairs. Pairs whose distance is not finite are
+/// removed. Cost: O(pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trimmed {
-    /// The share that is kept: the expected overlap. 1 and more keeps all; 0, negative values and NaN remove every pair.
+    /// The kept share: the expected overlap.
+    ///
+    /// 1 or more keeps all. 0, negative values and NaN remove every pair.
     pub keep: f32,
     distances: Scratch<Vec<f32>>,
 }
 
 impl Trimmed {
-    /// Makes the filter.
+    /// Creates the filter.
     #[must_use]
     pub fn new(keep: f32) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Rejection of a share that the distances decide.
+//! Rejection of a share that depends on the distances.
 
 use hicp_core::{Correspondences, Iteration};
 
@@ -7,24 +7,26 @@ use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
 
-/// Keeps the closest share f of the pairs, with the f that minimises the fractional RMSD (Phillips, Liu & Tomasi 2007).
+/// Keeps the closest share f of the pairs, with the f that minimizes the fractional RMSD.
 ///
-/// FRMSD(f) = f^−λ·√(Σ of the f·n smallest d² / (f·n)) over f = i/n between `min_keep` and `max_keep`: the overlap need not be
-/// known. Of equally good shares the largest is taken, and whatever ties with the largest distance kept is kept too: equal
-/// distances all stay. Distances that are not finite go. Cost: O(n log n) for n pairs.
+/// Source: Phillips, Liu & Tomasi 2007. FRMSD(f) = f^−λ·√(Σ of the f·n smallest d² / (f·n)) is
+/// evaluated at f = i/n between `min_keep` and `max_keep`, so the overlap need not be known. Of
+/// equally good shares, the largest is used. Ties with the largest kept distance are kept, too, so
+/// equal distances are all kept. Pairs whose distance is not finite are removed. Cost: O(n log n)
+/// for n pairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VarTrimmed {
-    /// Smallest share considered; clamped to 0 … 1, and at least one pair. NaN counts as 0.
+    /// Smallest share to consider, clamped to 0 … 1, and at least one pair. NaN counts as 0.
     pub min_keep: f32,
-    /// Largest share considered; clamped to `min_keep` … 1. NaN counts as 0.
+    /// Largest share to consider, clamped to `min_keep` … 1. NaN counts as 0.
     pub max_keep: f32,
-    /// Exponent λ: the larger, the more pairs are kept. NaN keeps the largest share.
+    /// Exponent λ: a larger value keeps more pairs. NaN keeps the largest share.
     pub lambda: f32,
     distances: Scratch<Vec<f32>>,
 }
 
 impl VarTrimmed {
-    /// Makes the filter.
+    /// Creates the filter.
     #[must_use]
     pub fn new(min_keep: f32, max_keep: f32, lambda: f32) -> Self {
         Self {
@@ -37,7 +39,7 @@ impl VarTrimmed {
 }
 
 impl Default for VarTrimmed {
-    /// Shares from 5 % to 99 %, λ = 0.95 as Phillips et al. advise for points in three dimensions.
+    /// Shares from 5 % to 99 %, with λ = 0.95 as Phillips et al. recommend for three dimensions.
     fn default() -> Self {
         Self::new(0.05, 0.99, 0.95)
     }
@@ -59,7 +61,8 @@ impl OutlierFilter for VarTrimmed {
             if kept >= fewest {
                 let fraction = kept as f64 / n as f64;
                 let rmsd = (sum / kept as f64).sqrt() * fraction.powf(-lambda);
-                // Rounding must not tell equal values apart. A NaN never is the better one, but the last one stands if all are.
+                // Rounding must not separate equal values. A NaN is never better, but if all are
+                // NaN, the last one is used.
                 if rmsd <= best.0 * (1.0 + 1e-12) || rmsd.is_nan() {
                     best = (rmsd.min(best.0), *distance);
                 }

@@ -7,11 +7,11 @@ use hicp_core::internal::Work;
 
 /// Children of a node.
 const WIDTH: usize = 8;
-/// Upper bound on the number of levels of a tree over 2³² elements whose nodes are at least half full.
+/// Upper bound of the number of levels, for 2³² elements and nodes that are at least half full.
 const MAX_DEPTH: usize = 16;
 /// Marks a child that is a leaf.
 const LEAF: u32 = 1 << 31;
-/// Rounding may put the computed distance of a box a few units in the last place beyond that of an element inside it.
+/// Rounding may put the computed distance of a box slightly above that of an element inside it.
 const PRUNING_SLACK: f32 = 1.0 - 1.0e-6;
 
 /// An axis-aligned box.
@@ -35,7 +35,7 @@ pub(crate) trait Element {
     /// Returns the smallest box around the element.
     fn bounds(&self) -> Bounds;
 
-    /// Returns the point by which elements are divided between boxes.
+    /// Returns the point that decides into which box the element goes.
     fn center(&self) -> Point3<f32>;
 }
 
@@ -63,9 +63,10 @@ struct Node {
 
 /// A tree of boxes with eight children per node, so that a node takes a few vector operations.
 ///
-/// The tree divides elements of any shape and leaves the distance of an element to its owner. The owner keeps a copy of the
-/// elements in the tree's order ([`BoxTree::order`]), in which the elements of a leaf are consecutive. A position in that
-/// order is called a slot. Every leaf but the last has exactly `LEAF_SIZE` slots.
+/// It divides elements of any shape; their owner computes distances. The owner keeps a copy of the
+/// elements in the tree's order ([`BoxTree::order`]), in which the elements of a leaf are
+/// consecutive. A position in that order is called a slot. Every leaf but the last has exactly
+/// `LEAF_SIZE` slots.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BoxTree<const LEAF_SIZE: usize> {
     nodes: Vec<Node>,
@@ -90,7 +91,7 @@ impl<const LEAF_SIZE: usize> BoxTree<LEAF_SIZE> {
         &self.order
     }
 
-    /// Builds the node over the slots from `first` on, which hold `order`; returns its index.
+    /// Builds the node over the slots from `first` on, which hold `order`, and returns its index.
     fn build(&mut self, elements: &[impl Element], order: &mut [u32], mut first: usize) -> u32 {
         // There are fewer nodes and leaves than elements, which are counted in `u32`.
         #[allow(clippy::cast_possible_truncation)]
@@ -128,7 +129,9 @@ impl<const LEAF_SIZE: usize> BoxTree<LEAF_SIZE> {
         index
     }
 
-    /// Starts a search for the elements nearest to a point. A query that is not finite is near nothing.
+    /// Starts a search for the elements nearest to a point.
+    ///
+    /// If the query is not finite, nothing is found.
     #[inline(always)]
     pub(crate) fn leaves_near(&self, query: &Point3<f32>) -> LeavesNear<'_, LEAF_SIZE> {
         let finite = query.iter().all(|x| x.is_finite());
@@ -141,7 +144,7 @@ impl<const LEAF_SIZE: usize> BoxTree<LEAF_SIZE> {
     }
 }
 
-/// Returns the smallest box around some elements, which must not be none.
+/// Returns the smallest box around some elements, of which there must be at least one.
 fn bounds(elements: &[impl Element], order: &[u32]) -> Bounds {
     let boxes = order.iter().map(|i| elements[*i as usize].bounds());
     boxes
@@ -149,8 +152,9 @@ fn bounds(elements: &[impl Element], order: &[u32]) -> Bounds {
         .unwrap_or_else(|| unreachable!("a part without elements has no box"))
 }
 
-/// Splits at the median of the longest extent of the centers, so that the first half has whole leaves. A single leaf is not
-/// split.
+/// Splits at the median of the longest extent of the centers.
+///
+/// The first half has whole leaves. A single leaf is not split.
 fn halve<'a, const LEAF_SIZE: usize>(
     elements: &[impl Element],
     order: &'a mut [u32],
@@ -168,7 +172,7 @@ fn halve<'a, const LEAF_SIZE: usize>(
     let middle = (order.len() / 2)
         .next_multiple_of(LEAF_SIZE)
         .min(order.len() - 1);
-    // The index makes the order total, so the tree does not depend on how the selection works.
+    // The index makes the order total, so the tree does not depend on the selection algorithm.
     order.select_nth_unstable_by(middle, |a, b| {
         (center(*a)[axis].total_cmp(&center(*b)[axis])).then_with(|| a.cmp(b))
     });
@@ -186,8 +190,9 @@ pub(crate) struct LeavesNear<'a, const LEAF_SIZE: usize> {
 }
 
 impl<const LEAF_SIZE: usize> LeavesNear<'_, LEAF_SIZE> {
-    /// Returns the slots of the next leaf that may hold an element at a squared distance of at most `bound`, which must be
-    /// finite. The bound may shrink from call to call.
+    /// Returns the slots of the next leaf that may hold an element within a squared distance.
+    ///
+    /// `bound` must be finite, and may shrink from call to call.
     #[inline(always)]
     pub(crate) fn next(&mut self, bound: f32) -> Option<Range<usize>> {
         while self.depth > 0 {
@@ -207,11 +212,12 @@ impl<const LEAF_SIZE: usize> LeavesNear<'_, LEAF_SIZE> {
         None
     }
 
-    /// Pushes the children that may be near enough, in any order except that the nearest one is on top.
+    /// Pushes the children that may be near enough, in any order except that the nearest one is on
+    /// top.
     #[inline(always)]
     fn push_children(&mut self, node: &Node, bound: f32) {
         let distances = node.distances(&self.query);
-        // Finite, so that missing children are left out.
+        // The limit is finite, so that missing children are excluded.
         let limit = (bound / PRUNING_SLACK).min(f32::MAX);
         let mut near = 0;
         for (slot, distance) in distances.iter().enumerate() {

@@ -5,7 +5,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use crate::search::nearest::{Nearest, PointIndex};
 
-/// `None` without points: kiddo would return item 0 at an infinite distance.
+/// kiddo's k-d tree, or `None` without points: kiddo would return item 0 at an infinite distance.
 pub(crate) struct KdTree(Option<ImmutableKdTree<f32, 3>>);
 
 impl PointIndex for KdTree {
@@ -27,7 +27,7 @@ impl PointIndex for KdTree {
             .query(&query)
             .nearest_one::<SquaredEuclidean<f32>>()
             .execute();
-        // A query that is not finite "finds" item 0 at an infinite distance.
+        // For a query that is not finite, kiddo returns item 0 at an infinite distance.
         found.distance.is_finite().then_some(found.item)
     }
 }

@@ -1,4 +1,4 @@
-//! Nearest points, as the search structures report them.
+//! Nearest points, as the search structures return them.
 
 use hicp_core::Point3;
 
@@ -9,7 +9,7 @@ pub(crate) fn distance_squared(a: &Point3<f32>, b: &Point3<f32>) -> f32 {
     x * x + y * y + z * z
 }
 
-/// A point that a search found.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Nearest {
     /// Squared distance, m², finite.
@@ -19,13 +19,13 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    /// Comes after every point at a finite distance.
+    /// A result that comes after every point at a finite distance.
     pub(crate) const NONE: Self = Self {
         distance_squared: f32::MAX,
         element: u32::MAX,
     };
 
-    /// Compares by distance. Of equally near points, the one given first precedes.
+    /// Compares by distance. Of equally near points, the first precedes.
     #[inline(always)]
     pub(crate) fn precedes(&self, other: &Self) -> bool {
         self.distance_squared < other.distance_squared
@@ -40,7 +40,7 @@ pub(crate) trait PointIndex: Send + Sync + 'static {
 
     /// Returns the index of the point nearest to `query`.
     ///
-    /// `start` is one of the points at its true distance, or [`Nearest::NONE`]. A near one saves time. The answer does not
-    /// depend on it. Returns `None` if no point is at a finite distance.
+    /// `start` is one of the points at its true distance, or [`Nearest::NONE`]. A near one saves
+    /// time. The result does not depend on it. Returns `None` if no point is at a finite distance.
     fn nearest_from(&self, query: &Point3<f32>, start: Nearest) -> Option<u32>;
 }

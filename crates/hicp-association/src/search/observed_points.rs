@@ -16,8 +16,10 @@ pub(crate) struct ObservedPoints<T> {
 }
 
 impl<T: PointIndex> ObservedPoints<T> {
-    /// Returns the points of a stride. They are built once per observation, stride and kind of index, and shared by all
-    /// threads and hypotheses.
+    /// Returns the points of a stride.
+    ///
+    /// They are built once per observation, stride and kind of index, and shared by all threads and
+    /// hypotheses.
     pub(crate) fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
         let stride = targets.pixels(observation.n_surfels());
         observation.derived().get_or_build(u64::from(stride), || {
@@ -41,14 +43,15 @@ impl<T: PointIndex> ObservedPoints<T> {
         &self.index
     }
 
-    /// Returns the pixel index in the observation and the surfel of one that the index found.
+    /// Returns a surfel that the index found, and its pixel index in the observation.
     #[inline(always)]
     pub(crate) fn get(&self, element: u32) -> (u32, Surfel) {
         self.surfels[element as usize]
     }
 
-    /// Returns an element with its distance from `query`, to start a search from, or [`Nearest::NONE`] if there is no such
-    /// element.
+    /// Returns an element with its distance from `query`, as the start of a search.
+    ///
+    /// If there is no such element, returns [`Nearest::NONE`].
     #[inline(always)]
     pub(crate) fn start_at(&self, element: u32, query: &Point3<f32>) -> Nearest {
         match self.surfels.get(element as usize) {

@@ -5,12 +5,12 @@ use hicp_core::Point3;
 use crate::search::box_tree::BoxTree;
 use crate::search::nearest::{Nearest, PointIndex};
 
-/// Points of a leaf. Comparing two vectors of points costs less than visiting another node.
+/// Points per leaf. Comparing two vectors of points costs less than visiting another node.
 const LEAF_SIZE: usize = 16;
 
 /// A [`BoxTree`] over points.
 ///
-/// Answers are exact and depend on the points alone: of equally near points, the one given first is found.
+/// Results are exact and depend only on the points: of equally near points, the first is found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PointTree {
     tree: BoxTree<LEAF_SIZE>,
@@ -55,7 +55,7 @@ impl PointTree {
         self.search(query, Nearest::NONE, |_| true)
     }
 
-    /// Returns the nearest of those points whose index `accept` accepts.
+    /// Returns the nearest of the points whose index `accept` accepts.
     #[inline(always)]
     pub(crate) fn nearest_where(
         &self,
@@ -105,7 +105,8 @@ impl PointTree {
         });
     }
 
-    /// Passes points to `take` until no other point is within the squared distance that `take` returned last.
+    /// Passes points to `take` until no other point is within the squared distance that `take`
+    /// returned last.
     #[inline(always)]
     fn visit(&self, query: &Point3<f32>, mut bound: f32, mut take: impl FnMut(Nearest) -> f32) {
         let order = self.tree.order();
@@ -128,7 +129,9 @@ impl PointTree {
     }
 }
 
-/// Returns the squared distances of the points of a leaf, rounded as [`super::nearest::distance_squared`] rounds.
+/// Returns the squared distances of the points of a leaf.
+///
+/// They are rounded as in [`super::nearest::distance_squared`].
 #[inline(always)]
 fn distances(leaf: &[[f32; LEAF_SIZE]; 3], query: &Point3<f32>) -> [f32; LEAF_SIZE] {
     let mut distances = [0.0; LEAF_SIZE];
@@ -155,9 +158,9 @@ mod tests {
         (*state >> 40) as f32 / 16_777_216.0
     }
 
-    /// On a coarse grid, where ties are the rule.
+    /// Uses a coarse grid, where ties are common.
     #[test]
-    fn answers_are_those_of_a_search_of_all_points_whatever_the_start() {
+    fn results_equal_those_of_brute_force_for_every_start() {
         let mut state = 5;
         for count in [1, 2, 7, 8, 9, 16, 17, 63, 64, 65, 200, 1000, 4100] {
             for cells in [6.0, 1e6] {
@@ -191,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_found_without_points_or_for_a_query_that_is_not_finite() {
+    fn empty_trees_and_queries_that_are_not_finite_find_nothing() {
         assert_eq!(PointTree::new(&[]).nearest(&Point3::origin()), None);
         let tree = PointTree::new(&[Point3::origin()]);
         for x in [f32::NAN, f32::INFINITY, f32::MAX] {

@@ -1,12 +1,12 @@
-//! Distance from a point to a triangle.
+//! The distance from a point to a triangle.
 
 use hicp_core::Point3;
 
-/// Returns the point of the triangle (a, b, c) that is closest to `point` (Ericson, Real-Time Collision Detection, 2005,
-/// §5.1.5).
+/// Returns the point of the triangle (a, b, c) that is closest to `point`.
 ///
-/// The regions of the three corners, the three edges and the face are told apart by barycentric coordinates that are not yet
-/// normalized. Exact up to rounding for triangles of non-zero area.
+/// Source: Ericson, Real-Time Collision Detection, 2005, §5.1.5. Unnormalized barycentric
+/// coordinates distinguish the regions of the three corners, the three edges and the face. The
+/// result is exact up to rounding for triangles of non-zero area.
 pub(crate) fn closest_point(point: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));

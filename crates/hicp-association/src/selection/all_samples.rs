@@ -4,10 +4,11 @@ use hicp_core::{Context, Isometry3, Surfel};
 
 use crate::selection::point_selection::PointSelection;
 
-/// Selects all of the model's area-uniform surface samples, visible or not: the plain reading of O in §III-A.
+/// Selects all of the model's area-uniform surface samples, visible or not.
 ///
-/// Points of the hidden side are among them; nearest-neighbour association drags those onto the visible surface, which is
-/// why [`crate::VisibleSurface`] is the better choice where it can be rendered. Cost: a copy of the samples.
+/// It is the literal reading of O in §III-A. Nearest-neighbor association drags points of the
+/// hidden side onto the visible surface. If the model can be rendered, [`crate::VisibleSurface`] is
+/// therefore the better choice. Cost: a copy of the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AllSamples;
 

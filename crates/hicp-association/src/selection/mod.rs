@@ -1,4 +1,4 @@
-//! Selections: which model points are registered.
+//! Selections: the model points to register.
 
 pub(crate) mod all_samples;
 pub(crate) mod keep;

@@ -1,4 +1,4 @@
-//! Subsets of evenly distributed normals.
+//! Subsets with evenly distributed normals.
 
 use hicp_core::{Context, Isometry3, Surfel, UnitVector3};
 
@@ -7,21 +7,28 @@ use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::spread;
 use crate::selection::point_selection::PointSelection;
 
-/// Keeps `count` points of another selection whose normals are spread as evenly as possible over all directions
-/// (normal-space sampling, Rusinkiewicz & Levoy 2001).
+/// Keeps `count` points of another selection whose normals are spread evenly over all directions.
 ///
-/// Small features that hold an object from sliding (the flatness of a plate, the handle of a mug) have few points but
-/// directions of their own; this gives every direction the same say. Points are sorted into buckets by the direction of
-/// their normal: the cells of a grid on the six faces of a cube, of nearly equal solid angles. Every bucket gives the same
-/// number of points, or all that it has; points of a bucket are drawn evenly spaced in the order of the inner selection,
-/// which is kept. All are kept when there are not more than `count`. Cost: the inner selection, and O(points + buckets).
+/// Source: normal-space sampling, Rusinkiewicz & Levoy 2001. Small features that keep an object
+/// from sliding (the rim of a plate, the handle of a mug) have few points but distinct normals.
+/// Here every direction has the same influence.
+///
+/// Points are sorted into buckets by the direction of their normal. The buckets are the cells of a
+/// grid on the six faces of a cube, with nearly equal solid angles. Every bucket contributes the
+/// same number of points, or all that it has. The points of a bucket are evenly spaced in the order
+/// of the inner selection, which does not change. If there are at most `count` points, all are
+/// kept.
+///
+/// Cost: the inner selection, and O(points + buckets).
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSpace<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
-    /// How many points are kept.
+    /// Number of points to keep.
     pub count: usize,
-    /// Cells along an edge of the cube, so 6·resolution² buckets; 0 counts as 1, and above 64 as 64.
+    /// Cells along an edge of the cube, for 6·resolution² buckets.
+    ///
+    /// 0 counts as 1, and values above 64 count as 64.
     pub resolution: usize,
     scratch: Scratch<Vec<Bucket>>,
 }
@@ -34,11 +41,11 @@ struct Bucket {
     kept: usize,
 }
 
-/// The largest resolution that counts.
+/// The largest effective resolution.
 const MAX_RESOLUTION: usize = 64;
 
 impl<P> NormalSpace<P> {
-    /// Makes the selection.
+    /// Creates the selection.
     #[must_use]
     pub fn new(inner: P, count: usize, resolution: usize) -> Self {
         Self {
@@ -91,7 +98,9 @@ impl<P: PointSelection> PointSelection for NormalSpace<P> {
     }
 }
 
-/// Sets quotas that add up to `count`, fewer than there are points: equal, unless a bucket has not as many.
+/// Sets quotas with the sum `count`, which is less than the number of points.
+///
+/// Quotas are equal, unless a bucket has fewer points.
 fn share_out(count: usize, buckets: &mut [Bucket]) {
     // The largest level at which every bucket can give min(size, level) points.
     let total = |level: usize| -> usize { buckets.iter().map(|b| b.size.min(level)).sum() };
@@ -104,7 +113,8 @@ fn share_out(count: usize, buckets: &mut [Bucket]) {
             too_much = middle;
         }
     }
-    // What is left is less than one for each bucket that has more; evenly spaced ones of these give it.
+    // The rest is less than one point for each bucket that has more. It comes from evenly spaced
+    // buckets.
     let left = count - total(level);
     let richer = buckets.iter().filter(|b| b.size > level).count();
     let (mut rank, mut given) = (0, 0);
@@ -120,9 +130,9 @@ fn share_out(count: usize, buckets: &mut [Bucket]) {
     }
 }
 
-/// Returns the bucket of a direction: the face of the cube that it points through, and the cell there.
+/// Returns the bucket of a direction: the face of the cube that it points through, and its cell.
 ///
-/// The arc tangent of the position on the face makes cells of nearly equal solid angles.
+/// The arc tangent of the position on the face gives cells of nearly equal solid angles.
 fn bucket_of(normal: &UnitVector3<f32>, resolution: usize) -> usize {
     let axis = normal.iamax();
     let (major, second, third) = (normal[axis], normal[(axis + 1) % 3], normal[(axis + 2) % 3]);

@@ -1,16 +1,18 @@
-//! Selection of what the camera saw.
+//! Selection of the observed points.
 
 use hicp_core::{Context, Isometry3, RigidTransform, Surfel, se3};
 
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
 
-/// Selects the observed surfels, brought into the object frame at the stage's initial estimate.
+/// Selects the observed surfels, moved into the object frame at the stage's initial estimate.
 ///
-/// For associations of your own that start from the observation and search the model: `source[i]` is the i-th surfel of
-/// [`hicp_core::Observation::surfels`] at this stride, moved by the inverse of the initial estimate; moved back by it, it is
-/// where it was seen. Under an association that searches the observation every point would find itself. Nothing is selected at
-/// an estimate that is not finite. Cost: O(pixels of the grid).
+/// It is meant for custom associations that start from the observation and search the model.
+/// `source[i]` is the i-th surfel of [`hicp_core::Observation::surfels`] at this stride, moved by
+/// the inverse of the initial estimate. With an association that searches the observation, every
+/// point would find itself.
+///
+/// If the estimate is not finite, nothing is selected. Cost: O(pixels of the grid).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObservedSurface {
     /// Spacing of the selected pixels.
@@ -18,7 +20,7 @@ pub struct ObservedSurface {
 }
 
 impl Default for ObservedSurface {
-    /// Keeps about 2,000 points.
+    /// About 2,000 points.
     fn default() -> Self {
         Self {
             stride: Stride::AboutPoints(2000),

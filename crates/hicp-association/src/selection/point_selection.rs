@@ -3,19 +3,20 @@
 use hicp_core::internal::type_label;
 use hicp_core::{Context, Isometry3, Surfel};
 
-/// Chooses the model points oᵢ that a stage registers (the first of the five ICP components, §II).
+/// Selects the model points oᵢ that a stage registers (the first of the five ICP components, §II).
 ///
-/// Called once per stage run, at the stage's initial estimate. Points and normals are in the object frame, metres.
-/// `source` arrives empty. Selecting nothing is no error: the stage then ends with "no pairs".
+/// It is called once per stage run, at the stage's initial estimate. Points and normals are in the
+/// object frame, in meters. `source` is empty at the call. Selecting nothing is not an error: the
+/// stage then ends with "no pairs".
 ///
-/// A selection is pure: equal inputs give equal points, and `&mut self` is for scratch memory only.
+/// A selection is pure: equal inputs give equal points, and `&mut self` is scratch.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a point selection",
     label = "this must implement `PointSelection`",
     note = "`Icp::selection` accepts a `PointSelection`, or `()` for an association that starts from the observation"
 )]
 pub trait PointSelection {
-    /// Fills `source` with the chosen surfels.
+    /// Fills `source` with the selected surfels.
     fn select(
         &mut self,
         context: &mut Context<'_>,

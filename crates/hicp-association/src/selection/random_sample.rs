@@ -5,18 +5,20 @@ use hicp_core::{Context, Isometry3, Surfel};
 use crate::selection::all_samples::AllSamples;
 use crate::selection::point_selection::PointSelection;
 
-/// Keeps `count` points of another selection, drawn at random without replacement (Masuda, Sakaue & Yokoya 1996).
+/// Keeps `count` points of another selection, drawn at random without replacement.
 ///
-/// Every subset is equally likely; the order of the inner selection is kept (selection sampling, Knuth, TAOCP 2, §3.4.2,
-/// algorithm S). The draw depends on the seed and the number of points alone, so a stage that runs again draws the same: give
-/// the stages of a pipeline seeds of their own. All are kept when there are not more. Cost: the inner selection, and O(points).
+/// Source: Masuda, Sakaue & Yokoya 1996. Every subset is equally likely, and the order of the inner
+/// selection does not change (selection sampling, Knuth, TAOCP 2, §3.4.2, algorithm S). The draw
+/// depends only on the seed and the number of points, so a stage that runs again draws the same
+/// points. Give the stages of a pipeline different seeds. If there are at most `count` points, all
+/// are kept. Cost: the inner selection, and O(points).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RandomSample<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
-    /// How many points are kept.
+    /// Number of points to keep.
     pub count: usize,
-    /// Which draw; any value.
+    /// Seed of the draw, any value.
     pub seed: u64,
 }
 
@@ -42,7 +44,7 @@ impl<P: PointSelection> PointSelection for RandomSample<P> {
         let mut random = SplitMix64(self.seed);
         let (mut left, mut wanted) = (source.len() as u64, self.count as u64);
         source.retain(|_| {
-            // Each point is taken with probability wanted/left; once left = wanted, all are.
+            // Each point is selected with probability wanted/left. Once left = wanted, all are.
             let take = random.below(left) < wanted;
             left -= 1;
             if take {
@@ -57,7 +59,10 @@ impl<P: PointSelection> PointSelection for RandomSample<P> {
     }
 }
 
-/// Steele, Lea & Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014: the n-th output is a hash of seed + n·γ.
+/// The generator of Steele, Lea & Flood, "Fast splittable pseudorandom number generators", OOPSLA
+/// 2014.
+///
+/// The n-th output is a hash of seed + n·γ.
 struct SplitMix64(u64);
 
 impl SplitMix64 {

@@ -1,4 +1,4 @@
-//! Subsets that hold the object from sliding.
+//! Subsets that keep the object from sliding.
 
 use hicp_core::{Context, Isometry3, Matrix6, Point3, Surfel, Vector3, Vector6};
 
@@ -7,23 +7,27 @@ use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::keep_positions;
 use crate::selection::point_selection::PointSelection;
 
-/// Keeps `count` points of another selection that constrain all six degrees of freedom alike (geometrically stable sampling,
-/// Gelfand, Ikemoto, Rusinkiewicz & Levoy 2003).
+/// Keeps `count` points of another selection that constrain all six degrees of freedom alike.
 ///
-/// With vᵢ = [pᵢ × nᵢ; nᵢ], the point-to-plane error of a small motion x is Σ (vᵢ·x)², so the eigenvectors xₖ of Σ vᵢvᵢᵀ
-/// with small eigenvalues are motions in which the surfaces slide along each other. Points are drawn one after the other:
-/// whichever eigenvector has the smallest sum of (vᵢ·xₖ)² over the points drawn so far gets the point with the largest that
-/// is left. Positions are taken about their mean and divided by their mean distance from it, which makes rotations and
-/// translations comparable.
+/// Source: geometrically stable sampling, Gelfand, Ikemoto, Rusinkiewicz & Levoy 2003. With vᵢ =
+/// [pᵢ × nᵢ; nᵢ], the point-to-plane error of a small motion x is Σ (vᵢ·x)². The eigenvectors xₖ of
+/// Σ vᵢvᵢᵀ with small eigenvalues are motions in which the surfaces slide along each other.
 ///
-/// The order of the inner selection is kept; equal contributions go to the first. All points are kept when there are not
-/// more than `count`. Works best on what can be seen ([`crate::VisibleSurface`] inside): the hidden side constrains nothing.
+/// Points are drawn one after the other. Each draw serves the eigenvector with the smallest sum of
+/// (vᵢ·xₖ)² over the points drawn so far: it draws the remaining point with the largest
+/// contribution. Positions are relative to their mean and divided by their mean distance from it,
+/// which makes rotations and translations comparable.
+///
+/// The order of the inner selection does not change. Of equal contributions, the first is drawn. If
+/// there are at most `count` points, all are kept. It works best on visible points
+/// ([`crate::VisibleSurface`] inside), because the hidden side constrains nothing.
+///
 /// Cost: the inner selection, and O(6 n log n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct StableSampling<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
-    /// How many points are kept.
+    /// Number of points to keep.
     pub count: usize,
     scratch: Scratch<Buffers>,
 }
@@ -32,13 +36,13 @@ pub struct StableSampling<P> {
 struct Buffers {
     /// (vᵢ·xₖ)² for every point and eigenvector.
     contributions: Vec<[f64; 6]>,
-    /// For every eigenvector, the points by falling contribution.
+    /// For every eigenvector, the points by decreasing contribution.
     rankings: [Vec<u32>; 6],
     taken: Vec<bool>,
 }
 
 impl<P> StableSampling<P> {
-    /// Makes the selection.
+    /// Creates the selection.
     #[must_use]
     pub fn new(inner: P, count: usize) -> Self {
         Self {
@@ -64,7 +68,8 @@ impl<P: PointSelection> PointSelection for StableSampling<P> {
         source: &mut Vec<Surfel>,
     ) {
         self.inner.select(context, camera_from_object, source);
-        // What is not finite constrains nothing, and an eigendecomposition may not meet it.
+        // Points that are not finite constrain nothing, and an eigendecomposition must not receive
+        // them.
         source.retain(is_finite);
         if source.len() <= self.count {
             return;
@@ -80,7 +85,7 @@ impl<P: PointSelection> PointSelection for StableSampling<P> {
 }
 
 impl Buffers {
-    /// Marks `count` of the points as taken, fewer than there are.
+    /// Marks `count` of the points as taken, which is less than their number.
     fn choose(&mut self, source: &[Surfel], count: usize) {
         self.rank(source);
         self.taken.clear();
@@ -89,7 +94,7 @@ impl Buffers {
         let mut next = [0_usize; 6];
         for _ in 0..count {
             let weakest = (1..6).fold(0, |k, other| if sums[other] < sums[k] { other } else { k });
-            // There are more points than are drawn, so every ranking holds one that is left.
+            // There are more points than draws, so every ranking holds a remaining one.
             let Some(point) = self.rankings[weakest][next[weakest]..]
                 .iter()
                 .map(|point| *point as usize)

@@ -6,16 +6,17 @@ use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::{keep_positions, spread};
 use crate::selection::point_selection::PointSelection;
 
-/// Keeps `count` points of another selection, evenly spaced in its order (the uniform subsampling of Turk & Levoy 1994).
+/// Keeps `count` points of another selection, evenly spaced in its order.
 ///
-/// The order of the model's samples follows the surface area and that of a rendered surface the image, so even spacing in
-/// the order is an even spread: the i-th point kept is the one at position ⌊(i + ½)·n/count⌋ of n. All are kept when there
-/// are not more. Cost: the inner selection, and O(count).
+/// Source: the uniform subsampling of Turk & Levoy 1994. The order of the model's samples follows
+/// the surface area, and that of a rendered surface follows the image. Even spacing in the order is
+/// therefore an even spread. The i-th kept point is at position ⌊(i + ½)·n/count⌋ of n. If there
+/// are at most `count` points, all are kept. Cost: the inner selection, and O(count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UniformCount<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
-    /// How many points are kept.
+    /// Number of points to keep.
     pub count: usize,
 }
 

@@ -1,15 +1,17 @@
-//! Selection of what the camera would see.
+//! Selection of the visible points.
 
 use hicp_core::{Context, Isometry3, Point3, Surfel, UnitVector3};
 
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
 
-/// Selects the points of the model that are visible at the stage's initial estimate: the vertex map V_O of §III-A.1.
+/// Selects the points of the model that are visible at the stage's initial estimate.
 ///
-/// The model is rendered at the initial estimate (from the render cache when the score has already asked for it) and every
-/// rendered pixel on a grid anchored at the image's corner becomes a surfel, with the normal of its face turned toward the camera.
-/// Nothing is selected when the object is behind the camera or outside the image. Cost: one render, and O(rendered pixels).
+/// They are the vertex map V_O of §III-A.1. The model is rendered at the initial estimate; if the
+/// score has rendered it already, the render comes from the cache. Every rendered pixel on a grid
+/// that starts at the image's corner becomes a surfel, with the normal of its face toward the
+/// camera. If the object is behind the camera or outside the image, nothing is selected. Cost: one
+/// render, and O(rendered pixels).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VisibleSurface {
     /// Spacing of the selected pixels.
@@ -17,7 +19,7 @@ pub struct VisibleSurface {
 }
 
 impl Default for VisibleSurface {
-    /// Keeps about 2,000 points.
+    /// About 2,000 points.
     fn default() -> Self {
         Self {
             stride: Stride::AboutPoints(2000),

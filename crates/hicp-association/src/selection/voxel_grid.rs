@@ -8,22 +8,25 @@ use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::keep_positions;
 use crate::selection::point_selection::PointSelection;
 
-/// Keeps one point of another selection in every cell of a cubic grid: the one closest to the cell's centre.
+/// Keeps in every cell of a cubic grid the point of another selection closest to the center.
 ///
-/// Thins out dense regions only, so a rendered surface keeps its slanted parts, which a pixel grid samples sparsely per
-/// area. Chosen points are points of the surface with their own normals, unlike averages. The grid is anchored at the
-/// object's origin; the order of the inner selection is kept, and of equally central points the first. A cell size that is
-/// not positive keeps every point. Cost: the inner selection, and O(n log n).
+/// Only dense regions become sparser. A rendered surface therefore keeps its slanted parts, which a
+/// pixel grid samples sparsely per area. Unlike averages, kept points are points of the surface
+/// with their own normals.
+///
+/// The grid starts at the object's origin. The order of the inner selection does not change, and of
+/// equally central points the first is kept. A cell size that is not positive keeps every point.
+/// Cost: the inner selection, and O(n log n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelGrid<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
     /// Edge of a cell.
     pub cell: Length,
     scratch: Scratch<Vec<Entry>>,
 }
 
-/// A point's cell, its squared distance from the cell's centre in units of cells, and its position in the selection.
+/// A point's cell, its squared distance from the cell's center in units of cells, and its position.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     cell: [i64; 3],
@@ -32,7 +35,7 @@ struct Entry {
 }
 
 impl<P> VoxelGrid<P> {
-    /// Makes the selection.
+    /// Creates the selection.
     #[must_use]
     pub fn new(inner: P, cell: Length) -> Self {
         Self {
@@ -44,7 +47,7 @@ impl<P> VoxelGrid<P> {
 }
 
 impl Default for VoxelGrid<AllSamples> {
-    /// Cells of 5 % of the diameter: some 500 to 1,000 on the surface of a compact object.
+    /// Cells of 5 % of the diameter: about 500 to 1,000 on the surface of a compact object.
     fn default() -> Self {
         Self::new(AllSamples, Length::Diameters(0.05))
     }
@@ -68,7 +71,7 @@ impl<P: PointSelection> PointSelection for VoxelGrid<P> {
             let scaled = surfel.point / edge;
             let corner = scaled.map(f32::floor);
             #[allow(clippy::cast_possible_truncation)]
-            // Casts saturate; so fine a grid has no cells to share.
+            // Casts saturate, which is harmless: points do not share cells in so fine a grid.
             let cell = corner.coords.map(|x| x as i64).into();
             Entry {
                 cell,

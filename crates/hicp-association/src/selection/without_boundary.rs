@@ -6,27 +6,35 @@ use crate::boundary::BoundaryRule;
 use crate::selection::point_selection::PointSelection;
 use crate::selection::visible_surface::VisibleSurface;
 
-/// Drops those points of another selection that lie next to the silhouette or to a depth step of the rendered model.
+/// Removes points of another selection next to the silhouette or a depth step of the rendered
+/// model.
 ///
-/// There a slight misalignment decides what a pixel shows, so projective pairs are wrong most often. The model is rendered
-/// at the stage's initial estimate (once, see [`Context::view`]) and every point judged by the pixel that it projects to:
-/// dropped when that pixel shows nothing, or when a pixel at a chessboard distance of r ≤ `width` shows nothing or surface
-/// nearer or further by more than r·tan(`max_tilt_degrees`)/f of the nearer depth, f the smaller focal length in pixels. A point that is hidden is judged by what hides it. The
-/// border of the image is no silhouette. Points that project outside the image are dropped. Cost: the inner selection, one
-/// render, and O((2·width + 1)²) per point.
+/// At such points a slight misalignment decides which surface a pixel shows, so projective pairs
+/// are wrong most often. The model is rendered at the stage's initial estimate (once, see
+/// [`Context::view`]). Each point is judged at the pixel that it projects to. It is removed if one
+/// of these conditions holds:
+///
+/// - It projects outside the image, or its pixel shows no surface.
+/// - A pixel at a chessboard distance of r ≤ `width` shows no surface.
+/// - The depth of such a pixel differs by more than r·tan(`max_tilt_degrees`)/f of the nearer
+///   depth, with the smaller focal length f in pixels.
+///
+/// A hidden point is judged by the surface that hides it. The border of the image is not a
+/// silhouette. Cost: the inner selection, one render, and O((2·width + 1)²) per point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithoutBoundary<P> {
-    /// The selection to choose from.
+    /// The selection to select from.
     pub inner: P,
-    /// How many pixels wide the boundary is; above 64 counts as 64.
+    /// Width of the boundary, pixels. Values above 64 count as 64.
     pub width: u32,
-    /// Largest tilt of a surface against the image plane, degrees: what is steeper is a depth step. From 90 on nothing is. NaN
-    /// and negative values make everything a boundary, unless `width` is 0.
+    /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth step.
+    ///
+    /// From 90 on, nothing is. With NaN and negative values everything is, unless `width` is 0.
     pub max_tilt_degrees: f32,
 }
 
 impl Default for WithoutBoundary<VisibleSurface> {
-    /// The visible surface but for one pixel along the silhouette and where it is steeper than 85°.
+    /// The visible surface without one pixel along the silhouette and along steps steeper than 85°.
     fn default() -> Self {
         Self {
             inner: VisibleSurface::default(),

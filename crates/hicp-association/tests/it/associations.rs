@@ -1,6 +1,6 @@
-//! Associations against brute force.
+//! Tests of associations against brute force.
 
-// References are written as the definition reads; the numbers of a test are small.
+// References are written like the definitions. Their cost does not matter, since tests are small.
 
 use crate::common::{
     Random, Scene, ball_scene, blind_scene, box_mesh, bumpy_ball, hostile_poses, scene_of, squared,
@@ -44,14 +44,14 @@ fn moved(source: &[Surfel], pose: &Isometry3<f64>) -> Vec<Surfel> {
     source.iter().map(|s| mover.surfel(s)).collect()
 }
 
-/// The observed surfels by distance from a point, nearest first, of equally near ones the first.
+/// Returns the observed surfels by distance from a point. Of equally near ones, the first precedes.
 fn by_distance(targets: &[(u32, Surfel)], point: &Point3<f32>) -> Vec<(u32, Surfel)> {
     let mut sorted = targets.to_vec();
     sorted.sort_by(|a, b| squared(&a.1.point, point).total_cmp(&squared(&b.1.point, point)));
     sorted
 }
 
-/// Sources and targets are those that the indices name, and numbers are numbers.
+/// Checks that sources and targets are those of the indices, and that all numbers are finite.
 fn assert_well_formed(scene: &Scene, source: &[Surfel], pose: &Isometry3<f64>, pairs: &[Pair]) {
     let source = moved(source, pose);
     for pair in pairs {
@@ -64,7 +64,7 @@ fn assert_well_formed(scene: &Scene, source: &[Surfel], pose: &Isometry3<f64>, p
 }
 
 #[test]
-fn every_association_is_deterministic_whatever_it_did_before() {
+fn every_association_is_deterministic_after_any_use() {
     let (scene, other) = (ball_scene(), scene_of(box_mesh(0.05, 0.07, 0.03), 0.0, 3));
     let source = scene.select(&mut AllSamples, &scene.truth);
     let other_source = other.select(&mut AllSamples, &other.truth);
@@ -80,7 +80,7 @@ fn every_association_is_deterministic_whatever_it_did_before() {
 }
 
 #[test]
-fn hostile_input_gives_no_pair_that_is_not_finite() {
+fn hostile_input_gives_only_finite_pairs() {
     let (seeing, blind) = (ball_scene(), blind_scene());
     let mut source = Random::new(3).surfels(20, 0.1);
     source[4].point.y = f32::NAN;
@@ -107,13 +107,13 @@ fn hostile_input_gives_no_pair_that_is_not_finite() {
 
 #[cfg(feature = "kiddo")]
 #[test]
-fn all_trees_find_the_same() {
+fn all_indexes_give_equal_pairs() {
     let scene = ball_scene();
     let source = scene.select(&mut AllSamples, &scene.truth);
     let targets = Stride::Pixels(2);
     let mut ours = KNearest::new(1, targets);
     let mut theirs = NearestNeighbor::new(targets, SearchIndex::KdTree);
-    // From pose to pose it starts with the pairs of the last one.
+    // At each pose, the search starts from the pairs of the last one.
     let mut warm = NearestNeighbor::new(targets, SearchIndex::BoxTree);
     for seed in 0..5 {
         let pose = scene.nearby(seed);
@@ -126,9 +126,10 @@ fn all_trees_find_the_same() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// From near and far, at and behind the camera, next to the image, and from the pairs of another pose.
+    /// Points near and far, at and behind the camera, next to the image, and from the pairs of
+    /// another pose.
     #[test]
-    fn a_search_from_the_last_pairs_finds_what_a_new_one_finds(seed: u64, stride in 1_u32..6, spread in 0.0_f64..1.5) {
+    fn a_search_from_the_last_pairs_equals_a_new_search(seed: u64, stride in 1_u32..6, spread in 0.0_f64..1.5) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let mut source = Random::new(seed).surfels(40, 0.1);
         source.extend(scene.select(&mut AllSamples, &scene.truth).iter().take(40));
@@ -163,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn normal_compatible_takes_the_first_that_fits(seed: u64, angle in 5.0_f32..120.0) {
+    fn normal_compatible_selects_the_nearest_compatible_point(seed: u64, angle in 5.0_f32..120.0) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let source = Random::new(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
@@ -180,7 +181,7 @@ proptest! {
     }
 
     #[test]
-    fn normal_shooting_takes_what_is_closest_to_the_line(seed: u64, offset in 0.0005_f32..0.02) {
+    fn normal_shooting_selects_the_point_closest_to_the_line(seed: u64, offset in 0.0005_f32..0.02) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let source = Random::new(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
@@ -208,7 +209,7 @@ proptest! {
     fn reciprocal_keeps_the_mutual_nearest(seed: u64) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let mut source = Random::new(seed).surfels(60, 0.08);
-        // Two points at one place have the same claim.
+        // Two points at the same place have the same claim.
         source[7] = source[31];
         let pose = scene.nearby(seed);
         let mut forward = KNearest::new(3, ALL);
@@ -255,7 +256,7 @@ proptest! {
     }
 
     #[test]
-    fn observed_points_meet_the_nearest_sample(seed: u64, visible_only: bool, samples in 0_usize..800) {
+    fn observed_points_pair_with_the_nearest_sample(seed: u64, visible_only: bool, samples in 0_usize..800) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let pose = scene.nearby(seed);
         let stride = Stride::Pixels(2);
@@ -278,9 +279,10 @@ proptest! {
     }
 
     #[test]
-    fn observed_points_meet_the_closest_point_of_the_mesh(seed: u64, visible_only: bool) {
+    fn observed_points_pair_with_the_closest_point_of_the_mesh(seed: u64, visible_only: bool) {
         let mut random = Random::new(seed);
-        // A closed mesh, a closed one wound inward, and a soup of triangles with slivers and a degenerate one.
+        // A closed mesh, a closed one wound inward, and a soup of triangles with slivers and a
+        // degenerate one.
         let closed = bumpy_ball(0.08);
         let inward = TriMesh::new(closed.vertices().to_vec(),
             closed.triangles().iter().map(|[a, b, c]| [*a, *c, *b]).collect()).unwrap();
@@ -307,7 +309,7 @@ proptest! {
                 }).map(|t| distance_to_triangle(&query, &mesh.corners(t).map(|p| p.cast::<f64>())))
                     .fold(f64::INFINITY, f64::min);
                 prop_assert!((f64::from(pair.distance()) - best).abs() < 1e-6, "{} {best}", pair.distance());
-                // The pair's point is on the triangle that it names.
+                // The point of the pair is on the triangle of its index.
                 let on = pose.inverse() * pair.source.point.cast::<f64>();
                 let triangle = pair.source_index as usize;
                 let corners = mesh.corners(triangle).map(|p| p.cast::<f64>());
@@ -325,7 +327,8 @@ proptest! {
     }
 }
 
-/// By definition over a triangle: the foot on the plane when it is inside, else the nearest of the three edges.
+/// The definition for a triangle: the foot on the plane if it is inside, otherwise the nearest
+/// point of the three edges.
 fn distance_to_triangle(point: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
     let to_edge = |p: &Point3<f64>, q: &Point3<f64>| {
         let along = q - p;
@@ -344,14 +347,14 @@ fn distance_to_triangle(point: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f6
     }
 }
 
-/// An observation of everything that the image shows.
+/// Observes all pixels of an image.
 fn observe(depth: Vec<f32>, camera: PinholeCamera) -> Observation {
     let (width, height) = (camera.width(), camera.height());
     let depth = DepthImage::from_meters(width, height, depth).unwrap();
     Observation::new(depth, Mask::full(width, height), camera).unwrap()
 }
 
-/// A plane n·X = d as seen by the test camera.
+/// The depth of a plane n·X = d in the test camera.
 fn plane_depth(normal: &UnitVector3<f64>, offset: f64, camera: &PinholeCamera) -> Vec<f32> {
     (0..camera.height())
         .flat_map(|v| (0..camera.width()).map(move |u| (u, v)))
@@ -397,7 +400,7 @@ fn interpolation_is_exact_on_a_plane() {
             (normal.dot(&point.coords) + 0.5).abs() < 2e-6,
             "on the plane"
         );
-        // On the ray of the source.
+        // The point lies on the ray of the source.
         let ray = pair.source.point.cast::<f64>().coords;
         assert!(ray.cross(&point.coords).norm() < 1e-6);
         assert!(pair.target.normal.dot(&normal.cast()) > 1.0 - 1e-5);
@@ -430,7 +433,7 @@ fn nothing_is_interpolated_across_an_edge() {
     let plain = scene.associate(&mut Projective, &source, &identity);
     assert_eq!(pairs, plain);
     let depths: Vec<f32> = pairs.as_slice().iter().map(|p| p.target.point.z).collect();
-    // The fourth falls into the hole and has no pair.
+    // The fourth point falls into the hole and has no pair.
     assert_eq!(depths, [0.5, 0.6, 0.5, 0.6]);
     association.max_step = 1.0;
     let pairs = scene.associate(&mut association, &source[..1], &identity);
@@ -445,7 +448,7 @@ fn nothing_is_interpolated_across_an_edge() {
 }
 
 #[test]
-fn the_order_of_the_points_changes_nothing_but_theirs() {
+fn the_order_of_the_points_does_not_change_the_pairs() {
     let scene = ball_scene();
     let pose = scene.nearby(4);
     let source = Random::new(4).surfels(50, 0.08);
@@ -475,8 +478,8 @@ fn the_order_of_the_points_changes_nothing_but_theirs() {
 }
 
 #[test]
-fn many_equal_points_are_searched() {
-    // A fronto-parallel wall: hundreds of targets share a coordinate; queries in between tie.
+fn many_equal_coordinates_are_searched() {
+    // A fronto-parallel wall: hundreds of targets share a coordinate, and queries between them tie.
     let scene = scene_with(observe(vec![0.5; 64 * 48], crate::common::camera()));
     let source: Vec<Surfel> = (0..200)
         .map(|i| Surfel {

@@ -1,4 +1,4 @@
-//! Outlier filters: their limits, and how they chain.
+//! Tests of outlier filters: their limits and their chains.
 
 use crate::support::{Numbers, cuboid, depth_image};
 use hicp_association::{MaxDistance, MaxNormalAngle, OutlierFilter};
@@ -84,7 +84,7 @@ fn angles_up_to_the_limit_are_kept() {
 }
 
 #[test]
-fn equal_and_opposite_normals_survive_their_rounding() {
+fn limits_of_0_and_180_degrees_allow_for_rounding() {
     let mut numbers = Numbers(221);
     let mut pairs = Vec::new();
     for _ in 0..200 {
@@ -101,7 +101,7 @@ fn equal_and_opposite_normals_survive_their_rounding() {
     assert_eq!(kept(&mut MaxNormalAngle::degrees(179.0), &pairs).len(), 0);
 }
 
-/// Doubles the weights, and so tells how often it saw a pair.
+/// Doubles the weights, which counts the calls per pair.
 struct Doubling;
 
 impl OutlierFilter for Doubling {
@@ -145,12 +145,12 @@ fn tuples_apply_their_members_in_order() {
         left.iter().map(|(i, _)| *i).collect::<Vec<u32>>()
     };
     let (mut distance, mut angle) = (MaxDistance::meters(0.1), MaxNormalAngle::degrees(60.0));
-    // `Half` does not commute with the others, so the order shows.
+    // `Half` does not commute with the others, so the order matters.
     let a = kept(&mut (distance, angle, Half), &pairs);
     assert_eq!(a, in_turn(&mut [&mut distance, &mut angle, &mut Half]));
     let b = kept(&mut (Half, angle, distance), &pairs);
     assert_eq!(b, in_turn(&mut [&mut Half, &mut angle, &mut distance]));
-    assert_ne!(a, b, "the fixture must tell orders apart");
+    assert_ne!(a, b, "the fixture must distinguish orders");
     assert_eq!(kept(&mut (Half, Half, Half, Half, Half, Half), &pairs), [0]);
     assert_eq!(kept(&mut (), &pairs).len(), 64);
     assert_eq!(kept(&mut (distance,), &pairs), kept(&mut distance, &pairs));
@@ -167,7 +167,7 @@ fn tuples_apply_their_members_in_order() {
 }
 
 #[test]
-fn filters_may_weigh_and_keep_the_order() {
+fn filters_may_change_weights_and_keep_the_order() {
     let mut pairs: Correspondences = (0..5)
         .map(|i| Pair {
             source_index: i,
@@ -180,7 +180,7 @@ fn filters_may_weigh_and_keep_the_order() {
     assert!(pairs.as_slice().iter().map(|p| p.source_index).eq(0..5));
 }
 
-/// The first iteration of a stage over a problem.
+/// Returns the first iteration of a stage over a problem.
 fn at(problem: Problem<'_>) -> Iteration<'_> {
     Iteration::new(0, &hicp_core::Isometry3::identity(), problem)
 }

@@ -1,6 +1,6 @@
-//! Filters and weights against their definitions.
+//! Tests of filters and weights against their definitions.
 
-// References are written as the definition reads; the numbers of a test are small.
+// References are written like the definitions. Their cost does not matter, since tests are small.
 
 use std::sync::OnceLock;
 
@@ -33,7 +33,7 @@ fn pairs_at(distances: &[f32]) -> Vec<Pair> {
                 point: Point3::new(0.0, 0.0, 0.5),
                 normal: -Vector3::z_axis(),
             };
-            // Off the axis of z, where the sum of squares keeps small distances exact.
+            // Away from the z axis, where the sum of squares keeps small distances exact.
             let source = Surfel {
                 point: Point3::new(*distance, 0.0, 0.5),
                 ..target
@@ -50,7 +50,7 @@ fn indices(pairs: &[Pair]) -> Vec<u32> {
     pairs.iter().map(|p| p.source_index).collect()
 }
 
-/// Filters that look at distances, at their defaults.
+/// Filters that depend on distances, with their defaults.
 fn distance_filters() -> Vec<Box<dyn OutlierFilter>> {
     vec![
         Box::new(MaxDistance::new(Length::Meters(f32::INFINITY))),
@@ -76,7 +76,7 @@ fn all_filters() -> Vec<Box<dyn OutlierFilter>> {
 }
 
 #[test]
-fn equal_distances_all_stay() {
+fn equal_distances_are_all_kept() {
     for distances in [
         vec![0.0; 30],
         vec![0.003; 30],
@@ -92,7 +92,7 @@ fn equal_distances_all_stay() {
 }
 
 #[test]
-fn what_is_not_finite_goes_and_counts_for_nothing() {
+fn distances_that_are_not_finite_are_removed_and_ignored() {
     let distances = [
         0.002,
         f32::NAN,
@@ -116,7 +116,7 @@ fn what_is_not_finite_goes_and_counts_for_nothing() {
 }
 
 #[test]
-fn weights_stay_weights_whatever_comes() {
+fn weights_stay_finite_and_not_negative() {
     let mut random = Random::new(3);
     let mut pairs: Vec<Pair> = (0..50)
         .map(|i| Pair::new(i, random.surfel(0.5), i % 7, random.surfel(0.5)))
@@ -151,7 +151,7 @@ fn weights_stay_weights_whatever_comes() {
     }
 }
 
-/// The given distances sorted.
+/// Returns the sorted distances.
 fn sorted(distances: &[f32]) -> Vec<f32> {
     let mut sorted = distances.to_vec();
     sorted.sort_by(f32::total_cmp);
@@ -164,7 +164,7 @@ fn within(pairs: &[Pair], limit: f32) -> Vec<Pair> {
 }
 
 fn distances() -> impl Strategy<Value = Vec<f32>> {
-    // Whole millimetres, so that many tie.
+    // Integer millimeters, so that many are equal.
     prop::collection::vec((0_u16..40).prop_map(|mm| f32::from(mm) * 0.001), 1..120)
 }
 
@@ -172,7 +172,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn median_and_mad_follow_their_definitions(d in distances(), factor in 0.0_f32..4.0, floor in 0.0_f32..0.01) {
+    fn median_and_mad_equal_their_definitions(d in distances(), factor in 0.0_f32..4.0, floor in 0.0_f32..0.01) {
         let pairs = pairs_at(&d);
         let median = |values: &[f32]| sorted(values)[values.len() / 2];
         let center = median(&d);
@@ -194,7 +194,7 @@ proptest! {
     }
 
     #[test]
-    fn var_trimmed_minimises_the_fractional_rmsd(d in distances(), lambda in 0.1_f32..3.0) {
+    fn var_trimmed_minimizes_the_fractional_rmsd(d in distances(), lambda in 0.1_f32..3.0) {
         let pairs = pairs_at(&d);
         let kept = run(VarTrimmed::new(0.1, 0.9, lambda), &pairs);
         let (sorted, n) = (sorted(&d), d.len() as f64);
@@ -227,7 +227,7 @@ proptest! {
     }
 
     #[test]
-    fn the_order_of_the_pairs_changes_nothing_but_theirs(d in distances(), seed: u64) {
+    fn the_order_of_the_pairs_does_not_change_the_result(d in distances(), seed: u64) {
         let pairs = pairs_at(&d);
         let mut shuffled = pairs.clone();
         Random::new(seed).shuffle(&mut shuffled);
@@ -247,7 +247,7 @@ proptest! {
 }
 
 #[test]
-fn parameters_out_of_range_do_what_is_documented() {
+fn parameters_out_of_range_act_as_documented() {
     let pairs = pairs_at(&[0.001, 0.002, 0.003, 0.004]);
     for nothing in [f32::NAN, -1.0] {
         assert!(run(MedianDistance::new(nothing), &pairs).is_empty());
@@ -275,7 +275,7 @@ fn parameters_out_of_range_do_what_is_documented() {
 }
 
 #[test]
-fn too_few_pairs_are_none() {
+fn too_few_pairs_are_all_removed() {
     let pairs = pairs_at(&[0.001; 5]);
     assert_eq!(run(MinPairs { count: 5 }, &pairs), pairs);
     assert!(run(MinPairs { count: 6 }, &pairs).is_empty());
@@ -315,7 +315,7 @@ fn weights_multiply() {
         weights(run(DistanceWeight { max }, &pairs)),
         [2.0, 1.0, 0.0, 0.0]
     );
-    // A twentieth of the diameter and the same in metres.
+    // A twentieth of the diameter, and the same in meters.
     let meters = 0.05 * scene().model.diameter() as f32;
     assert_eq!(
         run(
@@ -346,8 +346,8 @@ fn weights_multiply() {
 }
 
 #[test]
-fn sensor_noise_follows_its_formula() {
-    // The published values at half a metre, one and two, in millimetres.
+fn sensor_noise_equals_its_formula() {
+    // The published values at 0.5 m, 1 m and 2 m, in millimeters.
     let ahn = SensorNoise::d435_ahn2019_axial();
     let facing = |z: f32, degrees: f32| {
         let (sine, cosine) = degrees.to_radians().sin_cos();
@@ -386,7 +386,7 @@ fn sensor_noise_follows_its_formula() {
         },
         &pairs,
     );
-    // 1/z⁴ over its mean, times the weight that was there.
+    // 1/z⁴ over its mean, times the previous weight.
     let mean = (1.0 + 2.0 / 16.0) / 3.0;
     for (pair, expected) in weighted.iter().zip([1.0, 1.0 / 16.0, 1.0 / 16.0]) {
         assert!((pair.weight - 2.0 * expected / mean).abs() < 1e-5);
@@ -398,7 +398,7 @@ fn sensor_noise_follows_its_formula() {
 }
 
 #[test]
-fn boundary_targets_follow_their_definition() {
+fn boundary_targets_equal_their_definition() {
     for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
         let (observation, region) = (&scene.observation, scene.observation.region());
         let pairs: Vec<Pair> = observation
@@ -449,7 +449,7 @@ fn boundary_targets_follow_their_definition() {
             assert_eq!(kept.len() == pairs.len(), width == 0);
             assert_eq!(kept.is_empty(), max_step.is_nan());
         }
-        // An index that there is not counts as boundary.
+        // An invalid index counts as boundary.
         let beyond = Pair {
             target_index: u32::MAX,
             ..pairs[0]
@@ -463,7 +463,7 @@ fn boundary_targets_follow_their_definition() {
 }
 
 #[test]
-fn strides_and_lengths_take_any_value() {
+fn strides_and_lengths_accept_any_value() {
     assert_eq!(Stride::Pixels(0).pixels(100), 1);
     assert_eq!(Stride::AboutPoints(0).pixels(0), 1);
     let scene = scene();
@@ -472,16 +472,17 @@ fn strides_and_lengths_take_any_value() {
     assert!(Length::Diameters(f32::NAN).meters(&problem).is_nan());
 }
 
-/// A limit in depth per pixel that fits one camera takes slanted surface for an edge in the next, with a quarter of the pixels.
+/// A limit in depth per pixel would treat slanted surface as an edge at a lower resolution.
 #[test]
-fn what_is_an_edge_does_not_depend_on_the_resolution() {
+fn edges_do_not_depend_on_the_resolution() {
     for zoom in [0.25, 1.0, 4.0] {
         let camera = PinholeCamera::new(120.0 * zoom, 120.0 * zoom, 31.5, 23.5, 64, 48).unwrap();
-        // A plane through (0, 0, 0.5), tilted by 80° about the image's vertical; then one by 88°.
+        // A plane through (0, 0, 0.5), tilted by 80° around the image's vertical, then one tilted
+        // by 88°.
         for (degrees, is_edge) in [(80.0_f64, false), (88.0, true)] {
             let slope = degrees.to_radians().tan();
             let depth = |u: f64| 0.5 / (1.0 - slope * (u - 31.5) / (120.0 * zoom));
-            // Near the axis alone: further out the rays meet the plane at another angle.
+            // Only near the axis: farther away, rays meet the plane at another angle.
             let columns = 30..34;
             let pixels = (0..48).flat_map(|_| {
                 (0..64).map(|u| {
@@ -501,7 +502,7 @@ fn what_is_an_edge_does_not_depend_on_the_resolution() {
                 point: Point3::new(0.0, 0.0, 0.5),
                 normal: -Vector3::z_axis(),
             };
-            // Columns 31 and 32 of row 24 have neighbours on both sides.
+            // Columns 31 and 32 of row 24 have neighbors on both sides.
             let region = scene.observation.region();
             let index = |u: u32| (24 - region.v_min) * region.width() as u32 + u - region.u_min;
             let pairs = [31, 32].map(|u| Pair::new(0, target, index(u), target));

@@ -1,4 +1,4 @@
-//! Nearest neighbours against brute force (pitfall 26).
+//! Tests of nearest neighbors against brute force (pitfall 26).
 
 use crate::support::{Numbers, RayCaster, cuboid, depth_image, observe_depth, sphere_depth};
 use hicp_association::{DataAssociation, NearestNeighbor, SearchIndex, Stride};
@@ -45,7 +45,7 @@ fn associate(
     pairs
 }
 
-/// Every source has a pair, in order, and no target of the stride is nearer than its own.
+/// Checks that every source has a pair, in order, and that no target of the stride is nearer.
 fn assert_nearest(
     observation: &Observation,
     stride: u32,
@@ -79,14 +79,14 @@ fn assert_nearest(
 }
 
 #[test]
-fn pitfall_26_the_tree_finds_what_brute_force_finds() {
+fn pitfall_26_the_tree_equals_brute_force() {
     let mut numbers = Numbers(201);
     let center = Vector3::new(0.02, 0.0, 0.5);
     let sphere = observe_depth(
         depth_image(&camera(), |ray| sphere_depth(&center, 0.12, &ray)),
         &camera(),
     );
-    // A fronto-parallel wall: thousands of points that share a coordinate to the bit.
+    // A fronto-parallel wall: thousands of points with the same coordinate to the bit.
     let wall = observe_depth(depth_image(&camera(), |_| 0.5), &camera());
     for observation in [&sphere, &wall] {
         assert!(observation.n_surfels() > 300);
@@ -102,9 +102,9 @@ fn pitfall_26_the_tree_finds_what_brute_force_finds() {
 }
 
 #[test]
-fn pitfall_26_duplicate_points_are_no_obstacle() {
-    // So far away that the rays of neighbouring pixels differ by less than f32 holds beside 1000 m … in a far corner of an
-    // image of focal length 1e9, all of whose points fall together.
+fn pitfall_26_duplicate_points_do_not_fail() {
+    // In a far corner of an image with a focal length of 1e9, the rays of neighboring pixels differ
+    // by less than the resolution of f32. All points coincide.
     let camera = PinholeCamera::new(1e9, 1e9, -1e9, 0.0, 64, 48).unwrap();
     let observation = observe_depth(depth_image(&camera, |_| 1.0), &camera);
     let points: Vec<Point3<f32>> = observation.surfels(1).map(|(_, s)| s.point).collect();
@@ -124,7 +124,7 @@ fn pitfall_26_duplicate_points_are_no_obstacle() {
 }
 
 #[test]
-fn pitfall_26_nothing_to_find_gives_no_pairs() {
+fn pitfall_26_an_empty_index_gives_no_pairs() {
     let mut numbers = Numbers(203);
     let source = surfels(&mut numbers, 20, 0.1);
     let wall = || depth_image(&camera(), |_| 0.5);
@@ -156,7 +156,7 @@ fn pitfall_26_nothing_to_find_gives_no_pairs() {
 }
 
 #[test]
-fn pitfall_26_queries_that_are_not_finite_have_no_pair_and_far_ones_have() {
+fn pitfall_26_only_queries_that_are_not_finite_have_no_pair() {
     let mut numbers = Numbers(204);
     let observation = observe_depth(depth_image(&camera(), |_| 0.5), &camera());
     let mut source = surfels(&mut numbers, 10, 0.1);
@@ -176,7 +176,8 @@ fn pitfall_26_queries_that_are_not_finite_have_no_pair_and_far_ones_have() {
         );
         let indices: Vec<u32> = pairs.as_slice().iter().map(|p| p.source_index).collect();
         assert_eq!(indices, [1, 2, 4, 5, 7, 8, 9]);
-        // A thousand kilometers away something is still nearest; where squares overflow nothing is.
+        // At a thousand kilometers there is still a nearest point. If squares overflow, there is
+        // none.
         for (distance, expected) in [(1e6, 10), (1e12, 10), (1e25, 0), (1e39, 0), (1e300, 0)] {
             let pose = Isometry3::translation(distance, 0.0, 0.0);
             let pairs = associate(&mut association, &observation, &finite, &pose);
@@ -187,7 +188,7 @@ fn pitfall_26_queries_that_are_not_finite_have_no_pair_and_far_ones_have() {
 }
 
 #[test]
-fn strides_leave_about_as_many_points_as_asked_for() {
+fn strides_keep_about_the_requested_number_of_points() {
     for n in [0_usize, 1, 10, 999, 1000, 1001, 4000, 40_000, 300_000] {
         for wanted in [0_usize, 1, 100, 1000, 4000] {
             let stride = f64::from(Stride::AboutPoints(wanted).pixels(n));
@@ -201,7 +202,7 @@ fn strides_leave_about_as_many_points_as_asked_for() {
         (Stride::Pixels(0).pixels(9), Stride::Pixels(7).pixels(9)),
         (1, 7)
     );
-    // The default takes every surfel of a small image and thins a large one.
+    // The default uses every surfel of a small image and a part of a large one.
     assert_eq!(NearestNeighbor::default().targets.pixels(4000), 1);
     assert_eq!(NearestNeighbor::default().targets.pixels(16_000), 2);
 }

@@ -1,6 +1,6 @@
-//! Selections against their definitions.
+//! Tests of nested selections against their definitions.
 
-// References are written as the definition reads; the numbers of a test are small.
+// References are written like the definitions. Their cost does not matter, since tests are small.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -50,7 +50,7 @@ fn all_selections() -> Vec<Box<dyn PointSelection>> {
     ]
 }
 
-/// The positions of `chosen` in `all`; panics unless it is a subset in order.
+/// Returns the positions of `chosen` in `all`, and panics unless it is a subset in order.
 fn positions(all: &[Surfel], chosen: &[Surfel]) -> Vec<usize> {
     let mut rest = all.iter().enumerate();
     chosen
@@ -86,7 +86,7 @@ fn every_selection_is_deterministic_and_clones_by_value() {
 }
 
 #[test]
-fn hostile_input_is_survived() {
+fn hostile_input_does_not_panic() {
     for scene in [ball_scene(), blind_scene()] {
         for mut selection in all_selections() {
             for pose in hostile_poses() {
@@ -126,7 +126,7 @@ fn hostile_input_is_survived() {
 }
 
 #[test]
-fn points_that_are_not_finite_break_nothing() {
+fn points_that_are_not_finite_do_not_panic() {
     let mut surfels = Random::new(2).surfels(40, 0.1);
     surfels[3].point.x = f32::NAN;
     surfels[7].point.z = f32::INFINITY;
@@ -178,12 +178,13 @@ fn random_samples_are_fair_and_follow_the_seed() {
         }
         pairs_drawn += u32::from(chosen.contains(&2) && chosen.contains(&11));
     }
-    // Expected 500 each, deviation √(2000·¼·¾) = 19; a given pair 2000·3·2/(12·11) = 91, deviation 9.3.
+    // Expected are 500 draws each, with a deviation of √(2000·¼·¾) = 19. For a given pair they are
+    // 2000·3·2/(12·11) = 91, with a deviation of 9.3.
     assert!(drawn.iter().all(|n| n.abs_diff(500) < 85), "{drawn:?}");
     assert!(u32::abs_diff(pairs_drawn, 91) < 42, "{pairs_drawn}");
 }
 
-/// Cell by cell, the most central point, first of equals.
+/// Returns the most central point of each cell, the first of equals.
 fn voxel_reference(surfels: &[Surfel], cell: f32) -> Vec<usize> {
     let mut cells: BTreeMap<[i64; 3], (f32, usize)> = BTreeMap::new();
     for (position, surfel) in surfels.iter().enumerate() {
@@ -212,10 +213,11 @@ proptest! {
             select_fixed(&mut VoxelGrid::new(Fixed(surfels.to_vec()), Length::Meters(cell)))
         };
         let chosen = grid(&surfels);
-        // A squared distance in units of cells may tie up to rounding: compare what is kept by its cell.
+        // Squared distances in units of cells may tie up to rounding, so compare kept points by
+        // cell.
         let expected = voxel_reference(&surfels, cell);
         prop_assert_eq!(positions(&surfels, &chosen), expected);
-        // The order of the points decides nothing but theirs.
+        // The order of the points does not change which are kept.
         random.shuffle(&mut surfels);
         let mut shuffled = grid(&surfels);
         prop_assert_eq!(shuffled.len(), chosen.len());
@@ -224,7 +226,7 @@ proptest! {
     }
 
     #[test]
-    fn normal_space_gives_every_direction_its_share(seed: u64, count in 1_usize..150) {
+    fn normal_space_selects_equally_from_every_direction(seed: u64, count in 1_usize..150) {
         let mut random = Random::new(seed);
         // Six directions of very different frequency, so that the buckets are known.
         let axes = [Vector3::x_axis(), -Vector3::x_axis(), Vector3::y_axis(), -Vector3::y_axis(),
@@ -246,14 +248,14 @@ proptest! {
     }
 
     #[test]
-    fn stable_sampling_follows_its_definition(seed: u64, count in 1_usize..60) {
+    fn stable_sampling_equals_its_definition(seed: u64, count in 1_usize..60) {
         let surfels = Random::new(seed).surfels(60, 0.1);
         let chosen = select_fixed(&mut StableSampling::new(Fixed(surfels.clone()), count));
         prop_assert_eq!(positions(&surfels, &chosen), stable_reference(&surfels, count));
     }
 }
 
-/// The rows [p × n; n] about the mean, in units of the mean distance from it.
+/// Returns the rows [p × n; n] relative to the mean, in units of the mean distance from it.
 fn constraints(surfels: &[Surfel]) -> Vec<Vector6<f64>> {
     let n = surfels.len() as f64;
     let points: Vec<Vector3<f64>> = surfels.iter().map(|s| s.point.coords.cast()).collect();
@@ -297,7 +299,7 @@ fn stable_reference(surfels: &[Surfel], count: usize) -> Vec<usize> {
 
 #[test]
 fn stable_sampling_finds_the_groove_of_a_plate() {
-    // A plate whose only hold against sliding along x and y are forty slanted points of a thousand.
+    // Only forty slanted points of a thousand keep this plate from sliding along x and y.
     let mut random = Random::new(6);
     let mut surfels: Vec<Surfel> = (0..1000)
         .map(|_| Surfel {
@@ -331,7 +333,7 @@ fn stable_sampling_finds_the_groove_of_a_plate() {
 }
 
 #[test]
-fn observed_surface_lies_where_it_was_seen() {
+fn observed_surface_lies_at_the_observed_points() {
     let scene = ball_scene();
     let pose = scene.nearby(2);
     let stride = Stride::Pixels(2);
@@ -347,7 +349,7 @@ fn observed_surface_lies_where_it_was_seen() {
 }
 
 #[test]
-fn without_boundary_follows_its_definition() {
+fn without_boundary_equals_its_definition() {
     for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
         let pose = scene.nearby(3);
         let stride = Stride::Pixels(1);

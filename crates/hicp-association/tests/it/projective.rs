@@ -1,4 +1,4 @@
-//! Projective association against its definition (pitfall 22).
+//! Tests of projective association against its definition (pitfall 22).
 
 use crate::support::{
     Numbers, RayCaster, cuboid, depth_image, observe, observe_depth, pose, wedge,
@@ -57,7 +57,8 @@ fn pitfall_22_every_point_is_paired_with_the_pixel_it_projects_to() {
             let here = found.next_if(|p| p.source_index == index);
             let moved = pose * surfel.point.cast::<f64>();
             let pixel = camera().project(&moved);
-            // Within a thousandth of a pixel's border, or of the camera plane, f32 may decide either way.
+            // Within a thousandth of a pixel's border, or of the camera plane, f32 may decide
+            // either way.
             let border = |x: f64| ((x + 0.5).round() - (x + 0.5)).abs() < 1e-3;
             if moved.z.abs() < 1e-4 || pixel.is_some_and(|p| border(p.x) || border(p.y)) {
                 continue;
@@ -90,7 +91,7 @@ fn pitfall_22_every_point_is_paired_with_the_pixel_it_projects_to() {
 }
 
 #[test]
-fn pitfall_22_points_behind_the_camera_and_broken_ones_have_no_pair() {
+fn pitfall_22_points_behind_the_camera_or_not_finite_have_no_pair() {
     let observation = observe_depth(depth_image(&camera(), |_| 0.5), &camera());
     let front = Point3::new(0.01, 0.02, 0.5);
     assert_eq!(
@@ -117,7 +118,7 @@ fn pitfall_22_points_behind_the_camera_and_broken_ones_have_no_pair() {
             assert!(associate(&observation, &[surfel(point)], &Isometry3::identity()).is_empty());
         }
     }
-    // A pose that is finite in f64 but not in f32 puts every point nowhere.
+    // A pose that is finite in f64 but not in f32 moves every point to infinity.
     for far in [1e39, 1e300, f64::MAX] {
         let pose = Isometry3::translation(0.0, 0.0, far);
         assert!(
@@ -135,7 +136,7 @@ fn pitfall_22_points_behind_the_camera_and_broken_ones_have_no_pair() {
     );
 }
 
-/// The surface seen at a pose, projected into the image rendered at that pose, falls on its own pixels.
+/// The surface rendered at a pose projects onto its own pixels in an image rendered at that pose.
 #[test]
 fn a_render_is_paired_with_itself() {
     let model = Model::new(wedge());
@@ -154,10 +155,10 @@ fn a_render_is_paired_with_itself() {
         assert!(source.len() > 300, "{}", source.len());
         let mut pairs = Correspondences::new();
         Projective.associate(&mut context, &source, &pose, &mut pairs);
-        // Only pixels whose neighbourhood carries no normal stay alone.
+        // Only pixels whose neighborhood has no normal have no pair.
         assert_eq!(pairs.len(), observation.n_surfels());
         for pair in pairs.as_slice() {
-            // There and back through the object frame: f32 of 0.3 m, thrice.
+            // To the object frame and back: three roundings of f32 at 0.3 m.
             assert!(pair.distance() < 1e-7, "{}", pair.distance());
         }
     }

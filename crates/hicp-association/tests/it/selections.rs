@@ -1,4 +1,4 @@
-//! Point selections: the pixels and normals of the visible surface, and all samples.
+//! Tests of point selections: the pixels and normals of the visible surface, and all samples.
 
 use crate::support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
 use hicp_association::{
@@ -28,9 +28,9 @@ fn select(
 }
 
 #[test]
-fn the_visible_surface_is_the_pixels_of_the_grid_and_faces_the_camera() {
+fn the_visible_surface_has_the_pixels_of_the_grid_and_faces_the_camera() {
     let mut numbers = Numbers(231);
-    // Inward winding must not turn the normals away.
+    // Inward winding must not flip the normals.
     let wedge_inside_out = {
         let mesh = wedge();
         let triangles = mesh
@@ -68,7 +68,8 @@ fn the_visible_surface_is_the_pixels_of_the_grid_and_faces_the_camera() {
             for (surfel, (u, v)) in source.iter().zip(expected) {
                 let point = at * surfel.point.cast::<f64>();
                 let pixel = camera().project(&point).unwrap();
-                // f32 of the object's 6 cm: 4e-9 m, at 0.2 m and f = 84 a millionth of a pixel.
+                // The resolution of f32 at the object's 6 cm is 4e-9 m: at 0.2 m with f = 84, a
+                // millionth of a pixel.
                 assert!(
                     (pixel.x - f64::from(u)).abs() < 1e-5 && (pixel.y - f64::from(v)).abs() < 1e-5
                 );
@@ -92,7 +93,7 @@ fn the_visible_surface_is_the_pixels_of_the_grid_and_faces_the_camera() {
 }
 
 #[test]
-fn about_so_many_points() {
+fn strides_select_about_the_requested_number_of_points() {
     let model = Model::new(cuboid(0.1, 0.1, 0.1));
     let at = pose(0.0, 0.0, 0.3, 0.3, 0.4, 0.0);
     let observation = observe(&model, &camera(), &at);
@@ -118,14 +119,15 @@ fn about_so_many_points() {
             &at,
         );
         assert_eq!(found, thinned.len());
-        // Within a factor of two; a grid holds its share of a compact region, up to the region's border.
+        // Within a factor of two. A grid covers its share of a compact region, up to the region's
+        // border.
         assert!(found <= 2 * points + points / 3, "{found} of {points}");
         assert!(found == all || found >= points / 3, "{found} of {points}");
     }
 }
 
 #[test]
-fn what_is_not_seen_is_not_selected() {
+fn invisible_objects_give_no_points() {
     let model = Model::new(cuboid(0.1, 0.1, 0.1));
     let observation = observe(&model, &camera(), &pose(0.0, 0.0, 0.3, 0.0, 0.0, 0.0));
     for at in [
@@ -139,7 +141,7 @@ fn what_is_not_seen_is_not_selected() {
 }
 
 #[test]
-fn all_samples_are_all_samples() {
+fn all_samples_selects_every_sample() {
     let config = ModelConfig {
         samples: 77,
         ..ModelConfig::default()
@@ -155,7 +157,7 @@ fn all_samples_are_all_samples() {
 }
 
 #[test]
-fn boxed_and_static_components_are_one() {
+fn boxed_and_static_components_give_equal_bits() {
     let model = Model::new(wedge());
     let at = pose(0.0, 0.0, 0.25, 0.4, 0.2, 0.1);
     let observation = observe(&model, &camera(), &at);

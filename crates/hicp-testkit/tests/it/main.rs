@@ -11,4 +11,5 @@
 
 mod broken;
 mod built_in;
+mod documented;
 mod fusers;

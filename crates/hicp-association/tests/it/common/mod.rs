@@ -1,6 +1,4 @@
-//! Scenes that the tests of this crate share: small meshes, a ray-casting renderer, and observations made with it.
-
-// Every test file uses a part, and compiles it into itself.
+//! Scenes for the tests of this crate: small meshes, a ray-casting renderer, and observations.
 
 use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
 use hicp_core::Iteration;
@@ -10,7 +8,7 @@ use hicp_core::{
     Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
 };
 
-/// Numbers from a seed (xorshift64*), so that a failing case can be repeated.
+/// A seeded generator (xorshift64*), so that a failing case can be repeated.
 pub struct Random(u64);
 
 impl Random {
@@ -18,7 +16,7 @@ impl Random {
         Self(seed.wrapping_mul(2).wrapping_add(0x9e37_79b9_7f4a_7c15) | 1)
     }
 
-    /// A number in 0 … 1.
+    /// Returns a number in 0 … 1.
     pub fn unit(&mut self) -> f32 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -63,7 +61,7 @@ impl Random {
         }
     }
 
-    /// A motion of up to `angle` radians about each axis and `shift` metres along each.
+    /// Returns a motion of up to `angle` radians around each axis and `shift` meters along each.
     pub fn motion(&mut self, angle: f32, shift: f32) -> Isometry3<f64> {
         let (turn, shift) = (self.point(angle).coords, self.point(shift).coords);
         Isometry3::from_parts(
@@ -77,7 +75,7 @@ pub fn camera() -> PinholeCamera {
     PinholeCamera::new(90.0, 95.0, 31.2, 23.9, 64, 48).unwrap()
 }
 
-/// A box with the given half sides, wound outward, metres.
+/// A box with the given half sides in meters, wound outward.
 pub fn box_mesh(x: f32, y: f32, z: f32) -> TriMesh {
     let vertices = (0..8)
         .map(|i| {
@@ -100,7 +98,7 @@ pub fn box_mesh(x: f32, y: f32, z: f32) -> TriMesh {
     TriMesh::new(vertices, triangles).unwrap()
 }
 
-/// A bumpy ball of about 400 triangles, wound outward, metres.
+/// A bumpy ball of about 400 triangles, wound outward, in meters.
 pub fn bumpy_ball(radius: f32) -> TriMesh {
     let (rows, columns) = (12_u32, 18_u32);
     let mut vertices = vec![Point3::new(0.0, 0.0, radius)];
@@ -133,7 +131,7 @@ pub fn bumpy_ball(radius: f32) -> TriMesh {
     TriMesh::new(vertices, triangles).unwrap()
 }
 
-/// Renders by casting a ray through every pixel against every triangle.
+/// A renderer that intersects the ray of every pixel with every triangle.
 pub struct RayCaster;
 
 impl Renderer for RayCaster {
@@ -174,7 +172,7 @@ impl Renderer for RayCaster {
     }
 }
 
-/// A model, what was seen of it, and where it was.
+/// A model, its observation, and its true pose.
 pub struct Scene {
     pub model: Model,
     pub observation: Observation,
@@ -186,7 +184,7 @@ impl Scene {
         Problem::new(&self.model, &self.observation)
     }
 
-    /// A pose near the true one.
+    /// Returns a pose near the true one.
     pub fn nearby(&self, seed: u64) -> Isometry3<f64> {
         let offset = Random::new(seed).motion(0.1, 0.01);
         self.truth * offset
@@ -232,7 +230,7 @@ impl Scene {
         pairs.as_slice().to_vec()
     }
 
-    /// The observed surfels of a stride with their indices.
+    /// Returns the observed surfels of a stride with their indices.
     pub fn targets(&self, stride: u32) -> Vec<(u32, Surfel)> {
         self.observation
             .surfels(stride)
@@ -241,7 +239,7 @@ impl Scene {
     }
 }
 
-/// The mesh at a pose half a metre away, seen by the ray caster, with some depth noise.
+/// A mesh at a distance of 0.5 m, observed by the ray caster with some depth noise.
 pub fn scene_of(mesh: TriMesh, noise: f32, seed: u64) -> Scene {
     let mut random = Random::new(seed);
     let truth = Isometry3::translation(0.01, -0.02, 0.5) * random.motion(1.5, 0.0);
@@ -280,7 +278,7 @@ pub fn ball_scene() -> Scene {
     scene_of(bumpy_ball(0.08), 0.001, 5)
 }
 
-/// The ball, and an image in which nothing was seen.
+/// The ball, with an empty image.
 pub fn blind_scene() -> Scene {
     let mut scene = ball_scene();
     scene.observation = Observation::new(
@@ -292,7 +290,7 @@ pub fn blind_scene() -> Scene {
     scene
 }
 
-/// Poses at which nothing sensible can be done.
+/// Poses at which no useful result exists.
 pub fn hostile_poses() -> Vec<Isometry3<f64>> {
     vec![
         Isometry3::translation(f64::NAN, 0.0, 0.5),
