@@ -6,17 +6,21 @@ use crate::metric::minimize::Minimize;
 use crate::system::degeneracy::Degeneracy;
 use crate::system::normal_equations::NormalEquations;
 
-/// A metric whose normal equations are solved with a [`Degeneracy`] policy of choice.
+/// Solves the normal equations of a metric with a chosen [`Degeneracy`] policy.
 ///
-/// The step is Gauss–Newton's, also for metrics with a closed form. Cost of `Freeze` and `Refuse`: an eigen-decomposition of a
-/// 6×6 matrix per step.
+/// The step is that of Gauss–Newton, even for metrics with a closed form. Cost of `Freeze` and
+/// `Refuse`: an eigendecomposition of a 6×6 matrix per step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditioned<M> {
-    /// What is minimised.
+    /// The metric to minimize.
     pub metric: M,
-    /// What to do in degenerate directions; default [`Degeneracy::Freeze`], as `Damp` is what metrics do anyway.
+    /// The treatment of degenerate directions.
+    ///
+    /// The default is [`Degeneracy::Freeze`], since metrics use `Damp` without this decorator.
     pub policy: Degeneracy,
-    /// Largest ratio to the largest eigenvalue of the scaled JᵀWJ that is degenerate; default [`Degeneracy::THRESHOLD`], 10⁻³.
+    /// Largest eigenvalue of a degenerate direction, relative to the largest of the scaled JᵀWJ.
+    ///
+    /// The default is [`Degeneracy::THRESHOLD`], 10⁻³.
     pub threshold: f64,
 }
 

@@ -9,31 +9,35 @@ use crate::system::normal_equations::NormalEquations;
 /// The axes along which motion is frozen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Frame {
-    /// The camera's: x right, y down, z along the optical axis.
+    /// The camera frame: x right, y down, z along the optical axis.
     #[default]
     Camera,
-    /// The object's, at the pose that the pairs were made at.
+    /// The object frame at the pose of the pairs.
     Object,
 }
 
-/// A metric minimised over some of the six degrees of freedom: the others' components of the increment are exactly zero.
+/// Minimizes a metric over some of the six degrees of freedom; the others do not change.
 ///
-/// `translation` is the displacement of the object's origin, `rotation` the rotation vector about that origin, both along the axes
-/// of `frame`. Freezing the rotation about the axis of a bottle, or the height of what stands on a table, are the uses. The
-/// components of one increment are zero; several turns about two axes compose to a small one about the third, as rotations do.
+/// Frozen components of the increment are exactly zero. `translation` is the displacement of the
+/// object's origin, and `rotation` the rotation vector around that origin, both along the axes of
+/// `frame`. Examples are the rotation around the axis of a bottle, or the height of an object on a
+/// table. The components of each increment are zero. Several rotations around two axes still
+/// compose to a small one around the third.
 ///
-/// The constraint is on the normal equations (the loss is minimised over what is free, the rest is not cut off after), so the step is
-/// Gauss–Newton's also for metrics with a closed form. With nothing frozen it is the metric's own, bit for bit; with all
-/// frozen it is the identity. Nested in another, the outer one alone counts. Needs as many rows as unknowns are free.
+/// The constraint applies to the normal equations: the loss is minimized over the free components,
+/// instead of cutting off the others later. The step is therefore that of Gauss–Newton, even for
+/// metrics with a closed form. If nothing is frozen, it is the metric's own step, bit for bit. If
+/// all is frozen, it is the identity. Of nested `Frozen`, only the outer one counts. It needs as
+/// many rows as free unknowns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frozen<M> {
-    /// What is minimised.
+    /// The metric to minimize.
     pub metric: M,
-    /// Which axes; default the camera's.
+    /// The axes; by default those of the camera.
     pub frame: Frame,
-    /// True where the object's origin must not move along that axis; default all false.
+    /// Axes along which the object's origin must not move; by default none.
     pub translation: [bool; 3],
-    /// True where the object must not turn about that axis; default all false.
+    /// Axes around which the object must not rotate; by default none.
     pub rotation: [bool; 3],
 }
 

@@ -6,26 +6,31 @@ use crate::decorator::moved::{compose, move_sources};
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 
-/// Iterates Gauss–Newton over one set of pairs: the sources are moved by the increment so far and linearised anew.
+/// Iterates Gauss–Newton over one set of pairs, linearizing again at the moved sources.
 ///
-/// Worth it where a turn of association costs more than a few passes over its pairs, and turns are large: one linearised step
-/// of point-to-plane leaves 4° of 15°. Whatever the metric does in `minimize`, this solves its [`Minimize::system`]. The increment is the
-/// product of the inner ones; the mean loss is the one *before* it. The loss may rise, see [`crate::LevenbergMarquardt`].
+/// It pays if associating costs more than a few passes over the pairs, and rotations are large: one
+/// linearized point-to-plane step leaves 4° of 15°. It always solves the metric's
+/// [`Minimize::system`], whatever its `minimize` does. The increment is the product of the inner
+/// ones. The mean loss is that *before* the increment. The loss may rise, see
+/// [`crate::LevenbergMarquardt`].
 ///
-/// No step where the first linearisation gives none; a later one ends the iterations.
+/// If the first linearization gives no step, neither does this. A later one without a step ends the
+/// iterations.
 #[derive(Clone, Debug)]
 pub struct GaussNewton<M> {
-    /// What is minimised.
+    /// The metric to minimize.
     pub metric: M,
-    /// Largest number of inner steps; default 10. Zero moves nothing.
+    /// Largest number of inner steps; default 10. Zero gives the identity.
     pub max_iterations: usize,
-    /// Ends when a step's length, with rotations as displacements at the RMS radius, is at most this share of that radius; default 10⁻⁶.
+    /// Relative step length at which the iterations end; default 10⁻⁶.
+    ///
+    /// It is relative to the RMS radius. Rotations count as displacements at that radius.
     pub tolerance: f64,
     moved: Correspondences,
 }
 
 impl<M> GaussNewton<M> {
-    /// Iterates a metric with the default limits.
+    /// Creates the decorator with the default limits.
     #[must_use]
     pub fn new(metric: M) -> Self {
         Self {

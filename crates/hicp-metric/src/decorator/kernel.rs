@@ -1,8 +1,9 @@
-//! Robust kernels: how much a residual counts, by its size.
+//! Robust kernels: the influence of a residual by its size.
 
-/// A robust loss ρ(x) of a residual x = r/σ, with its weight for iteratively re-weighted least squares.
+/// A robust loss ρ(x) of a residual x = r/σ, with its weight for iteratively reweighted least
+/// squares.
 ///
-/// [`Kernel`] holds the usual ones; implement this trait for another one.
+/// [`Kernel`] has the usual ones. Implement this trait for a custom kernel.
 ///
 /// ```
 /// use hicp_metric::{PointToPlane, Robust, RobustKernel, Scale};
@@ -30,10 +31,12 @@
     note = "`Robust::kernel` accepts a `Kernel` or any type with `weight` and `loss`"
 )]
 pub trait RobustKernel {
-    /// Returns w(x) = ρ′(x)/x; x = r/σ has no unit. At most 1, w(0) = 1, even, and not increasing with |x|.
+    /// Returns the weight w(x) = ρ′(x)/x, where x = r/σ has no unit.
+    ///
+    /// It must be even and at most 1, with w(0) = 1, and must not increase with |x|.
     fn weight(&self, x: f64) -> f64;
 
-    /// Returns ρ(x), ρ(0) = 0 and ρ(x) ≈ x²/2 near zero.
+    /// Returns the loss ρ(x), with ρ(0) = 0 and ρ(x) ≈ x²/2 near zero.
     fn loss(&self, x: f64) -> f64;
 }
 
@@ -49,18 +52,19 @@ impl RobustKernel for Kernel {
     }
 }
 
-/// Smaller ones would overflow in the square.
+/// Smallest tuning constant: the square of a smaller one would overflow.
 const MIN_CONSTANT: f64 = 1e-9;
 
-/// A robust loss ρ(x) of a residual x = r/σ, and its weight w(x) = ρ′(x)/x for iteratively re-weighted least squares.
+/// The usual robust losses ρ(x) of a residual x = r/σ, with their weights w(x) = ρ′(x)/x.
 ///
-/// One parametrisation throughout: ρ(x) ≈ x²/2 near zero, so w(0) = 1; w is even, finite and does not increase with |x|; the
-/// tuning constant is in units of σ. The named constants have 95 % efficiency for Gaussian residuals (Holland & Welsch 1977;
-/// Zhang 1997). Other libraries write "Cauchy" and "Geman–McClure" with other constants of other widths.
+/// All use the same parametrization. Near zero ρ(x) ≈ x²/2, so w(0) = 1; w is even, finite and does
+/// not increase with |x|. The tuning constant is in units of σ. The named constants have 95 %
+/// efficiency for Gaussian residuals (Holland & Welsch 1977; Zhang 1997). Other libraries use
+/// "Cauchy" and "Geman–McClure" with different constants and widths.
 ///
-/// Convex kernels (`L2`, `Huber`, `Fair`) have one minimum and bounded influence; `Cauchy`'s falls off, and `GemanMcClure`,
-/// `Welsch` and `Tukey` reject what is far off, which asks for a start that is not.
-/// Constants below 10⁻⁹ are taken as 10⁻⁹.
+/// Convex kernels (`L2`, `Huber`, `Fair`) have one minimum and a bounded influence. The influence
+/// of `Cauchy` decreases for large residuals. `GemanMcClure`, `Welsch` and `Tukey` reject large
+/// residuals and therefore need a good initial pose. Constants below 10⁻⁹ count as 10⁻⁹.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Kernel {
@@ -72,29 +76,33 @@ pub enum Kernel {
     Fair(f64),
     /// ρ = c²/2 ln(1 + (x/c)²), also Lorentzian. w = 1/(1 + (x/c)²).
     Cauchy(f64),
-    /// ρ = x²/2 / (1 + (x/c)²), the textbook form (Geman & McClure 1985 with a width). w = c⁴/(c² + x²)².
+    /// ρ = x²/2 / (1 + (x/c)²), the textbook form (Geman & McClure 1985 with a width).
+    ///
+    /// w = c⁴/(c² + x²)².
     GemanMcClure(f64),
     /// ρ = c²/2 (1 − exp(−(x/c)²)), also Leclerc. w = exp(−(x/c)²).
     Welsch(f64),
-    /// ρ = c²/6 (1 − (1 − (x/c)²)³) up to c, c²/6 beyond (Beaton & Tukey 1974). w = (1 − (x/c)²)², 0 beyond.
+    /// ρ = c²/6 (1 − (1 − (x/c)²)³) up to c, c²/6 beyond (Beaton & Tukey 1974).
+    ///
+    /// w = (1 − (x/c)²)² up to c, 0 beyond.
     Tukey(f64),
 }
 
 impl Kernel {
-    /// k = 1.345.
+    /// Huber's kernel with 95 % efficiency, k = 1.345.
     pub const HUBER: Self = Self::Huber(1.345);
-    /// c = 1.3998.
+    /// The fair kernel with 95 % efficiency, c = 1.3998.
     pub const FAIR: Self = Self::Fair(1.3998);
-    /// c = 2.3849.
+    /// Cauchy's kernel with 95 % efficiency, c = 2.3849.
     pub const CAUCHY: Self = Self::Cauchy(2.3849);
-    /// c = 3.7874.
+    /// Geman and McClure's kernel with 95 % efficiency, c = 3.7874.
     pub const GEMAN_MCCLURE: Self = Self::GemanMcClure(3.7874);
-    /// c = 2.9846.
+    /// Welsch's kernel with 95 % efficiency, c = 2.9846.
     pub const WELSCH: Self = Self::Welsch(2.9846);
-    /// c = 4.6851.
+    /// Tukey's kernel with 95 % efficiency, c = 4.6851.
     pub const TUKEY: Self = Self::Tukey(4.6851);
 
-    /// Returns w(x) = ρ′(x)/x, in [0, 1]; x = r/σ has no unit.
+    /// Returns the weight w(x) = ρ′(x)/x, in [0, 1], where x = r/σ has no unit.
     ///
     /// ```
     /// use hicp_metric::Kernel;
@@ -119,7 +127,7 @@ impl Kernel {
         }
     }
 
-    /// Returns ρ(x), at most x²/2.
+    /// Returns the loss ρ(x), at most x²/2.
     #[must_use]
     #[inline]
     pub fn loss(&self, x: f64) -> f64 {
@@ -129,12 +137,12 @@ impl Kernel {
             Self::L2 => 0.5 * x * x,
             Self::Huber(_) if u <= 1.0 => 0.5 * x * x,
             Self::Huber(_) => c * (x.abs() - 0.5 * c),
-            // Below 10⁻⁴ the difference cancels: u²/2 − u³/3 + u⁴/4.
+            // Below 10⁻⁴ the difference cancels, so use its series u²/2 − u³/3 + u⁴/4.
             Self::Fair(_) if u < 1e-4 => c * c * square * (0.5 - u / 3.0 + square / 4.0),
             Self::Fair(_) if u.is_infinite() => u,
             Self::Fair(_) => c * c * (u - u.ln_1p()),
             Self::Cauchy(_) => 0.5 * c * c * square.ln_1p(),
-            // Its limit where the square is out of range.
+            // The limit if the square overflows.
             Self::GemanMcClure(_) if square.is_infinite() => 0.5 * c * c,
             Self::GemanMcClure(_) => 0.5 * c * c * (square / (1.0 + square)),
             Self::Welsch(_) => -0.5 * c * c * (-square).exp_m1(),
@@ -146,7 +154,7 @@ impl Kernel {
         }
     }
 
-    /// The tuning constant, and |x| in its units.
+    /// Returns the tuning constant, and |x| in its units.
     #[inline]
     fn relative(&self, x: f64) -> (f64, f64) {
         let c = match *self {
@@ -162,7 +170,7 @@ impl Kernel {
     }
 }
 
-/// Huber's with 95 % efficiency: convex, so that a far start keeps its one minimum.
+/// Huber's kernel with 95 % efficiency, which is convex and so keeps one minimum far away.
 impl Default for Kernel {
     fn default() -> Self {
         Self::HUBER

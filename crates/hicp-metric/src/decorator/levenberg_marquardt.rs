@@ -8,37 +8,42 @@ use crate::decorator::moved::{compose, move_sources};
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 
-/// How much the damping grows when a step is rejected and shrinks when one is accepted.
+/// Factor by which the damping grows with a rejected step and shrinks with an accepted one.
 const FACTOR: f64 = 10.0;
-/// Damping beyond which no step is left.
+/// Largest damping; beyond it, steps are negligible.
 const MAX_DAMPING: f64 = 1e12;
 const MIN_DAMPING: f64 = 1e-12;
 
-/// Iterates over one set of pairs like [`crate::GaussNewton`], but takes only steps that lower the mean loss.
+/// Iterates over one set of pairs like [`crate::GaussNewton`], with only steps that lower the loss.
 ///
-/// The normal equations are damped by λ diag(JᵀWJ) (Levenberg 1944; Marquardt 1963) in scaled unknowns, each diagonal entry at
-/// least 10⁻⁶ of the mean; so λ has no unit. A step is tried on a copy of the pairs: if the metric's
-/// [`Minimize::mean_loss`] there is lower, λ falls by 10; if not, the step is discarded and λ grows by 10. The mean loss after
-/// the increment is therefore never above the one before, which is the one reported.
+/// The normal equations are damped by λ diag(JᵀWJ) (Levenberg 1944; Marquardt 1963) in scaled
+/// unknowns, so λ has no unit. Each diagonal entry counts as at least 10⁻⁶ of the mean. A step is
+/// tried on a copy of the pairs. If the metric's [`Minimize::mean_loss`] is lower there, λ
+/// decreases by a factor of 10. Otherwise the step is rejected and λ increases by a factor of 10.
+/// The mean loss after the increment is therefore never above the reported one, which is that
+/// before it.
 ///
-/// No step where the first linearisation gives none. Where no step lowers the loss the increment is the identity.
-/// Cost per iteration: a pass to move the pairs, one for the loss, and one to linearise.
+/// If the first linearization gives no step, neither does this. If no step lowers the loss, the
+/// increment is the identity. Cost per iteration: three passes, to move the pairs, to compute the
+/// loss, and to linearize.
 #[derive(Clone, Debug)]
 pub struct LevenbergMarquardt<M> {
-    /// What is minimised.
+    /// The metric to minimize.
     pub metric: M,
-    /// Largest number of steps tried, rejected ones included; default 20. Zero moves nothing.
+    /// Largest number of steps, including rejected ones; default 20. Zero gives the identity.
     pub max_iterations: usize,
-    /// Ends when a step's length, with rotations as displacements at the RMS radius, is at most this share of that radius; default 10⁻⁶.
+    /// Relative step length at which the iterations end; default 10⁻⁶.
+    ///
+    /// It is relative to the RMS radius. Rotations count as displacements at that radius.
     pub tolerance: f64,
-    /// λ of the first step tried, relative to the diagonal; default 10⁻³.
+    /// λ of the first step, relative to the diagonal; default 10⁻³.
     pub initial_damping: f64,
     current: Correspondences,
     trial: Correspondences,
 }
 
 impl<M> LevenbergMarquardt<M> {
-    /// Iterates a metric with the default limits.
+    /// Creates the decorator with the default limits.
     #[must_use]
     pub fn new(metric: M) -> Self {
         Self {

@@ -5,11 +5,14 @@ use hicp_core::{Correspondences, Iteration};
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 
-/// One metric per iteration: the k-th in the k-th iteration of a stage, and the last from then on.
+/// Selects one metric per iteration: the k-th in the k-th iteration of a stage, then the last.
 ///
-/// A kernel whose scale falls ([`crate::Robust`] with [`crate::Scale::Meters`] of 20 mm, 10 mm, 5 mm) starts almost convex and
-/// ends selective (graduated non-convexity: Blake & Zisserman 1987). Rules that compare losses see those of different metrics
-/// while the schedule lasts: let them be lenient, or end on the motion. Without metrics no step is determined.
+/// A kernel with a decreasing scale starts almost convex and ends selective (graduated
+/// non-convexity: Blake & Zisserman 1987). An example is [`crate::Robust`] with
+/// [`crate::Scale::Meters`] of 20 mm, 10 mm and 5 mm.
+///
+/// During the schedule, stop rules that compare losses receive those of different metrics. Make
+/// them lenient, or use rules on the motion. Without metrics, there is no step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MetricSchedule<M> {
     /// The metrics by iteration.

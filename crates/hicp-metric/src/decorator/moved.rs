@@ -1,10 +1,10 @@
-//! Pairs with their sources moved further.
+//! Pairs with moved sources.
 
 use hicp_core::{Correspondences, Isometry3, Pair, Surfel, UnitVector3};
 
-/// Refills `moved` with the pairs, their sources and their pose moved by an increment.
+/// Fills `moved` with the pairs, whose sources and pose are moved by an increment.
 ///
-/// Always from the original pairs, so that roundings to `f32` do not add up.
+/// It starts from the original pairs, so that roundings to `f32` do not accumulate.
 pub(crate) fn move_sources(
     pairs: &Correspondences,
     increment: &Isometry3<f64>,
@@ -24,7 +24,7 @@ pub(crate) fn move_sources(
     }));
 }
 
-/// Composes increments; long products stay rotations.
+/// Composes increments, and normalizes the rotation so that long products stay rotations.
 pub(crate) fn compose(after: &Isometry3<f64>, before: &Isometry3<f64>) -> Isometry3<f64> {
     let mut product = after * before;
     product.rotation.renormalize();

@@ -7,33 +7,40 @@ use crate::metric::minimize::Minimize;
 use crate::system::freedom::blocks;
 use crate::system::normal_equations::NormalEquations;
 
-/// A Gaussian of the pose: its mean and its information Λ, the inverse of the covariance.
+/// A Gaussian distribution of the pose, given by its mean and its information Λ = Σ⁻¹.
 ///
-/// As everywhere, ξ = ln(T T₀⁻¹)^∨ = [ρ; φ] is a left perturbation in the camera frame, translation first (metres, radians).
+/// As everywhere, ξ = ln(T T₀⁻¹)^∨ = [ρ; φ] is a left perturbation in the camera frame, translation
+/// first (meters, radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant)] // One in a pipeline.
+#[allow(clippy::large_enum_variant)] // A pipeline has only one.
 #[non_exhaustive]
 pub enum Prior {
-    /// Anything is as likely.
+    /// All poses are equally likely.
     Flat,
-    /// A mean and information from elsewhere: the covariance of a fused estimate is Λ⁻¹ as it stands.
+    /// A given mean and information. For a fused estimate, Λ is the inverse of its covariance.
     Gaussian {
-        /// T₀, the mean.
+        /// The mean T₀.
         camera_from_object: Isometry3<f64>,
-        /// Λ, symmetric and positive semi-definite: 1/m² for the translation, 1/rad² for the rotation.
+        /// Λ, symmetric and positive semi-definite: 1/m² for the translation, 1/rad² for the
+        /// rotation.
         information: Matrix6<f64>,
     },
-    /// The pose that the stage begins at is the mean, as good as the detector that gave it: alike in all directions.
+    /// The initial pose of the stage is the mean, with the same uncertainty in all directions.
     AboutInitial {
-        /// Standard deviation of the position of the object's origin along each axis, metres, above 0; infinite for none.
+        /// Standard deviation of the object's origin along each axis, meters.
+        ///
+        /// Above 0; infinite for no information.
         translation_meters: f64,
-        /// Standard deviation of the turn about each axis through the object's origin, degrees, above 0; infinite for none.
+        /// Standard deviation of the rotation around each axis through the object's origin,
+        /// degrees.
+        ///
+        /// Above 0; infinite for no information.
         rotation_degrees: f64,
     },
 }
 
 impl Prior {
-    /// T₀ and Λ for a stage that begins at `init`; `None` without information.
+    /// Returns T₀ and Λ for a stage that starts at `init`, or `None` without information.
     fn resolve(&self, init: &Isometry3<f64>) -> Option<(Isometry3<f64>, Matrix6<f64>)> {
         let (mean, information) = match *self {
             Self::Flat => return None,
@@ -59,24 +66,29 @@ impl Prior {
     }
 }
 
-/// A metric with a Gaussian [`Prior`] of the pose T: Σ w E + σ² ξᵀΛξ, ξ = ln(T T₀⁻¹)^∨.
+/// Adds a Gaussian [`Prior`] of the pose to a metric: Σ w E + σ² ξᵀΛξ.
 ///
-/// σ (`sigma_meters`) is the standard deviation of a residual of weight 1: it makes both terms squares in units of m²,
-/// and 1/σ² times the sum is the negative log posterior. N residuals count as N independent ones; neighbouring pixels are not,
-/// so multiply σ by √(pixels per independent residual) where the prior should be heard.
+/// ξ = ln(T T₀⁻¹)^∨ is the deviation from the mean.
 ///
-/// The prior is linearised with the inverse left Jacobian (Barfoot & Furgale 2014): ξ + 𝓙(ξ)⁻¹ δ. The step is Gauss–Newton's,
-/// also for metrics with a closed form; without information it is the metric's own, bit for bit. A strong prior leads to T₀ in one
-/// step. The mean loss is the sum over Σ w. Six components of information make up for missing rows, not for missing pairs.
+/// σ (`sigma_meters`) is the standard deviation of a residual of weight 1. It gives both terms the
+/// unit m², and 1/σ² times the sum is the negative log posterior. N residuals count as N
+/// independent ones, which neighboring pixels are not. To give the prior its full influence,
+/// multiply σ by √(pixels per independent residual).
 ///
-/// [`Prior::AboutInitial`] reads the pose that the stage started from in [`Iteration::init`].
+/// The prior is linearized with the inverse left Jacobian (Barfoot & Furgale 2014): ξ + 𝓙(ξ)⁻¹ δ.
+/// The step is that of Gauss–Newton, even for metrics with a closed form. Without information, it
+/// is the metric's own step, bit for bit. A strong prior leads to T₀ in one step. The mean loss is
+/// the sum divided by Σ w. Information about six components replaces missing rows, but not missing
+/// pairs.
+///
+/// [`Prior::AboutInitial`] reads the initial pose of the stage from [`Iteration::init`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PosePrior<M> {
     /// The data term.
     pub metric: M,
-    /// What is known of the pose; default nothing.
+    /// The prior of the pose; by default flat.
     pub prior: Prior,
-    /// σ of a residual of weight 1, metres; default 1 mm.
+    /// σ of a residual of weight 1, meters; default 1 mm.
     pub sigma_meters: f64,
 }
 
@@ -87,7 +99,9 @@ impl<M: Default> Default for PosePrior<M> {
 }
 
 impl<M> PosePrior<M> {
-    /// Adds a prior to a metric; `sigma_meters` is the standard deviation of a residual of weight 1.
+    /// Adds a prior to a metric.
+    ///
+    /// `sigma_meters` is the standard deviation of a residual of weight 1.
     #[must_use]
     pub fn new(metric: M, prior: Prior, sigma_meters: f64) -> Self {
         Self {
@@ -97,7 +111,7 @@ impl<M> PosePrior<M> {
         }
     }
 
-    /// ξ at the pose of the pairs, and σ² Λ.
+    /// Returns ξ at the pose of the pairs, and σ² Λ.
     fn term(
         &self,
         iteration: &Iteration<'_>,

@@ -7,23 +7,26 @@ use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
-/// σ of a Gaussian over the median of its absolute values.
+/// σ of a Gaussian, divided by the median of its absolute values.
 const SIGMA_PER_MAD: f64 = 1.4826;
-/// Scales are at least a picometre, so that residuals of zero keep the weight 1.
+/// Smallest scale, a picometer, so that residuals of zero keep the weight 1.
 const MIN_SCALE: f64 = 1e-12;
 
-/// The σ that a kernel measures residuals by.
+/// The σ that residuals are divided by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Scale {
-    /// A known σ of the residuals, metres.
+    /// A known σ of the residuals, meters.
     Meters(f64),
-    /// 1.4826 × the median of |r| over the pairs with weight, found anew in each step, but no less than a floor.
+    /// 1.4826 × the median of |r| over the pairs with weight, computed in each step, with a floor.
     ///
-    /// It is right for residuals of one dimension; distances of points in space (`PointToPoint`) have a median 2.3 times as
-    /// large for the same σ per axis. More than half of the pairs must be right.
+    /// It is right for residuals of one dimension. Distances of points in space (`PointToPoint`)
+    /// have a median 2.3 times as large for the same σ per axis. More than half of the pairs must
+    /// be right.
     Mad {
-        /// Smallest σ, metres: the resolution of the sensor. Without it a perfect fit rejects whatever is not exactly zero.
+        /// Smallest σ, meters: the resolution of the sensor.
+        ///
+        /// Without it, a perfect fit would reject all residuals that are not exactly zero.
         floor_meters: f64,
     },
 }
@@ -35,24 +38,27 @@ impl Default for Scale {
     }
 }
 
-/// A metric with a robust kernel: E = 2σ² ρ(r/σ), r² the error of the metric inside; by iteratively re-weighted least squares.
+/// Applies a robust kernel to a metric: E = 2σ² ρ(r/σ), where r² is the error of the inner metric.
 ///
-/// A step multiplies the weight of each pair by w(r/σ) in a copy and lets the metric inside minimise that, closed form or not.
+/// It uses iteratively reweighted least squares. A step multiplies the weight of each pair by
+/// w(r/σ) in a copy, which the inner metric minimizes, in closed form or not.
 ///
-/// The mean loss is that of E, over the *original* weights, not the mean of w r². Only E falls with every exact step at a given
-/// σ (w r² is part of a majoriser), rises when pairs drift into the tail although their weights vanish there, and falls and rises
-/// with σ; so the rules that judge a mean loss keep their meaning. It equals the inner loss for [`Kernel::L2`] and for small residuals.
+/// The mean loss is that of E over the *original* weights, and not the mean of w r², which is only
+/// part of a majorizer. At a given σ, E falls with every exact step. It rises if pairs drift into
+/// the tail, although their weights vanish there, and it changes in the direction of σ. Stop rules
+/// on the mean loss therefore keep their meaning. For [`Kernel::L2`] and for small residuals, it
+/// equals the inner loss.
 ///
-/// The kernel belongs to the set of pairs: squared errors are those of the metric inside; [`Minimize::system`] carries the
-/// weights. Any [`RobustKernel`] can be given.
-/// Cost: one pass for the residuals, one to copy the pairs, a selection for the median, and the metric inside.
+/// The kernel belongs to the set of pairs: squared errors are those of the inner metric, and
+/// [`Minimize::system`] contains the weights. Any [`RobustKernel`] can be used. Cost: one pass for
+/// the residuals, one to copy the pairs, a selection for the median, and the inner metric.
 #[derive(Clone, Debug, Default)]
 pub struct Robust<M, K = Kernel> {
-    /// What is minimised.
+    /// The metric to minimize.
     pub metric: M,
-    /// How much a residual counts; default [`Kernel::HUBER`].
+    /// The influence of a residual; default [`Kernel::HUBER`].
     pub kernel: K,
-    /// What residuals are measured by; default the median, floored at 1 mm.
+    /// The scale of residuals; by default the median with a floor of 1 mm.
     pub scale: Scale,
     reweighted: Correspondences,
     residuals: Vec<f64>,
@@ -60,7 +66,7 @@ pub struct Robust<M, K = Kernel> {
 }
 
 impl<M: Minimize, K: RobustKernel> Robust<M, K> {
-    /// Makes a metric robust.
+    /// Applies a kernel to a metric.
     #[must_use]
     pub fn new(metric: M, kernel: K, scale: Scale) -> Self {
         Self {
@@ -73,7 +79,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
         }
     }
 
-    /// Fills the residuals and returns σ; `None` where it is not finite.
+    /// Computes the residuals and returns σ, or `None` if it is not finite.
     fn measure(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.residuals.clear();
         self.residuals.resize(pairs.len(), 0.0);
@@ -109,7 +115,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
         sigma.is_finite().then_some(sigma)
     }
 
-    /// Fills the copy with the kernel's weights; returns the robust mean loss.
+    /// Fills the copy with the kernel's weights and returns the robust mean loss.
     fn reweigh(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         let sigma = self.measure(iteration, pairs)?;
         let kernel = &self.kernel;
@@ -124,7 +130,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
         self.loss(pairs, sigma)
     }
 
-    /// Σ w 2σ² ρ(r/σ) / Σ w over the residuals measured last.
+    /// Returns Σ w 2σ² ρ(r/σ) / Σ w over the last residuals.
     fn loss(&self, pairs: &Correspondences, sigma: f64) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for (pair, residual) in pairs.as_slice().iter().zip(&self.residuals) {

@@ -6,30 +6,38 @@ use hicp_core::{Correspondences, Isometry3, Pair};
 use crate::system::moments::Moments;
 use crate::system::normal_equations::NormalEquations;
 
-/// The result of one minimization: the loss at the present pose, and the increment from there.
+/// The result of one minimization: the loss at the current pose, and the increment from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// The increment T_k of Algorithm 1: the next estimate is `increment * camera_from_object`. Camera frame.
+    /// The increment T_k of Algorithm 1, in the camera frame.
+    ///
+    /// The next estimate is `increment * camera_from_object`.
     pub increment: Isometry3<f64>,
-    /// Weighted mean of the squared residuals *before* the increment, at the pose that the pairs were made at; m².
+    /// Weighted mean of the squared residuals at the pose of the pairs, *before* the increment; m².
     pub mean_loss: f64,
 }
 
 /// An error metric E(c, n, o, m, T) of one pair (Algorithm 1, line 3).
 ///
-/// Pairs are in the camera frame with the source already moved, so a metric is linearized at the identity increment
-/// ξ = [ρ; φ] (translation first, left perturbation).
+/// Pairs are in the camera frame and their sources are already moved. A metric is therefore
+/// linearized at the identity increment ξ = [ρ; φ] (translation first, left perturbation).
 ///
-/// Implement [`ErrorMetric::linearize`]; the rest is provided. Override [`ErrorMetric::squared_error`] if it is a short
-/// formula, [`ErrorMetric::linearize_all`] if there is a faster loop over many pairs, and [`ErrorMetric::step`] if the
-/// minimum has a closed form. Every error metric is a [`Minimize`](crate::Minimize), which is what a stage requires. What
-/// acts on the whole set of pairs (a robust kernel, a prior, a frozen axis) implements `Minimize` instead.
+/// Implement [`ErrorMetric::linearize`]; the rest is provided. Override other methods if that is
+/// useful:
+///
+/// - [`ErrorMetric::squared_error`], if it is a short formula.
+/// - [`ErrorMetric::linearize_all`], if there is a faster loop over many pairs.
+/// - [`ErrorMetric::step`], if the minimum has a closed form.
+///
+/// Every error metric is a [`Minimize`](crate::Minimize), which is what a stage requires. A
+/// component that acts on the whole set of pairs (a robust kernel, a prior, a frozen axis)
+/// implements `Minimize` instead.
 ///
 /// ```
 /// use hicp_core::{Pair, Vector3};
 /// use hicp_metric::{ErrorMetric, NormalEquations};
 ///
-/// /// The difference of depths alone: z of the optical axis.
+/// /// The difference of depths, z along the optical axis.
 /// #[derive(Debug)]
 /// struct DepthDifference;
 ///
@@ -50,9 +58,10 @@ pub trait ErrorMetric {
     /// Adds the residual rows of one pair, linearized at the identity increment.
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations);
 
-    /// Returns E(c, n, o, m, I) of one pair at the pose that it was made at, without its weight; m².
+    /// Returns E(c, n, o, m, I) of one pair at the pose of the pairs, without its weight; m².
     ///
-    /// The provided method sums the squares of the pair's own rows. Robust kernels and mean losses call it once per pair.
+    /// The provided method sums the squares of the pair's rows. Robust kernels and mean losses call
+    /// it once per pair.
     fn squared_error(&self, pair: &Pair) -> f64 {
         let mut system = NormalEquations::new(pair.source.point.cast(), 1.0);
         let unweighted = Pair {
@@ -63,8 +72,10 @@ pub trait ErrorMetric {
         system.loss()
     }
 
-    /// Returns the weighted mean of the errors at the pose that the pairs were made at, as [`ErrorMetric::step`] reports
-    /// it; m². `None` without weight or with numbers that are not finite.
+    /// Returns the weighted mean of the errors at the pose of the pairs, as [`ErrorMetric::step`]
+    /// does; m².
+    ///
+    /// Returns `None` without weight or with numbers that are not finite.
     fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for pair in pairs.as_slice() {
@@ -76,23 +87,23 @@ pub trait ErrorMetric {
         (weight > 0.0 && mean.is_finite()).then_some(mean)
     }
 
-    /// Returns all pairs linearized. `None` without weight or with points that are not finite.
+    /// Returns all pairs linearized, or `None` without weight or with points that are not finite.
     ///
-    /// The provided method sums the rows of [`ErrorMetric::linearize`] around the centroid, with lengths scaled by the RMS
-    /// radius.
+    /// The provided method sums the rows of [`ErrorMetric::linearize`] around the centroid, with
+    /// lengths scaled by the RMS radius.
     fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
         let system = vectorized(Linearize {
             metric: self,
             pairs: pairs.as_slice(),
         })?;
-        // Sources were checked with the centroid; this catches targets and normals.
+        // Sources were checked with the centroid. This check covers targets and normals.
         system.loss().is_finite().then_some(system)
     }
 
-    /// Takes one step of minimization over all pairs.
+    /// Computes one step of minimization over all pairs.
     ///
-    /// `None` if the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
-    /// that are not finite. The provided method is one Gauss–Newton step.
+    /// Returns `None` if the pairs do not determine a step: no pairs, only zero weights, fewer rows
+    /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step.
     fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let system = self.linearize_all(pairs)?;
         let sum = || pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
@@ -111,7 +122,7 @@ pub trait ErrorMetric {
     }
 }
 
-/// Sums the rows of all pairs.
+/// The loop that sums the rows of all pairs.
 struct Linearize<'a, M: ?Sized> {
     metric: &'a M,
     pairs: &'a [Pair],
@@ -122,7 +133,8 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        // One pass: relative to any point nearby at first, then moved to the centroid and scaled by the radius found.
+        // One pass: the sums are relative to a nearby point first, and then moved to the centroid
+        // and scaled by the radius.
         let mut moments = Moments::about_first(self.pairs)?;
         let mut system = NormalEquations::new(moments.origin(), 1.0);
         for pair in self.pairs {

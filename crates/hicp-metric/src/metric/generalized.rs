@@ -5,22 +5,25 @@ use hicp_core::{Pair, Vector3};
 use crate::metric::error_metric::ErrorMetric;
 use crate::system::normal_equations::NormalEquations;
 
-/// Below this length of the difference (or the sum) of two unit normals they are parallel for all purposes.
+/// Length of the difference or the sum of two unit normals below which they count as parallel.
 const PARALLEL: f64 = 1e-4;
 
-/// E = dᵀ (C_c + R C_o Rᵀ)⁻¹ d, d = c − T o (Generalized ICP; Segal, Haehnel & Thrun 2009), by Gauss–Newton.
+/// E = dᵀ (C_c + R C_o Rᵀ)⁻¹ d, d = c − T o (Generalized ICP), minimized by Gauss–Newton.
 ///
-/// Each point is known well along its normal and badly in its tangent plane: C = I − (1 − ε) n nᵀ, with eigenvalues 1, 1, ε.
-/// The original estimates the normals from 20 neighbours; here they are the surfels'. Where both normals agree, the error is
-/// ½ |tangential offset|² + (normal offset)²/(2ε). At ε = 1 it is half of [`crate::PointToPoint`]'s; towards ε = 0, with equal
-/// normals, point-to-plane's over 2ε. So the loss is in m², but 1/(2ε) times as large as others'.
+/// Source: Segal, Haehnel & Thrun 2009. Each point is known well along its normal and badly in its
+/// tangent plane: C = I − (1 − ε) n nᵀ, with eigenvalues 1, 1, ε. The original estimates normals
+/// from 20 neighbors; here they are those of the surfels. If both normals agree, the error is ½
+/// |tangential offset|² + (normal offset)²/(2ε). At ε = 1, it is half of that of
+/// [`crate::PointToPoint`]. For ε → 0 and equal normals, it approaches that of point-to-plane over
+/// 2ε. The loss is therefore in m², but 1/(2ε) times as large as that of other metrics.
 ///
-/// The rows are whitened: the three eigenvectors of C_c + R C_o Rᵀ, known in closed form, weighted by the inverse eigenvalues.
-/// The matrix is held during a step, as in the original. It is the same for n and −n, so the orientation of normals does not matter.
-/// No step from fewer than two pairs. Cost: three rows per pair.
+/// The rows are whitened: they are the three eigenvectors of C_c + R C_o Rᵀ, known in closed form,
+/// weighted by the inverse eigenvalues. The matrix is constant during a step, as in the original.
+/// It is the same for n and −n, so the orientation of normals does not matter. There is no step
+/// from fewer than two pairs. Cost: three rows per pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Generalized {
-    /// Variance along the normal relative to that in the tangent plane; taken into [10⁻⁶, 1].
+    /// Variance along the normal relative to that in the tangent plane, clamped to [10⁻⁶, 1].
     pub epsilon: f64,
 }
 
@@ -32,10 +35,11 @@ impl Default for Generalized {
 }
 
 impl Generalized {
-    /// Unit eigenvectors of C_c + R C_o Rᵀ and their eigenvalues.
+    /// Returns the unit eigenvectors of C_c + R C_o Rᵀ and their eigenvalues.
     #[inline]
     fn axes(&self, pair: &Pair) -> [(Vector3<f64>, f64); 3] {
-        // Unit to f64: near-parallel normals amplify an error of their length by 1/ε.
+        // Normalized in f64, because nearly parallel normals amplify an error of their length by
+        // 1/ε.
         let n = pair.target.normal.cast::<f64>().into_inner().normalize();
         let m = pair.source.normal.cast::<f64>().into_inner().normalize();
         let stiffness = 1.0 - self.epsilon.clamp(1e-6, 1.0);
@@ -48,7 +52,8 @@ impl Generalized {
         } else {
             (sum / along, difference / across)
         };
-        // The eigenvalues of n nᵀ + m mᵀ are 1 ± n·m, that is half the squares of sum and difference.
+        // The eigenvalues of n nᵀ + m mᵀ are 1 ± n·m, which is half the squares of sum and
+        // difference.
         [
             (first, 2.0 - stiffness * 0.5 * along * along),
             (second, 2.0 - stiffness * 0.5 * across * across),
@@ -82,7 +87,7 @@ impl ErrorMetric for Generalized {
     }
 }
 
-/// A unit vector across another.
+/// Returns a unit vector orthogonal to another.
 fn perpendicular(vector: &Vector3<f64>) -> Vector3<f64> {
     let mut other = Vector3::zeros();
     other[vector.iamin()] = 1.0;

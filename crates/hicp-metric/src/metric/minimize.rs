@@ -1,4 +1,4 @@
-//! The trait of whatever a stage can minimize over a set of pairs.
+//! The trait of metrics and decorators that a stage can minimize over a set of pairs.
 
 use hicp_core::{Correspondences, Iteration};
 
@@ -7,22 +7,28 @@ use crate::system::normal_equations::NormalEquations;
 
 /// Minimizes over the pairs of one iteration: every [`ErrorMetric`], and the decorators around one.
 ///
-/// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs rather than on one of them. It
-/// names what it wraps in [`Minimize::inner`] and overrides the methods that it changes; the others forward.
+/// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs and
+/// not on one of them. It returns the wrapped metric in [`Minimize::inner`] and overrides the
+/// methods that it changes; the others forward.
 ///
-/// Pure: `&mut self` is scratch, and equal iterations and pairs give equal results. A metric that depends on the pose finds
-/// it in [`Correspondences::camera_from_object`]; what changes with the iteration or the stage's start is in [`Iteration`].
+/// It is pure: equal iterations and pairs give equal results, and `&mut self` is scratch. A metric
+/// that depends on the pose reads it from [`Correspondences::camera_from_object`]. The index of the
+/// iteration and the initial pose of the stage are in [`Iteration`].
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an error metric",
     label = "this must implement `ErrorMetric` (or `Minimize`)",
     note = "`Icp::metric` accepts an `ErrorMetric`, a decorator such as `Robust<M>` around one, or a `Box<dyn Minimize>`"
 )]
 pub trait Minimize {
-    /// Returns what this decorates in an iteration: the provided methods forward to it. `None` if it decorates nothing.
+    /// Returns the wrapped metric for an iteration, to which the provided methods forward.
+    ///
+    /// Returns `None` if there is none.
     fn inner(&mut self, iteration: &Iteration<'_>) -> Option<&mut dyn Minimize>;
 
-    /// Returns all pairs linearized: what one Gauss–Newton step solves, and what information, covariance and observability
-    /// at that pose are read from. `None` without weight or with points that are not finite.
+    /// Returns all pairs linearized, or `None` without weight or with points that are not finite.
+    ///
+    /// One Gauss–Newton step solves this system. Information, covariance and observability at the
+    /// pose come from it.
     fn system(
         &mut self,
         iteration: &Iteration<'_>,
@@ -31,13 +37,14 @@ pub trait Minimize {
         self.inner(iteration)?.system(iteration, pairs)
     }
 
-    /// Returns the weighted mean of the errors at the pose that the pairs were made at; m². `None` without weight or with
-    /// numbers that are not finite.
+    /// Returns the weighted mean of the errors at the pose of the pairs; m².
+    ///
+    /// Returns `None` without weight or with numbers that are not finite.
     fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.inner(iteration)?.mean_loss(iteration, pairs)
     }
 
-    /// Adds `factor` times the squared error of each pair, without its weight, to `errors`, one number per pair; m².
+    /// Adds `factor` times the squared error of each pair, without its weight, to `errors`; m².
     fn add_squared_errors(
         &mut self,
         iteration: &Iteration<'_>,
@@ -50,10 +57,11 @@ pub trait Minimize {
         }
     }
 
-    /// Takes one step of minimization over all pairs.
+    /// Computes one step of minimization over all pairs.
     ///
-    /// `None` if the pairs do not determine a step: none at all, only zero weights, fewer rows than unknowns, or numbers
-    /// that are not finite. The provided method is one Gauss–Newton step: it solves [`Minimize::system`].
+    /// Returns `None` if the pairs do not determine a step: no pairs, only zero weights, fewer rows
+    /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step:
+    /// it solves [`Minimize::system`].
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         Some(Step {
             increment: self.system(iteration, pairs)?.solve()?,
@@ -61,7 +69,8 @@ pub trait Minimize {
         })
     }
 
-    /// Returns the name in traces; not `name`, so that a metric's own name stays unambiguous.
+    /// Returns the name in traces. It is not called `name`, to keep a metric's own `name`
+    /// unambiguous.
     fn label(&self) -> &'static str;
 }
 
@@ -99,7 +108,7 @@ impl<M: ErrorMetric + ?Sized> Minimize for M {
     }
 }
 
-// Not for any `Box<T>`: a boxed error metric is one already.
+// Not for every `Box<T>`, since a boxed error metric implements it already.
 macro_rules! forward {
     ($($pointer:ty),+) => {$(
         impl Minimize for $pointer {

@@ -1,4 +1,4 @@
-//! Error metrics: what is minimized over the pairs.
+//! Error metrics: the functions that are minimized over the pairs.
 
 pub(crate) mod error_metric;
 pub(crate) mod generalized;

@@ -6,18 +6,19 @@ use crate::metric::error_metric::ErrorMetric;
 use crate::system::normal_equations::NormalEquations;
 use crate::system::row_blocks::{Row, system_of_rows};
 
-/// E = (mᵀ (T o − c))², m the normal of the model, which turns with it; by Gauss–Newton.
+/// E = (mᵀ (T o − c))², where the normal m of the model rotates with it, by Gauss–Newton.
 ///
-/// The model's normals are free of the depth sensor's noise. Otherwise as [`crate::PointToPlane`], by whose symmetry the row
-/// is that of the observed point: J = [mᵀ, (c × m)ᵀ].
-/// No step from fewer than six pairs. Cost: one pass to centre, one to sum, and a 6×6 Cholesky decomposition.
+/// The model's normals do not have the noise of the depth sensor. Otherwise the metric is like
+/// [`crate::PointToPlane`]. By symmetry, its row is that of the observed point: J = [mᵀ, (c × m)ᵀ].
+/// There is no step from fewer than six pairs. Cost: one pass and a 6×6 Cholesky decomposition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PlaneToPoint;
 
 impl PlaneToPoint {
     #[inline(always)]
     fn row(pair: &Pair) -> Row {
-        // m·(ρ + φ × p) + (φ × m)·(p − c) = m·ρ + φ·(c × m): the lever of c, not of p, as m turns too.
+        // m·(ρ + φ × p) + (φ × m)·(p − c) = m·ρ + φ·(c × m): the lever is c and not p, because m
+        // rotates, too.
         let point = pair.target.point.cast::<f64>();
         let direction = pair.source.normal.cast::<f64>().into_inner();
         Row {

@@ -6,10 +6,11 @@ use crate::metric::error_metric::ErrorMetric;
 use crate::system::normal_equations::NormalEquations;
 use crate::system::row_blocks::{Row, system_of_rows};
 
-/// E = (nᵀ (T o − c))² (§III-A.2; Chen & Medioni 1991), n the observed normal, by Gauss–Newton (Low 2004's rows).
+/// E = (nᵀ (T o − c))² with the observed normal n (§III-A.2), minimized by Gauss–Newton.
 ///
-/// Surfaces may slide along each other: directions that no normal constrains are damped and stay put.
-/// No step from fewer than six pairs. Cost: one pass to centre, one to sum, and a 6×6 Cholesky decomposition.
+/// Sources: Chen & Medioni 1991; the rows are those of Low 2004. Surfaces may slide along each
+/// other: directions that no normal constrains are damped and do not move. There is no step from
+/// fewer than six pairs. Cost: one pass and a 6×6 Cholesky decomposition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PointToPlane;
 

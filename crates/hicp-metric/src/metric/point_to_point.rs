@@ -11,18 +11,21 @@ use crate::system::normal_equations::NormalEquations;
 use crate::system::pair_block::{BLOCK, LANES, PairBlock, add, add_products, product};
 use crate::system::point_blocks::system_of_points;
 
-/// Fewer pairs leave the rotation open.
+/// Smallest number of pairs that determines a rotation.
 const MIN_PAIRS: usize = 3;
 
-/// E = ‖T o − c‖² (§III-A.2; Besl & McKay 1992), minimised in closed form.
+/// E = ‖T o − c‖² (§III-A.2; Besl & McKay 1992), minimized in closed form.
 ///
-/// The minimiser is Kabsch's with Umeyama's determinant factor (1991), so the result is a rotation even where planar
-/// points and noise would make a reflection fit better. One step is exact for exact correspondences. Cost: one pass over
-/// the pairs and one decomposition of a 3×3 matrix.
+/// The minimizer is Kabsch's with Umeyama's determinant factor (1991). The result is a rotation,
+/// even if planar points and noise would make a reflection fit better. One step is exact for exact
+/// correspondences. Cost: one pass over the pairs and one decomposition of a 3×3 matrix.
 ///
-/// Collinear sets leave the turn about their line free: it stays zero, and the smallest rotation that aligns the lines is taken.
-/// No step from fewer than three pairs of positive weight, from points all in one place, nor where a reflection would fit better
-/// and several rotations fit next best.
+/// Collinear points do not determine the rotation around their line, which stays zero: the result
+/// is the smallest rotation that aligns the lines. There is no step in these cases:
+///
+/// - There are fewer than three pairs of positive weight.
+/// - All points are at one place.
+/// - A reflection would fit better, and several rotations fit next best.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PointToPoint;
 
@@ -43,8 +46,8 @@ impl ErrorMetric for PointToPoint {
 
     fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let pairs = pairs.as_slice();
-        // Sums relative to the first pair that counts, so that objects far from the camera lose no digits, and points all
-        // in one place give sums of exact zeros.
+        // Sums are relative to the first pair with weight. Objects far from the camera lose no
+        // digits, and points at one place give exact zeros.
         let counting = || pairs.iter().filter(|pair| pair.weight > 0.0);
         let first = counting().next()?;
         counting().nth(MIN_PAIRS - 1)?;
@@ -80,7 +83,7 @@ impl ErrorMetric for PointToPoint {
     }
 }
 
-/// Sums over the pairs, p and q being sources and targets relative to an origin each.
+/// Sums over the pairs, where p and q are sources and targets, each relative to an origin.
 struct Products {
     /// Σ w p.
     source: Vector3<f64>,
@@ -152,7 +155,7 @@ impl VectorLoop for SumProducts<'_> {
     }
 }
 
-/// The motion that turns about `from` and carries `from` to `to`.
+/// Returns the motion that rotates around `from` and moves `from` to `to`.
 fn about(from: &Point3<f64>, to: &Point3<f64>, rotation: UnitQuaternion<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::from(to.coords - rotation * from.coords),
@@ -160,11 +163,15 @@ fn about(from: &Point3<f64>, to: &Point3<f64>, rotation: UnitQuaternion<f64>) ->
     )
 }
 
-/// Returns the rotation R that maximises tr(R H) for H = Σ w p qᵀ, as Kabsch's V diag(1, 1, det(V Uᵀ)) Uᵀ.
+/// Returns the rotation R that maximizes tr(R H), for H = Σ w p qᵀ.
 ///
-/// The largest singular pair (u₁, v₁) comes from the eigenvectors of HᵀH, which know smaller ones only to √ε. What is left is
-/// the turn about v₁ that maximises the trace over the planes across u₁ and v₁, an angle in closed form. A turn has
-/// determinant +1, so a reflection cannot come out, and no small singular value is ever divided by.
+/// It is Kabsch's V diag(1, 1, det(V Uᵀ)) Uᵀ.
+/// Uᵀ.
+///
+/// The largest singular pair (u₁, v₁) comes from the eigenvectors of HᵀH, which determine smaller
+/// pairs only to √ε. The rest is the rotation around v₁ that maximizes the trace over the planes
+/// orthogonal to u₁ and v₁, an angle in closed form. A rotation has determinant +1, so the result
+/// is never a reflection, and there is no division by a small singular value.
 fn nearest_rotation(covariance: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let scale = covariance.amax();
     if !(scale > 0.0 && scale.is_finite()) {
@@ -180,13 +187,15 @@ fn nearest_rotation(covariance: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let ((u2, u3), (v2, v3)) = (plane_across(&u1), plane_across(&v1));
     let (h2, h3) = (h * v2, h * v3);
     let m = Matrix2::new(u2.dot(&h2), u2.dot(&h3), u3.dot(&h2), u3.dot(&h3));
-    // Collinear points: any turn about their line fits, and the shortest way from line to line has none.
+    // Collinear points: any rotation around their line fits, and the shortest one from line to line
+    // has none.
     if m.norm() <= 1e-9 * sigma1 {
         return Some(shortest_turn(&u1, &v1));
     }
     let (along, across) = (m.m11 + m.m22, m.m12 - m.m21);
     let gain = along.hypot(across);
-    // A reflection would fit better and the two smallest singular values agree: every turn fits alike.
+    // A reflection would fit better and the two smallest singular values agree: all rotations fit
+    // alike.
     if gain <= 1e-9 * sigma1 {
         return None;
     }
@@ -207,7 +216,7 @@ fn plane_across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (second, axis.cross(&second))
 }
 
-/// Returns the smallest rotation that carries one unit vector to another, one of many when they are opposite.
+/// Returns the smallest rotation of one unit vector to another, one of many if they are opposite.
 ///
 /// The half angle from the sum and the difference of the vectors has full precision at every angle.
 fn shortest_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {

@@ -5,27 +5,30 @@ use hicp_core::{Correspondences, Isometry3, Pair, Point3, Translation3, Vector3,
 use crate::metric::error_metric::{ErrorMetric, Step};
 use crate::system::normal_equations::NormalEquations;
 
-/// E = (nᵀ (T^½ o − T^{−½} c))², n = (n_o + n_c)/2 the mean of both normals (Rusinkiewicz, "A Symmetric Objective Function
-/// for ICP", TOG 2019, there without the ½).
+/// E = (nᵀ (T^½ o − T^{−½} c))², where n = (n_o + n_c)/2 is the mean of both normals.
 ///
-/// Each side takes half of the motion. The error vanishes wherever both points lie on a common surface of the second order, so
-/// it converges from further away than [`crate::PointToPlane`] and slides less on curved surfaces. One step is *exact* for
-/// exact correspondences: with p̃ = p − p̄, q̃ = q − q̄ and the Gibbs vector a = axis · tan θ of the half rotation the problem
+/// Source: Rusinkiewicz, "A Symmetric Objective Function for ICP", TOG 2019, without the ½. Each
+/// side takes half of the motion. The error vanishes if both points lie on a common surface of
+/// second order. The metric therefore converges from farther away than [`crate::PointToPlane`] and
+/// slides less on curved surfaces.
+///
+/// One step is *exact* for exact correspondences. With p̃ = p − p̄, q̃ = q − q̄ and the Gibbs
+/// vector a = axis · tan θ of the half rotation, this problem is linear without approximation:
 ///
 /// ```text
 /// min Σ w [ (p̃ − q̃)·n + ((p̃ + q̃) × n)·a + n·t' ]²,   T = Trans(q̄) Rot(θ) Trans(t' cos θ) Rot(θ) Trans(−p̄)
 /// ```
 ///
-/// is linear, without approximation. Directions that no normal constrains stay put, as under [`crate::Degeneracy::Damp`].
+/// Directions that no normal constrains do not move, as with [`crate::Degeneracy::Damp`].
 ///
-/// Normals must be oriented alike. Pairs with n_o · n_c ≤ 0 see different sides: they are skipped, which means no row, no part in
-/// the mean loss, and a squared error of zero.
-/// No step from fewer than six pairs that count. Cost: two passes and a 6×6 Cholesky decomposition.
+/// Both normals must have the same orientation. Pairs with n_o · n_c ≤ 0 are on different sides and
+/// are skipped: they have no row, no part in the mean loss, and a squared error of zero. There is
+/// no step from fewer than six other pairs. Cost: two passes and a 6×6 Cholesky decomposition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Symmetric;
 
 impl Symmetric {
-    /// n and the residual at the identity; `None` for a pair that is skipped.
+    /// Returns n and the residual at the identity, or `None` for a skipped pair.
     #[inline]
     fn residual(pair: &Pair) -> Option<(Vector3<f64>, f64)> {
         let source = pair.source.normal.cast::<f64>().into_inner();
@@ -43,7 +46,7 @@ impl ErrorMetric for Symmetric {
     #[inline(always)]
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         if let Some((normal, residual)) = Self::residual(pair) {
-            // Half of the motion at each point: the lever of their midpoint.
+            // Each point takes half of the motion, so the lever is that of their midpoint.
             let middle = nalgebra::center(
                 &pair.source.point.cast::<f64>(),
                 &pair.target.point.cast::<f64>(),
@@ -89,7 +92,8 @@ impl ErrorMetric for Symmetric {
             squares += source.norm_squared() * w;
             weight += w;
         }
-        // Without weight, or with points that are not finite, neither are these; then the rows have no solution.
+        // Without weight, or with points that are not finite, these are not finite either, and the
+        // rows have no solution.
         let (source_mean, target_mean) = (source_sum / weight, target_sum / weight);
         let variance = squares / weight - source_mean.norm_squared();
         let length = if variance > 1e-12 {
@@ -100,7 +104,8 @@ impl ErrorMetric for Symmetric {
         let middle = (source_mean + target_mean) * 0.5;
         let mut system = NormalEquations::new(Point3::origin(), length);
         for (source, target, normal, residual, w) in counting() {
-            // The unknowns are u = t' + (q̄ − p̄) and 2a: where nothing is known they are zero, and zero is no motion.
+            // The unknowns are u = t' + (q̄ − p̄) and 2a. Undetermined ones are zero, and zero
+            // means no motion.
             let lever = Point3::from((source + target) * 0.5 - middle);
             system.add_row(&lever, &normal, residual, w);
         }

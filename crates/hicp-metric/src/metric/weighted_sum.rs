@@ -5,15 +5,16 @@ use hicp_core::{Correspondences, Iteration};
 use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
-/// E = Σₖ αₖ Eₖ: several metrics over the same pairs, minimised together by Gauss–Newton.
+/// E = Σₖ αₖ Eₖ: several metrics over the same pairs, minimized together by Gauss–Newton.
 ///
-/// Point-to-plane with a little point-to-point (α = 0.1 or so) no longer slides along planes; GenZ-ICP (Lee, Lim & Han 2024) is
-/// the sum of both with α and 1 − α. Terms are `(factor, metric)`: a tuple of two or three, or a `Vec` of any number of one type
-/// (boxed ones, for instance). Factors are not negative; a term of factor 0 is left out.
+/// Point-to-plane with a little point-to-point (α ≈ 0.1) does not slide along planes. GenZ-ICP
+/// (Lee, Lim & Han 2024) is the sum of both with α and 1 − α. Terms are `(factor, metric)`: a tuple
+/// of up to three, or a `Vec` of any number of one type (such as boxed ones). Factors are not
+/// negative, and terms of factor 0 are skipped.
 ///
-/// Terms contribute their [`Minimize::system`]s, so kernels and priors inside keep their effect; what solves (closed forms,
-/// solvers, held components, policies) belongs outside: `Frozen` around the sum, not in it. The system is solved with the
-/// policy and the held components of the first term.
+/// Terms contribute their [`Minimize::system`], so kernels and priors inside keep their effect.
+/// Closed forms, solvers, frozen components and policies belong outside: use `Frozen` around the
+/// sum. The system is solved with the policy and the frozen components of the first term.
 ///
 /// ```
 /// use hicp_metric::{PointToPlane, PointToPoint, Robust, WeightedSum};
@@ -25,11 +26,12 @@ use crate::system::normal_equations::NormalEquations;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WeightedSum<T> {
-    /// `(factor, metric)` each.
+    /// The terms, each `(factor, metric)`.
     pub terms: T,
 }
 
-/// The terms of a [`WeightedSum`]: one to three pairs `(factor, metric)` as a tuple, or a `Vec` of any number.
+/// The terms of a [`WeightedSum`]: one to three pairs `(factor, metric)` as a tuple, or a `Vec` of
+/// any number.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a list of terms",
     note = "`WeightedSum::terms` accepts a tuple of one to three `(f64, M)` or a `Vec<(f64, M)>`, each `M` an error metric"
@@ -111,7 +113,7 @@ impl<T: Terms> Minimize for WeightedSum<T> {
         factor: f64,
         errors: &mut [f64],
     ) {
-        // Every term adds something to each error, so the visit never ends early.
+        // Every term adds to each error, so the visit never ends early.
         let _ = self.terms.visit(&mut |own, metric| {
             metric.add_squared_errors(iteration, pairs, factor * own, errors);
             Some(())

@@ -7,43 +7,57 @@ use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
 use crate::system::solve::eigen;
 
-/// Ratio to the largest eigenvalue below which a direction is without information: points of 5 cm at 1 m in `f32` leave
-/// 10⁻¹² of it where there should be none.
+/// Ratio to the largest eigenvalue below which a direction has no information.
+///
+/// Points of 5 cm at 1 m in `f32` leave 10⁻¹² of it where it should be zero.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 impl NormalEquations {
-    /// Returns JᵀWJ for the twist ξ = [ρ; φ] about the *camera origin*, unscaled: metres, radians, translation first, a left
-    /// perturbation of `camera_from_object`.
+    /// Returns JᵀWJ, unscaled, for the twist ξ = [ρ; φ] around the *camera origin*.
     ///
-    /// The units are those of the weights per m², per m·rad and per rad²: divided by the variance of a residual of weight 1 it
-    /// is Fisher's information. To move it to another frame: Ad(A)⁻ᵀ Λ Ad(A)⁻¹ when poses move as A T.
+    /// The unknowns are in meters and radians, translation first. The twist is a left perturbation
+    /// of `camera_from_object`. The units are those of the weights per m², per m·rad and per rad².
+    /// Divided by the variance of a residual of weight 1, it is Fisher's information. If poses move
+    /// as A T, it moves as Ad(A)⁻ᵀ Λ Ad(A)⁻¹.
     #[must_use]
     pub fn information(&self) -> Matrix6<f64> {
         let scaled = self.scaled_from_camera();
         scaled.transpose() * self.scaled_hessian() * scaled
     }
 
-    /// Returns JᵀWr, half the gradient of the loss for the twist of [`NormalEquations::information`]: zero at a minimum.
+    /// Returns JᵀWr, half the gradient of the loss: zero at a minimum.
+    ///
+    /// The twist is that of [`NormalEquations::information`].
     #[must_use]
     pub fn gradient(&self) -> Vector6<f64> {
         self.scaled_from_camera().transpose() * self.scaled_gradient()
     }
 
-    /// Returns the covariance Σ = s² (JᵀWJ)⁻¹ of ξ = [ρ; φ], in the frame and order of [`NormalEquations::information`],
-    /// with s² = Σ w r²/(N − 6) over the N rows of positive weight.
+    /// Returns the covariance Σ = s² (JᵀWJ)⁻¹ of ξ = [ρ; φ], with s² = Σ w r²/(N − 6).
     ///
-    /// It holds for residuals that are independent, with variances inversely proportional to their weights, at the pose that
-    /// minimises the loss, and for the right pairs: wrong pairs and common errors are not in it, so it is optimistic for ICP
-    /// (Censi 2007; Bonnabel, Barczyk & Goulette 2016). Neighbouring pixels are correlated; a robust kernel's weights shrink Σ w r².
+    /// N is the number of rows of positive weight. Frame and order are those of
+    /// [`NormalEquations::information`]. If components are frozen ([`NormalEquations::freeze`]),
+    /// they have no variance, and N minus the number of free components replaces N − 6. Returns
+    /// `None` if the rows do not determine all free components, if no row is left over, or if a
+    /// number is not finite.
     ///
-    /// Mean ξᵀΣ⁻¹ξ, 6 if Σ is right, over 300 runs on noisy images (0.2 % of the depth, three synthetic objects): 6.1 to 6.4 with the right pairs,
-    /// exact normals and exact weights; 5.1 to 5.8 for projective plane-to-point and 4.8 to 6.3 for point-to-plane when the points are selected anew where the
-    /// last stage starts; 11 to 26 when they stay those visible 1 mm and 1° off, for pixels beside the silhouette then have wrong pairs. At 0.5 %
-    /// noisy normals take point-to-plane of a thin object to 13. [`crate::Generalized`] gives 22 to 34 even with the right pairs:
-    /// [`crate::sandwich_covariance`] is for it. Reproduce with `cargo run --release -p hicp-tests --example nees_report 300`.
+    /// It is valid at the pose that minimizes the loss, for right pairs and independent residuals
+    /// whose variances are inversely proportional to their weights. It does not contain wrong pairs
+    /// and common errors, so it is optimiztic for ICP (Censi 2007; Bonnabel, Barczyk & Goulette
+    /// 2016). Neighboring pixels are correlated, and a robust kernel's weights reduce Σ w r².
     ///
-    /// Components that are held ([`NormalEquations::freeze`]) have no variance and N − 6 becomes N less the number of free ones.
-    /// `None` where the rows do not determine all that is free, or no row is left over, or a number is not finite.
+    /// The measure of its accuracy is the mean of ξᵀΣ⁻¹ξ, which is 6 if Σ is right. Over 300 runs
+    /// on noisy images (0.2 % of the depth, three synthetic objects) it was:
+    ///
+    /// - 6.1 to 6.4 with the right pairs, exact normals and exact weights.
+    /// - 5.1 to 5.8 for projective plane-to-point, and 4.8 to 6.3 for point-to-plane, if the last
+    ///   stage selects its points again.
+    /// - 11 to 26 if the points stay those visible 1 mm and 1° away, because pixels near the
+    ///   silhouette then have wrong pairs.
+    ///
+    /// At 0.5 %, noisy normals raise point-to-plane of a thin object to 13. [`crate::Generalized`]
+    /// gives 22 to 34 even with the right pairs; use [`crate::sandwich_covariance`] for it. `cargo
+    /// run --release -p hicp-tests --example nees_report 300` reproduces these figures.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         let n_free = self.n_free();
@@ -57,11 +71,11 @@ impl NormalEquations {
         if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {
             return None;
         }
-        // Inverted where it is well conditioned, about the pivot, and carried to the camera origin after. The columns of held
-        // components are zero.
+        // Inverted around the pivot, where it is well conditioned, and then moved to the camera
+        // origin. The columns of frozen components are zero.
         let carried = self.camera_from_scaled() * basis;
         let covariance = carried * reduced.cholesky()?.inverse() * carried.transpose() * variance;
-        // Symmetric to the bit.
+        // Make it symmetric to the bit.
         let covariance = (covariance + covariance.transpose()) * 0.5;
         covariance
             .iter()
@@ -70,16 +84,20 @@ impl NormalEquations {
     }
 }
 
-/// Returns the sandwich covariance H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹ · N/(N − 6) of ξ = [ρ; φ] over the N pairs of positive weight, with
-/// gᵢ = Jᵢᵀ Wᵢ rᵢ each pair's own gradient (White 1980), in the frame and order of [`NormalEquations::information`].
+/// Returns the sandwich covariance H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹ · N/(N − 6) of ξ = [ρ; φ].
 ///
-/// Pairs must be independent and the right ones, as for [`NormalEquations::covariance`], but the weights need not be inverse
-/// variances and the rows of one pair may depend on each other. That is the case of [`crate::Generalized`]: its tangential rows carry
-/// no noise like that of its normal ones, so the plain covariance is four to five times too small. Mean ξᵀΣ⁻¹ξ, 6 if right, of
-/// projective Generalized ICP at 0.2 % of noise: 5.6 to 6.2 in place of 22 to 29, and 5.6 to 5.9 at 0.5 %; nearest neighbours are drawn to the
-/// noise and give 20 at 0.5 % (`cargo run --release -p hicp-tests --example nees_report 300`).
+/// It is summed over the N pairs of positive weight, where gᵢ = Jᵢᵀ Wᵢ rᵢ is the gradient of a pair
+/// (White 1980). Frame and order are those of [`NormalEquations::information`]. Pairs must be right
+/// and independent, as for [`NormalEquations::covariance`], but weights need not be inverse
+/// variances, and the rows of a pair may depend on each other.
 ///
-/// `None` where the pairs do not determine all six directions. Cost: two linearisations.
+/// It suits [`crate::Generalized`], whose tangential rows have less noise than its normal ones, so
+/// that the plain covariance is four to five times too small. For projective Generalized ICP, the
+/// mean of ξᵀΣ⁻¹ξ (6 if right) is 5.6 to 6.2 instead of 22 to 29 at 0.2 % of noise, and 5.6 to 5.9
+/// at 0.5 %. Nearest neighbors fit the noise and give 20 at 0.5 % (`cargo run --release -p
+/// hicp-tests --example nees_report 300`).
+///
+/// Returns `None` if the pairs do not determine all six directions. Cost: two linearizations.
 pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
     metric: &M,
     pairs: &Correspondences,

@@ -1,9 +1,10 @@
-//! Components of the increment that are held at zero.
+//! Frozen components of the increment.
 
 use hicp_core::{Matrix3, Matrix6, Point3, UnitQuaternion, Vector6};
 
-/// Which components of the increment are free: y = [δ; θ], the displacement δ of a centre and the rotation θ = L φ, both along
-/// given axes.
+/// The free components of the increment y = [δ; θ].
+///
+/// δ is the displacement of a center and θ = L φ the scaled rotation, both along given axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Freedom {
     pub(crate) axes: UnitQuaternion<f64>,
@@ -11,7 +12,7 @@ pub(crate) struct Freedom {
     pub(crate) held: [bool; 6],
 }
 
-/// Returns BᵀHB and Bᵀg: the equations of y, with zero rows and columns for what is held.
+/// Returns BᵀHB and Bᵀg: the equations of y, with zero rows and columns for frozen components.
 pub(crate) fn reduce(
     basis: &Matrix6<f64>,
     hessian: &Matrix6<f64>,
@@ -23,7 +24,7 @@ pub(crate) fn reduce(
     )
 }
 
-/// [a b; 0 d]
+/// Assembles [a b; 0 d].
 pub(crate) fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);

@@ -1,4 +1,4 @@
-//! Normal equations with components of the increment held at zero.
+//! Normal equations with frozen components of the increment.
 
 use hicp_core::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use hicp_core::{so3, so3::hat};
@@ -7,11 +7,12 @@ use crate::system::freedom::{Freedom, blocks};
 use crate::system::normal_equations::NormalEquations;
 
 impl NormalEquations {
-    /// Holds components of the increment at zero, in every way of solving.
+    /// Freezes components of the increment at zero, for every way of solving.
     ///
-    /// The increment then displaces `center` (camera frame, metres) by δ and turns about it by φ; `translation` holds the
-    /// components of δ along the axes given by `camera_from_axes`, `rotation` those of φ. The loss is minimised over the
-    /// others. A second call replaces the first.
+    /// The increment displaces `center` (camera frame, meters) by δ and rotates around it by φ.
+    /// `translation` selects the frozen components of δ along the axes of `camera_from_axes`, and
+    /// `rotation` those of φ. The loss is minimized over the others. A second call replaces the
+    /// first.
     pub fn freeze(
         &mut self,
         camera_from_axes: &UnitQuaternion<f64>,
@@ -28,18 +29,18 @@ impl NormalEquations {
         });
     }
 
-    /// Number of unknowns that are not held.
+    /// Returns the number of unknowns that are not frozen.
     pub(crate) fn n_free(&self) -> usize {
         let held = self.freedom.map_or([false; 6], |freedom| freedom.held);
         6 - held.iter().filter(|held| **held).count()
     }
 
-    /// Which unknowns are held.
+    /// Returns whether an unknown is frozen.
     pub(crate) fn held(&self, component: usize) -> bool {
         self.freedom.is_some_and(|freedom| freedom.held[component])
     }
 
-    /// Returns the matrix B of z = B y; columns of held components are zero.
+    /// Returns the matrix B of z = B y, whose columns are zero for frozen components.
     pub(crate) fn basis(&self) -> Matrix6<f64> {
         let Some(freedom) = &self.freedom else {
             return Matrix6::identity();
@@ -55,12 +56,12 @@ impl NormalEquations {
         basis
     }
 
-    /// Returns the motion of the camera frame that the unknowns y mean.
+    /// Returns the motion of the camera frame for the unknowns y.
     pub(crate) fn increment(&self, y: &Vector6<f64>) -> Isometry3<f64> {
         let first: Vector3<f64> = y.fixed_rows::<3>(0).into_owned();
         let second: Vector3<f64> = y.fixed_rows::<3>(3) / self.length;
         let Some(freedom) = &self.freedom else {
-            // The exponential about the pivot.
+            // The exponential around the pivot.
             let about_pivot = Isometry3::from_parts(
                 Translation3::from(so3::left_jacobian(&second) * first),
                 so3::exp(&second),
@@ -68,10 +69,12 @@ impl NormalEquations {
             let pivot = self.pivot.coords;
             return Translation3::from(pivot) * about_pivot * Translation3::from(-pivot);
         };
-        // Not the exponential, whose screws would displace the centre along held axes to second order.
+        // Not the exponential: its screw motion would displace the center along frozen axes to
+        // second order.
         let rotation = so3::exp(&(freedom.axes * second));
         let center = freedom.center.coords;
-        // Exactly zero displacement where nothing moves, rather than the rounding of c − R c.
+        // Without a rotation, the displacement must be exactly zero instead of the rounding of c −
+        // R c.
         let swing = if second == Vector3::zeros() {
             Vector3::zeros()
         } else {

@@ -1,4 +1,4 @@
-//! Normal equations, and what can be read from them.
+//! Normal equations and the quantities derived from them.
 
 pub(crate) mod covariance;
 pub(crate) mod degeneracy;

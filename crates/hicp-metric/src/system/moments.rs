@@ -1,11 +1,11 @@
-//! Where the sources of some pairs are, and how far they spread.
+//! The centroid and the spread of the sources of some pairs.
 
 use hicp_core::{Pair, Point3, Vector3};
 
 /// Weighted sums of the source points and their squares.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
-    /// The first point that counts, so that an object far from the origin loses no digits.
+    /// The first point with weight, so that an object far from the origin loses no digits.
     origin: Point3<f64>,
     /// Σ w (x, y, z, 1).
     sums: [f64; 4],
@@ -14,7 +14,7 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// `None` without a pair that has weight.
+    /// Returns empty sums, or `None` without a pair that has weight.
     #[inline(always)]
     pub(crate) fn about_first(pairs: &[Pair]) -> Option<Self> {
         let first = pairs.iter().find(|pair| pair.weight > 0.0)?;
@@ -25,7 +25,7 @@ impl Moments {
         })
     }
 
-    /// Takes Σ w (x, y, z, 1) and Σ w (x², y², z²), of coordinates from the same origin.
+    /// Sets Σ w (x, y, z, 1) and Σ w (x², y², z²), relative to the same origin.
     pub(crate) fn with_sums(&self, sums: [f64; 4], squares: [f64; 3]) -> Self {
         let [x, y, z] = squares;
         Self {
@@ -55,7 +55,9 @@ impl Moments {
         }
     }
 
-    /// Returns the centroid and the RMS radius; `None` without weight or with numbers that are not finite.
+    /// Returns the centroid and the RMS radius.
+    ///
+    /// Without weight, or with numbers that are not finite, returns `None`.
     pub(crate) fn pivot_and_length(&self) -> Option<(Point3<f64>, f64)> {
         let [x, y, z, weight] = self.sums;
         let squares = self.squares[0] + self.squares[1] + self.squares[2];
@@ -64,7 +66,8 @@ impl Moments {
         }
         let mean = Vector3::new(x, y, z) / weight;
         let variance = squares / weight - mean.norm_squared();
-        // All points in one place: any length will do, the rotation is undetermined and stays damped.
+        // If all points are at one place, any length is valid: the rotation is undetermined and
+        // stays damped.
         let length = if variance > 1e-12 {
             variance.sqrt()
         } else {

@@ -6,14 +6,16 @@ use crate::system::degeneracy::Degeneracy;
 use crate::system::freedom::{Freedom, blocks};
 use crate::system::row_sums::RowSums;
 
-/// Sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centred and scaled.
+/// The sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centered and scaled.
 ///
-/// Rotations turn about a pivot (the centroid of the points) and are measured in units of 1/L radians (L the RMS radius),
-/// so that all six unknowns are lengths of similar size: for a 10 cm object at 0.5 m the condition number falls from 2·10⁴
-/// to about 40 (Low 2004 for the rows). [`NormalEquations::solve`] converts back.
+/// Rotations are around a pivot (the centroid of the points) and in units of 1/L radians (L the RMS
+/// radius), so that all six unknowns are lengths of similar size. For a 10 cm object at 0.5 m, the
+/// condition number falls from 2·10⁴ to about 40 (Low 2004 for the rows).
+/// [`NormalEquations::solve`] converts back.
 ///
-/// A system also knows how it is to be solved, so that decorators compose: what happens in directions that the rows leave
-/// open ([`NormalEquations::with_policy`]) and which components of the increment are held ([`NormalEquations::freeze`]).
+/// A system also stores how to solve it, so that decorators compose. This is the treatment of
+/// undetermined directions ([`NormalEquations::with_policy`]) and the frozen components of the
+/// increment ([`NormalEquations::freeze`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
@@ -22,7 +24,7 @@ pub struct NormalEquations {
     weight: Option<f64>,
     sums: RowSums,
     pub(crate) rows: usize,
-    /// Trace of the rows alone, once a prior was added: its stiffness must not raise the damping.
+    /// Trace of the rows alone, if a prior was added: its stiffness must not raise the damping.
     row_trace: Option<f64>,
     pub(crate) freedom: Option<Freedom>,
     pub(crate) policy: Degeneracy,
@@ -30,7 +32,8 @@ pub struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// Makes an empty system about a pivot (camera frame, metres) with a length scale (metres, above 0).
+    /// Creates an empty system with a pivot (camera frame, meters) and a length scale (meters,
+    /// above 0).
     #[must_use]
     pub fn new(pivot: Point3<f64>, length: f64) -> Self {
         Self {
@@ -47,7 +50,7 @@ impl NormalEquations {
         }
     }
 
-    /// Takes sums over `rows` rows about a pivot, with lengths in metres.
+    /// Creates a system from sums over `rows` rows relative to a pivot, with lengths in meters.
     pub(crate) fn from_sums(pivot: Point3<f64>, sums: RowSums, rows: usize) -> Self {
         Self {
             sums,
@@ -56,7 +59,7 @@ impl NormalEquations {
         }
     }
 
-    /// Returns this system about another pivot, with lengths scaled by another length.
+    /// Returns this system with another pivot and another length scale.
     #[must_use]
     pub(crate) fn moved_to(&self, pivot: Point3<f64>, length: f64, weight: f64) -> Self {
         let mut moved = Self::new(pivot, length);
@@ -65,14 +68,16 @@ impl NormalEquations {
         moved
     }
 
-    /// Σ w over the pairs, if this is the sum over pairs that [`crate::ErrorMetric::linearize_all`] provides.
+    /// Returns Σ w over the pairs, if [`crate::ErrorMetric::linearize_all`] summed the system.
     pub(crate) fn weight(&self) -> Option<f64> {
         self.weight
     }
 
-    /// Adds one scalar residual r of weight w whose change under the increment is `direction` · (displacement of `point`).
+    /// Adds a scalar residual r of weight w that changes by `direction` · (displacement of
+    /// `point`).
     ///
-    /// That is the row J = [dᵀ, ((p − pivot) × d)ᵀ]. `point` is in the camera frame; r and d·(displacement) share a unit (metres for distances).
+    /// Its row is J = [dᵀ, ((p − pivot) × d)ᵀ]. `point` is in the camera frame. The residual and
+    /// d·(displacement) have the same unit, meters for distances.
     #[inline(always)]
     pub fn add_row(
         &mut self,
@@ -106,22 +111,24 @@ impl NormalEquations {
         self.sums.loss()
     }
 
-    /// Point about which rotations turn, camera frame, metres.
+    /// Center of rotations, camera frame, meters.
     #[must_use]
     pub fn pivot(&self) -> Point3<f64> {
         self.pivot
     }
 
-    /// Length by which rotations are scaled, metres.
+    /// Scale of rotations, meters.
     #[must_use]
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Adds eᵀΛe for e(ξ) = `residual` + `jacobian` ξ, with ξ the twist about the *camera origin* in metres and radians.
+    /// Adds eᵀΛe for e(ξ) = `residual` + `jacobian` ξ.
     ///
-    /// Λ (`information`) is symmetric and positive semi-definite; eᵀΛe has the unit of the loss. Each component with
-    /// information counts as a row. Add it after the rows: they alone set the damping of [`NormalEquations::solve`].
+    /// ξ is the twist around the *camera origin* in meters and radians. Λ (`information`) is
+    /// symmetric and positive semi-definite, and eᵀΛe has the unit of the loss. Each component with
+    /// information counts as a row. Add it after the rows, because they alone determine the damping
+    /// of [`NormalEquations::solve`].
     pub fn add_twist(
         &mut self,
         residual: &Vector6<f64>,
@@ -140,11 +147,12 @@ impl NormalEquations {
         self.rows += (0..6).filter(|&i| information[(i, i)] > 0.0).count();
     }
 
-    /// Adds `factor` times another system, whose pivot and length may be others.
+    /// Adds `factor` times another system, whose pivot and length may differ.
     ///
-    /// Policy and held components stay those of `self`.
+    /// Policy and frozen components stay those of `self`.
     pub fn merge(&mut self, other: &Self, factor: f64) {
-        // The same twist in the other system's unknowns: ρ' = ρ + φ × (pivot' − pivot), θ' = θ L'/L.
+        // The same twist in the other system's unknowns: ρ' = ρ + φ × (pivot' − pivot), θ' = θ
+        // L'/L.
         let shift = hat(&(other.pivot - self.pivot)) / -self.length;
         let scale = Matrix3::identity() * (other.length / self.length);
         let change = blocks(&Matrix3::identity(), &shift, &scale);
@@ -170,24 +178,27 @@ impl NormalEquations {
         self
     }
 
-    /// The trace that the damping is relative to: that of the rows, or of all if they say nothing.
+    /// Returns the trace that damping is relative to: that of the rows, or of all if the rows have
+    /// none.
     pub(crate) fn damping_trace(&self) -> f64 {
         self.row_trace
             .filter(|trace| *trace > 0.0)
             .unwrap_or_else(|| self.sums.trace())
     }
 
-    /// JᵀWJ in scaled unknowns, both triangles.
+    /// Returns JᵀWJ in scaled unknowns, both triangles.
     pub(crate) fn scaled_hessian(&self) -> Matrix6<f64> {
         self.sums.hessian()
     }
 
-    /// JᵀWr in scaled unknowns.
+    /// Returns JᵀWr in scaled unknowns.
     pub(crate) fn scaled_gradient(&self) -> Vector6<f64> {
         self.sums.gradient()
     }
 
-    /// The matrix S of ξ = S z: z the scaled twist about the pivot, ξ the plain one about the camera origin.
+    /// Returns the matrix S of ξ = S z.
+    ///
+    /// z is the scaled twist around the pivot, and ξ the plain one around the camera origin.
     pub(crate) fn camera_from_scaled(&self) -> Matrix6<f64> {
         blocks(
             &Matrix3::identity(),
@@ -196,7 +207,7 @@ impl NormalEquations {
         )
     }
 
-    /// The inverse of [`NormalEquations::camera_from_scaled`].
+    /// Returns the inverse of [`NormalEquations::camera_from_scaled`].
     pub(crate) fn scaled_from_camera(&self) -> Matrix6<f64> {
         blocks(
             &Matrix3::identity(),
@@ -211,7 +222,9 @@ mod tests {
     use super::*;
     use hicp_core::se3;
 
-    /// ½ Σ w (d · (exp(ξ) p) + r₀)² over the rows, with ξ about the pivot and rotations in units of 1/L.
+    /// Rows with the loss ½ Σ w (d · (exp(ξ) p) + r₀)².
+    ///
+    /// ξ is around the pivot, with rotations in units of 1/L.
     struct Rows {
         pivot: Point3<f64>,
         length: f64,
@@ -240,8 +253,9 @@ mod tests {
     }
 
     #[test]
-    fn gradient_and_hessian_are_those_of_the_linearised_loss() {
-        // Rows of no symmetry; zero residuals, where the Gauss–Newton Hessian is the Hessian.
+    fn gradient_and_hessian_equal_those_of_the_linearized_loss() {
+        // Rows without symmetry, and zero residuals, for which the Gauss–Newton Hessian is the
+        // Hessian.
         let rows = Rows {
             pivot: Point3::new(0.1, -0.2, 0.7),
             length: 0.037,
@@ -270,7 +284,8 @@ mod tests {
                 let second =
                     (f(1.0, 1.0) - f(1.0, -1.0) - f(-1.0, 1.0) + f(-1.0, -1.0)) / (4.0 * h * h);
                 let found = at_zero.scaled_hessian()[(i, j)];
-                // Differences cancel to ε/h² and are off by h² times the fourth derivative, which levers of 1/L reach.
+                // Differences cancel to ε/h². Their error is h² times the fourth derivative, which
+                // levers of 1/L increase.
                 let scale = at_zero.scaled_hessian().diagonal().amax();
                 assert!(
                     (found - second).abs() < 1e-5 * scale,
@@ -322,7 +337,7 @@ mod tests {
         let reference = solve(Point3::origin(), 1.0);
         for (pivot, length) in [(Point3::new(0.3, -0.2, 0.4), 1.0), (Point3::origin(), 0.5)] {
             let (angle, distance) = se3::pose_distance(&solve(pivot, length), &reference);
-            // Both damp by 1e-6 of themselves, of a step of 1e-2, each in its own coordinates.
+            // Both damp by 1e-6 of a step of 1e-2, each in its own coordinates.
             assert!(angle < 1e-6 && distance < 1e-6, "{angle} {distance}");
         }
     }

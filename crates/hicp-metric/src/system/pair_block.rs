@@ -1,16 +1,17 @@
-//! Some pairs side by side, for loops over the lanes of vectors.
+//! Blocks of pairs, for loops over the lanes of vectors.
 
 use hicp_core::Pair;
 
-/// Pairs of a block: what is made of them stays in the innermost cache, and each sum is loaded once per block.
+/// Pairs per block. Intermediate values stay in the innermost cache, and sums are loaded once per
+/// block.
 pub(crate) const BLOCK: usize = 32;
-/// Partial sums of each sum.
+/// Partial sums per sum.
 pub(crate) const LANES: usize = 4;
 
 /// One number per pair of a block.
 pub(crate) type Column = [f64; BLOCK];
 
-/// The coordinates of up to [`BLOCK`] pairs, an array each. What is not filled has no weight.
+/// The coordinates of up to [`BLOCK`] pairs, in one array each. Unused lanes have no weight.
 #[derive(Clone, Copy)]
 pub(crate) struct PairBlock {
     pub(crate) source: [[f32; BLOCK]; 3],
@@ -28,7 +29,7 @@ impl PairBlock {
         }
     }
 
-    /// Takes at most [`BLOCK`] pairs in the place of those before.
+    /// Replaces the content by at most [`BLOCK`] pairs.
     #[inline(always)]
     pub(crate) fn fill(&mut self, pairs: &[Pair]) {
         for (lane, pair) in pairs.iter().take(BLOCK).enumerate() {
@@ -44,7 +45,7 @@ impl PairBlock {
     }
 }
 
-/// Σ a b over a block, added to the lanes of a sum.
+/// Adds Σ a b over a block to the lanes of a sum.
 #[inline(always)]
 pub(crate) fn add_products(sum: &mut [f64; LANES], a: &Column, b: &Column) {
     let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
@@ -55,7 +56,7 @@ pub(crate) fn add_products(sum: &mut [f64; LANES], a: &Column, b: &Column) {
     }
 }
 
-/// The product of two columns.
+/// Returns the product of two columns.
 #[inline(always)]
 pub(crate) fn product(a: &Column, b: &Column) -> Column {
     let mut product = [0.0; BLOCK];

@@ -1,4 +1,4 @@
-//! Normal equations of the distances between points, many pairs at a time.
+//! Normal equations of distances between points, many pairs at a time.
 
 use hicp_core::Pair;
 use hicp_core::internal::{VectorLoop, vectorized};
@@ -8,12 +8,13 @@ use crate::system::normal_equations::NormalEquations;
 use crate::system::pair_block::{BLOCK, LANES, PairBlock, add, add_products, product};
 use crate::system::row_sums::RowSums;
 
-/// Returns what [`crate::ErrorMetric::linearize_all`] provides for the residuals p − c of all pairs, up to rounding, in a sixth of the time.
+/// Returns the system of the residuals p − c of all pairs.
 ///
-/// The three rows of a pair at p are [eₖ, p × eₖ], so that JᵀJ is made of Σ w, Σ w p and Σ w p pᵀ alone.
+/// Up to rounding it equals the provided [`crate::ErrorMetric::linearize_all`], in a sixth of the
+/// time. The three rows of a pair at p are [eₖ, p × eₖ], so JᵀJ only needs Σ w, Σ w p and Σ w p pᵀ.
 pub(crate) fn system_of_points(pairs: &[Pair]) -> Option<NormalEquations> {
     let system = vectorized(SumPoints { pairs })?;
-    // Sources were checked with the centroid; this catches targets.
+    // Sources were checked with the centroid. This check covers targets.
     system.loss().is_finite().then_some(system)
 }
 
@@ -29,7 +30,8 @@ impl VectorLoop for SumPoints<'_> {
         let first = Moments::about_first(self.pairs)?;
         let origin = first.origin();
         let zero = [0.0; LANES];
-        // Of p from the origin, of d = p − c, of p × d; of p pᵀ the diagonal and xy, yz, zx.
+        // Sums of p relative to the origin, of d = p − c, and of p × d; of p pᵀ the diagonal and
+        // xy, yz, zx.
         let (mut points, mut offsets, mut turns) = ([zero; 3], [zero; 3], [zero; 3]);
         let (mut squares, mut mixed) = ([zero; 3], [zero; 3]);
         let (mut loss, mut weight) = (zero, zero);

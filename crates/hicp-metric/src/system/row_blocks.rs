@@ -1,4 +1,4 @@
-//! Sums over pairs that have one residual row each, many pairs at a time.
+//! Normal equations of pairs with one residual row each, many pairs at a time.
 
 use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{Pair, Point3, Vector3};
@@ -8,7 +8,7 @@ use crate::system::normal_equations::NormalEquations;
 use crate::system::pair_block::{BLOCK, LANES, add_products};
 use crate::system::row_sums::RowSums;
 
-/// Sums over the lower triangle of a aᵀ, a of seven numbers.
+/// Number of sums over the lower triangle of a aᵀ, where a has seven numbers.
 const TRIANGLE: usize = 28;
 
 /// The row of one pair: its residual changes by `direction` · (displacement of `point`).
@@ -28,14 +28,16 @@ impl Row {
     }
 }
 
-/// Returns what [`crate::ErrorMetric::linearize_all`] provides for a metric of one row per pair, up to rounding, in half the time: rows
-/// lie across the lanes of vectors instead of along them.
+/// Returns the system of a metric with one row per pair.
+///
+/// Up to rounding it equals the provided [`crate::ErrorMetric::linearize_all`], in half the time,
+/// because rows lie across the lanes of vectors instead of along them.
 pub(crate) fn system_of_rows(
     pairs: &[Pair],
     row: impl Fn(&Pair) -> Row,
 ) -> Option<NormalEquations> {
     let system = vectorized(SumBlocks { pairs, row })?;
-    // Sources were checked with the centroid; this catches targets and normals.
+    // Sources were checked with the centroid. This check covers targets and normals.
     system.loss().is_finite().then_some(system)
 }
 
@@ -55,7 +57,7 @@ impl<F: Fn(&Pair) -> Row> VectorLoop for SumBlocks<'_, F> {
         let mut sums = [[0.0; LANES]; TRIANGLE];
         let mut rows = 0;
         for pairs in self.pairs.chunks(BLOCK) {
-            // p, d and r of each pair; what is not filled has no weight.
+            // p, d and r of each pair. Unused lanes have no weight.
             let (mut point, mut a) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 7]);
             let mut weight = [0.0; BLOCK];
             for (lane, pair) in pairs.iter().enumerate() {
@@ -96,7 +98,7 @@ impl<F: Fn(&Pair) -> Row> VectorLoop for SumBlocks<'_, F> {
     }
 }
 
-/// The moments of the points that rows act at, summed in lanes.
+/// The moments of the points of rows, summed in lanes.
 struct BlockMoments {
     about: Moments,
     sums: [[f64; LANES]; 4],

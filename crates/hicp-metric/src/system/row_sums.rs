@@ -2,14 +2,15 @@
 
 use hicp_core::{Matrix6, Vector6};
 
-/// Columns of a row, filled up to whole vectors: six of J, the residual, and a zero.
+/// Columns of a row, padded to whole vectors: six of J, the residual, and a zero.
 const LANES: usize = 8;
-/// The residual's place in a row.
+/// The position of the residual in a row.
 const RESIDUAL: usize = 6;
 
-/// Σ w a aᵀ over rows a = [J, r]: JᵀWJ, JᵀWr and rᵀWr in one matrix, of which the lower triangle counts.
+/// The sums Σ w a aᵀ over rows a = [J, r]: JᵀWJ, JᵀWr and rᵀWr in one matrix.
 ///
-/// `0[j][i]` is the entry of line i and column j, so that adding a row is the same operation on whole vectors.
+/// Only the lower triangle counts. `0[j][i]` is the entry of line i and column j, so that adding a
+/// row is the same operation on whole vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RowSums([[f64; LANES]; RESIDUAL + 1]);
 
@@ -18,7 +19,7 @@ impl RowSums {
         Self([[0.0; LANES]; RESIDUAL + 1])
     }
 
-    /// Takes sums over the lower triangle of a aᵀ, column by column.
+    /// Creates sums from the lower triangle of a aᵀ, column by column.
     pub(crate) fn from_triangle(triangle: [f64; 28]) -> Self {
         let mut sums = Self::zeros();
         let mut triangle = triangle.into_iter();
@@ -37,14 +38,14 @@ impl RowSums {
         let row = [a, b, c, d, e, f, residual, 0.0];
         for (column, sums) in self.0.iter_mut().enumerate() {
             let weighted = weight * row[column];
-            // Whole vectors of four: the lines above the diagonal's vector are never read.
+            // Whole vectors of four. The lines above the diagonal's vector are never read.
             for line in column / 4 * 4..LANES {
                 sums[line] += weighted * row[line];
             }
         }
     }
 
-    /// Adds to each sum.
+    /// Adds to every sum.
     pub(crate) fn add(&mut self, hessian: &Matrix6<f64>, gradient: &Vector6<f64>, loss: f64) {
         for (column, sums) in self.0[..RESIDUAL].iter_mut().enumerate() {
             for line in column..RESIDUAL {
@@ -55,29 +56,29 @@ impl RowSums {
         self.0[RESIDUAL][RESIDUAL] += loss;
     }
 
-    /// Multiplies each sum.
+    /// Multiplies every sum.
     pub(crate) fn scale(&mut self, factor: f64) {
         for sum in self.0.as_flattened_mut() {
             *sum *= factor;
         }
     }
 
-    /// JᵀWJ, both triangles.
+    /// Returns JᵀWJ, both triangles.
     pub(crate) fn hessian(&self) -> Matrix6<f64> {
         Matrix6::from_fn(|line, column| self.0[line.min(column)][line.max(column)])
     }
 
-    /// JᵀWr.
+    /// Returns JᵀWr.
     pub(crate) fn gradient(&self) -> Vector6<f64> {
         Vector6::from_fn(|column, _| self.0[column][RESIDUAL])
     }
 
-    /// rᵀWr.
+    /// Returns rᵀWr.
     pub(crate) fn loss(&self) -> f64 {
         self.0[RESIDUAL][RESIDUAL]
     }
 
-    /// The sum of the diagonal of JᵀWJ.
+    /// Returns the sum of the diagonal of JᵀWJ.
     pub(crate) fn trace(&self) -> f64 {
         (0..RESIDUAL).map(|i| self.0[i][i]).sum()
     }

@@ -1,4 +1,4 @@
-//! How the normal equations are solved.
+//! Solutions of the normal equations.
 
 use hicp_core::{Isometry3, Matrix6, Vector6, se3};
 use nalgebra::SymmetricEigen;
@@ -7,48 +7,52 @@ use crate::system::degeneracy::Degeneracy;
 use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
 
-/// Damping relative to the mean diagonal of the scaled system: directions that the pairs do not constrain stay put.
+/// Damping relative to the mean diagonal of the scaled system. Undetermined directions do not move.
 const DAMPING: f64 = 1e-6;
-/// Smallest diagonal entry that Levenberg's damping is relative to, as a share of the mean.
+/// Smallest diagonal entry for Marquardt's damping, as a share of the mean.
 const DIAGONAL_FLOOR: f64 = 1e-6;
-/// More than any 6×6 matrix needs; a bound because of what is not a number.
+/// Largest number of eigenvalue iterations: more than any 6×6 matrix needs.
 const EIGEN_ITERATIONS: usize = 1000;
 
-/// A step, and how far it goes.
+/// A step and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Solution {
     pub(crate) increment: Isometry3<f64>,
-    /// Length of the scaled step relative to the length scale: without unit.
+    /// Length of the scaled step relative to the length scale, without unit.
     pub(crate) size: f64,
 }
 
 impl NormalEquations {
-    /// Says how [`NormalEquations::solve`] treats directions that the rows leave open. Initially [`Degeneracy::Damp`].
+    /// Sets the treatment of undetermined directions; by default [`Degeneracy::Damp`].
     ///
-    /// `threshold` is the largest ratio to the largest eigenvalue at which a direction counts as degenerate.
+    /// `threshold` is the largest ratio to the largest eigenvalue at which a direction is
+    /// degenerate.
     #[must_use]
     pub fn with_policy(mut self, policy: Degeneracy, threshold: f64) -> Self {
         (self.policy, self.threshold) = (policy, threshold);
         self
     }
 
-    /// Returns the increment that minimises the linearised loss, as a motion of the camera frame.
+    /// Returns the increment that minimizes the linearized loss, as a motion of the camera frame.
     ///
-    /// `None` with fewer rows than unknowns (six, less those held), without any information, or with numbers that are not
-    /// finite. Directions that the rows leave free (a plane's own plane, a cylinder's axis) are treated by the system's policy,
-    /// [`Degeneracy::Damp`] if none was set: they do not move.
+    /// Returns `None` with fewer rows than unknowns (six minus the frozen ones), without
+    /// information, or with numbers that are not finite. The system's policy defines the treatment
+    /// of undetermined directions, such as translations along a plane. With the default,
+    /// [`Degeneracy::Damp`], they do not move.
     #[must_use]
     pub fn solve(&self) -> Option<Isometry3<f64>> {
         Some(self.solution(0.0)?.increment)
     }
 
-    /// Solves with a policy other than the system's own.
+    /// Solves with another policy.
     #[must_use]
     pub fn solve_with(&self, policy: Degeneracy, threshold: f64) -> Option<Isometry3<f64>> {
         self.with_policy(policy, threshold).solve()
     }
 
-    /// Solves with Marquardt's damping `lambda` ≥ 0 (relative to each diagonal entry) on top of the policy.
+    /// Solves with Marquardt's damping `lambda` ≥ 0, in addition to the policy.
+    ///
+    /// The damping is relative to each diagonal entry.
     pub(crate) fn solution(&self, lambda: f64) -> Option<Solution> {
         let n_free = self.n_free();
         if n_free == 0 {
@@ -76,9 +80,10 @@ impl NormalEquations {
         })
     }
 
-    /// Returns the minimiser of the linearised loss as a twist about the pivot, its free directions damped but its others exact.
+    /// Returns the minimizer of the linearized loss as a twist around the pivot.
     ///
-    /// Iterated Tikhonov: each pass leaves λ/(h + λ) of the error that it found, and nothing of a free direction moves.
+    /// Undetermined directions are damped, and the others are exact. It is iterated Tikhonov: each
+    /// pass leaves λ/(h + λ) of the remaining error, and undetermined directions do not move.
     pub(crate) fn exact_twist(&self) -> Option<Vector6<f64>> {
         const PASSES: usize = 4;
         if self.rows < 6 {
@@ -87,7 +92,7 @@ impl NormalEquations {
         let mean_diagonal = self.damping_trace() / 6.0;
         let hessian = self.scaled_hessian();
         let damped = hessian + Matrix6::identity() * (DAMPING * mean_diagonal);
-        // None where the rows say nothing or not in numbers.
+        // Fails if the rows have no information or are not finite.
         let factor = damped.cholesky()?;
         let mut z = Vector6::zeros();
         for _ in 0..PASSES {
@@ -98,7 +103,7 @@ impl NormalEquations {
         z.iter().all(|x| x.is_finite()).then_some(z)
     }
 
-    /// The unknowns from a Cholesky decomposition, damped absolutely and by Marquardt's λ.
+    /// Returns the unknowns from a Cholesky decomposition, with absolute damping and Marquardt's λ.
     fn factored(&self, damping: f64, lambda: f64) -> Option<Vector6<f64>> {
         let mut hessian = self.scaled_hessian();
         self.damp(&mut hessian, lambda);
@@ -113,7 +118,7 @@ impl NormalEquations {
         Some(y)
     }
 
-    /// The unknowns from an eigen-decomposition, degenerate directions left out.
+    /// Returns the unknowns from an eigendecomposition without the degenerate directions.
     fn remapped(&self, lambda: f64) -> Option<Vector6<f64>> {
         let (hessian, gradient) = reduce(
             &self.basis(),
@@ -128,7 +133,7 @@ impl NormalEquations {
             .iter()
             .zip(eigen.eigenvectors.column_iter())
         {
-            // Held unknowns have the eigenvalue zero.
+            // Frozen unknowns have the eigenvalue zero.
             if *value > limit {
                 y -= direction * (direction.dot(&gradient) / (value * (1.0 + lambda)));
             }
@@ -137,7 +142,7 @@ impl NormalEquations {
         Some(y)
     }
 
-    /// Whether a direction that is not held is degenerate.
+    /// Returns whether a direction that is not frozen is degenerate.
     fn is_degenerate(&self) -> Option<bool> {
         let (hessian, _) = reduce(
             &self.basis(),
@@ -150,7 +155,9 @@ impl NormalEquations {
         Some(determined < self.n_free())
     }
 
-    /// Marquardt's damping: relative to each diagonal entry, with a floor for directions without information.
+    /// Applies Marquardt's damping relative to each diagonal entry.
+    ///
+    /// A floor covers directions without information.
     fn damp(&self, hessian: &mut Matrix6<f64>, lambda: f64) {
         let floor = DIAGONAL_FLOOR * self.damping_trace() / 6.0;
         for i in 0..6 {
@@ -159,7 +166,7 @@ impl NormalEquations {
         }
     }
 
-    /// Gives held unknowns, whose rows and columns are zero, an equation of their own.
+    /// Adds an equation for frozen unknowns, whose rows and columns are zero.
     pub(crate) fn fill_held(&self, reduced: &mut Matrix6<f64>) {
         let diagonal = reduced.trace();
         for i in (0..6).filter(|&i| self.held(i)) {
@@ -174,9 +181,9 @@ impl NormalEquations {
     }
 }
 
-/// Eigenvalues and vectors of a symmetric matrix; `None` where an entry is not finite.
+/// Returns eigenvalues and eigenvectors of a symmetric matrix, or `None` if an entry is not finite.
 pub(crate) fn eigen(matrix: Matrix6<f64>) -> Option<SymmetricEigen<f64, nalgebra::U6>> {
-    // Not finite, and the iteration would not end.
+    // If an entry is not finite, the iteration would not end.
     let scale = matrix.amax();
     if !matrix.iter().all(|x| x.is_finite()) {
         return None;

@@ -1,4 +1,4 @@
-//! Covariance and information against Monte Carlo and under changes of frame.
+//! Tests of covariance and information: against Monte Carlo, and under changes of frame.
 
 use crate::scenes::{Numbers, carried, center, ellipsoid, exact, messy};
 use hicp_core::Iteration;
@@ -8,7 +8,7 @@ use hicp_metric::{NormalEquations, PointToPlane, PointToPoint};
 
 const TRIALS: u32 = 4000;
 
-/// Noise of σ/√w: along the normal for point-to-plane, in all directions for point-to-point.
+/// Adds noise of σ/√w: along the normal for point-to-plane, in all directions for point-to-point.
 fn noisy(
     numbers: &mut Numbers,
     source: &[Surfel],
@@ -30,7 +30,8 @@ fn noisy(
     pairs
 }
 
-/// Mean predicted and sample covariance of the increment at the minimum of each trial.
+/// Returns the mean predicted and the sample covariance of the increment at the minimum of each
+/// trial.
 fn monte_carlo(metric: &mut dyn Minimize, sigma: f64, plane: bool) -> (Matrix6<f64>, Matrix6<f64>) {
     let mut numbers = Numbers(91);
     let source = ellipsoid(&mut numbers, 60);
@@ -57,12 +58,14 @@ fn monte_carlo(metric: &mut dyn Minimize, sigma: f64, plane: bool) -> (Matrix6<f
     (predicted, sample)
 }
 
-/// Σ^{-½} S Σ^{-½} is Wishart over N around the identity: entries have a standard deviation of √(1/N), diagonals of √(2/N).
+/// Checks Σ^{-½} S Σ^{-½}, which is Wishart over N around the identity.
+///
+/// Its entries have a standard deviation of √(1/N), and its diagonals of √(2/N).
 fn check(predicted: &Matrix6<f64>, sample: &Matrix6<f64>) {
     let factor = predicted.cholesky().unwrap().l();
     let inverse = factor.try_inverse().unwrap();
     let whitened = inverse * sample * inverse.transpose();
-    // Five standard deviations for 21 entries, and 1 % for what is not linear.
+    // Five standard deviations for 21 entries, and 1 % for nonlinearity.
     let bound = 5.0 * (2.0 / f64::from(TRIALS)).sqrt() + 0.01;
     assert!(
         (whitened - Matrix6::identity()).amax() < bound,
@@ -71,7 +74,7 @@ fn check(predicted: &Matrix6<f64>, sample: &Matrix6<f64>) {
 }
 
 #[test]
-fn monte_carlo_reproduces_the_covariance() {
+fn monte_carlo_confirms_the_covariance() {
     let (predicted, sample) = monte_carlo(&mut PointToPlane, 5e-4, true);
     check(&predicted, &sample);
     let (predicted, sample) = monte_carlo(&mut PointToPoint, 5e-4, false);
@@ -95,7 +98,7 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
     let (one, three) = (at(1e-3), at(3e-3));
     // Targets are rounded to f32: 3e-8 m of 1e-3 m.
     assert!((three - one * 9.0).amax() < 1e-4 * three.amax());
-    // And weights that all double change nothing.
+    // Doubling all weights changes nothing.
     let pairs = messy(&mut numbers, 60);
     let mut heavy = pairs.clone();
     for pair in heavy.as_mut_slice() {
@@ -116,7 +119,8 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
     assert!((a - b).amax() < 1e-12 * a.amax());
 }
 
-/// Residuals at random points on directions, about some pivot, all of it displaced by an offset; in f64 throughout.
+/// Returns residuals at random points along random directions, around a pivot, all displaced by an
+/// offset; in f64.
 fn displaced(offset: &Vector3<f64>, pivot: &Point3<f64>) -> NormalEquations {
     let mut numbers = Numbers(94);
     let mut system = NormalEquations::new(pivot + offset, 0.05);
@@ -129,7 +133,7 @@ fn displaced(offset: &Vector3<f64>, pivot: &Point3<f64>) -> NormalEquations {
 }
 
 #[test]
-fn information_is_about_the_camera_origin_whatever_the_pivot() {
+fn information_is_around_the_camera_origin_for_every_pivot() {
     let here = displaced(&Vector3::zeros(), &center());
     let expected = {
         let mut numbers = Numbers(94);
@@ -156,7 +160,7 @@ fn information_is_about_the_camera_origin_whatever_the_pivot() {
     assert!((product - Matrix6::identity()).amax() < 1e-9, "{product}");
 }
 
-/// A kilometre away the covariance is Ad Σ Adᵀ, and the step is the same.
+/// At a distance of a kilometer the covariance is Ad Σ Adᵀ, and the step is the same.
 #[test]
 fn a_far_pivot_keeps_the_digits() {
     let offset = Vector3::new(800.0, -500.0, 300.0);
@@ -166,7 +170,7 @@ fn a_far_pivot_keeps_the_digits() {
     let expected = adjoint * near.covariance().unwrap() * adjoint.transpose();
     let found = far.covariance().unwrap();
     assert!((found - expected).amax() < 1e-9 * expected.amax());
-    // Carried back to the object: the lever amplifies roundings by the square of 10⁴.
+    // Moved back to the object: the lever amplifies roundings by the square of 10⁴.
     let back = adjoint.try_inverse().unwrap();
     let near_again = back * found * back.transpose();
     let covariance = near.covariance().unwrap();
@@ -184,7 +188,7 @@ fn a_far_pivot_keeps_the_digits() {
 }
 
 #[test]
-fn a_common_motion_carries_the_covariance_by_the_adjoint() {
+fn a_common_motion_transforms_the_covariance_by_the_adjoint() {
     let mut numbers = Numbers(95);
     let pairs = messy(&mut numbers, 60);
     let motion = numbers.motion(&center(), 70.0, 0.3);
@@ -209,7 +213,7 @@ fn a_common_motion_carries_the_covariance_by_the_adjoint() {
 }
 
 #[test]
-fn what_is_not_determined_has_no_covariance() {
+fn undetermined_poses_have_no_covariance() {
     let mut numbers = Numbers(96);
     let plane: Vec<_> = (0..100)
         .map(|_| {
@@ -225,7 +229,7 @@ fn what_is_not_determined_has_no_covariance() {
             .covariance(),
         None
     );
-    // Six rows determine the pose but leave nothing to estimate the noise from.
+    // Six rows determine the pose, but leave nothing to estimate the noise from.
     let six = messy(&mut numbers, 6);
     assert_eq!(
         PointToPlane
@@ -234,7 +238,7 @@ fn what_is_not_determined_has_no_covariance() {
             .covariance(),
         None
     );
-    // Pairs without weight are no rows.
+    // Pairs without weight are not rows.
     let mut eight = messy(&mut numbers, 8);
     for pair in &mut eight.as_mut_slice()[..3] {
         pair.weight = 0.0;
@@ -246,7 +250,7 @@ fn what_is_not_determined_has_no_covariance() {
             .covariance(),
         None
     );
-    // A sphere leaves its turns open.
+    // A sphere leaves its rotations undetermined.
     let sphere: Vec<_> = (0..100)
         .map(|_| {
             let normal = numbers.direction();

@@ -1,4 +1,4 @@
-//! How much damping shortens a step, against its closed form.
+//! Tests of damping against its closed form.
 
 use std::collections::VecDeque;
 
@@ -10,12 +10,15 @@ use hicp_metric::{Degeneracy, LevenbergMarquardt, NormalEquations};
 
 /// L of the systems here.
 const LENGTH: f64 = 0.1;
-/// What the turn about z moves its rows by that are to be moved.
+/// The residual of the rows that rotate around z.
 const RESIDUAL: f64 = 1e-3;
 
-/// Rows of weight `strong` for each of the translations, and two for each of the turns about x and y, none of which wants to
-/// move; and two of weight `weak` for the turn about z, which want to turn by −`RESIDUAL`/`LENGTH`. No row acts on two unknowns,
-/// but for translations, where the two of a turn cancel.
+/// A system in which no row acts on two unknowns, after the terms of each pair of rows have
+/// canceled.
+///
+/// It has a row of weight `strong` for each translation, and two for each rotation around x and y,
+/// all with residual zero. It has two of weight `weak` for the rotation around z, which demand
+/// −`RESIDUAL`/`LENGTH`.
 fn system(strong: f64, weak: f64) -> NormalEquations {
     let mut system = NormalEquations::new(center(), LENGTH);
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -29,12 +32,14 @@ fn system(strong: f64, weak: f64) -> NormalEquations {
     system
 }
 
-/// Diagonal of JᵀWJ in scaled unknowns, summed up: 3 translations, and each pair of rows acts on a translation and a turn.
+/// The trace of JᵀWJ in scaled unknowns.
+///
+/// There are 3 translations, and pairs of rows that act on a translation and a rotation.
 fn trace(strong: f64, weak: f64) -> f64 {
     3.0 * strong + 4.0 * (strong + strong + weak)
 }
 
-/// The turn about z, and that nothing else moves.
+/// Returns the rotation around z and checks that nothing else moves.
 fn turn(increment: &Isometry3<f64>) -> f64 {
     let shift = (increment * center() - center()).norm();
     let turn = so3::log(&increment.rotation);
@@ -42,7 +47,8 @@ fn turn(increment: &Isometry3<f64>) -> f64 {
     turn.z
 }
 
-/// A prior of the displacement of the pivot along x, a million times as stiff as the rows, and content as it is.
+/// Adds a prior of the pivot's displacement along x, a million times as stiff as the rows and
+/// already satisfied.
 fn pin(system: &mut NormalEquations) {
     let row = Vector3::x();
     let lever = center().coords.cross(&row);
@@ -56,8 +62,9 @@ fn pin(system: &mut NormalEquations) {
     system.add_twist(&Vector6::zeros(), &jacobian, &information);
 }
 
-/// A direction whose information is a millionth of the mean diagonal of the rows goes half of the way, however the rows were put together,
-/// and whatever a prior says of other directions.
+/// A direction with a millionth of the mean diagonal of the rows goes half of its way.
+///
+/// It does so for every way of assembling the rows and every prior of other directions.
 #[test]
 fn tikhonovs_damping_is_a_millionth_of_the_mean_diagonal_of_the_rows() {
     // 2 w = 10⁻⁶ (11 + 4 w)/6
@@ -90,24 +97,25 @@ fn tikhonovs_damping_is_a_millionth_of_the_mean_diagonal_of_the_rows() {
     }
 }
 
-/// Where the rows say nothing a prior does, and the damping is relative to that.
+/// If the rows have no information, the damping is relative to that of the prior.
 #[test]
 fn a_prior_alone_determines_a_step() {
     let wanted = Vector6::new(1e-4, -2e-4, 3e-4, 4e-4, -5e-4, 6e-4);
     let mut system = NormalEquations::new(center(), LENGTH);
     system.add_twist(&-wanted, &Matrix6::identity(), &Matrix6::identity());
     let found = hicp_core::se3::log(&system.solve().unwrap());
-    // Shortened by 10⁻⁶ of the mean over the smallest eigenvalue: turns of a camera 0.6 m away against shifts.
+    // Shortened by 10⁻⁶ of the mean over the smallest eigenvalue: rotations of a camera 0.6 m away
+    // against translations.
     assert!((found - wanted).norm() < 1e-2 * wanted.norm(), "{found}");
 }
 
-/// Stiffness out of range is no number to divide by.
+/// An infinite stiffness must not become a divisor.
 #[test]
 fn infinite_stiffness_determines_none() {
     let mut system = NormalEquations::new(Point3::origin(), 1.0);
     system.merge(&self::system(1.0, 1.0), 1.0);
     assert!(system.solve().is_some());
-    // Each of them is a number, but their sum is not.
+    // Each entry is finite, but their sum is not.
     let mut information = Matrix6::zeros();
     information[(0, 0)] = f64::MAX;
     information[(1, 1)] = f64::MAX;
@@ -117,10 +125,11 @@ fn infinite_stiffness_determines_none() {
     }
 }
 
-/// A metric with one system and whatever losses it is told to find, that remembers where it was asked for them.
+/// A metric with one system and scripted losses, which records the poses at which they are
+/// requested.
 struct Scripted {
     system: NormalEquations,
-    /// The losses in the order that they are asked for; the last for good.
+    /// The losses in the order of the requests; the last one repeats.
     losses: VecDeque<f64>,
     asked: Vec<Isometry3<f64>>,
 }
@@ -160,13 +169,15 @@ fn solver(system: NormalEquations, losses: &[f64]) -> LevenbergMarquardt<Scripte
     solver
 }
 
-/// The turns that were tried, relative to the whole way.
+/// Returns the rotations of the trial steps, relative to the full step.
 fn tried(solver: &LevenbergMarquardt<Scripted>) -> Vec<f64> {
     let turns = solver.metric.asked[1..].iter().map(turn);
     turns.map(|turn| turn / (-RESIDUAL / LENGTH)).collect()
 }
 
-/// (JᵀWJ + λ D) y = −JᵀWr with the diagonal of JᵀWJ in D, but no less than a millionth of the mean.
+/// (JᵀWJ + λ D) y = −JᵀWr, where D is the diagonal of JᵀWJ with a floor.
+///
+/// The floor is a millionth of the mean.
 #[test]
 fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
     for (weak, lambda) in [(1.0, 0.5), (1.0, 3.0), (1e-9, 3e-4), (1e-9, 0.5)] {
@@ -188,7 +199,7 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
                 "{policy:?} {weak} {lambda}: {found} {expected}"
             );
         }
-        // Among the eigenvectors it is relative to each eigenvalue.
+        // With eigenvectors, it is relative to each eigenvalue.
         let mut once = solver(system.with_policy(Degeneracy::Freeze, 0.0), &[2.0, 1.0]);
         once.initial_damping = lambda;
         once.max_iterations = 1;
@@ -201,7 +212,8 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
     }
 }
 
-/// Down by ten where the loss falls, up by ten where it does not; a step that leaves the loss as it is does not lower it.
+/// Divided by ten if the loss falls, otherwise multiplied by ten. A step that keeps the loss does
+/// not lower it.
 #[test]
 fn the_damping_follows_the_loss() {
     let system = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
@@ -231,17 +243,17 @@ fn the_damping_follows_the_loss() {
 }
 
 #[test]
-fn iterations_end_where_no_step_is_left() {
+fn iterations_end_if_no_step_is_left() {
     let pairs = Correspondences::new();
     let whole = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
-    // Never lower: once the damping has left next to nothing of the step.
+    // The loss never falls: the iterations end when damping leaves almost nothing of the step.
     let mut never = solver(whole, &[1.0]);
     let step = never.minimize(&Iteration::default(), &pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     let found = tried(&never);
     assert!(found.len() < 20, "{}", found.len());
     assert!(found.last().unwrap().abs() < 1e-11, "{found:?}");
-    // Nothing to gain: the first step is none, and none is tried after it.
+    // Nothing to gain: the first step is zero, and no other is tried.
     let mut content = NormalEquations::new(center(), LENGTH);
     for _ in 0..6 {
         content.add_row(&center(), &Vector3::x(), 0.0, 1.0);
@@ -250,7 +262,8 @@ fn iterations_end_where_no_step_is_left() {
     let step = content.minimize(&Iteration::default(), &pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     assert_eq!(tried(&content).len(), 1);
-    // A step within the tolerance is the last, lower or not: here all are, relative to L.
+    // A step within the tolerance is the last one, whether it lowers the loss or not. Here all are,
+    // relative to L.
     for losses in [[2.0, 1.0, 0.5], [2.0, 3.0, 4.0]] {
         let mut tolerant = solver(whole, &losses);
         tolerant.tolerance = RESIDUAL / LENGTH;

@@ -1,4 +1,4 @@
-//! Which motions are open on which shapes, and that nothing moves along them.
+//! Tests of the undetermined motions of shapes, and that nothing moves along them.
 
 use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel};
 use hicp_core::Iteration;
@@ -51,9 +51,9 @@ fn degenerate(metric: &mut dyn Minimize, pairs: &Correspondences) -> usize {
     found.n_degenerate(Degeneracy::THRESHOLD)
 }
 
-/// In every frame, at every size and for any number of pairs.
+/// Holds in every frame, at every size and for any number of pairs.
 #[test]
-fn shapes_leave_open_what_they_should() {
+fn shapes_have_their_known_undetermined_motions() {
     let mut numbers = Numbers(81);
     let (plane, cylinder) = (plane(&mut numbers), cylinder(&mut numbers));
     let (sphere, line) = (sphere(&mut numbers), line(&mut numbers));
@@ -73,7 +73,8 @@ fn shapes_leave_open_what_they_should() {
             assert_eq!(count(&mut PointToPlane, &ellipsoid), 0);
             assert_eq!(count(&mut PointToPlane, &ellipsoid[..5]), 1);
             assert_eq!(count(&mut PointToPlane, &ellipsoid[..1]), 5);
-            // Points on a line determine all but the turn about it; planes through them also not more.
+            // Points on a line determine all but the rotation around it. Planes through them do not
+            // determine more.
             assert_eq!(count(&mut PointToPoint, &line), 1);
             assert_eq!(count(&mut PointToPlane, &line), 1);
             assert_eq!(count(&mut PointToPoint, &plane), 0);
@@ -83,7 +84,7 @@ fn shapes_leave_open_what_they_should() {
 }
 
 #[test]
-fn directions_are_unit_orthogonal_and_leave_the_residuals_alone() {
+fn directions_are_orthonormal_and_keep_the_residuals() {
     let mut numbers = Numbers(82);
     for source in [
         plane(&mut numbers),
@@ -106,7 +107,8 @@ fn directions_are_unit_orthogonal_and_leave_the_residuals_alone() {
                 .mean_loss(&Iteration::default(), &moved)
                 .unwrap()
                 .sqrt();
-            // A millimetre along an open direction moves by roundings and by the curvature over a millimetre.
+            // A millimeter along an undetermined direction changes residuals only by roundings and
+            // by the curvature.
             assert_eq!(rms < 2e-5, i < n, "{i} of {n}: {rms}");
         }
     }
@@ -120,7 +122,7 @@ fn conditioned<M>(metric: M, policy: Degeneracy) -> Conditioned<M> {
     }
 }
 
-/// A plane a little off, its counterparts elsewhere on the same plane.
+/// A plane at a small distance, with its counterparts elsewhere on the same plane.
 fn lifted(numbers: &mut Numbers, motion: &Isometry3<f64>) -> (Correspondences, Vector3<f64>) {
     let lift = Isometry3::translation(0.03, 0.01, 0.004);
     let pairs = carried(&exact(&plane(numbers), &lift), motion);
@@ -152,15 +154,15 @@ fn nothing_slides_along_a_plane() {
     }
 }
 
-/// Where noise alone determines a direction, damping moves along it and freezing does not.
+/// If noise alone determines a direction, damping moves along it and freezing does not.
 #[test]
-fn noisy_normals_do_not_make_a_plane_slide_when_frozen() {
+fn noisy_normals_do_not_let_a_plane_slide_under_freeze() {
     let mut numbers = Numbers(84);
     let (mut worst, mut worst_damped) = (0.0_f64, 0.0_f64);
     for _ in 0..20 {
         let (mut pairs, normal) = lifted(&mut numbers, &Isometry3::identity());
         for pair in pairs.as_mut_slice() {
-            // Normals off by a degree, points by a millimetre.
+            // Normals off by a degree, points by a millimeter.
             let tilted =
                 -normal + Vector3::new(numbers.gaussian(), numbers.gaussian(), 0.0) * 0.017;
             pair.target = surfel(pair.target.point.cast(), tilted);
@@ -176,7 +178,7 @@ fn noisy_normals_do_not_make_a_plane_slide_when_frozen() {
         worst = worst.max(slide(Degeneracy::Freeze));
         worst_damped = worst_damped.max(slide(Degeneracy::Damp));
     }
-    // Eigenvectors are tilted by about a degree over √200 at most; the lift is 4 mm.
+    // Eigenvectors are tilted by at most about a degree over √200. The lift is 4 mm.
     assert!(worst < 1e-3, "{worst}");
     assert!(worst_damped > 3.0 * worst, "{worst_damped} {worst}");
 }
@@ -199,7 +201,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
         );
         assert_eq!(step.mean_loss.to_bits(), expected.mean_loss.to_bits());
     }
-    // Damping is what the metric does by itself.
+    // Damping is the default of the metric.
     let damped = conditioned(PointToPlane, Degeneracy::Damp)
         .minimize(&Iteration::default(), &pairs)
         .unwrap();
@@ -214,9 +216,10 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
 }
 
-/// The threshold is a share of the largest eigenvalue: above 1 everything is degenerate, at 0 only what has no information.
+/// The threshold is a share of the largest eigenvalue. Above 1 all directions are degenerate; at 0,
+/// only those without information.
 #[test]
-fn thresholds_bound_what_moves() {
+fn thresholds_separate_degenerate_directions() {
     let mut numbers = Numbers(86);
     let pairs = messy(&mut numbers, 200);
     let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
@@ -224,7 +227,7 @@ fn thresholds_bound_what_moves() {
     assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
     assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
     assert!(system.solve_with(Degeneracy::Refuse, 0.0).is_some());
-    // The ratio at the threshold is degenerate too, and that of the best direction is 1.
+    // A ratio equal to the threshold is degenerate, and that of the best direction is 1.
     let still = system.solve_with(Degeneracy::Freeze, 1.0).unwrap();
     assert_eq!(
         crate::scenes::difference(&still, &Isometry3::identity()).1,
@@ -232,7 +235,8 @@ fn thresholds_bound_what_moves() {
     );
     assert_eq!(system.solve_with(Degeneracy::Refuse, 1.0), None);
     assert_eq!(system.observability().unwrap().n_degenerate(1.0), 6);
-    // Six directions of the same information, to the bit: whatever is below 1 leaves all of them, and 1 none.
+    // Six directions with exactly the same information: below 1 the threshold keeps all of them, at
+    // 1 none.
     let mut alike = NormalEquations::new(Point3::origin(), 1.0);
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     for (lever, direction) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (axes[i], axes[j])) {
@@ -242,7 +246,7 @@ fn thresholds_bound_what_moves() {
     assert_eq!(alike.information(), Matrix6::identity() * 2.0);
     assert!(alike.solve_with(Degeneracy::Refuse, 0.999).is_some());
     assert_eq!(alike.solve_with(Degeneracy::Refuse, 1.0), None);
-    // A negative threshold is none.
+    // A negative threshold counts as 0.
     let (zero, below) = (
         system.solve_with(Degeneracy::Freeze, 0.0),
         system.solve_with(Degeneracy::Freeze, -1.0),
@@ -251,7 +255,7 @@ fn thresholds_bound_what_moves() {
 }
 
 #[test]
-fn numbers_that_are_none_end_in_none() {
+fn numbers_that_are_not_finite_give_none() {
     let mut empty = NormalEquations::new(center(), 0.1);
     let found = empty.observability().unwrap();
     assert_eq!(found.n_degenerate(0.0), 6);

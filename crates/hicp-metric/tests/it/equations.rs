@@ -1,4 +1,4 @@
-//! Normal equations in the hands of someone who writes a metric of their own.
+//! Tests of normal equations as the author of a custom metric uses them.
 
 use crate::scenes::{Numbers, messy};
 use hicp_core::Iteration;
@@ -13,7 +13,7 @@ fn system(seed: u64) -> NormalEquations {
 }
 
 #[test]
-fn a_policy_of_the_system_is_the_policy_of_its_solution() {
+fn the_policy_of_a_system_applies_to_its_solution() {
     let system = system(3);
     for policy in [
         Degeneracy::Damp,
@@ -26,13 +26,13 @@ fn a_policy_of_the_system_is_the_policy_of_its_solution() {
             assert_eq!(own.solve(), system.solve_with(policy, threshold));
         }
     }
-    // Above the ratio of every direction, all but one count as degenerate.
+    // Above the ratio of every direction, all but one are degenerate.
     let refused = system.with_policy(Degeneracy::Refuse, 0.999_999);
     assert!(refused.solve().is_none() && system.solve().is_some());
 }
 
 #[test]
-fn held_components_do_not_move_the_centre_or_turn_about_it() {
+fn frozen_components_neither_move_nor_rotate_the_center() {
     let mut numbers = Numbers(5);
     let axes = UnitQuaternion::new(numbers.vector());
     let center = Point3::new(0.1, -0.05, 0.7);
@@ -53,7 +53,7 @@ fn held_components_do_not_move_the_centre_or_turn_about_it() {
 }
 
 #[test]
-fn a_twist_with_all_the_information_is_the_solution() {
+fn a_twist_with_all_information_is_the_solution() {
     let wanted = Vector6::new(1e-4, -2e-4, 3e-4, 4e-4, -5e-4, 6e-4);
     let plain = system(7);
     let mut pulled = plain;
@@ -63,7 +63,7 @@ fn a_twist_with_all_the_information_is_the_solution() {
     assert_eq!(pulled.rows(), plain.rows() + 6);
     let expected = plain.loss() + 1e9 * wanted.norm_squared();
     assert!((pulled.loss() / expected - 1.0).abs() < 1e-12);
-    // And with none it is nothing.
+    // Without information it has no effect.
     let mut same = plain;
     same.add_twist(&-wanted, &Matrix6::identity(), &Matrix6::zeros());
     assert_eq!((same.rows(), same.loss()), (plain.rows(), plain.loss()));

@@ -1,4 +1,4 @@
-//! Held components are exactly zero, and the rest is the constrained minimum.
+//! Tests that frozen components are exactly zero, and that the rest is the constrained minimum.
 
 use crate::scenes::{Numbers, at, difference, exact, messy};
 use hicp_core::Iteration;
@@ -9,7 +9,8 @@ use hicp_metric::{
     Symmetric,
 };
 
-/// Displacement of the object's origin and rotation vector, in the axes of the frame.
+/// Returns the displacement of the object's origin and the rotation vector, in the axes of the
+/// frame.
 fn components(frame: Frame, pose: &Isometry3<f64>, increment: &Isometry3<f64>) -> [f64; 6] {
     let axes = match frame {
         Frame::Camera => Isometry3::identity().rotation,
@@ -48,7 +49,7 @@ fn frozen<M>(
 }
 
 #[test]
-fn held_components_are_zero_and_the_others_move() {
+fn frozen_components_are_zero_and_the_others_move() {
     fn check<M: Minimize + Copy>(metric: M) {
         let mut numbers = Numbers(51);
         let pairs = posed(&mut numbers, 80);
@@ -60,7 +61,7 @@ fn held_components_are_zero_and_the_others_move() {
                 let found = components(frame, pairs.camera_from_object(), &step.increment);
                 let held = [mask.0, mask.1].concat();
                 for (i, (x, held)) in found.iter().zip(held).enumerate() {
-                    // Zero but for the rounding of c − R c here in the test.
+                    // Zero up to the rounding of c − R c in this test.
                     if held {
                         assert!(x.abs() < 1e-15, "{frame:?} {mask:?} {i}: {x}");
                     } else {
@@ -76,7 +77,7 @@ fn held_components_are_zero_and_the_others_move() {
 }
 
 #[test]
-fn exactly_zero_means_the_bits() {
+fn frozen_components_are_zero_to_the_bit() {
     let mut numbers = Numbers(52);
     let pairs = posed(&mut numbers, 80);
     let all = [true; 3];
@@ -91,7 +92,7 @@ fn exactly_zero_means_the_bits() {
             .unwrap();
         assert_eq!(step.increment.rotation, Isometry3::identity().rotation);
     }
-    // Among the eigenvectors too, although their algorithm mixes what is held with what is free on its way.
+    // With eigenvectors, too, although their algorithm mixes frozen and free components.
     for mask in masks() {
         let mut metric = Conditioned {
             metric: frozen(PointToPlane, Frame::Camera, mask),
@@ -116,7 +117,7 @@ fn exactly_zero_means_the_bits() {
 }
 
 #[test]
-fn nothing_held_is_the_metric_itself() {
+fn nothing_frozen_equals_the_inner_metric() {
     let mut numbers = Numbers(53);
     let pairs = posed(&mut numbers, 80);
     let none = ([false; 3], [false; 3]);
@@ -136,7 +137,8 @@ fn nothing_held_is_the_metric_itself() {
     );
 }
 
-/// The loss of the linearised problem has no slope left in the free components, and translation alone is the mean offset.
+/// The loss of the linearized problem has no slope in the free components. With translations only,
+/// the step is the mean offset.
 #[test]
 fn the_free_components_are_at_the_constrained_minimum() {
     let mut numbers = Numbers(54);
@@ -178,7 +180,7 @@ fn the_free_components_are_at_the_constrained_minimum() {
                 .increment;
             let held = [mask.0, mask.1].concat();
             for component in (0..6).filter(|i| !held[*i]) {
-                // Along one component, from wherever the object is after a motion.
+                // Along one component, from the position of the object after a motion.
                 let slope = |motion: &Isometry3<f64>| {
                     let pose = motion * pairs.camera_from_object();
                     let axes = match frame {
@@ -196,7 +198,8 @@ fn the_free_components_are_at_the_constrained_minimum() {
                     (nudged(1e-5) - nudged(-1e-5)) / 2e-5
                 };
                 let (start, rest) = (slope(&Isometry3::identity()), slope(&end));
-                // Sources are rounded to f32 in between: 3e-8 m of offsets of a centimetre, and slopes may start small by chance.
+                // Sources are rounded to f32 in between: 3e-8 m of offsets of a centimeter. Slopes
+                // may be small at the start by chance.
                 assert!(
                     rest.abs() < 1e-4 * start.abs().max(0.01),
                     "{frame:?} {mask:?} {component}: {start} {rest}"
@@ -206,9 +209,9 @@ fn the_free_components_are_at_the_constrained_minimum() {
     }
 }
 
-/// A motion within the free components is found although the others are held.
+/// A motion within the free components is found although the others are frozen.
 #[test]
-fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
+fn exact_pairs_are_aligned_by_a_rotation_around_the_objects_axis() {
     let mut numbers = Numbers(55);
     for _ in 0..10 {
         let pose = Isometry3::translation(0.02, -0.03, 0.58)
@@ -222,7 +225,7 @@ fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
         let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
-        // Held, it does not turn.
+        // If the rotation is frozen, the object does not rotate.
         let mut held = frozen(
             PointToPoint,
             Frame::Object,
@@ -241,7 +244,7 @@ fn exact_pairs_are_aligned_by_a_turn_about_the_objects_axis() {
 }
 
 #[test]
-fn as_few_rows_as_unknowns_do() {
+fn as_many_rows_as_unknowns_are_enough() {
     let mut numbers = Numbers(56);
     let pairs = posed(&mut numbers, 3);
     assert_eq!(PointToPlane.minimize(&Iteration::default(), &pairs), None);
@@ -256,7 +259,7 @@ fn as_few_rows_as_unknowns_do() {
 }
 
 #[test]
-fn solvers_and_policies_heed_what_is_held() {
+fn solvers_and_policies_respect_frozen_components() {
     let mut numbers = Numbers(57);
     let pairs = posed(&mut numbers, 80);
     let pose = *pairs.camera_from_object();
@@ -281,7 +284,7 @@ fn solvers_and_policies_heed_what_is_held() {
         }
         assert!(found[1].abs() > 1e-6, "{}", metric.label());
     }
-    // Its covariance is that of the free components.
+    // The covariance is that of the free components.
     let covariance = frozen
         .clone()
         .system(&Iteration::default(), &pairs)

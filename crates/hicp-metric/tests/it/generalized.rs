@@ -1,4 +1,4 @@
-//! Generalized ICP between its special cases.
+//! Tests of Generalized ICP and its special cases.
 
 use crate::scenes::{Numbers, center, difference, ellipsoid, exact, messy, same_information};
 use hicp_core::Iteration;
@@ -27,7 +27,7 @@ fn epsilon_one_is_half_of_point_to_point() {
 }
 
 #[test]
-fn epsilon_towards_zero_is_point_to_plane_where_normals_agree() {
+fn epsilon_near_zero_is_point_to_plane_if_normals_agree() {
     let mut numbers = Numbers(32);
     let mut pairs = messy(&mut numbers, 80);
     for pair in pairs.as_mut_slice() {

@@ -1,4 +1,4 @@
-//! What a metric of one's own gets from the trait.
+//! Tests of the provided methods of a custom metric.
 
 use crate::scenes::{Numbers, ellipsoid, exact, messy, same_information};
 use hicp_core::Iteration;
@@ -8,10 +8,10 @@ use hicp_metric::{
     ErrorMetric, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
 };
 
-/// The point that a pair's rows act at.
+/// The point at which a pair's rows act.
 type Place = fn(&Pair) -> Vector3<f64>;
 
-/// The difference of depths alone.
+/// The difference of depths.
 struct DepthDifference;
 
 impl ErrorMetric for DepthDifference {
@@ -24,7 +24,7 @@ impl ErrorMetric for DepthDifference {
     }
 }
 
-/// The rows of another metric and nothing else of it.
+/// The rows of another metric, without its other methods.
 struct Rows<M>(M);
 
 impl<M: ErrorMetric> ErrorMetric for Rows<M> {
@@ -34,7 +34,7 @@ impl<M: ErrorMetric> ErrorMetric for Rows<M> {
 }
 
 #[test]
-fn the_error_of_a_pair_is_the_sum_of_the_squares_of_its_rows_without_its_weight() {
+fn squared_errors_sum_the_squares_of_unweighted_rows() {
     let mut numbers = Numbers(401);
     let mut pairs = messy(&mut numbers, 30);
     pairs.as_mut_slice()[0].weight = 0.0;
@@ -56,12 +56,12 @@ fn the_error_of_a_pair_is_the_sum_of_the_squares_of_its_rows_without_its_weight(
 }
 
 #[test]
-fn its_name_is_that_of_its_type() {
+fn the_default_name_is_that_of_the_type() {
     assert_eq!(DepthDifference.name(), "DepthDifference");
     assert_eq!(Rows(PointToPoint).name(), "Rows");
 }
 
-/// Points that are not finite are found even where no row's residual says so.
+/// Points that are not finite are detected, even if no residual shows it.
 #[test]
 fn points_that_are_not_finite_give_no_system() {
     let mut numbers = Numbers(402);
@@ -83,9 +83,9 @@ fn points_that_are_not_finite_give_no_system() {
     );
 }
 
-/// Centred at the centroid of the points that the rows act at, and scaled by their RMS radius.
+/// The pivot is the centroid of the points at which the rows act, and the length their RMS radius.
 #[test]
-fn systems_are_centred_and_scaled() {
+fn systems_are_centered_and_scaled() {
     let mut numbers = Numbers(403);
     let pairs = messy(&mut numbers, 70);
     let expected = |of: Place| {
@@ -124,7 +124,7 @@ fn systems_are_centred_and_scaled() {
             metric.label()
         );
     }
-    // Points all in one place have no radius.
+    // Points at one place have a radius of zero.
     let one = exact(
         &vec![ellipsoid(&mut numbers, 1)[0]; 9],
         &Isometry3::identity(),
@@ -138,9 +138,9 @@ fn systems_are_centred_and_scaled() {
     );
 }
 
-/// A pair without weight costs no digits, however far off it is and wherever in the list.
+/// A pair without weight costs no digits, at any distance and at any position in the list.
 #[test]
-fn what_has_no_weight_does_not_matter_wherever_it_is() {
+fn pairs_without_weight_do_not_matter_anywhere() {
     let mut numbers = Numbers(404);
     let pairs = messy(&mut numbers, 60);
     let mut far = pairs.as_slice()[0];
@@ -182,12 +182,12 @@ fn what_has_no_weight_does_not_matter_wherever_it_is() {
     }
 }
 
-/// A metric that must not be asked.
+/// A metric that must not be called.
 struct Never;
 
 impl ErrorMetric for Never {
     fn linearize(&self, _: &Pair, _: &mut NormalEquations) {
-        unreachable!("asked for rows");
+        unreachable!("rows were requested");
     }
     fn mean_squared_error(&self, _: &Correspondences) -> Option<f64> {
         None
@@ -195,7 +195,7 @@ impl ErrorMetric for Never {
 }
 
 #[test]
-fn a_term_of_factor_zero_is_left_out() {
+fn a_term_of_factor_zero_is_skipped() {
     let mut numbers = Numbers(405);
     let pairs = messy(&mut numbers, 30);
     let mut sum = WeightedSum {

@@ -1,4 +1,4 @@
-//! Point-to-plane: the definition, its invariances, and what it must not move.
+//! Tests of point-to-plane: its definition, its invariances, and motions that it must not cause.
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
@@ -7,7 +7,7 @@ use hicp_core::{Correspondences, Matrix6, Pair, Point3, Vector3, Vector6, se3, s
 use hicp_metric::Minimize;
 use hicp_metric::PointToPlane;
 
-/// n · (exp(ξ) p − q) by its definition.
+/// Returns n · (exp(ξ) p − q) by its definition.
 fn residual(pair: &Pair, xi: &Vector6<f64>) -> f64 {
     let (p, q) = (
         pair.source.point.cast::<f64>(),
@@ -20,7 +20,7 @@ fn residual(pair: &Pair, xi: &Vector6<f64>) -> f64 {
 }
 
 #[test]
-fn the_step_is_gauss_newtons_for_the_residual_as_defined() {
+fn the_step_is_that_of_gauss_newton_for_the_defined_residual() {
     let mut numbers = Numbers(121);
     for _ in 0..30 {
         let off = small_motion(&mut numbers, 5.0, 0.01);
@@ -47,8 +47,8 @@ fn the_step_is_gauss_newtons_for_the_residual_as_defined() {
             .minimize(&Iteration::default(), &pairs)
             .unwrap();
         let (angle, distance) = se3::pose_distance(&step.increment, &expected);
-        // Damping of 1e-6 of the mean diagonal shortens a step by up to 1e-6 · mean/smallest eigenvalue, some 2e-5 here,
-        // of 0.1 rad and 3 cm.
+        // Damping with 1e-6 of the mean diagonal shortens a step by up to 1e-6 · mean/smallest
+        // eigenvalue, about 2e-5 here, of 0.1 rad and 3 cm.
         assert!(angle < 5e-6 && distance < 2e-6, "{angle} {distance}");
         assert!((step.mean_loss - loss / weight).abs() <= 1e-12 * step.mean_loss);
     }
@@ -56,7 +56,8 @@ fn the_step_is_gauss_newtons_for_the_residual_as_defined() {
 
 #[test]
 fn pitfall_2_the_residual_is_a_projection_not_an_elementwise_product() {
-    // n = (1, 1, 0)/√2 and an offset of (0.5, −0.5, 7): in the plane, so no residual. The element-wise sum would be 0.25.
+    // n = (1, 1, 0)/√2 and an offset of (0.5, −0.5, 7) in the plane, so the residual is zero. The
+    // element-wise sum would be 0.25.
     let normal = Vector3::new(1.0, 1.0, 0.0).normalize();
     let points = (0..10).map(|i| Point3::new(f64::from(i % 3), f64::from(i % 4), f64::from(i)));
     let pairs: Correspondences = points
@@ -86,21 +87,23 @@ fn pitfall_2_loss_and_step_do_not_depend_on_the_frame() {
                 .minimize(&Iteration::default(), &moved(&pairs, &frame))
                 .unwrap(),
         );
-        // Points of up to 2 m round by 1e-7 m, residuals of 5 mm with them; levers are 4 cm.
+        // Points of up to 2 m round by 1e-7 m, and so do residuals of 5 mm. Levers are 4 cm.
         assert!((here.mean_loss - there.mean_loss).abs() < 4e-5 * here.mean_loss);
         let (angle, distance) = se3::pose_distance(
             &(frame * here.increment * frame.inverse()),
             &there.increment,
         );
         assert!(angle < 1e-5, "{angle}");
-        // The frame's origin is metres from the object.
+        // The frame's origin is meters away from the object.
         assert!(distance < 3e-5, "{distance}");
     }
 }
 
-/// A plane 5 cm off along its normal: the step is those 5 cm, and nothing slides or turns in the plane, in any frame.
+/// A plane 5 cm away along its normal.
+///
+/// In every frame, the step is those 5 cm, without sliding or rotating.
 #[test]
-fn pitfall_12_a_plane_moves_along_its_normal_only() {
+fn pitfall_12_a_plane_moves_only_along_its_normal() {
     let mut numbers = Numbers(123);
     for _ in 0..50 {
         let frame = numbers.pose(0.5);
@@ -126,18 +129,19 @@ fn pitfall_12_a_plane_moves_along_its_normal_only() {
         );
         assert!((shift - normal * shift.dot(&normal)).norm() < 1e-7);
         assert!(so3::angle(&increment.rotation) < 1e-6);
-        // And of that, no twist about the normal.
+        // No rotation around the normal either.
         assert!(so3::log(&increment.rotation).dot(&normal).abs() < 1e-9);
     }
 }
 
 #[test]
-fn pitfall_12_a_sphere_does_not_turn_and_a_cylinder_neither_slides_nor_spins() {
+fn pitfall_12_a_sphere_does_not_rotate_and_a_cylinder_neither_slides_nor_spins() {
     let mut numbers = Numbers(124);
     for _ in 0..30 {
         let frame = numbers.pose(0.3);
         let shift = numbers.direction() * 0.002;
-        // Opposite points in pairs, so that the centroid is the centre and the damped turn about it is free.
+        // Opposite points in pairs, so that the centroid is the center, and only damping limits the
+        // rotation around it.
         let sphere: Correspondences = (0..150)
             .map(|_| numbers.direction())
             .flat_map(|n| [n, -n])
@@ -152,8 +156,9 @@ fn pitfall_12_a_sphere_does_not_turn_and_a_cylinder_neither_slides_nor_spins() {
             .increment;
         let center = Point3::from(frame.translation.vector) + shift;
         assert!((increment * center - center + shift).norm() < 1e-6);
-        // Rounded normals pull at the free turn with up to 1e-7 of the residuals (1 mm RMS), 1/√300 of that together, against
-        // a damping of 1e-6/6: 4e-5 m at the rim, 8e-4 rad. Undamped, the turn would be anything.
+        // Rounded normals act on the free rotation with up to 1e-7 of the residuals (1 mm RMS),
+        // together 1/√300 of that, against a damping of 1e-6/6: 4e-5 m at the rim, 8e-4 rad.
+        // Without damping, the rotation would be arbitrary.
         assert!(
             so3::angle(&increment.rotation) < 1e-3,
             "{}",

@@ -1,4 +1,4 @@
-//! Point-to-plane: units, distance, accuracy, and pairs that say little.
+//! Tests of point-to-plane: units, distance, accuracy, and pairs with little information.
 
 use crate::pairs::support::{Numbers, median};
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
@@ -8,7 +8,7 @@ use hicp_metric::Minimize;
 use hicp_metric::PointToPlane;
 
 #[test]
-fn pitfall_13_metres_and_millimetres_take_the_same_step() {
+fn pitfall_13_meters_and_millimeters_give_the_same_step() {
     let mut numbers = Numbers(125);
     for _ in 0..30 {
         let off = small_motion(&mut numbers, 5.0, 0.01);
@@ -44,7 +44,7 @@ fn pitfall_13_metres_and_millimetres_take_the_same_step() {
 }
 
 #[test]
-fn pitfall_20_a_kilometre_away_the_step_is_the_same() {
+fn pitfall_20_the_step_is_the_same_a_kilometer_away() {
     let mut numbers = Numbers(126);
     let grid = |x: f64| (x * 8192.0).round() / 8192.0;
     let offset = Vector3::new(600.0, -700.0, 400.0);
@@ -74,14 +74,15 @@ fn pitfall_20_a_kilometre_away_the_step_is_the_same() {
         );
         assert!(se3::pose_distance(&a.increment, &b.increment).0 < 1e-12);
         let shifted = b.increment * Point3::from(offset) - offset;
-        // A kilometre times ε of the rotation, a few times over.
+        // A few times a kilometer times the ε of the rotation.
         assert!((shifted.coords - a.increment.translation.vector).norm() < 2e-12);
     }
 }
 
-/// What one step on exact correspondences leaves: an error of second order, unlike the closed form's, which leaves none.
+/// One step on exact correspondences leaves an error of second order, unlike that of the closed
+/// form.
 ///
-/// A box of 10 × 8 × 5 cm whose every point is paired with its own image.
+/// The scene is a box of 10 × 8 × 5 cm whose points are paired with their images.
 #[test]
 fn one_step_leaves_an_error_of_second_order() {
     let mut numbers = Numbers(127);
@@ -109,12 +110,12 @@ fn one_step_leaves_an_error_of_second_order() {
         median(&mut errors)
     };
     let (small, middle, large) = (left(5.0), left(15.0), left(30.0));
-    // Measured: 0.06, 0.97 and 5.5 degrees. Low's rows on other shapes: 0.19, 3.9 and 13.
+    // Measured: 0.06°, 0.97° and 5.5°. Low's rows on other shapes: 0.19°, 3.9° and 13°.
     assert!(
         small < 0.19 && middle < 3.9 && large < 13.0,
         "{small} {middle} {large}"
     );
-    // Three times the angle leaves between three squared and three cubed as much.
+    // Three times the angle leaves between three squared and three cubed times the error.
     assert!((9.0..27.0).contains(&(middle / small)), "{small} {middle}");
 }
 
@@ -149,7 +150,7 @@ fn fewer_than_six_pairs_and_no_information_determine_nothing() {
     assert_eq!(changed(&|p| p.target.normal = normal([f32::NAN; 3])), None);
     assert_eq!(changed(&|p| p.source.point.x = f32::NAN), None);
     assert_eq!(changed(&|p| p.target.point.x = f32::INFINITY), None);
-    // Pairs of weight zero do not make up the number.
+    // Pairs of weight zero do not count.
     let mut five = first(20);
     five.as_mut_slice()[5..]
         .iter_mut()
@@ -158,7 +159,7 @@ fn fewer_than_six_pairs_and_no_information_determine_nothing() {
 }
 
 #[test]
-fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
+fn weights_count_like_repeated_pairs() {
     let mut numbers = Numbers(129);
     for _ in 0..30 {
         let off = small_motion(&mut numbers, 5.0, 0.01);
@@ -186,7 +187,7 @@ fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
 }
 
 #[test]
-fn nothing_makes_a_nan() {
+fn no_input_gives_nan() {
     let mut numbers = Numbers(130);
     let scales = [0.0, 1e-38, 1e-20, 1e-6, 1.0, 1e6, 1e18, 3e38];
     let mut steps = 0;

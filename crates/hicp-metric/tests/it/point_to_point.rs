@@ -1,4 +1,4 @@
-//! The closed form of point-to-point: exact, a rotation always, and the best one.
+//! Tests of the closed form of point-to-point: exact, always a rotation, and the best one.
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, loss, pair, rms, rounding};
@@ -7,7 +7,7 @@ use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, Vector6, se3}
 use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, NormalEquations, PointToPoint};
 
-/// The provided Gauss–Newton step with point-to-point's rows.
+/// The provided Gauss–Newton step with the rows of point-to-point.
 #[derive(Debug)]
 struct Iterative;
 
@@ -38,7 +38,7 @@ fn moved(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
 }
 
 #[test]
-fn exact_pairs_are_aligned_in_one_step_to_the_rounding_of_their_points() {
+fn exact_pairs_are_aligned_in_one_step_up_to_rounding() {
     let mut numbers = Numbers(101);
     for shape in [
         [0.05, 0.05, 0.05],
@@ -58,7 +58,8 @@ fn exact_pairs_are_aligned_in_one_step_to_the_rounding_of_their_points() {
                 let step = PointToPoint
                     .minimize(&Iteration::default(), &pairs)
                     .unwrap();
-                // The true motion leaves the roundings of both points; the best motion cannot leave more.
+                // The true motion leaves the roundings of both points. The best motion cannot leave
+                // more.
                 let bound = 2.0 * rounding(&pairs);
                 assert!(rms(&pairs, &step.increment) <= bound, "{shape:?} {count}");
                 assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
@@ -69,9 +70,9 @@ fn exact_pairs_are_aligned_in_one_step_to_the_rounding_of_their_points() {
     }
 }
 
-/// Its sums over points are the sums over its rows, weights of all kinds included.
+/// The sums over points equal the sums over rows, for all kinds of weights.
 #[test]
-fn the_system_is_that_of_its_rows() {
+fn the_system_equals_that_of_its_rows() {
     let mut numbers = Numbers(117);
     for count in [1, 2, 31, 32, 33, 500] {
         let motion = numbers.pose(0.02);
@@ -114,16 +115,17 @@ fn random_motions_are_recovered() {
             .unwrap()
             .increment;
         let (angle, _) = se3::pose_distance(&found, &motion);
-        // Points at 5 cm from the centroid, each off by a rounding: no more than rounding / 5 cm even if all conspired.
+        // Points are 5 cm from the centroid and off by one rounding each: at most rounding / 5 cm
+        // in the worst case.
         assert!(angle <= 2.0 * rounding(&pairs) / 0.05, "{angle}");
         let center = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 200.0);
         assert!((found * center - motion * center).norm() <= 2.0 * rounding(&pairs));
     }
 }
 
-/// Collinear points: aligned, with no turn about their line, opposite directions included.
+/// Collinear points are aligned without a rotation around their line, also in opposite directions.
 #[test]
-fn pitfall_12_collinear_points_are_mapped_onto_their_targets_the_short_way() {
+fn pitfall_12_collinear_points_are_mapped_onto_their_targets_by_the_smallest_rotation() {
     let mut numbers = Numbers(103);
     for angle in [
         0.0,
@@ -136,7 +138,8 @@ fn pitfall_12_collinear_points_are_mapped_onto_their_targets_the_short_way() {
     ] {
         for _ in 0..20 {
             let line = numbers.direction();
-            // A turn about an axis across the line is the shortest that carries it where it goes.
+            // A rotation around an axis orthogonal to the line is the smallest one with this
+            // result.
             let axis = line.cross(&numbers.direction()).normalize();
             let motion = Isometry3::new(numbers.vector(), axis * angle);
             let points: Vec<_> = (-3..=3)
@@ -150,7 +153,7 @@ fn pitfall_12_collinear_points_are_mapped_onto_their_targets_the_short_way() {
             assert!(rms(&pairs, &found) <= 2.0 * rounding(&pairs), "{angle}");
             assert!((determinant(&found) - 1.0).abs() < 1e-14);
             let (turned, _) = se3::pose_distance(&found, &Isometry3::identity());
-            // RMS radius 4 cm; rounding of coordinates of a few metres.
+            // RMS radius 4 cm; rounding of coordinates of a few meters.
             assert!(
                 (turned - angle).abs() <= 2.0 * rounding(&pairs) / 0.04,
                 "{turned} {angle}"
@@ -160,7 +163,7 @@ fn pitfall_12_collinear_points_are_mapped_onto_their_targets_the_short_way() {
 }
 
 #[test]
-fn pitfall_18_planar_points_and_noise_give_a_rotation_never_a_reflection() {
+fn pitfall_18_planar_points_and_noise_never_give_a_reflection() {
     let mut numbers = Numbers(104);
     for sigma in [0.0, 1e-4, 0.01, 0.1] {
         for _ in 0..200 {
@@ -177,7 +180,7 @@ fn pitfall_18_planar_points_and_noise_give_a_rotation_never_a_reflection() {
 }
 
 #[test]
-fn a_mirror_image_gets_the_best_rotation() {
+fn a_mirror_image_gives_the_best_rotation() {
     let mut numbers = Numbers(105);
     for _ in 0..50 {
         let points = cloud(&mut numbers, 40, [0.05, 0.03, 0.01]);
@@ -195,7 +198,7 @@ fn a_mirror_image_gets_the_best_rotation() {
     }
 }
 
-/// Turns and shifts of every direction and of sizes down to a tenth of a millimetre raise the loss.
+/// Checks that small rotations and translations in every direction raise the loss.
 fn assert_no_better_neighbor(
     numbers: &mut Numbers,
     pairs: &Correspondences,
@@ -218,7 +221,7 @@ fn assert_no_better_neighbor(
             let about_center =
                 Isometry3::from_parts(center.coords.into(), hicp_core::UnitQuaternion::identity());
             let nudged = about_center * se3::exp(&twist) * about_center.inverse() * found;
-            // Loss sums are exact to a few ε of themselves.
+            // Loss sums are exact to a few ε of their value.
             assert!(
                 loss(pairs, &nudged) >= best * (1.0 - 1e-12),
                 "scale {scale}"
@@ -254,13 +257,16 @@ fn no_perturbation_lowers_the_loss() {
     }
 }
 
-/// A rod of a millionth of its length is still no line: its turn about itself is determined, in f64.
+/// A rod a million times as long as thick is still not a line.
+///
+/// In f64, its rotation around itself is determined.
 #[test]
-fn thin_rods_keep_their_turn() {
+fn thin_rods_determine_their_rotation() {
     let mut numbers = Numbers(107);
     for ratio in [1e-2_f64, 1e-3, 1e-4, 5e-5] {
         for _ in 0..20 {
-            // Coordinates that f32 holds exactly, turned about their line by a quarter: also exact.
+            // Coordinates that f32 holds exactly, rotated around their line by a quarter turn,
+            // which is exact, too.
             let exact = |x: f64| f64::from(x as f32);
             let points: Vec<_> = (0..40)
                 .map(|_| {
@@ -280,7 +286,8 @@ fn thin_rods_keep_their_turn() {
                 &found,
                 &Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2),
             );
-            // The covariance is exact to ε of its largest entry; across the rod it is ratio² of that.
+            // The covariance is exact to ε of its largest entry. Across the rod it is ratio² of
+            // that.
             let bound = 100.0 * f64::EPSILON / (0.3 * ratio * ratio);
             assert!(angle < bound, "ratio {ratio}: {angle}, bound {bound}");
         }
@@ -288,7 +295,7 @@ fn thin_rods_keep_their_turn() {
 }
 
 #[test]
-fn the_closed_form_is_the_fixpoint_of_gauss_newton() {
+fn the_closed_form_is_the_fixed_point_of_gauss_newton() {
     let mut numbers = Numbers(108);
     for _ in 0..50 {
         let points = cloud(&mut numbers, 50, [0.05, 0.04, 0.02]);
@@ -308,7 +315,7 @@ fn the_closed_form_is_the_fixpoint_of_gauss_newton() {
                 * walked;
         }
         let (angle, _) = se3::pose_distance(&closed, &walked);
-        // The walk rounds the moved points to f32 at every step.
+        // Every step rounds the moved points to f32.
         assert!(angle <= 2.0 * rounding(&pairs) / 0.02, "{angle}");
         assert!((rms(&pairs, &walked) - rms(&pairs, &closed)).abs() <= rounding(&pairs));
     }

@@ -1,4 +1,4 @@
-//! Point-to-point where the pairs are few, weightless, far away or in one place.
+//! Tests of point-to-point with few pairs, without weight, far away, and at one place.
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, pair, rms, rounding};
@@ -19,7 +19,7 @@ fn close(a: &Step, b: &Step) -> bool {
 }
 
 #[test]
-fn a_weight_of_two_is_the_pair_twice_and_of_zero_no_pair() {
+fn weights_count_like_repeated_pairs() {
     let mut numbers = Numbers(111);
     for _ in 0..50 {
         let points = cloud(&mut numbers, 20);
@@ -83,7 +83,7 @@ fn too_few_pairs_and_no_weight_determine_nothing() {
             "weight {weight}"
         );
     }
-    // Pairs of weight zero do not make up the number.
+    // Pairs of weight zero do not count.
     let mut two = first(8);
     two.as_mut_slice()[2..]
         .iter_mut()
@@ -92,7 +92,7 @@ fn too_few_pairs_and_no_weight_determine_nothing() {
 }
 
 #[test]
-fn points_all_in_one_place_determine_no_rotation() {
+fn points_at_one_place_determine_no_rotation() {
     let mut numbers = Numbers(113);
     for _ in 0..100 {
         let (here, there) = (
@@ -112,7 +112,7 @@ fn points_all_in_one_place_determine_no_rotation() {
             .collect();
         for mut pairs in [sources, targets, both] {
             assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
-            // A pair without weight elsewhere changes nothing, wherever it stands in the list.
+            // A pair without weight elsewhere changes nothing, at any position in the list.
             let outsider = pair(
                 spread(&mut numbers),
                 spread(&mut numbers),
@@ -129,7 +129,7 @@ fn points_all_in_one_place_determine_no_rotation() {
     }
 }
 
-/// A mirrored cube: a quarter turn one way fits as well as the other, so there is no best rotation to return.
+/// A mirrored cube: two quarter turns fit equally well, so there is no best rotation.
 #[test]
 fn pitfall_18_ambiguous_reflections_are_refused() {
     let mut numbers = Numbers(114);
@@ -141,7 +141,8 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
             .flat_map(|a| [*a, -*a])
             .map(|p| pair(Point3::from(p), turn * Point3::from(-p), Vector3::z(), 1.0))
             .collect();
-        // Roundings of f32 (6e-8) may break the tie, and the result is a rotation then; exact ties are refused.
+        // Roundings of f32 (6e-8) may break the tie. The result is a rotation then; exact ties are
+        // refused.
         if let Some(step) = PointToPoint.minimize(&Iteration::default(), &pairs) {
             assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
         }
@@ -155,12 +156,13 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
 }
 
 #[test]
-fn pitfall_20_a_common_offset_of_a_kilometre_costs_only_the_digits_of_the_points() {
+fn pitfall_20_an_offset_of_a_kilometer_costs_only_the_digits_of_the_points() {
     let mut numbers = Numbers(115);
     let offset = Vector3::new(600.0, -700.0, 400.0);
     for _ in 0..50 {
         let motion = numbers.pose(0.05);
-        // Coordinates on the grid that f32 has at 1 km (2⁻¹³ m), so that the points of both sets are exact.
+        // Coordinates on the grid that f32 has at 1 km (2⁻¹³ m), so that the points of both sets
+        // are exact.
         let grid = |x: f64| (x * 8192.0).round() / 8192.0;
         let points: Vec<_> = (0..100)
             .map(|_| Point3::from(numbers.vector().map(|x| grid(0.2 * x))))
@@ -197,13 +199,13 @@ fn pitfall_20_a_common_offset_of_a_kilometre_costs_only_the_digits_of_the_points
         assert!(angle < 1e-14, "{angle}");
         let moved_near = a.increment * points[0] + offset;
         let moved_far = b.increment * (points[0] + offset);
-        // A kilometre times ε of the rotation.
+        // A kilometer times the ε of the rotation.
         assert!((moved_near - moved_far).norm() < 1e-11);
     }
 }
 
 #[test]
-fn nothing_makes_a_nan() {
+fn no_input_gives_nan() {
     let mut numbers = Numbers(116);
     let scales = [0.0, 1e-38, 1e-20, 1e-6, 1.0, 1e6, 1e18, 3e38];
     let mut steps = 0;
@@ -242,9 +244,9 @@ fn nothing_makes_a_nan() {
     }
 }
 
-/// Weights of which some are tiny count for what they are.
+/// Tiny weights have their tiny influence.
 #[test]
-fn pitfall_18_tiny_weights_are_tiny() {
+fn pitfall_18_tiny_weights_have_a_tiny_influence() {
     let mut numbers = Numbers(117);
     let motion = numbers.pose(0.2);
     let mut pairs = images(&cloud(&mut numbers, 30), &motion);
@@ -266,7 +268,9 @@ fn pitfall_18_tiny_weights_are_tiny() {
     assert!(rms(&inliers, &found) <= bound);
 }
 
-/// From the smallest numbers of f32 to its largest: a power of two of all lengths changes no bit of the rotation.
+/// A power of two of all lengths changes no bit of the rotation.
+///
+/// This holds from the smallest numbers of f32 to its largest.
 #[test]
 fn the_rotation_does_not_depend_on_the_unit_of_length() {
     let mut numbers = Numbers(118);
@@ -294,10 +298,11 @@ fn the_rotation_does_not_depend_on_the_unit_of_length() {
     }
 }
 
-/// A line and one that is opposite to it but for 10⁻¹¹ rad, in whole numbers that f32 holds: the axis of that half turn is known to few
-/// digits, and the line arrives where it should all the same.
+/// A line and another one, opposite to it up to 10⁻¹¹ rad, in integers that f32 holds exactly.
+///
+/// The axis of the half turn is known to few digits, but the line must arrive at its target.
 #[test]
-fn pitfall_12_a_line_is_mapped_onto_one_that_is_all_but_opposite() {
+fn pitfall_12_a_line_is_mapped_onto_a_nearly_opposite_one() {
     let size = f64::from((1 << 24) - 10_000);
     for off in [[3000.0, -5000.0], [-9000.0, 1234.0], [1000.0, 2000.0]] {
         let from = Vector3::new(size, size - off[0], size - off[1]);

@@ -1,4 +1,4 @@
-//! The prior between its limits.
+//! Tests of the prior and its limits.
 
 use crate::scenes::{Numbers, at, center, difference, messy};
 use hicp_core::Iteration;
@@ -20,14 +20,14 @@ fn prior<M>(metric: M, mean: &Isometry3<f64>, information: Matrix6<f64>) -> Pose
     PosePrior::new(metric, prior, 1e-3)
 }
 
-/// A full, not diagonal, positive definite matrix.
+/// Returns a full positive definite matrix, which is not diagonal.
 fn random_information(numbers: &mut Numbers, size: f64) -> Matrix6<f64> {
     let m = Matrix6::from_fn(|_, _| numbers.sign());
     (m * m.transpose() + Matrix6::identity() * 0.1) * size
 }
 
 #[test]
-fn without_information_it_is_the_metric_itself() {
+fn without_information_it_equals_the_inner_metric() {
     let mut numbers = Numbers(61);
     let pairs = posed(&mut numbers, 80);
     let elsewhere = numbers.motion(&center(), 50.0, 0.3);
@@ -45,7 +45,7 @@ fn without_information_it_is_the_metric_itself() {
         default.minimize(&Iteration::default(), &pairs),
         PointToPlane.minimize(&Iteration::default(), &pairs)
     );
-    // And very little changes very little.
+    // Very little information changes very little.
     let mut weak = prior(PointToPlane, &elsewhere, Matrix6::identity() * 1e-9);
     let (a, b) = (
         weak.minimize(&Iteration::default(), &pairs).unwrap(),
@@ -57,7 +57,7 @@ fn without_information_it_is_the_metric_itself() {
 }
 
 #[test]
-fn a_strong_prior_pins_the_pose() {
+fn a_strong_prior_fixes_the_pose() {
     let mut numbers = Numbers(62);
     for degrees in [0.0, 1.0, 30.0, 120.0] {
         let pairs = posed(&mut numbers, 80);
@@ -78,7 +78,8 @@ fn a_strong_prior_pins_the_pose() {
     }
 }
 
-/// Directions that the prior leaves alone are refined as without it, however stiff the others are.
+/// Directions without prior information are refined as without a prior, for any stiffness of the
+/// others.
 #[test]
 fn a_prior_of_one_direction_does_not_damp_the_others() {
     let mut numbers = Numbers(63);
@@ -94,7 +95,7 @@ fn a_prior_of_one_direction_does_not_damp_the_others() {
                 .increment,
         )
     };
-    // The data say some 60 here, the prior 10⁶ and 10⁹.
+    // The information of the data is about 60 here, that of the prior 10⁶ and 10⁹.
     let (stiff, stiffer) = (step(1e12), step(1e15));
     assert!(stiffer[2].abs() < 1e-9);
     assert!(
@@ -103,9 +104,10 @@ fn a_prior_of_one_direction_does_not_damp_the_others() {
     );
 }
 
-/// At the minimum the slope of the stated sum vanishes: data loss over σ² plus the square of the logarithm.
+/// At the minimum, the slope of the documented sum vanishes: data loss over σ² plus the square of
+/// the logarithm.
 #[test]
-fn the_minimum_is_that_of_the_stated_sum() {
+fn the_minimum_is_that_of_the_documented_sum() {
     let mut numbers = Numbers(64);
     for _ in 0..5 {
         let pairs = posed(&mut numbers, 80);
@@ -159,7 +161,7 @@ fn information_adds_up() {
     let mut numbers = Numbers(65);
     let pairs = posed(&mut numbers, 80);
     let information = random_information(&mut numbers, 1e5);
-    // At the mean the left Jacobian is the identity.
+    // At the mean, the left Jacobian is the identity.
     let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
     let sum = metric
         .system(&Iteration::default(), &pairs)
@@ -174,7 +176,7 @@ fn information_adds_up() {
 }
 
 #[test]
-fn a_prior_makes_up_for_rows_but_not_for_pairs() {
+fn a_prior_replaces_rows_but_not_pairs() {
     let mut numbers = Numbers(66);
     let pairs = posed(&mut numbers, 2);
     let mut metric = prior(
@@ -191,7 +193,7 @@ fn a_prior_makes_up_for_rows_but_not_for_pairs() {
 }
 
 #[test]
-fn boxed_and_decorated_it_stays_in_effect() {
+fn a_boxed_or_decorated_prior_stays_in_effect() {
     let mut numbers = Numbers(67);
     let pairs = posed(&mut numbers, 80);
     let pose = *pairs.camera_from_object();
@@ -233,9 +235,10 @@ fn boxed_and_decorated_it_stays_in_effect() {
     }
 }
 
-/// A prior about the start is the Gaussian that it says: of the object's origin and of turns about it, once told where.
+/// A prior around the initial pose is the documented Gaussian: of the object's origin, and of
+/// rotations around it.
 #[test]
-fn about_the_initial_pose() {
+fn a_prior_around_the_initial_pose() {
     let mut numbers = Numbers(68);
     let pairs = posed(&mut numbers, 80);
     let pose = *pairs.camera_from_object();
@@ -252,7 +255,8 @@ fn about_the_initial_pose() {
         - PointToPlane
             .mean_loss(&Iteration::default(), &pairs)
             .unwrap();
-    // To first order the twist about the object's origin is its displacement and the rotation vector; 4° and 1 cm are small.
+    // To first order, the twist around the object's origin is its displacement and the rotation
+    // vector. 4° and 1 cm are small.
     let turn = (pose.rotation * init.rotation.inverse()).scaled_axis();
     let moved = pose.translation.vector - init.translation.vector;
     let expected = moved.norm_squared() / translation_meters.powi(2)
@@ -262,7 +266,7 @@ fn about_the_initial_pose() {
         (found - expected).abs() < 0.05 * expected,
         "{found} {expected}"
     );
-    // It depends on where the stage started, not on the iteration or on what came before.
+    // It depends on the initial pose of the stage, and not on the iteration or on earlier calls.
     let mut fresh = PosePrior::new(PointToPlane, prior, 1e-3);
     assert_eq!(
         metric.minimize(&at(7, &pose), &pairs),

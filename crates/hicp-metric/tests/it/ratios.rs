@@ -1,4 +1,4 @@
-//! Only ratios of weights count, and only ratios of lengths.
+//! Tests that only ratios of weights and only ratios of lengths matter.
 
 use crate::scenes::{Numbers, carried, center, exact, messy, resized, surfel};
 use hicp_core::Iteration;
@@ -21,7 +21,7 @@ fn weighing(pairs: &Correspondences, factor: f32) -> Correspondences {
     pairs
 }
 
-/// A plane that is not along an axis, lifted by 4 mm, its counterparts elsewhere on it.
+/// A plane not along an axis, lifted by 4 mm, with counterparts elsewhere on it.
 fn plane(numbers: &mut Numbers) -> Correspondences {
     let source: Vec<_> = (0..200)
         .map(|_| Vector3::new(numbers.sign(), numbers.sign(), 0.0) * 0.1)
@@ -42,7 +42,7 @@ fn conditioned(policy: Degeneracy) -> Box<dyn Minimize> {
     })
 }
 
-/// Metrics without a length of their own.
+/// Metrics without a parameter that is a length.
 fn metrics() -> Vec<Box<dyn Minimize>> {
     let scale = Scale::Mad { floor_meters: 0.0 };
     vec![
@@ -69,7 +69,7 @@ fn metrics() -> Vec<Box<dyn Minimize>> {
 }
 
 #[test]
-fn steps_depend_on_the_ratios_of_weights_alone() {
+fn steps_depend_only_on_the_ratios_of_weights() {
     let mut numbers = Numbers(301);
     for pairs in [messy(&mut numbers, 60), plane(&mut numbers)] {
         for factor in FACTORS {
@@ -93,7 +93,7 @@ fn steps_depend_on_the_ratios_of_weights_alone() {
 }
 
 #[test]
-fn covariances_depend_on_the_ratios_of_weights_alone() {
+fn covariances_depend_only_on_the_ratios_of_weights() {
     let mut numbers = Numbers(302);
     let pairs = messy(&mut numbers, 60);
     for factor in FACTORS {
@@ -113,9 +113,9 @@ fn covariances_depend_on_the_ratios_of_weights_alone() {
     }
 }
 
-/// From a tenth of a millimetre to a hundred kilometres.
+/// From a tenth of a millimeter to a hundred kilometers.
 #[test]
-fn steps_depend_on_the_ratios_of_lengths_alone() {
+fn steps_depend_only_on_the_ratios_of_lengths() {
     let mut numbers = Numbers(303);
     let pairs = messy(&mut numbers, 60);
     for factor in [1.0 / 1024.0, 1024.0, 1_048_576.0] {

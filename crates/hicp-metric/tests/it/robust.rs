@@ -1,4 +1,4 @@
-//! Kernels by their properties, and what they do to outliers.
+//! Tests of the properties of kernels, and of their effect on outliers.
 
 use std::f64::consts::PI;
 
@@ -28,7 +28,7 @@ fn grid() -> impl Iterator<Item = f64> {
 }
 
 #[test]
-fn weights_are_one_at_zero_even_finite_and_never_increase() {
+fn weights_are_one_at_zero_even_finite_and_not_increasing() {
     for kernel in KERNELS {
         assert_eq!(
             kernel.weight(0.0).to_bits(),
@@ -71,7 +71,9 @@ fn the_weight_is_the_slope_of_the_loss_over_the_residual() {
     }
 }
 
-/// Fair's loss is a difference of nearly equal numbers near zero: its series, c² (u²/2 − u³/3 + u⁴/4 − …), to the last term that counts.
+/// Near zero, Fair's loss is a difference of nearly equal numbers.
+///
+/// Its series is c² (u²/2 − u³/3 + u⁴/4 − …), to the last term that counts.
 #[test]
 fn fairs_loss_keeps_its_digits_near_zero() {
     for c in [1.3998, 0.02, 50.0] {
@@ -81,15 +83,15 @@ fn fairs_loss_keeps_its_digits_near_zero() {
                 .map(|n| (-u).powi(n) / f64::from(n) * c * c)
                 .sum();
             let found = Kernel::Fair(c).loss(c * u);
-            // Where the difference takes over it has lost 4 of 16 digits.
+            // At the switch to the difference, 4 of 16 digits are lost.
             assert!((found - series).abs() < 1e-11 * series, "{c} {u}: {found}");
         }
     }
 }
 
-/// What rejects has a loss that levels off: c²/2, and c²/6 for Tukey's.
+/// The losses of rejecting kernels approach c²/2, and c²/6 for Tukey's.
 #[test]
-fn losses_that_level_off_do_so_at_their_limits() {
+fn bounded_losses_approach_their_limits() {
     for c in [0.3, 1.0, 4.6851] {
         let half = 0.5 * c * c;
         let kernels = [
@@ -109,7 +111,7 @@ fn losses_that_level_off_do_so_at_their_limits() {
     }
 }
 
-/// The constants have 95 % efficiency: (E ψ′)² / E ψ² over a Gaussian, ψ = x w.
+/// The constants have 95 % efficiency: (E ψ′)² / E ψ² over a Gaussian, with ψ = x w.
 #[test]
 fn tuning_constants_have_95_percent_efficiency() {
     for kernel in &KERNELS[1..] {
@@ -119,7 +121,7 @@ fn tuning_constants_have_95_percent_efficiency() {
             let x = (f64::from(i) + 0.5) * h;
             let density = (-0.5 * x * x).exp() / (2.0 * PI).sqrt() * h;
             let psi = x * kernel.weight(x);
-            // E ψ′ = E x ψ for a Gaussian, by parts.
+            // E ψ′ = E x ψ for a Gaussian, by integration by parts.
             slope += x * psi * density;
             square += psi * psi * density;
         }
@@ -129,7 +131,7 @@ fn tuning_constants_have_95_percent_efficiency() {
 }
 
 #[test]
-fn constants_that_are_none_give_numbers() {
+fn invalid_constants_give_finite_numbers() {
     type Make = fn(f64) -> Kernel;
     let make: [Make; 6] = [
         Kernel::Huber,
@@ -150,7 +152,7 @@ fn constants_that_are_none_give_numbers() {
     }
 }
 
-/// Pairs of a motion with Gaussian noise, and a share of gross outliers on one side.
+/// Returns pairs of a motion with Gaussian noise, and a share of gross outliers on one side.
 fn contaminated(numbers: &mut Numbers, motion: &Isometry3<f64>, share: f64) -> Correspondences {
     let source = ellipsoid(numbers, 400);
     let mut pairs = exact(&source, motion);
@@ -182,7 +184,7 @@ fn robust<M: Minimize + Clone + 'static>(metric: &M, kernel: Kernel) -> Robust<M
 }
 
 #[test]
-fn with_30_percent_gross_outliers_robust_beats_plain() {
+fn with_30_percent_gross_outliers_robust_is_better_than_plain() {
     fn check<M: Minimize + Clone + 'static>(metric: &M) {
         let mut numbers = Numbers(41);
         let motion = numbers.motion(&center(), 3.0, 0.005);
@@ -191,7 +193,7 @@ fn with_30_percent_gross_outliers_robust_beats_plain() {
         for kernel in &KERNELS[1..] {
             let mut robust = robust(metric, *kernel);
             let found = difference(&settle(&mut robust, &pairs), &motion).1;
-            // Convex kernels bound an outlier's pull, the others end it.
+            // Convex kernels bound the influence of an outlier; the others end it.
             let bound = match kernel {
                 Kernel::Huber(_) | Kernel::Fair(_) => 0.5,
                 Kernel::Cauchy(_) => 0.1,
@@ -210,7 +212,7 @@ fn with_30_percent_gross_outliers_robust_beats_plain() {
 }
 
 #[test]
-fn without_kernel_it_is_the_metric_itself() {
+fn without_a_kernel_it_equals_the_inner_metric() {
     let mut numbers = Numbers(42);
     let pairs = messy(&mut numbers, 60);
     for scale in [Scale::Meters(0.002), Scale::default()] {
@@ -230,7 +232,7 @@ fn without_kernel_it_is_the_metric_itself() {
     }
 }
 
-/// Doubling residuals and scale leaves the weights; so do metres against millimetres.
+/// Doubling residuals and scale keeps the weights. So does a change from meters to millimeters.
 #[test]
 fn weights_depend_on_the_residual_in_units_of_the_scale() {
     let mut numbers = Numbers(43);
@@ -256,7 +258,7 @@ fn weights_depend_on_the_residual_in_units_of_the_scale() {
 }
 
 #[test]
-fn the_scale_is_the_median_of_what_counts() {
+fn the_scale_is_the_median_of_pairs_with_weight() {
     let mut numbers = Numbers(44);
     let mut pairs = messy(&mut numbers, 101);
     for pair in &mut pairs.as_mut_slice()[..50] {
@@ -276,7 +278,9 @@ fn the_scale_is_the_median_of_what_counts() {
     assert_eq!(a, b);
 }
 
-/// The loss that the rules of divergence judge does not rise at a fixed scale, and tells a drift into the tail.
+/// At a fixed scale, the loss that the divergence rules judge does not rise.
+///
+/// It shows a drift into the tail.
 #[test]
 fn the_mean_loss_falls_with_every_step_and_rises_with_drift() {
     let mut numbers = Numbers(45);
@@ -303,7 +307,7 @@ fn the_mean_loss_falls_with_every_step_and_rises_with_drift() {
 }
 
 #[test]
-fn residuals_that_are_zero_equal_alone_or_infinite() {
+fn residuals_may_be_zero_equal_single_or_infinite() {
     let mut numbers = Numbers(46);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
     let shift = Isometry3::translation(0.0, 0.0, 0.004);
@@ -339,7 +343,7 @@ fn residuals_that_are_zero_equal_alone_or_infinite() {
                 metric.mean_loss(&Iteration::default(), &Correspondences::new()),
                 None
             );
-            // Equal distances are not all outliers under a median.
+            // With a median, equal distances are not all outliers.
             if matches!(scale, Scale::Mad { .. }) {
                 let step = metric.minimize(&Iteration::default(), &equal).unwrap();
                 assert!(
@@ -352,7 +356,7 @@ fn residuals_that_are_zero_equal_alone_or_infinite() {
 }
 
 #[test]
-fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
+fn scratch_and_boxes_do_not_change_results() {
     let mut numbers = Numbers(47);
     let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
     let fresh = Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default());
@@ -379,7 +383,7 @@ fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
     assert_eq!(inside.minimize(&Iteration::default(), &pairs), expected);
 }
 
-/// Student's t with ν degrees of freedom, which does not ship.
+/// Student's t with ν degrees of freedom, which is not a built-in kernel.
 #[derive(Clone, Copy)]
 struct StudentT(f64);
 
@@ -393,7 +397,9 @@ impl RobustKernel for StudentT {
     }
 }
 
-/// Cauchy's kernel is Student's with c² degrees of freedom, so a custom kernel takes the steps of a shipped one.
+/// Cauchy's kernel is Student's with c² degrees of freedom.
+///
+/// The custom kernel must therefore give the steps of the built-in one.
 #[test]
 fn a_custom_kernel_takes_the_steps_of_its_definition() {
     let mut numbers = Numbers(91);

@@ -1,4 +1,4 @@
-//! Every metric against its definition: squared errors, Jacobians, invariance.
+//! Tests of every metric against its definition: squared errors, Jacobians, invariance.
 
 use std::f64::consts::PI;
 
@@ -53,7 +53,7 @@ fn generalized(epsilon: f64, pair: &Pair, t: &Isometry3<f64>) -> f64 {
 }
 
 #[test]
-fn squared_errors_and_jacobians_are_those_of_the_definitions() {
+fn squared_errors_and_jacobians_equal_the_definitions() {
     let mut numbers = Numbers(11);
     let gicp = Generalized { epsilon: 0.01 };
     for pair in messy(&mut numbers, 40).as_slice() {
@@ -67,7 +67,7 @@ fn squared_errors_and_jacobians_are_those_of_the_definitions() {
 }
 
 #[test]
-fn generalized_normals_may_be_parallel_opposite_or_anything() {
+fn generalized_accepts_parallel_opposite_and_other_normals() {
     let mut numbers = Numbers(12);
     let base = messy(&mut numbers, 1).as_slice()[0];
     for angle in [
@@ -123,9 +123,9 @@ fn metrics() -> Vec<Box<dyn Minimize>> {
     ]
 }
 
-/// Moving both clouds moves the step with them: S T S⁻¹, and leaves the loss.
+/// Moving both clouds transforms the step to S T S⁻¹ and keeps the loss.
 #[test]
-fn a_common_rigid_motion_changes_nothing_else() {
+fn a_common_rigid_motion_only_transforms_the_step() {
     let mut numbers = Numbers(13);
     for _ in 0..10 {
         let pairs = messy(&mut numbers, 60);
@@ -136,7 +136,8 @@ fn a_common_rigid_motion_changes_nothing_else() {
             let there = metric.minimize(&Iteration::default(), &moved).unwrap();
             let expected = motion * here.increment * motion.inverse();
             let (angle, _) = se3::pose_distance(&there.increment, &expected);
-            // Points of some 0.8 m rounded to f32: 5e-8 m at 5 cm; GICP's weights amplify that by up to 1/√ε.
+            // Points at about 0.8 m are rounded to f32: 5e-8 m at 5 cm. The weights of GICP amplify
+            // that by up to 1/√ε.
             assert!(angle < 1e-4, "{}: {angle}", metric.label());
             let (a, b) = (here.mean_loss, there.mean_loss);
             assert!((a - b).abs() < 1e-3 * a, "{}: {a} {b}", metric.label());
@@ -148,7 +149,7 @@ fn a_common_rigid_motion_changes_nothing_else() {
 fn the_unit_of_length_does_not_matter() {
     let mut numbers = Numbers(14);
     let pairs = messy(&mut numbers, 60);
-    // A power of two: the same roundings.
+    // A power of two, which keeps the roundings.
     let millis = resized(&pairs, 1024.0);
     for mut metric in metrics() {
         let meters = metric.minimize(&Iteration::default(), &pairs).unwrap();
@@ -185,9 +186,9 @@ fn mean_loss_minimize_and_system_agree() {
     }
 }
 
-/// A sum would fall as pairs are lost, and rise as they are found.
+/// A sum would fall if pairs are lost, and rise if pairs are found.
 #[test]
-fn the_loss_is_a_mean_that_does_not_depend_on_how_many_pairs_there_are() {
+fn the_loss_is_a_mean_and_does_not_depend_on_the_number_of_pairs() {
     let mut numbers = Numbers(19);
     let pairs = messy(&mut numbers, 40);
     let mut thrice = pairs.clone();
@@ -210,9 +211,9 @@ fn the_loss_is_a_mean_that_does_not_depend_on_how_many_pairs_there_are() {
     }
 }
 
-/// No pair, one pair, pairs all in one place, pairs without weight: a step or none, never a number that is none.
+/// No pair, one pair, pairs at one place, and pairs without weight give a finite step or none.
 #[test]
-fn few_and_coincident_pairs_give_no_nonsense() {
+fn few_and_coincident_pairs_give_finite_steps_or_none() {
     let mut numbers = Numbers(16);
     let many = messy(&mut numbers, 20);
     let first = many.as_slice()[0];
@@ -240,9 +241,10 @@ fn few_and_coincident_pairs_give_no_nonsense() {
     }
 }
 
-/// Without weight, with weights that are none, and with points that are not finite there is no mean and no system.
+/// Without weight, with invalid weights, and with points that are not finite, there is neither a
+/// mean nor a system.
 #[test]
-fn what_is_no_number_has_no_loss() {
+fn inputs_that_are_not_finite_have_no_loss() {
     let mut numbers = Numbers(20);
     let pairs = messy(&mut numbers, 20);
     let mut wrong: Vec<Correspondences> = Vec::new();
@@ -254,7 +256,7 @@ fn what_is_no_number_has_no_loss() {
             .for_each(|p| p.weight = weight);
         wrong.push(pairs);
     }
-    // They cancel.
+    // The weights cancel.
     let mut cancelling = pairs.clone();
     for (i, pair) in cancelling.as_mut_slice().iter_mut().enumerate() {
         pair.weight = [1.0, -1.0][i % 2];
@@ -343,7 +345,7 @@ fn a_sum_is_the_sum_of_its_systems() {
     let expected = plane.information() * 0.7 + symmetric.information() * 0.3;
     assert!((whole.information() - expected).amax() < 1e-12 * expected.amax());
     assert_eq!(whole.rows(), plane.rows() + symmetric.rows());
-    // One term with factor 1 is that term.
+    // One term with factor 1 equals that term.
     let mut alone = WeightedSum {
         terms: ((1.0, PointToPlane),),
     };
@@ -357,7 +359,7 @@ fn a_sum_is_the_sum_of_its_systems() {
             .unwrap()
             .increment
     );
-    // Systems about other pivots and lengths merge into the same information.
+    // Systems with other pivots and lengths merge into the same information.
     let mut elsewhere = hicp_metric::NormalEquations::new(Point3::new(1.0, 2.0, -1.0), 0.7);
     elsewhere.merge(&plane, 1.0);
     assert!(same_information(&elsewhere, &plane, 1e-12));
@@ -365,7 +367,7 @@ fn a_sum_is_the_sum_of_its_systems() {
 }
 
 #[test]
-fn a_plane_held_by_a_little_point_to_point_does_not_slide() {
+fn a_little_point_to_point_keeps_a_plane_from_sliding() {
     let mut numbers = Numbers(19);
     let source: Vec<_> = (0..200)
         .map(|_| {

@@ -1,4 +1,5 @@
-//! The sandwich covariance against its formula and against Monte Carlo where the weights are not inverse variances.
+//! Tests of the sandwich covariance: against its formula, and against Monte Carlo for weights that
+//! are not inverse variances.
 
 use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy};
 use hicp_core::Iteration;
@@ -6,7 +7,8 @@ use hicp_core::{Correspondences, Isometry3, Matrix6, Vector3, Vector6, se3};
 use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint, sandwich_covariance};
 
-/// The rows (J, r) of a pair about the camera origin, by the definitions of the two metrics.
+/// Returns the rows (J, r) of a pair around the camera origin, by the definitions of the two
+/// metrics.
 fn rows(pair: &hicp_core::Pair, plane: bool) -> Vec<(Vector6<f64>, f64)> {
     let point = pair.source.point.cast::<f64>();
     let difference = point - pair.target.point.cast::<f64>();
@@ -24,7 +26,7 @@ fn rows(pair: &hicp_core::Pair, plane: bool) -> Vec<(Vector6<f64>, f64)> {
     directions.into_iter().map(row).collect()
 }
 
-/// H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹ N/(N − 6), summed in metres and radians about the camera origin.
+/// Returns H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹ N/(N − 6), summed in meters and radians around the camera origin.
 fn by_formula(pairs: &Correspondences, plane: bool) -> Matrix6<f64> {
     let (mut hessian, mut middle) = (Matrix6::zeros(), Matrix6::zeros());
     for pair in pairs.as_slice() {
@@ -42,7 +44,7 @@ fn by_formula(pairs: &Correspondences, plane: bool) -> Matrix6<f64> {
 }
 
 #[test]
-fn it_is_its_formula_with_the_rows_of_a_pair_taken_together() {
+fn the_sandwich_equals_its_formula_with_one_gradient_per_pair() {
     let mut numbers = Numbers(201);
     for count in [7, 20, 100] {
         let pairs = messy(&mut numbers, count);
@@ -59,15 +61,17 @@ fn it_is_its_formula_with_the_rows_of_a_pair_taken_together() {
     }
 }
 
-/// Σ^{-½} S Σ^{-½}, the identity where S is what Σ predicts.
+/// Returns Σ^{-½} S Σ^{-½}, which is the identity if Σ predicts S.
 fn whitened(predicted: &Matrix6<f64>, sample: &Matrix6<f64>) -> Matrix6<f64> {
     let inverse = predicted.cholesky().unwrap().l().try_inverse().unwrap();
     inverse * sample * inverse.transpose()
 }
 
-/// Noise that is five times as strong at the ends of an ellipsoid, where the levers are, and weights that know nothing of it.
+/// The noise is five times as strong at the ends of an ellipsoid, where the levers are.
+///
+/// The weights ignore that.
 #[test]
-fn monte_carlo_reproduces_it_where_the_plain_covariance_is_wrong() {
+fn monte_carlo_confirms_it_where_the_plain_covariance_is_wrong() {
     const TRIALS: u32 = 3000;
     let mut numbers = Numbers(202);
     let source = ellipsoid(&mut numbers, 400);
@@ -98,8 +102,8 @@ fn monte_carlo_reproduces_it_where_the_plain_covariance_is_wrong() {
         let xi = se3::log(&increment);
         sample += xi * xi.transpose() * share;
     }
-    // Diagonals of a Wishart matrix over N trials have a standard deviation of √(2/N): five of them, and 3 % for the bias of
-    // the formula, some 6/400 with the leverage of the ends.
+    // Diagonals of a Wishart matrix over N trials have a standard deviation of √(2/N). Five of them
+    // are allowed, and 3 % for the bias of the formula, about 6/400 times the leverage of the ends.
     let bound = 5.0 * (2.0 / f64::from(TRIALS)).sqrt() + 0.03;
     let right = whitened(&robust, &sample);
     assert!((right - Matrix6::identity()).amax() < bound, "{right}");
@@ -108,7 +112,7 @@ fn monte_carlo_reproduces_it_where_the_plain_covariance_is_wrong() {
 }
 
 #[test]
-fn a_common_motion_carries_it_and_the_scale_of_the_weights_does_not_matter() {
+fn a_common_motion_transforms_it_and_the_scale_of_weights_does_not_matter() {
     let mut numbers = Numbers(203);
     let pairs = messy(&mut numbers, 60);
     let motion = numbers.motion(&center(), 70.0, 0.3);
@@ -133,9 +137,9 @@ fn a_common_motion_carries_it_and_the_scale_of_the_weights_does_not_matter() {
 }
 
 #[test]
-fn what_is_not_determined_has_none() {
+fn undetermined_poses_have_no_sandwich_covariance() {
     let mut numbers = Numbers(204);
-    // As many pairs as unknowns leave no residual to learn from, and pairs without weight do not count.
+    // With as many pairs as unknowns, no residual is left. Pairs without weight do not count.
     let mut pairs = messy(&mut numbers, 8);
     for pair in &mut pairs.as_mut_slice()[..2] {
         pair.weight = 0.0;
@@ -145,7 +149,7 @@ fn what_is_not_determined_has_none() {
     assert!(sandwich_covariance(&PointToPlane, &pairs).is_some());
     let alone = Correspondences::new();
     assert_eq!(sandwich_covariance(&PointToPlane, &alone), None);
-    // A plane leaves three directions open.
+    // A plane leaves three directions undetermined.
     let plane: Vec<_> = (0..100)
         .map(|_| {
             let offset = Vector3::new(numbers.sign(), numbers.sign(), 0.0) * 0.1;

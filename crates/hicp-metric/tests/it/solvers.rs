@@ -1,4 +1,4 @@
-//! Iterations over fixed pairs.
+//! Tests of iterations over fixed pairs.
 
 use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
 use hicp_core::Iteration;
@@ -25,7 +25,7 @@ fn metrics() -> Vec<Box<dyn Minimize>> {
     ]
 }
 
-/// Sources moved as the solvers move them: from the originals, once.
+/// Returns the loss with sources moved as the solvers move them: once, from the originals.
 fn loss_after(
     metric: &mut dyn Minimize,
     pairs: &Correspondences,
@@ -37,7 +37,7 @@ fn loss_after(
 }
 
 #[test]
-fn gauss_newton_ends_where_the_closed_form_does() {
+fn gauss_newton_ends_at_the_closed_form() {
     let mut numbers = Numbers(71);
     for degrees in [0.0, 5.0, 30.0, 60.0] {
         let motion = numbers.motion(&center(), degrees, 0.05);
@@ -121,7 +121,7 @@ fn one_iteration_is_one_step() {
 fn levenberg_marquardt_never_raises_the_loss() {
     let mut numbers = Numbers(74);
     for _ in 0..20 {
-        // Far off, with wrong normals and outliers: Gauss–Newton overshoots on some of these.
+        // Far away, with wrong normals and outliers: Gauss–Newton overshoots on some of these.
         let motion = numbers.motion(&center(), 100.0, 0.1);
         let mut pairs = advanced(&messy(&mut numbers, 30), &motion);
         for pair in &mut pairs.as_mut_slice()[..10] {
@@ -143,7 +143,8 @@ fn levenberg_marquardt_never_raises_the_loss() {
     }
 }
 
-/// Steps are really rejected: there are problems where the plain step raises the loss and this one does not.
+/// Confirms that steps are rejected: on some problems the plain step raises the loss and this one
+/// does not.
 #[test]
 fn plain_steps_that_raise_the_loss_are_rejected() {
     let mut numbers = Numbers(75);
@@ -165,7 +166,7 @@ fn plain_steps_that_raise_the_loss_are_rejected() {
     assert!(raised > 0);
 }
 
-/// A power of two keeps the roundings: the same iterations in metres and in units of a 1024th.
+/// A power of two keeps the roundings: the same iterations in meters and in units of 1/1024 m.
 #[test]
 fn the_unit_of_length_does_not_matter() {
     let mut numbers = Numbers(76);
@@ -188,7 +189,7 @@ fn the_unit_of_length_does_not_matter() {
 }
 
 #[test]
-fn fitting_few_and_no_pairs() {
+fn perfect_few_and_missing_pairs() {
     let mut numbers = Numbers(77);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
     let few: Correspondences = messy(&mut numbers, 1);
@@ -209,7 +210,7 @@ fn fitting_few_and_no_pairs() {
 }
 
 #[test]
-fn scratch_leaves_no_trace_and_a_box_changes_nothing() {
+fn scratch_and_boxes_do_not_change_results() {
     fn check<M: Minimize + Clone + 'static>(fresh: &M) {
         let mut numbers = Numbers(78);
         let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));

@@ -1,4 +1,4 @@
-//! The symmetric metric: exact in one step, and what it skips.
+//! Tests of the symmetric metric: exact in one step, with skipped pairs.
 
 use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, surfel};
 use hicp_core::Iteration;
@@ -16,14 +16,14 @@ fn exact_pairs_are_aligned_in_one_step() {
             let pairs = exact(&source, &motion);
             let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
             let (angle, distance) = difference(&step.increment, &motion);
-            // Points rounded to f32 at 0.6 m: 3e-8 m against 5 cm.
+            // Points are rounded to f32 at 0.6 m: 3e-8 m against 5 cm.
             assert!(
                 angle < 2e-6 && distance < 2e-7,
                 "{degrees}: {angle} {distance}"
             );
         }
     }
-    // Point-to-plane is not: that is the point.
+    // Point-to-plane is not exact, which is the difference to this metric.
     let source = ellipsoid(&mut numbers, 300);
     let motion = numbers.motion(&center(), 30.0, 0.0);
     let linear = PointToPlane
@@ -33,10 +33,11 @@ fn exact_pairs_are_aligned_in_one_step() {
 }
 
 #[test]
-fn weights_count_and_its_minimum_is_that_of_its_rows() {
+fn weights_count_and_the_minimum_is_that_of_its_rows() {
     let mut numbers = Numbers(22);
     let mut pairs = messy(&mut numbers, 200);
-    // Repeated steps come to rest where the gradient of the linearised rows vanishes, up to terms of the residuals.
+    // Repeated steps converge to a zero gradient of the linearized rows, up to terms of the
+    // residuals.
     for _ in 0..30 {
         let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
         pairs = advanced(&pairs, &step.increment);
@@ -45,7 +46,7 @@ fn weights_count_and_its_minimum_is_that_of_its_rows() {
     let rest = system.solve().unwrap();
     let (angle, distance) = difference(&rest, &Isometry3::identity());
     assert!(angle < 5e-3 && distance < 3e-4, "{angle} {distance}");
-    // A pair of weight zero is not there.
+    // A pair of weight zero does not count.
     let mut with = messy(&mut numbers, 50);
     let without: Correspondences = with.as_slice()[..40].iter().copied().collect();
     for pair in &mut with.as_mut_slice()[40..] {
@@ -60,7 +61,7 @@ fn weights_count_and_its_minimum_is_that_of_its_rows() {
 }
 
 #[test]
-fn pairs_that_see_different_sides_count_for_nothing() {
+fn pairs_of_different_sides_are_skipped() {
     let mut numbers = Numbers(23);
     let pairs = messy(&mut numbers, 60);
     let mut more = pairs.clone();
@@ -81,7 +82,7 @@ fn pairs_that_see_different_sides_count_for_nothing() {
         Symmetric.mean_loss(&Iteration::default(), &more),
         Symmetric.mean_loss(&Iteration::default(), &pairs)
     );
-    // Perpendicular ones too, and nothing else left is no step.
+    // Perpendicular ones are skipped, too. If nothing else is left, there is no step.
     let source = surfel(center(), Vector3::x());
     let across = Pair::new(0, source, 0, surfel(center(), Vector3::y()));
     let only: Correspondences = [across; 20].into_iter().collect();
@@ -90,7 +91,7 @@ fn pairs_that_see_different_sides_count_for_nothing() {
 }
 
 #[test]
-fn a_plane_comes_down_without_sliding() {
+fn a_plane_approaches_without_sliding() {
     let mut numbers = Numbers(24);
     let source: Vec<_> = (0..200)
         .map(|_| {
@@ -106,7 +107,7 @@ fn a_plane_comes_down_without_sliding() {
     assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
 }
 
-/// The linear problem as stated, solved by brute force, and the motion made of its solution as stated.
+/// Solves the documented linear problem by brute force and returns the documented motion.
 fn by_formula(pairs: &Correspondences) -> Isometry3<f64> {
     let ends = |pair: &Pair| {
         let (p, q) = (
@@ -149,7 +150,7 @@ fn by_formula(pairs: &Correspondences) -> Isometry3<f64> {
 }
 
 #[test]
-fn the_step_is_the_stated_one_where_pairs_are_wrong_too() {
+fn the_step_is_the_documented_one_also_for_wrong_pairs() {
     let mut numbers = Numbers(25);
     for degrees in [1.0, 30.0, 60.0] {
         let pairs = messy(&mut numbers, 60);
@@ -173,9 +174,10 @@ fn the_step_is_the_stated_one_where_pairs_are_wrong_too() {
     }
 }
 
-/// Exact too where a direction has a ten thousandth of the information that the others have: damping is for those that have none.
+/// A direction with a ten-thousandth of the information of the others is exact, too: only
+/// undetermined ones are damped.
 #[test]
-fn a_weak_direction_is_no_free_one() {
+fn a_weak_direction_is_not_an_undetermined_one() {
     let mut numbers = Numbers(26);
     let sides = [Vector3::x(), Vector3::y(), -Vector3::x(), -Vector3::y()];
     let (mut source, mut weights) = (Vec::new(), Vec::new());
@@ -206,7 +208,7 @@ fn a_weak_direction_is_no_free_one() {
 }
 
 #[test]
-fn pairs_that_fit_stay_and_fewer_than_six_say_nothing() {
+fn fitting_pairs_do_not_move_and_fewer_than_six_give_no_step() {
     let mut numbers = Numbers(27);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
     let step = Symmetric.minimize(&Iteration::default(), &fitting).unwrap();
@@ -226,7 +228,7 @@ fn pairs_that_fit_stay_and_fewer_than_six_say_nothing() {
             .minimize(&Iteration::default(), &first(6))
             .is_some()
     );
-    // Without weight, or seen from the other side, a pair is none.
+    // A pair without weight, or seen from the other side, does not count.
     let mut five = pairs.clone();
     five.as_mut_slice()[1].weight = 0.0;
     five.as_mut_slice()[4].target.normal = -five.as_slice()[4].source.normal;

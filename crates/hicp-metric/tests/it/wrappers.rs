@@ -1,4 +1,4 @@
-//! What stands around a metric passes on what it does not change.
+//! Tests that decorators forward what they do not change.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,7 +15,7 @@ use hicp_metric::{
 
 type Seen = Rc<RefCell<Vec<(usize, Isometry3<f64>)>>>;
 
-/// A decorator that notes the iterations that it receives.
+/// A decorator that records the iterations that it receives.
 #[derive(Clone)]
 struct Spy<M> {
     metric: M,
@@ -64,7 +64,8 @@ impl<M: Minimize> Minimize for Spy<M> {
     }
 }
 
-/// What stands around one metric, by the name that it states, and changes neither a pair's error nor the mean of all.
+/// Returns decorators around one metric that change neither a pair's error nor the mean of all,
+/// with their names.
 fn around<M: Minimize + Clone + 'static>(metric: &M) -> Vec<(&'static str, Box<dyn Minimize>)> {
     let metric = || metric.clone();
     let prior = Prior::AboutInitial {
@@ -125,7 +126,7 @@ fn every_kind() -> Vec<(&'static str, Box<dyn Minimize>)> {
     all
 }
 
-/// A kernel belongs to the set of pairs: it changes the mean, but no pair's own error.
+/// Returns a decorator with a kernel: it changes the mean, but not the errors of pairs.
 fn with_kernel<M: Minimize + Clone + 'static>(
     metric: &M,
 ) -> Vec<(&'static str, Box<dyn Minimize>)> {
@@ -160,7 +161,7 @@ fn errors_of_a_pair_are_those_of_the_metric() {
     }
 }
 
-/// The loss of the pairs too, but where there is a prior, and that only once a stage has begun.
+/// Losses are those of the metric, except with a prior, which acts once a stage has started.
 #[test]
 fn losses_are_those_of_the_metric() {
     let mut numbers = Numbers(29);
@@ -180,7 +181,7 @@ fn losses_are_those_of_the_metric() {
     }
 }
 
-/// What iterates or takes turns asks the metric inside what the pairs determine.
+/// Solvers and schedules return the system of the inner metric.
 #[test]
 fn systems_are_those_of_the_metric() {
     let mut numbers = Numbers(30);
@@ -198,7 +199,7 @@ fn systems_are_those_of_the_metric() {
     assert_eq!(found, same.len());
 }
 
-/// Everything that a decorator calls inside receives the iteration that the decorator received.
+/// Every inner call receives the iteration that the decorator received.
 #[test]
 fn the_iteration_reaches_every_metric_inside() {
     let mut numbers = Numbers(31);
@@ -234,7 +235,7 @@ fn the_iteration_reaches_every_metric_inside() {
             );
         }
     }
-    // Every term of a sum with a positive factor, once.
+    // Every term of a sum with a positive factor is called once.
     let sums: [(usize, Box<dyn Minimize>); 3] = [
         (
             2,
@@ -263,7 +264,7 @@ fn the_iteration_reaches_every_metric_inside() {
 }
 
 #[test]
-fn a_schedule_takes_the_metric_of_its_iteration_and_stays_at_the_last() {
+fn a_schedule_selects_the_metric_of_its_iteration_and_then_the_last() {
     let mut numbers = Numbers(37);
     let pairs = messy(&mut numbers, 20);
     let mut metrics: Vec<Box<dyn Minimize>> = vec![Box::new(PointToPoint), Box::new(PointToPlane)];
@@ -276,7 +277,7 @@ fn a_schedule_takes_the_metric_of_its_iteration_and_stays_at_the_last() {
         let iteration = Iteration::new(iteration, &Isometry3::identity(), Problem::default());
         assert_eq!(schedule.mean_loss(&iteration, &pairs), expected[which]);
     }
-    // Without any it measures nothing.
+    // Without metrics, there is no result.
     let mut empty = MetricSchedule::new(Vec::<PointToPoint>::new());
     let mut errors = vec![0.0; pairs.len()];
     empty.add_squared_errors(&first, &pairs, 1.0, &mut errors);
@@ -289,7 +290,7 @@ fn a_schedule_takes_the_metric_of_its_iteration_and_stays_at_the_last() {
 }
 
 #[test]
-fn metrics_say_their_names() {
+fn metrics_report_their_names() {
     let metrics: [(&str, Box<dyn Minimize>); 5] = [
         ("point-to-point", Box::new(PointToPoint)),
         ("point-to-plane", Box::new(PointToPlane)),

@@ -1,4 +1,4 @@
-//! Pairs to be aligned.
+//! Helpers that create pairs.
 
 pub(crate) use crate::support;
 
@@ -19,7 +19,7 @@ pub fn pair(p: Point3<f64>, q: Point3<f64>, normal: Vector3<f64>, weight: f32) -
     }
 }
 
-/// Pairs of points and their images under a motion, both rounded to f32.
+/// Returns pairs of points and their images under a motion, both rounded to f32.
 pub fn images(points: &[Point3<f64>], motion: &Isometry3<f64>) -> Correspondences {
     points
         .iter()
@@ -27,7 +27,7 @@ pub fn images(points: &[Point3<f64>], motion: &Isometry3<f64>) -> Correspondence
         .collect()
 }
 
-/// Mean squared distance between the moved sources and the targets.
+/// Returns the mean squared distance between the moved sources and the targets.
 pub fn loss(pairs: &Correspondences, motion: &Isometry3<f64>) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for pair in pairs.as_slice() {
@@ -43,7 +43,9 @@ pub fn rms(pairs: &Correspondences, motion: &Isometry3<f64>) -> f64 {
     loss(pairs, motion).sqrt()
 }
 
-/// The largest rounding of a coordinate of the pairs: half a unit in the last place of f32, times √3 for a point.
+/// Returns the largest rounding of a point of the pairs.
+///
+/// It is half a unit in the last place of f32, times √3.
 pub fn rounding(pairs: &Correspondences) -> f64 {
     let largest = pairs
         .as_slice()
@@ -57,7 +59,7 @@ pub fn determinant(motion: &Isometry3<f64>) -> f64 {
     motion.rotation.to_rotation_matrix().matrix().determinant()
 }
 
-/// Pairs on an ellipsoid of 10 cm, the source off by a motion about its centre.
+/// Returns pairs on an ellipsoid of 10 cm, with sources displaced by a motion around its center.
 pub fn ellipsoid(
     numbers: &mut support::Numbers,
     count: usize,

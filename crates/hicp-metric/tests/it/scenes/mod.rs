@@ -7,7 +7,7 @@ use hicp_core::{
 };
 use hicp_metric::{ErrorMetric, NormalEquations};
 
-/// SplitMix64: the same numbers everywhere.
+/// A seeded generator (SplitMix64) with the same numbers on every platform.
 #[derive(Clone, Debug)]
 pub struct Numbers(pub u64);
 
@@ -19,12 +19,12 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In [-1, 1).
+    /// Returns a number in [−1, 1).
     pub fn sign(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
@@ -47,7 +47,8 @@ impl Numbers {
         (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
     }
 
-    /// A turn of `degrees` about a random axis through `center`, and a shift of `meters`.
+    /// Returns a rotation by `degrees` around a random axis through `center`, and a shift of
+    /// `meters`.
     pub fn motion(&mut self, center: &Point3<f64>, degrees: f64, meters: f64) -> Isometry3<f64> {
         let turn = self.direction() * degrees.to_radians();
         let c = center.coords;
@@ -75,12 +76,12 @@ pub fn transformed(motion: &Isometry3<f64>, surfel: &Surfel) -> Surfel {
     }
 }
 
-/// The centre of all scenes.
+/// The center of all scenes.
 pub fn center() -> Point3<f64> {
     Point3::new(0.02, -0.03, 0.6)
 }
 
-/// An ellipsoid of 4, 6 and 9 cm about the centre: determines everything.
+/// An ellipsoid of 4, 6 and 9 cm around the center, which determines every direction.
 pub fn ellipsoid(numbers: &mut Numbers, count: usize) -> Vec<Surfel> {
     let radii = Vector3::new(0.04, 0.06, 0.09);
     (0..count)
@@ -91,7 +92,7 @@ pub fn ellipsoid(numbers: &mut Numbers, count: usize) -> Vec<Surfel> {
         .collect()
 }
 
-/// Model points and their counterparts at `motion * point`.
+/// Returns model points and their counterparts at `motion * point`.
 pub fn exact(source: &[Surfel], motion: &Isometry3<f64>) -> Correspondences {
     let pairs = source.iter().zip(0..);
     pairs
@@ -99,7 +100,8 @@ pub fn exact(source: &[Surfel], motion: &Isometry3<f64>) -> Correspondences {
         .collect()
 }
 
-/// Pairs with independent noise of the target points, random weights, and normals that differ.
+/// Returns pairs with independent noise of the target points, random weights, and different
+/// normals.
 pub fn messy(numbers: &mut Numbers, count: usize) -> Correspondences {
     let source = ellipsoid(numbers, count);
     let motion = numbers.motion(&center(), 4.0, 0.01);
@@ -113,7 +115,7 @@ pub fn messy(numbers: &mut Numbers, count: usize) -> Correspondences {
     pairs
 }
 
-/// All pairs moved by one motion: sources, targets and the pose.
+/// Returns the pairs with sources, targets and pose moved by one motion.
 pub fn carried(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
     let mut moved = Correspondences::new();
     moved.begin(&(motion * pairs.camera_from_object()), pairs.n_candidates());
@@ -125,7 +127,7 @@ pub fn carried(pairs: &Correspondences, motion: &Isometry3<f64>) -> Corresponden
     moved
 }
 
-/// The sources moved by one motion.
+/// Returns the pairs with sources moved by one motion.
 pub fn advanced(pairs: &Correspondences, motion: &Isometry3<f64>) -> Correspondences {
     let mut moved = Correspondences::new();
     moved.begin(&(motion * pairs.camera_from_object()), pairs.n_candidates());
@@ -136,7 +138,7 @@ pub fn advanced(pairs: &Correspondences, motion: &Isometry3<f64>) -> Corresponde
     moved
 }
 
-/// All lengths times a factor.
+/// Returns the pairs with all lengths multiplied by a factor.
 pub fn resized(pairs: &Correspondences, factor: f32) -> Correspondences {
     let mut resized = pairs.clone();
     for pair in resized.as_mut_slice() {
@@ -146,7 +148,7 @@ pub fn resized(pairs: &Correspondences, factor: f32) -> Correspondences {
     resized
 }
 
-/// The pairs as if made at a pose.
+/// Returns the pairs with another pose.
 pub fn at(pose: &Isometry3<f64>, pairs: &Correspondences) -> Correspondences {
     let mut posed = Correspondences::new();
     posed.begin(pose, pairs.n_candidates());
@@ -154,15 +156,16 @@ pub fn at(pose: &Isometry3<f64>, pairs: &Correspondences) -> Correspondences {
     posed
 }
 
-/// Rotation (radians) and displacement of the scene's centre (metres) between two motions.
+/// Returns the rotation (radians) and the displacement of the scene's center (meters) between
+/// motions.
 pub fn difference(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     let (angle, _) = se3::pose_distance(a, b);
     (angle, (a * center() - b * center()).norm())
 }
 
-/// Checks a metric's rows: the gradient of the system against central differences of its residuals, one pair at a time.
+/// Checks a metric's rows: the gradient against central differences, one pair at a time.
 ///
-/// `residual` is E's definition, exact in the twist.
+/// `residual` is the definition of E, exact in the twist.
 pub fn check_rows<M: ErrorMetric>(
     metric: &M,
     pair: &Pair,
@@ -175,7 +178,7 @@ pub fn check_rows<M: ErrorMetric>(
     let at_rest = squared(&Isometry3::identity());
     assert!((system.loss() - weight * at_rest).abs() <= tolerance * weight * at_rest.max(1e-9));
     assert!((metric.squared_error(pair) - at_rest).abs() <= tolerance * at_rest.max(1e-9));
-    // E = rᵀr: half of its derivative is Jᵀr, its second difference JᵀJ where r is linear enough.
+    // E = rᵀr: half of its derivative is Jᵀr. If r is nearly linear, its second difference is JᵀJ.
     let step = 1e-5;
     let gradient = system.gradient();
     for i in 0..6 {
@@ -192,7 +195,7 @@ pub fn check_rows<M: ErrorMetric>(
     }
 }
 
-/// Whether two systems hold the same information, to a relative tolerance.
+/// Returns whether two systems hold the same information, to a relative tolerance.
 pub fn same_information(a: &NormalEquations, b: &NormalEquations, tolerance: f64) -> bool {
     let (a, b) = (a.information(), b.information());
     (a - b).amax() <= tolerance * a.amax()
