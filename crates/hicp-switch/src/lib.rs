@@ -1,6 +1,7 @@
-//! Dynamic Switching: the trait [`Switcher`], the [`Threshold`] on a score, and the stage [`Switch`] that runs what was chosen.
+//! Dynamic Switching: the trait [`Switcher`], thresholds on a score, and stages that switch.
 //!
-//! **Should you use this crate?** To choose between ICP stages by the image, yes. To refine poses with one call, use `hybrid-icp`.
+//! **Should you use this crate?** Yes, to select ICP stages by the image. To refine poses with one
+//! call, use `hybrid-icp`.
 //!
 //! ```
 //! use hicp_icp::Stage;

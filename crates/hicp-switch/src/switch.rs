@@ -1,20 +1,21 @@
-//! The stage that switches.
+//! Stages that select another stage.
 
 use hicp_core::{Isometry3, Problem};
 use hicp_icp::{Outcome, Regime, Session, Stage, Termination};
 
 use crate::switcher::Switcher;
 
-/// Runs one of two stages, chosen from the image at the initial estimate: one iteration of Hybrid ICP (§IV-C).
+/// Runs one of two stages, selected from the image at the initial estimate.
 ///
-/// Any regime but [`Regime::ALIGNED`] counts as misaligned; [`SwitchAmong`] takes more than two.
+/// It is one iteration of Hybrid ICP (§IV-C). Any regime but [`Regime::ALIGNED`] counts as
+/// misaligned; [`SwitchAmong`] accepts more than two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Switch<W, A, M> {
-    /// Who decides.
+    /// Selects the regime.
     pub switcher: W,
-    /// What runs when the estimate agrees with the image.
+    /// The stage for an estimate that agrees with the image.
     pub aligned: A,
-    /// What runs when it does not.
+    /// The stage for an estimate that does not agree with the image.
     pub misaligned: M,
 }
 
@@ -41,14 +42,15 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for Switch<W, A, M> {
     }
 }
 
-/// Runs one of any number of stages, chosen from the image at the initial estimate.
+/// Runs one of any number of stages, selected from the image at the initial estimate.
 ///
-/// Regime k runs the k-th stage, and any regime beyond the last one runs the last; without stages the initial pose is kept.
+/// Regime k runs the k-th stage, and regimes beyond the last stage run the last one. Without
+/// stages, it keeps the initial pose.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SwitchAmong<W, S> {
-    /// Who decides.
+    /// Selects the regime.
     pub switcher: W,
-    /// What runs, by regime.
+    /// The stages, by regime.
     pub stages: Vec<S>,
 }
 

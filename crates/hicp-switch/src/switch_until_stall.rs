@@ -1,32 +1,35 @@
-//! The stage that switches as long as it pays.
+//! The stage that switches until the score stalls.
 
 use hicp_core::{Isometry3, Problem};
 use hicp_icp::{Outcome, Regime, RegimeEvent, Session, Stage, Termination, Verdict};
 use hicp_score::Score;
 
-/// Dynamic Switching until the score stalls, with the best pose met as the result.
+/// Runs Dynamic Switching until the score stalls, and returns the best pose.
 ///
-/// A step starts from the best pose so far and runs `aligned` where its score is below `alpha`, else `misaligned`. A step that
-/// lowers the score by less than `min_gain` is a stall: the other of the two is then tried once, and if it gains nothing either,
-/// the stage ends. It ends at once where the score is at or below `good_enough`, but never before the first step.
+/// A step starts from the best pose so far. It runs `aligned` if the score of that pose is below
+/// `alpha`, otherwise `misaligned`. A step that lowers the score by less than `min_gain` is a
+/// stall. Then the other stage is tried once, and if that is a stall, too, the iteration ends. It
+/// also ends if the score is at or below `good_enough`, but not before the first step.
 ///
-/// **Contract**: the score of the returned pose is never above that of the initial one, and the pose is the initial one bit
-/// for bit unless its score is lower. Cost: at most `max_steps` × (a stage and a score), and a score.
+/// **Contract**: the score of the returned pose is never above that of the initial one. Unless its
+/// score is lower, the returned pose is the initial one, bit for bit.
+///
+/// Cost: a score, and at most `max_steps` × (a stage and a score).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SwitchUntilStall<C, A, M> {
-    /// The judge, lower is better; the MVE, as in [`crate::Threshold`].
+    /// The score, lower is better: the MVE, as in [`crate::Threshold`].
     pub score: C,
-    /// The score from which on an estimate counts as misaligned.
+    /// The smallest score of a misaligned estimate.
     pub alpha: f64,
-    /// What runs when the estimate agrees with the image.
+    /// The stage for an estimate that agrees with the image.
     pub aligned: A,
-    /// What runs when it does not.
+    /// The stage for an estimate that does not agree with the image.
     pub misaligned: M,
-    /// How many steps at most; 0 keeps the initial pose.
+    /// Maximum number of steps; 0 keeps the initial pose.
     pub max_steps: usize,
-    /// The gain of the score below which a step is a stall.
+    /// The gain in score below which a step is a stall.
     pub min_gain: f64,
-    /// The score at which no further step is taken.
+    /// The score at which no further steps follow.
     pub good_enough: f64,
 }
 

@@ -4,16 +4,16 @@ use hicp_core::internal::type_label;
 use hicp_core::{Context, Isometry3};
 use hicp_icp::{Regime, RegimeEvent};
 
-/// Decides from the image which regime the current estimate is in (Dynamic Switching, §IV-A).
+/// Selects the regime of the current estimate from the image (Dynamic Switching, §IV-A).
 ///
-/// Pure: equal inputs give equal answers; `&mut self` is scratch.
+/// It is pure: equal inputs give equal results, and `&mut self` is scratch.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a switcher",
     label = "this must implement `Switcher`",
     note = "`Switch::switcher` accepts a `Switcher`, such as `Threshold`, or a fixed `Regime`"
 )]
 pub trait Switcher {
-    /// Judges a pose.
+    /// Returns the regime of a pose `camera_from_object`, with the score that decided.
     fn regime(
         &mut self,
         context: &mut Context<'_>,
@@ -45,7 +45,7 @@ macro_rules! forward {
 }
 forward!(Box<T>, &mut T);
 
-/// Always the same regime: switches Dynamic Switching off.
+/// Selects always the same regime, which disables Dynamic Switching.
 impl Switcher for Regime {
     fn regime(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> RegimeEvent {
         RegimeEvent {

@@ -1,4 +1,4 @@
-//! Switching on a score's threshold.
+//! Switching by thresholds on a score.
 
 use hicp_core::{Context, Isometry3};
 use hicp_icp::{Regime, RegimeEvent};
@@ -6,16 +6,18 @@ use hicp_score::Score;
 
 use crate::switcher::Switcher;
 
-/// Misaligned when a score is α or more, aligned below: Dynamic Switching with the MVE as the score (§IV-A).
+/// Selects misaligned if a score is at least α, otherwise aligned.
+///
+/// With the MVE as the score, it is Dynamic Switching (§IV-A).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Threshold<S> {
-    /// The score, higher is worse.
+    /// The score; higher is worse.
     pub score: S,
     /// The threshold; the paper's is [`PAPER_ALPHA`].
     pub alpha: f64,
 }
 
-/// The threshold on the MVE that the paper found to generalise (§IV-A.2).
+/// The threshold on the MVE that generalizes according to the paper (§IV-A.2).
 pub const PAPER_ALPHA: f64 = 0.4;
 
 impl<S: Score> Switcher for Threshold<S> {
@@ -40,12 +42,13 @@ impl<S: Score> Switcher for Threshold<S> {
     }
 }
 
-/// Any number of regimes by ascending thresholds on a score: regime k when exactly k of the bounds are at or below it.
+/// Selects among any number of regimes by thresholds on a score.
 ///
-/// With one bound it is [`Threshold`].
+/// It is regime k if exactly k of the bounds are at or below the score. With one bound it equals
+/// [`Threshold`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Thresholds<S> {
-    /// The score, higher is worse.
+    /// The score; higher is worse.
     pub score: S,
     /// The bounds, in any order.
     pub bounds: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Dynamic Switching: who is asked, who runs, and what is told.
+//! Tests of Dynamic Switching: the called switcher, the selected stage, and the reported events.
 
 use crate::support::{RayCaster, cuboid, depth_image, observe, observe_depth, pose, wedge};
 use hicp_core::{Context, Isometry3, Model, PinholeCamera, Problem};
@@ -6,7 +6,7 @@ use hicp_icp::{Observer, Outcome, Session, Stage, Termination, Workspace};
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{PAPER_ALPHA, Regime, RegimeEvent, Switch, Switcher, Threshold};
 
-/// A score that is told.
+/// A score with a fixed value.
 #[derive(Clone, Copy, Debug)]
 struct Fixed(f64);
 
@@ -16,7 +16,7 @@ impl Score for Fixed {
     }
 }
 
-/// A stage that leaves its mark on the pose.
+/// A stage that marks the pose.
 struct Mark(f64);
 
 impl Stage for Mark {
@@ -35,7 +35,7 @@ impl Observer for Regimes {
     }
 }
 
-/// Runs a switch between marks 1 (aligned) and 2 (misaligned), and returns the mark and what was observed.
+/// Runs a switch between marks 1 (aligned) and 2 (misaligned), and returns the mark and the events.
 fn mark(switcher: impl Switcher) -> (f64, Vec<RegimeEvent>) {
     let model = Model::new(cuboid(0.1, 0.1, 0.1));
     let camera = PinholeCamera::new(10.0, 10.0, 3.5, 3.5, 8, 8).unwrap();
@@ -80,7 +80,7 @@ fn pitfall_24_a_score_of_exactly_alpha_is_misaligned() {
 }
 
 #[test]
-fn a_regime_is_a_switcher_that_never_changes_its_mind() {
+fn a_regime_is_a_constant_switcher() {
     for (regime, expected, name) in [
         (Regime::ALIGNED, 1.0, "aligned"),
         (Regime::MISALIGNED, 2.0, "misaligned"),
@@ -105,7 +105,7 @@ fn a_regime_is_a_switcher_that_never_changes_its_mind() {
 }
 
 #[test]
-fn switches_nest_and_every_choice_is_told() {
+fn nested_switches_report_every_choice() {
     let model = Model::new(wedge());
     let camera = PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap();
     let at = pose(0.0, 0.0, 0.25, 0.4, 0.2, 0.1);
@@ -139,7 +139,7 @@ fn switches_nest_and_every_choice_is_told() {
             workspace.renders(),
         )
     };
-    // The true pose scores 0: below 0.4, and not below 0. Its render is shared by both.
+    // The true pose scores 0: below 0.4, and not below 0. Both share its render.
     let (by, told, renders) = run(&at);
     assert!((by - 2.0).abs() < 1e-15);
     assert_eq!(
@@ -153,7 +153,7 @@ fn switches_nest_and_every_choice_is_told() {
     // Behind the camera nothing agrees.
     let (by, told, _) = run(&pose(0.0, 0.0, -1.0, 0.0, 0.0, 0.0));
     assert_eq!((by, told), (3.0, vec![(Regime::MISALIGNED, Some(1.0))]));
-    // A pose that is not a number is no reason to panic.
+    // A pose that is not finite must not panic.
     let (_, told, _) = run(&Isometry3::translation(0.0, f64::NAN, 0.25));
     assert_eq!(told, [(Regime::MISALIGNED, Some(1.0))]);
 }
