@@ -1,10 +1,10 @@
-//! Counting agreeing pixels, many at a time.
+//! Counts of agreeing pixels, many at a time.
 
 use hicp_core::internal::VectorLoop;
 
 use crate::tolerances::{N_TOLERANCES, tolerances};
 
-/// Pixels counted at a time.
+/// Number of pixels counted at once.
 const LANES: usize = 8;
 
 /// A row of pixels: rendered depth, measured depth and mask, from the same column on.
@@ -19,7 +19,7 @@ pub(crate) struct Row<'a> {
     pub(crate) y: f64,
 }
 
-/// Counts the pixels of a region, row by row.
+/// The loop that counts the pixels of a region, row by row.
 #[derive(Debug)]
 pub(crate) struct Agreement<R> {
     pub(crate) rows: R,
@@ -83,7 +83,7 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
                     let masked = all_bits(masked[lane]);
                     let hidden = known & all_bits(behind > self.hidden_beyond);
                     outside[lane] += 1 & seen & !masked & !hidden;
-                    // NaN where the pixel does not count: NaN is below no limit.
+                    // NaN if the pixel does not count: NaN is below no limit.
                     let nothing = !(seen & known & masked);
                     relative[lane] =
                         f64::from_bits((behind.abs() * inverse_diameter).to_bits() | nothing);
@@ -104,7 +104,7 @@ impl<'a, R: Iterator<Item = Row<'a>>> VectorLoop for Agreement<R> {
     }
 }
 
-/// All bits or none.
+/// Returns all-ones if the condition holds, otherwise zero.
 #[inline(always)]
 fn all_bits(condition: bool) -> u64 {
     u64::from(condition).wrapping_neg()

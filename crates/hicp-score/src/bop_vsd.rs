@@ -1,4 +1,4 @@
-//! VSD as BOP'19 evaluates it: from renders of both poses and the test image.
+//! VSD by the rules of BOP'19: from renders of both poses and the test image.
 
 use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, PixelRegion, RenderedView};
 
@@ -7,16 +7,18 @@ use crate::vsd::{ScoreError, visibility_masks, vsd};
 
 /// Returns e_VSD(τ) for τ = 5 %, …, 50 % of the diameter with the visibility masks of BOP'19.
 ///
-/// `test` is the measured depth, `estimate` and `truth` are renders of the object at both poses
-/// with the camera of the test image; `delta` is the visibility tolerance (metres;
-/// [`crate::VISIBILITY_TOLERANCE_METERS`] for all datasets but ITODD, which has 0.005). 1 for every
-/// τ where neither render shows a visible pixel. Cost: O(pixels of the smallest rectangle around
-/// both renders): elsewhere neither pose can be visible.
+/// `test` is the measured depth. `estimate` and `truth` are renders of the object at both poses
+/// with the camera of the test image. `diameter` and `delta`, the visibility tolerance, are in
+/// meters. `delta` is [`crate::VISIBILITY_TOLERANCE_METERS`] for all datasets except ITODD, where
+/// it is 0.005. If neither render shows a visible pixel, the result is 1 for every τ.
+///
+/// Cost: O(pixels of the smallest rectangle around both renders), since neither pose can be visible
+/// elsewhere.
 ///
 /// # Errors
 ///
-/// [`ScoreError`] when the test image is not of the camera's size, or the diameter is not finite
-/// and positive.
+/// [`ScoreError`] if the test image does not have the camera's size, or if the diameter is not
+/// finite and positive.
 pub fn bop_vsd(
     test: &DepthImage,
     camera: &PinholeCamera,
@@ -61,11 +63,10 @@ pub fn bop_vsd(
     )
 }
 
-/// Returns whether the spheres of the object's diameter about its origin at two poses overlap in
-/// the image.
+/// Returns whether spheres around the object's origin at two poses overlap in the image.
 ///
-/// Where they do not, BOP takes every e_VSD as 1 without rendering. False for a pose that is not in
-/// front of the camera.
+/// The spheres have the object's diameter, in meters. If they do not overlap, BOP sets every e_VSD
+/// to 1 without rendering. If a pose is not in front of the camera, returns `false`.
 #[must_use]
 pub fn spheres_overlap(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, diameter: f64) -> bool {
     let (a, b) = (&estimate.translation.vector, &truth.translation.vector);
@@ -76,7 +77,7 @@ pub fn spheres_overlap(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, diamet
     between < 0.5 * diameter * (1.0 / a.z + 1.0 / b.z)
 }
 
-/// Returns the smallest region that holds both.
+/// Returns the smallest region that contains both.
 fn around(a: &PixelRegion, b: &PixelRegion) -> PixelRegion {
     if a.is_empty() {
         return *b;

@@ -1,37 +1,37 @@
-//! Compares how flat the measured and the rendered surface are.
+//! A comparison of the flatness of the measured and the rendered surface.
 
 use hicp_core::{Context, Isometry3, Matrix3, Observation, PixelRegion, RenderedView, Vector3};
 
-/// Largest number of pixels that are compared.
+/// Largest number of compared pixels.
 const MAX_PIXELS: usize = 512;
 /// Smallest number of pixels for a result.
 const MIN_PIXELS: usize = 64;
-/// Share of the pixels that are nearer than a reported distance. The rest may be another surface,
-/// flying pixels or edges.
+/// Share of the pixels that are nearer than a reported distance.
+///
+/// The rest may be another surface, flying pixels or edges.
 const SHARE: f64 = 0.7;
-/// Share of the pixels, the nearest ones, that the next plane is fitted to.
+/// Share of the pixels, the nearest ones, for the next plane fit.
 const FITTED: f64 = 0.8;
 /// Number of fits.
 const ROUNDS: usize = 4;
-/// Least ratio of the distances from the pose's surface and from the plane for
+/// Smallest ratio of the distances from the pose's surface and from the plane for
 /// [`Flatness::is_flat`].
 const RATIO: f64 = 1.5;
-/// Share of the diameter below which a distance is the error of a sensor and an ICP.
+/// Share of the diameter below which a distance counts as the error of a sensor and an ICP.
 const SHARE_OF_DIAMETER: f64 = 0.01;
-/// Share of the diameter within which a surface is flat, as a sensor measures a wall.
+/// Share of the diameter within which a surface is flat, for a wall as measured by a sensor.
 const FLAT: f64 = 0.03;
 
-/// How flat the measured and the rendered surface are where both are seen, and how far apart they
-/// are.
+/// The flatness of the measured and the rendered surface where both are visible.
 ///
-/// A wall, a table or a box in the place of the object may still have a good MVE: its finest
-/// tolerance is 5 % of the diameter, so a face or a side of the object lies flat against it. A
-/// plane then explains the depth better than the pose does.
+/// A wall, a table or a box in the place of the object may still have a good MVE. Its finest
+/// tolerance is 5 % of the diameter, so a face or a side of the object fits against it. A plane then
+/// explains the depth better than the pose does.
 ///
 /// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer.
 /// The pixels are those of the mask with depth where the model is rendered, on a grid of at most
-/// 512. The plane has the least squares of inverse depths, fitted again to the nearest eight tenths
-/// of the pixels.
+/// 512. The plane minimizes the squares of inverse depths and is fitted repeatedly to the nearest
+/// eight tenths of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -47,7 +47,7 @@ pub struct Flatness {
 }
 
 impl Flatness {
-    /// Creates a value from stored numbers, meters; see the fields.
+    /// Creates a value from stored numbers, in meters; see the fields.
     #[must_use]
     pub fn new(residual: f64, measured: f64, rendered: f64, diameter: f64) -> Self {
         Self {
@@ -108,13 +108,19 @@ impl Flatness {
         })
     }
 
-    /// Whether what was measured is flat, a plane explains it better than the pose does, and the
-    /// model is less flat: the measured surface is within 3 % of the diameter of a plane and more
-    /// than half as far again from the rendered one, the rendered one is further from a plane than
-    /// the measured one, and both these distances are more than 1 % of the diameter.
+    /// Returns whether the measured surface is a plane that the pose does not explain.
     ///
-    /// A face of the model that is itself flat lies on a wall as in its own place: of that this
-    /// says nothing.
+    /// It requires all of these:
+    ///
+    /// - The measured surface is within 3 % of the diameter of a plane.
+    /// - Its distance from the rendered surface is more than 1.5 times its distance from that
+    ///   plane.
+    /// - The rendered surface is farther from a plane than the measured one.
+    /// - The distance between the surfaces, and that of the rendered one from its plane, exceed 1 %
+    ///   of the diameter.
+    ///
+    /// A flat face of the model fits a wall as well as its own place. This test does not detect
+    /// that.
     #[must_use]
     pub fn is_flat(&self) -> bool {
         let least = SHARE_OF_DIAMETER * self.diameter;
@@ -124,7 +130,7 @@ impl Flatness {
     }
 }
 
-/// A pixel with both depths, metres, counted from the corner of the region that is looked at.
+/// A pixel with both depths in meters, relative to the corner of the compared region.
 #[derive(Clone, Copy, Default)]
 struct Pixel {
     u: f64,
@@ -133,8 +139,9 @@ struct Pixel {
     rendered: f64,
 }
 
-/// Gathers the pixels of a region that show both surfaces, on a grid of that step; returns how
-/// many, `None` when they are too many.
+/// Collects the pixels of a region that show both surfaces, on a grid with a given step.
+///
+/// Returns their number, or `None` if there are too many.
 fn gather(
     observation: &Observation,
     view: &RenderedView,
@@ -165,7 +172,7 @@ fn gather(
     Some(n)
 }
 
-/// The distance that a share of the distances stays below. Reorders them.
+/// Returns the distance that a share of the distances stays below. Reorders them.
 fn nearest(distances: &mut [f64], share: f64) -> f64 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // Not negative, below the length as shares are below 1.
@@ -173,10 +180,10 @@ fn nearest(distances: &mut [f64], share: f64) -> f64 {
     *distances.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
-/// The distance along the optical axis that seven tenths of a surface stay below, from the plane
-/// that fits it best; `scratch` is as long as `pixels`. `None` where no plane fits.
+/// Returns the distance, along the optical axis, of seven tenths of a surface from its best plane.
 ///
-/// In an image the inverse depth of a plane is linear: 1/z = a + b u + c v.
+/// `scratch` is as long as `pixels`. If no plane fits, returns `None`. In an image the inverse
+/// depth of a plane is linear: 1/z = a + b u + c v.
 fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f64]) -> Option<f64> {
     let mut plane = Vector3::zeros();
     let mut limit = f64::INFINITY;
@@ -199,8 +206,9 @@ fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f6
     Some(nearest(scratch, SHARE)).filter(|distance| distance.is_finite())
 }
 
-/// How far a depth is from a plane, along the optical axis; infinite where the plane is not in
-/// front of the camera.
+/// Returns the distance of a depth from a plane, along the optical axis.
+///
+/// It is infinite if the plane is not in front of the camera.
 fn distance(plane: &Vector3<f64>, pixel: &Pixel, z: f64) -> f64 {
     let inverse = plane.x + plane.y * pixel.u + plane.z * pixel.v;
     if inverse > 0.0 {

@@ -1,11 +1,11 @@
 //! Scores and pose errors.
 //!
 //! - [`Score`]: the trait. [`MeanVsd`] (the paper's MVE) scores a pose against the live image,
-//!   [`SampledMve`] ranks many poses, [`Vsd`] compares with a known true pose.
+//!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
 //!   benchmark.
-//! - [`roc_area`], [`reliability`]: how well a score separates correct poses from wrong ones.
+//! - [`roc_area`], [`reliability`]: the separation of correct poses from wrong ones by a score.
 //!
 //! **Should you use this crate?** Yes, to judge poses from any source, with or without ground
 //! truth. To refine poses, use `hybrid-icp`, which reports the MVE of the refined pose. `hicp-core`
@@ -23,7 +23,7 @@
 //! # Ok(()) }
 //! ```
 
-// Counts become floating point numbers; all are far below 2⁵³.
+// Counts are converted to floating point; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
 mod agreement;

@@ -8,21 +8,20 @@ use crate::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 
-/// The mean VSD estimate (MVE) of §IV-A: VSD against the measured distances and the segmentation
-/// mask.
+/// The mean VSD estimate (MVE) of §IV-A: VSD against the measured distances and the mask.
 ///
-/// The mean over τ = 5 %…50 % of the diameter: 0 if the render of the pose equals the image, 1 if
-/// nothing agrees or nothing is seen. It needs no ground truth, so it scores a pose against the
-/// live image and serves as a measure of uncertainty.
+/// It is the mean over τ = 5 %…50 % of the diameter. It is 0 if the render of the pose equals the
+/// image, and 1 if nothing agrees or nothing is visible. It does not need ground truth, so it
+/// scores a pose against the live image and serves as a measure of uncertainty.
 ///
-/// Masked pixels without depth count in neither mask. They hold no evidence about the pose, and
+/// Masked pixels without depth count in neither mask. They contain no evidence about the pose, and
 /// would raise the score of every image with holes. An empty union is 1.
 ///
 /// Cost: one render (shared with other components that use this pose) and O(rendered pixels).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeanVsd {
-    /// Which rendered pixels outside the mask count against the pose.
+    /// The rendered pixels outside the mask that count against the pose.
     pub occlusion: Occlusion,
 }
 
@@ -36,8 +35,9 @@ impl MeanVsd {
         }
     }
 
-    /// Creates the score for masks that miss a part of the object: [`Occlusion::Lenient`] with
-    /// BOP's tolerance.
+    /// Creates the score for masks that miss a part of the object.
+    ///
+    /// It uses [`Occlusion::Lenient`] with BOP's tolerance.
     #[must_use]
     pub fn lenient() -> Self {
         Self {
@@ -45,7 +45,7 @@ impl MeanVsd {
         }
     }
 
-    /// Returns e(τ) for every tolerance.
+    /// Returns e(τ) for every tolerance at the pose `camera_from_object`.
     pub fn errors(
         &self,
         context: &mut Context<'_>,

@@ -2,23 +2,25 @@
 
 use hicp_core::{Isometry3, Point3};
 
-/// Points per leaf: small enough to prune, large enough that a leaf is a short scan.
+/// Points per leaf: few enough to prune, and enough for a short scan per leaf.
 const LEAF_SIZE: usize = 8;
 
-/// A balanced binary tree of tight boxes over points, in `f64` so that no precision is lost against an exhaustive search.
+/// A balanced binary tree of tight boxes over points, in `f64` to equal an exhaustive search.
 ///
-/// An estimate may be far off. Then every query lies far outside the points. Tight boxes still prune there, whereas the
-/// half-spaces of a k-d tree hardly do: kiddo's took 10 to 24 times as long for 30,000 points a little over a diameter off.
+/// If an estimate is far off, every query lies far outside the points. Tight boxes still prune
+/// there, whereas the half-spaces of a k-d tree hardly do: with 30,000 points a little over a
+/// diameter away, kiddo took 10 to 24 times as long.
 #[derive(Debug)]
 pub(crate) struct NearestPoints {
-    /// The points of node 0 are all points. Nodes 2i + 1 and 2i + 2 divide those of node i in halves.
+    /// The points of node 0 are all points. Nodes 2i + 1 and 2i + 2 have one half each of those of
+    /// node i.
     points: Vec<Point3<f64>>,
     /// The box around each node's points. A node of at most [`LEAF_SIZE`] points is not divided.
     boxes: Vec<[Point3<f64>; 2]>,
 }
 
 impl NearestPoints {
-    /// Builds the tree. Points that are not finite are left out. Cost: O(n log n).
+    /// Builds the tree without points that are not finite. Cost: O(n log n).
     pub(crate) fn new(points: &[Point3<f32>]) -> Self {
         let finite = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
         let mut points: Vec<Point3<f64>> = finite.map(|p| p.cast::<f64>()).collect();
@@ -27,7 +29,7 @@ impl NearestPoints {
         Self { points, boxes }
     }
 
-    /// Returns the squared distance to the nearest point, or `limit` if no point is nearer than that.
+    /// Returns the squared distance to the nearest point, or `limit` if no point is nearer.
     fn distance_squared(&self, from: &Point3<f64>, limit: f64) -> f64 {
         self.search(0, &self.points, from, limit)
     }
@@ -52,8 +54,9 @@ impl NearestPoints {
             })
     }
 
-    /// Returns ADI of `points`, which must be those of the tree. Returns 0 without points, and infinity if a distance is not
-    /// finite.
+    /// Returns the ADI of `points`, which must be those of the tree.
+    ///
+    /// It is 0 without points, and infinite if a distance is not finite.
     pub(crate) fn adi(
         &self,
         estimate: &Isometry3<f64>,
@@ -63,8 +66,9 @@ impl NearestPoints {
         if points.is_empty() {
             return 0.0;
         }
-        // The points at the true pose, in the frame of the estimate, so that the tree does not move. The translations are
-        // subtracted first, which keeps the precision far from the camera.
+        // The points at the true pose are moved into the frame of the estimate, so that the tree
+        // does not move. Subtracting the translations first keeps the precision far from the
+        // camera.
         let back = estimate.rotation.inverse();
         let shift = back * (truth.translation.vector - estimate.translation.vector);
         let rotation = (back * truth.rotation).to_rotation_matrix();
@@ -73,7 +77,8 @@ impl NearestPoints {
             .map(|x| {
                 let x = x.cast::<f64>();
                 let moved = rotation * x + shift;
-                // The same point is one of those searched, and often not far from the nearest.
+                // The same point is in the tree, and its distance is often not far from the
+                // smallest.
                 let same = (moved - x).norm_squared();
                 if same.is_finite() {
                     self.distance_squared(&moved, same).sqrt()
@@ -86,7 +91,9 @@ impl NearestPoints {
     }
 }
 
-/// Orders the points of a node so that its halves lie side by side along the longest edge of its box, and stores the boxes.
+/// Orders the points of a node such that its halves are separate along the longest edge of its box.
+///
+/// Stores the boxes.
 fn divide(points: &mut [Point3<f64>], node: usize, boxes: &mut Vec<[Point3<f64>; 2]>) {
     let Some(first) = points.first().copied() else {
         return;
@@ -118,7 +125,7 @@ fn distance_squared([min, max]: &[Point3<f64>; 2], point: &Point3<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// By what a search passes over: the distance to the nearest point of the box.
+    /// Searches skip boxes by this distance.
     #[test]
     fn the_distance_of_a_box_is_that_of_its_nearest_point() {
         let node = [Point3::new(-1.0, 0.0, 2.0), Point3::new(1.0, 0.5, 5.0)];
@@ -136,16 +143,16 @@ mod tests {
         }
     }
 
-    /// What makes a query short: the two halves of a node lie side by side along its longest edge.
+    /// Queries are fast because the halves of a node are separate along its longest edge.
     #[test]
     fn the_halves_of_a_node_do_not_overlap() {
-        // Of no order, and without equal coordinates.
+        // Points in no order, and without equal coordinates.
         let points: Vec<Point3<f32>> = (0..500_u32)
             .map(|i| Point3::new(i * 383 % 509, i * 191 % 503, i * 97 % 521))
             .map(|p| p.map(f64::from).cast())
             .collect();
         let tree = NearestPoints::new(&points);
-        // 500 points halve into 64 leaves of 7 or 8 points.
+        // 500 points are halved into 64 leaves of 7 or 8 points.
         assert_eq!(tree.boxes.len(), 127);
         for node in 0..63 {
             let [min, max] = tree.boxes[node];

@@ -1,28 +1,31 @@
-//! Whether rendered pixels outside the mask count against a pose.
+//! The treatment of rendered pixels outside the mask.
 
 /// BOP's visibility tolerance δ for every dataset but ITODD, meters.
 pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
 
-/// Which rendered pixels outside the mask count against a pose.
+/// The rendered pixels outside the mask that count against a pose.
 ///
 /// Distances are along the viewing ray. A negative `meters` counts as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Occlusion {
-    /// All of them: the definition of §IV-A.
+    /// All rendered pixels outside the mask: the definition of §IV-A.
     Counted,
-    /// Those that nothing hides: pixels whose measured surface is more than `meters` in front of
-    /// the rendered one do not count.
+    /// The pixels that nothing hides.
+    ///
+    /// A pixel does not count if its measured surface is more than `meters` in front of the
+    /// rendered one.
     Tolerated {
-        /// The tolerance.
+        /// The tolerance, meters.
         meters: f64,
     },
-    /// Those that the camera sees through: only pixels without a measurement, or whose measured
-    /// surface is `meters` or more *behind* the rendered one, count. For masks that miss a part of
-    /// the object.
+    /// The pixels that the camera sees through, for masks that miss a part of the object.
+    ///
+    /// A pixel counts only if it has no measurement, or if its measured surface is `meters` or more
+    /// *behind* the rendered one.
     Lenient {
-        /// The tolerance.
+        /// The tolerance, meters.
         meters: f64,
     },
 }
@@ -42,7 +45,7 @@ impl Occlusion {
         meters: VISIBILITY_TOLERANCE_METERS,
     };
 
-    /// Reads the one number, in meters, that pipeline files and Python use.
+    /// Converts the single number, in meters, of pipeline files and Python.
     ///
     /// A number below 0 is [`Occlusion::Lenient`]; infinity and NaN are [`Occlusion::Counted`].
     ///
@@ -63,8 +66,8 @@ impl Occlusion {
         }
     }
 
-    /// Returns by how much, in meters, a rendered surface must be behind the measured one not to
-    /// count.
+    /// Returns the distance behind the measured surface from which on a rendered one does not
+    /// count, meters.
     pub(crate) fn least_distance_behind(self) -> f64 {
         match self {
             Self::Counted => f64::INFINITY,

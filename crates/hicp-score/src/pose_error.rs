@@ -1,13 +1,13 @@
-//! Distances between model points at two poses: the errors of BOP that need no image.
+//! Distances between model points at two poses: the errors of BOP that do not need an image.
 
 use hicp_core::{Isometry3, Matrix3, PinholeCamera, Point2, Point3, Vector3};
 
 use crate::nearest::NearestPoints;
 
-/// Returns ADD: the mean distance between corresponding model points at two poses, metres. 0
-/// without points.
+/// Returns ADD: the mean distance between corresponding model points at two poses, in meters.
 ///
-/// ADD = mean |T_est x − T_gt x| (Hinterstoisser et al. 2012). Cost: O(points).
+/// ADD = mean |T_est x − T_gt x| (Hinterstoisser et al. 2012). Without points it is 0. Cost:
+/// O(points).
 #[must_use]
 pub fn add(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f32>]) -> f64 {
     if points.is_empty() {
@@ -23,25 +23,28 @@ pub fn add(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f
     sum / points.len() as f64
 }
 
-/// Returns ADI (also ADD-S): the mean distance from a model point at the true pose to the *closest*
-/// model point at the estimate, metres.
+/// Returns ADI (also ADD-S), in meters: the mean distance to the *closest* model point.
 ///
-/// ADI = mean over x of min over y |T_est y − T_gt x|; 0 without points. Never above ADD, and blind
-/// to symmetries, as far as the points are symmetric: of points sampled on the surface, an
-/// equivalent pose maps each between others, and ADI stays at about half their spacing. [`mssd`]
-/// over the symmetries has no such floor. Cost: O(n log n) for the search tree over the points and
-/// for the search; [`crate::ModelPoints::adi`] builds the tree once.
+/// ADI = mean over x of min over y |T_est y − T_gt x|. Without points it is 0. It is never above
+/// ADD. If the points are symmetric, it does not depend on symmetries of the pose. With points
+/// sampled on the surface, an equivalent pose maps each between others, and ADI stays at about half
+/// of their spacing. [`mssd`] over the symmetries does not have such a floor.
+///
+/// Cost: O(n log n) for the search tree over the points and for the search.
+/// [`crate::ModelPoints::adi`] builds the tree once.
 #[must_use]
 pub fn adi(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f32>]) -> f64 {
     NearestPoints::new(points).adi(estimate, truth, points)
 }
 
-/// Returns MSSD, the maximum symmetry-aware surface distance, metres. 0 without points.
+/// Returns MSSD, the maximum symmetry-aware surface distance, in meters.
 ///
-/// MSSD = min over S of max over x |T_est x − T_gt S x| (BOP'19). `symmetries` are motions of the
-/// object frame, as [`hicp_core::Symmetries::motions`] expands them; the identity always counts.
-/// Cost: O(points × symmetries) at most; a symmetry is given up at the first point that lies
-/// farther off than the best symmetry's farthest.
+/// MSSD = min over S of max over x |T_est x − T_gt S x| (BOP'19). Without points it is 0.
+/// `symmetries` are motions in the object frame, as [`hicp_core::Symmetries::motions`] expands
+/// them. The identity always counts.
+///
+/// Cost: at most O(points × symmetries). A symmetry is abandoned at the first point with a larger
+/// distance than the maximum of the best symmetry.
 #[must_use]
 pub fn mssd(
     estimate: &Isometry3<f64>,
@@ -59,12 +62,11 @@ pub fn mssd(
     .sqrt()
 }
 
-/// Returns MSPD, the maximum symmetry-aware projection distance, pixels of this camera. 0 without
-/// points.
+/// Returns MSPD, the maximum symmetry-aware projection distance, in pixels of this camera.
 ///
-/// MSPD = min over S of max over x |proj(T_est x) − proj(T_gt S x)| (BOP'19), over points seen or
-/// not, in the image or not. Infinite when a point at either pose is not in front of the camera.
-/// Symmetries and cost as for [`mssd`].
+/// MSPD = min over S of max over x |proj(T_est x) − proj(T_gt S x)| (BOP'19), over all points,
+/// visible or not, and inside the image or not. Without points it is 0. If a point at either pose
+/// is not in front of the camera, it is infinite. Symmetries and cost are as for [`mssd`].
 #[must_use]
 pub fn mspd(
     estimate: &Isometry3<f64>,
@@ -91,8 +93,7 @@ pub fn mspd(
     .sqrt()
 }
 
-/// T_est x − T_gt x as one linear map, which is exactly zero for equal poses and loses nothing far
-/// from the camera.
+/// The linear map T_est x − T_gt x, exactly zero for equal poses and precise far from the camera.
 struct Difference {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
@@ -112,8 +113,9 @@ impl Difference {
     }
 }
 
-/// Returns the least of the identity's and the symmetries' maxima. `maximum_of` may return any
-/// value ≥ the limit once it is reached.
+/// Returns the smallest of the maxima of the identity and the symmetries.
+///
+/// `maximum_of` may return any value ≥ the limit once the limit is reached.
 fn least_maximum(
     symmetries: &[Isometry3<f64>],
     maximum_of: impl Fn(&Isometry3<f64>, f64) -> f64,
@@ -128,8 +130,7 @@ fn least_maximum(
     least
 }
 
-/// Returns the largest value, or the first that reaches the limit. What is not a number is
-/// infinite.
+/// Returns the largest value, or the first that reaches the limit. NaN counts as infinite.
 fn maximum(values: impl Iterator<Item = f64>, limit: f64) -> f64 {
     let mut largest = 0.0;
     for value in values {

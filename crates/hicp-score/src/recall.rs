@@ -1,64 +1,67 @@
-//! Which estimates are correct, and recalls by BOP's matching rules.
+//! Correctness of estimates, and recalls by BOP's matching rules.
 
 use crate::tolerances::{N_TOLERANCES, tolerances};
 
 /// Number of thresholds of correctness per error function.
 pub const N_THRESHOLDS: usize = 10;
 
-/// The image width, pixels, in which BOP states its thresholds of MSPD.
+/// The image width, in pixels, for which BOP defines its thresholds of MSPD.
 const MSPD_WIDTH: f64 = 640.0;
 
-/// Share of the diameter below which ADD or ADI is correct.
+/// Share of the diameter below which an ADD or ADI is correct.
 const AD_THRESHOLD: f64 = 0.1;
 
-/// All errors of an estimate against one instance.
+/// All errors of an estimate with respect to one instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseErrors {
-    /// e_VSD(τ), see [`crate::bop_vsd`].
+    /// e_VSD(τ); see [`crate::bop_vsd`].
     pub vsd: [f64; N_TOLERANCES],
-    /// MSSD, metres.
+    /// MSSD, meters.
     pub mssd_m: f64,
     /// MSPD, pixels of the test image.
     pub mspd_px: f64,
-    /// ADD, metres.
+    /// ADD, meters.
     pub add_m: f64,
-    /// ADI, metres.
+    /// ADI, meters.
     pub adi_m: f64,
-    /// |t_est − t_gt|, metres. From the diameter on, BOP takes MSSD, ADD and ADI as infinite; see [`PoseErrors::is_apart`].
+    /// |t_est − t_gt|, meters.
+    ///
+    /// If it is a diameter or more, BOP sets MSSD, ADD and ADI to infinity; see
+    /// [`PoseErrors::is_apart`].
     pub translation_m: f64,
 }
 
 impl PoseErrors {
-    /// Returns whether the object's origins lie a diameter or more apart, where MSSD, ADD and ADI
-    /// count as infinite.
+    /// Returns whether the object's origins are a diameter or more apart.
+    ///
+    /// MSSD, ADD and ADI then count as infinite. The diameter is in meters.
     #[must_use]
     pub fn is_apart(&self, diameter: f64) -> bool {
-        // A translation that is no number is apart from everything.
+        // A translation of NaN counts as apart.
         self.translation_m.is_nan() || self.translation_m >= diameter
     }
 }
 
-/// The estimates of one object in one image against its instances.
+/// The estimates of one object in one image with respect to its instances.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TargetErrors {
-    /// Diameter of the object, metres.
+    /// Diameter of the object, meters.
     pub diameter_m: f64,
     /// Width of the test image, pixels.
     pub image_width: u32,
-    /// Whether AD is ADI for this object, else it is ADD.
+    /// Whether AD means ADI for this object, and not ADD.
     pub symmetric: bool,
-    /// Instances to be found.
+    /// Number of instances to find.
     pub instances: usize,
-    /// One list per estimate, by descending score ([`top_estimates`]), of its errors against every
+    /// One list per estimate, by descending score ([`top_estimates`]), of its errors for every
     /// instance.
     pub estimates: Vec<Vec<PoseErrors>>,
 }
 
 impl TargetErrors {
-    /// Returns, for every instance, which estimate is matched to it when `error` is below
-    /// `threshold`.
+    /// Returns for every instance the matched estimate, if its `error` is below `threshold`.
     ///
     /// See [`match_instances`].
     #[must_use]
@@ -80,9 +83,10 @@ impl TargetErrors {
         taken
     }
 
-    /// Returns the ADI (metres) of the estimate that each instance is left with when every
-    /// estimate, best score first, takes the nearest instance by ADI; `None` for an instance
-    /// without one.
+    /// Returns the ADI, in meters, of the estimate that remains for each instance.
+    ///
+    /// Estimates select the nearest free instance by ADI, in the order of their scores. An instance
+    /// without an estimate has `None`.
     #[must_use]
     pub fn adi_of_instances(&self) -> Vec<Option<f64>> {
         let matched = self.matches(f64::INFINITY, |e| e.adi_m);
@@ -100,15 +104,14 @@ impl TargetErrors {
     }
 }
 
-/// Returns which estimate is matched to every instance: greedily by descending score, each estimate
-/// takes the free instance with the lowest error that is strictly below the threshold, the first of
-/// equals.
+/// Returns the matched estimate of every instance.
 ///
-/// `errors[e][i]` is the error of estimate e, in descending order of score, against instance i.
-/// Cost: O(estimates × instances).
+/// The matching is greedy by descending score. Each estimate selects the free instance with the
+/// lowest error strictly below the threshold, and the first of equals. `errors[e][i]` is the error
+/// of estimate e, in descending order of score, for instance i. Cost: O(estimates × instances).
 ///
 /// ```
-/// // The better estimate takes the instance that both are nearest to; the other one has to take the next.
+/// // The better estimate selects the instance nearest to both. The other one gets the next.
 /// let errors = [vec![0.1, 0.4], vec![0.0, 0.3]];
 /// assert_eq!(hicp_score::match_instances(&errors, 2, 0.5), [Some(0), Some(1)]);
 /// assert_eq!(hicp_score::match_instances(&errors, 2, 0.3), [Some(0), None]);
@@ -147,18 +150,18 @@ fn assign(
     }
 }
 
-/// Returns the indices of the `count` estimates with the highest scores, highest first; of equals
-/// the first.
+/// Returns the indices of the `count` estimates with the highest scores, highest first.
+///
+/// Of equal scores, the first precedes.
 #[must_use]
 pub fn top_estimates(scores: &[f64], count: usize) -> Vec<usize> {
     descending(scores, count)
 }
 
-/// Returns the indices of the `count` instances with the largest visible fractions, largest first;
-/// of equals the first.
+/// Returns the indices of the `count` instances with the largest visible fractions, largest first.
 ///
-/// BOP asks for no more than `inst_count` instances of an object in an image, the most visible
-/// ones.
+/// Of equal fractions, the first precedes. BOP requires at most `inst_count` instances of an object
+/// in an image, the most visible ones.
 #[must_use]
 pub fn most_visible(fractions: &[f64], count: usize) -> Vec<usize> {
     descending(fractions, count)
@@ -171,11 +174,11 @@ fn descending(values: &[f64], count: usize) -> Vec<usize> {
     order
 }
 
-/// Recalls over any number of targets: of one object, of a scene, of a dataset.
+/// Recalls over any number of targets: of an object, of a scene, of a dataset.
 ///
-/// A recall is the number of matched instances over the number of all instances, so one that nobody
-/// estimated counts as not found. Recalls of several parts are not averaged: [`Recalls::merge`]
-/// adds their instances up.
+/// A recall is the number of matched instances divided by the number of all instances, so one
+/// without an estimate counts as not found. Recalls of several parts are not averaged:
+/// [`Recalls::merge`] adds their instances.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -191,9 +194,12 @@ pub struct Recalls {
 impl Recalls {
     /// Counts a target.
     ///
-    /// Thresholds θ: 0.05, 0.10, …, 0.50 for VSD at each of its tolerances, and times the diameter
-    /// for MSSD; 5, 10, …, 50 pixels for MSPD in an image 640 pixels wide; a tenth of the diameter
-    /// for AD. Correct is strictly below.
+    /// The thresholds θ, strictly above correct errors, are:
+    ///
+    /// - VSD: 0.05, 0.10, …, 0.50 at each of its tolerances.
+    /// - MSSD: the same, times the diameter.
+    /// - MSPD: 5, 10, …, 50 pixels in an image 640 pixels wide.
+    /// - AD: a tenth of the diameter.
     pub fn count(&mut self, target: &TargetErrors) {
         self.instances += target.instances;
         self.missing += target.instances.saturating_sub(target.estimates.len());
@@ -231,21 +237,21 @@ impl Recalls {
         sum(&mut self.mspd, &other.mspd);
     }
 
-    /// Instances to be found.
+    /// Number of instances to find.
     #[must_use]
     pub fn instances(&self) -> usize {
         self.instances
     }
 
-    /// Instances beyond the number of estimates: whatever the thresholds, nobody can have found
-    /// them.
+    /// Number of instances in excess of the estimates, which no threshold can match.
     #[must_use]
     pub fn missing(&self) -> usize {
         self.missing
     }
 
-    /// AR_VSD: the mean recall over 10 tolerances and 10 thresholds. 0 without instances, as are
-    /// all recalls.
+    /// AR_VSD: the mean recall over 10 tolerances and 10 thresholds.
+    ///
+    /// Like all recalls, it is 0 without instances.
     #[must_use]
     pub fn vsd(&self) -> f64 {
         self.mean(self.vsd.as_flattened())

@@ -1,4 +1,4 @@
-//! The mean VSD estimate from a sampling of the model instead of a render.
+//! The mean VSD estimate from samples of the model instead of a render.
 
 use std::sync::Arc;
 
@@ -10,23 +10,23 @@ use crate::tolerances::{AgreementCounts, mean};
 
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
-/// Splats points of the model's surface into a coarse depth buffer and compares the buffer with the
-/// observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs whatever the mesh,
-/// and does not replace the MVE where a pose is accepted or reported: pixels without a sample count
-/// as not rendered, and thin parts may be missed. Samples of a closed mesh that face away from the
+/// It splats points of the model's surface into a coarse depth buffer and compares the buffer with
+/// the observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs for every mesh.
+/// It does not replace the MVE for accepting or reporting a pose: pixels without a sample count as
+/// not rendered, and thin parts may be missed. Samples of a closed mesh that face away from the
 /// camera are skipped.
 ///
-/// Cost: O(samples) per pose. The sampling is computed once per model and shared, and so is the
+/// Cost: O(samples) per pose. The samples are computed once per model and shared, and so is the
 /// coarse observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledMve {
     /// Number of points on the model; 0 scores every pose 1.
     pub samples: usize,
-    /// Approximate number of pixels of the mask that are compared.
+    /// Approximate number of compared pixels of the mask.
     pub pixels: usize,
-    /// Which splatted pixels outside the mask count against the pose.
+    /// The splatted pixels outside the mask that count against the pose.
     pub occlusion: Occlusion,
-    /// The depth buffer of the coarse image, empty (0) between two poses.
+    /// The depth buffer of the coarse image; all 0 between two poses.
     buffer: Vec<f32>,
     /// The pixels of the buffer that were written.
     touched: Vec<usize>,
@@ -45,7 +45,7 @@ impl SampledMve {
         }
     }
 
-    /// Creates the default for masks that miss a part of the object, as
+    /// Creates the default score for masks that miss a part of the object, like
     /// [`crate::MeanVsd::lenient`].
     #[must_use]
     pub fn lenient() -> Self {
@@ -55,7 +55,7 @@ impl SampledMve {
         }
     }
 
-    /// The factor by which the image is coarsened.
+    /// Returns the factor between the resolutions of the image and the buffer.
     fn factor(&self, observation: &Observation) -> u32 {
         let ratio = observation.n_measured() as f64 / self.pixels.max(1) as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -64,7 +64,7 @@ impl SampledMve {
         factor.max(1)
     }
 
-    /// Fills the depth buffer.
+    /// Fills the depth buffer at a pose.
     fn splat(&mut self, coarse: &Observation, surface: &Surface, pose: &Isometry3<f64>) {
         let camera = coarse.camera();
         let (width, height) = (camera.width() as usize, camera.height() as usize);
@@ -108,7 +108,7 @@ impl SampledMve {
         }
     }
 
-    /// Compares the depth buffer with the observation, and empties it.
+    /// Compares the depth buffer with the observation, and clears it.
     fn compare(&mut self, coarse: &Observation, diameter: f64) -> f64 {
         let camera = coarse.camera();
         let width = camera.width() as usize;
@@ -136,7 +136,7 @@ impl SampledMve {
 }
 
 impl Default for SampledMve {
-    /// 1500 points against about 200 pixels.
+    /// 1500 points and about 200 pixels.
     fn default() -> Self {
         Self::new(1500, 200)
     }
@@ -158,10 +158,10 @@ impl Score for SampledMve {
     }
 }
 
-/// A sampling of a model.
+/// The samples of a model.
 struct Surface {
     surfels: Vec<Surfel>,
-    /// Whether normals are known to point out of the object.
+    /// Whether normals are certain to point out of the object.
     oriented: bool,
 }
 

@@ -5,7 +5,7 @@ use hicp_core::{Context, Isometry3};
 
 /// Scores a pose: 0 is perfect, higher is worse.
 ///
-/// Pure: equal inputs give equal bits. Use `context.view(pose)` for the render at the pose; a
+/// It is pure: equal inputs give equal bits. Use `context.view(pose)` for the render at the pose. A
 /// selection that starts from the same pose then shares it.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a score",
@@ -13,7 +13,7 @@ use hicp_core::{Context, Isometry3};
     note = "`Score` is implemented by `MeanVsd`, `SampledMve`, `Vsd` and boxes of scores"
 )]
 pub trait Score {
-    /// Returns the score of a pose; never NaN.
+    /// Returns the score of a pose `camera_from_object`; never NaN.
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64;
 
     /// Returns the name in traces.

@@ -1,4 +1,4 @@
-//! The misalignment tolerances of VSD, and counting against them.
+//! The misalignment tolerances of VSD, and counts for them.
 
 /// Number of tolerances: 5 %, 10 %, …, 50 % of the diameter.
 pub const N_TOLERANCES: usize = 10;
@@ -9,12 +9,13 @@ pub fn tolerances() -> [f64; N_TOLERANCES] {
     std::array::from_fn(|k| (k + 1) as f64 * 0.05)
 }
 
-/// Counts how many pixels agree within each tolerance.
+/// Counts the pixels that agree within each tolerance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AgreementCounts {
     tolerances: [f64; N_TOLERANCES],
-    /// `histogram[k]`: pixels whose smallest tolerance above the difference is the k-th; the last
-    /// entry, pixels beyond all.
+    /// `histogram[k]` counts pixels whose smallest tolerance above the difference is the k-th.
+    ///
+    /// The last entry counts pixels beyond all tolerances.
     histogram: [u64; N_TOLERANCES + 1],
     inverse_diameter: f64,
 }
@@ -32,10 +33,10 @@ impl AgreementCounts {
     #[inline]
     pub(crate) fn add(&mut self, difference: f64) {
         let relative = difference * self.inverse_diameter;
-        // A first guess that rounding may put one off, then the strict comparison that defines
+        // A first guess, which rounding may put off by one. Then the strict comparison that defines
         // "correct".
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // Clamped, and NaN becomes 0, from where it climbs to the end: it agrees with nothing.
+        // Clamped. NaN becomes 0 and then climbs to the end: it agrees with nothing.
         let mut k = (relative * 20.0).clamp(0.0, N_TOLERANCES as f64) as usize;
         let correct = |k: usize| relative < self.tolerances[k];
         while k > 0 && correct(k - 1) {
@@ -47,10 +48,10 @@ impl AgreementCounts {
         self.histogram[k] += 1;
     }
 
-    /// Returns e(τ) for every tolerance: the share of the union that is not in the intersection or
-    /// differs by τ or more.
+    /// Returns e(τ) for every tolerance.
     ///
-    /// An empty union is an error of 1: nothing was seen where something should be.
+    /// It is the share of the union that is not in the intersection or differs by τ or more. An
+    /// empty union is an error of 1: nothing is visible where something should be.
     pub(crate) fn errors(&self, union: u64) -> [f64; N_TOLERANCES] {
         let mut sum = 0;
         let correct = std::array::from_fn(|k| {
@@ -61,8 +62,9 @@ impl AgreementCounts {
     }
 }
 
-/// Returns the share of `union` pixels that are not `correct`, for every tolerance; all 1 for an
-/// empty union.
+/// Returns the share of `union` pixels that are not `correct`, for every tolerance.
+///
+/// For an empty union, all are 1.
 pub(crate) fn errors(correct: [u64; N_TOLERANCES], union: u64) -> [f64; N_TOLERANCES] {
     correct.map(|correct| {
         if union == 0 {

@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, N_TOLERANCES, mean};
 
-/// Inputs that have no score.
+/// The reason why inputs have no score.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ScoreError {
@@ -15,9 +15,9 @@ pub enum ScoreError {
     Size {
         /// Name of the image.
         what: &'static str,
-        /// Its width and height.
+        /// The width and height found.
         found: (u32, u32),
-        /// The width and height of the others.
+        /// The width and height of the other images.
         expected: (u32, u32),
     },
     /// A diameter is not finite and positive.
@@ -31,17 +31,16 @@ pub enum ScoreError {
     Image(#[from] hicp_core::ImageError),
 }
 
-/// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter, from distance maps and
-/// visibility masks.
+/// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter.
 ///
-/// A pixel of the union of the masks costs 0 when it is in both and the distances differ by
-/// strictly less than τ, else 1; e is the mean cost. An empty union gives 1. Distances and diameter
-/// in one unit, any. Symmetric in its two sides. Cost: O(pixels).
+/// The inputs are distance maps and visibility masks. A pixel of the union of the masks costs 0 if
+/// it is in both and the distances differ by strictly less than τ, otherwise 1. e is the mean cost.
+/// An empty union gives 1. Distances and diameter may have any common unit. The result does not
+/// change if the two sides are swapped. Cost: O(pixels).
 ///
 /// # Errors
 ///
-/// [`ScoreError`] when the images are not all of one size, or the diameter is not finite and
-/// positive.
+/// [`ScoreError`] if the images differ in size, or if the diameter is not finite and positive.
 pub fn vsd(
     estimate: &DistanceImage,
     estimate_mask: &Mask,
@@ -84,16 +83,16 @@ pub fn vsd(
     Ok(counts.errors(union))
 }
 
-/// Returns BOP'19's visibility masks (V_est, V_gt) from the distances of the test image and of the
-/// two renders.
+/// Returns BOP'19's visibility masks (V_est, V_gt) from distances.
 ///
-/// V_gt holds where the true surface is at most δ behind the measured one, or nothing was measured;
-/// V_est likewise, and wherever V_gt does and the estimate shows anything. Same unit throughout; 0
-/// is "nothing".
+/// The inputs are the distances of the test image and of the two renders, in one unit, where 0
+/// means that nothing is visible. V_gt contains the pixels where the true surface is at most δ
+/// behind the measured one, or where nothing was measured. V_est is computed likewise, and also
+/// contains the pixels of V_gt where the estimate is visible.
 ///
 /// # Errors
 ///
-/// [`ScoreError`] when the images are not all of one size.
+/// [`ScoreError`] if the images differ in size.
 pub fn visibility_masks(
     test: &DistanceImage,
     estimate: &DistanceImage,
@@ -125,25 +124,24 @@ pub fn visibility_masks(
         estimate_mask.push(visible(*d_estimate, *d_test) || (v_truth && *d_estimate > 0.0));
     }
     let (width, height) = expected;
-    // The vectors were filled from images of this size.
+    // The vectors were filled from images of this size, so this does not fail.
     Ok((
         Mask::new(width, height, estimate_mask)?,
         Mask::new(width, height, truth_mask)?,
     ))
 }
 
-/// The reference compares single-precision differences, and so decides ties as it does.
+/// Compares in single precision, like the reference, to decide ties in the same way.
 #[allow(clippy::cast_possible_truncation)]
 fn in_front(model: f64, test: f64, delta: f64) -> bool {
     f64::from(model as f32 - test as f32) <= delta
 }
 
-/// Mean VSD against a known true pose, over τ = 5 %…50 % of the diameter: the evaluation metric of
-/// §VI-A.2.
+/// Mean VSD against a known true pose, over τ = 5 %…50 % of the diameter.
 ///
-/// Both poses are rendered; the visibility masks are the silhouettes, as for an object that nothing
-/// occludes. 1 when neither pose shows anything. Cost: two renders (one when the true pose is still
-/// remembered) and O(rendered pixels).
+/// It is the evaluation metric of §VI-A.2. Both poses are rendered. The visibility masks are the
+/// silhouettes, as for an object that nothing occludes. If neither pose shows anything, the score
+/// is 1. Cost: two renders (one if the cache holds the true pose) and O(rendered pixels).
 #[derive(Clone, Debug)]
 pub struct Vsd {
     truth: Isometry3<f64>,
@@ -151,7 +149,7 @@ pub struct Vsd {
 }
 
 impl Vsd {
-    /// Makes the score against a true pose.
+    /// Creates the score from a true pose, `camera_from_object`.
     #[must_use]
     pub fn new(truth: Isometry3<f64>) -> Self {
         Self {
@@ -160,13 +158,13 @@ impl Vsd {
         }
     }
 
-    /// The true pose.
+    /// The true pose, `camera_from_object`.
     #[must_use]
     pub fn truth(&self) -> &Isometry3<f64> {
         &self.truth
     }
 
-    /// Returns e(τ) for every tolerance.
+    /// Returns e(τ) for every tolerance at the pose `camera_from_object`.
     pub fn errors(
         &mut self,
         context: &mut Context<'_>,
@@ -177,7 +175,7 @@ impl Vsd {
             return [1.0; N_TOLERANCES];
         };
         let camera = observation.camera();
-        // The cache hands out one view at a time, so the truth's is copied.
+        // The cache returns one view at a time, so copy that of the true pose.
         if let Some(truth) = context.view(&self.truth) {
             self.scratch.copy_from(truth);
         }

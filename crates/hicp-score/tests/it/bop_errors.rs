@@ -1,4 +1,6 @@
-//! MSSD, MSPD and VSD as BOP evaluates them: the golden case of its reference code, the definitions, and the invariances.
+//! Tests of MSSD, MSPD and VSD as BOP evaluates them.
+//!
+//! They cover the golden case of its reference code, the definitions, and invariances.
 
 use std::f64::consts::{PI, TAU};
 
@@ -50,7 +52,7 @@ fn camera() -> PinholeCamera {
     PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
 }
 
-/// Poses in front of the camera, near each other.
+/// Returns two poses in front of the camera, near each other.
 fn two_poses(numbers: &mut Numbers) -> (Isometry3<f64>, Isometry3<f64>) {
     let forward = Isometry3::translation(0.0, 0.0, 0.6);
     (forward * numbers.pose(0.02), forward * numbers.pose(0.02))
@@ -67,7 +69,7 @@ fn random_symmetries(numbers: &mut Numbers) -> Vec<Isometry3<f64>> {
 }
 
 #[test]
-fn each_is_its_definition() {
+fn each_error_equals_its_definition() {
     let mut numbers = Numbers(811);
     let camera = camera();
     for _ in 0..100 {
@@ -134,7 +136,7 @@ fn symmetric_model() -> Model {
 }
 
 #[test]
-fn a_symmetric_equivalent_is_no_error_for_mssd_mspd_and_adi() {
+fn a_symmetric_equivalent_has_no_mssd_mspd_and_adi() {
     let points = ModelPoints::new(&symmetric_model());
     assert_eq!(points.points(), symmetric_model().mesh().vertices());
     assert!(points.is_symmetric() && points.symmetries().len() == 2);
@@ -163,8 +165,8 @@ fn a_model_without_symmetries_has_the_errors_of_its_points() {
 }
 
 #[test]
-fn a_continuous_symmetry_is_cut_into_315_steps() {
-    // A prism of 63 corners about a displaced axis: 63 divides 315.
+fn a_continuous_symmetry_has_315_steps() {
+    // A prism of 63 corners around a displaced axis: 63 divides 315.
     let axis = SymmetryAxis::new(Vector3::z(), Point3::new(0.01, -0.02, 0.0)).unwrap();
     let vertices: Vec<Point3<f32>> = (0..126_u8)
         .map(|i| {
@@ -186,10 +188,10 @@ fn a_continuous_symmetry_is_cut_into_315_steps() {
     assert_eq!(points.symmetries().len(), 315);
     let truth = pose(0.01, -0.02, 0.5, 0.4, -0.3, 0.2);
     let turned = |angle: f64| truth * axis.rotation(angle);
-    // f32 vertices are turned exactly up to 1e-9 m.
+    // f32 vertices rotate exactly up to 1e-9 m.
     assert!(points.mssd(&turned(TAU * 44.0 / 315.0), &truth) < 1e-12);
     assert!(points.mspd(&turned(TAU * 44.0 / 315.0), &truth, &camera()) < 1e-9);
-    // Half a step off: 2 r sin(π / 630).
+    // Half a step: 2 r sin(π / 630).
     let half_step = points.mssd(&turned(TAU * 44.5 / 315.0), &truth);
     assert!(
         (half_step - 2.0 * 0.03 * (PI / 630.0).sin()).abs() < 1e-8,
@@ -198,7 +200,7 @@ fn a_continuous_symmetry_is_cut_into_315_steps() {
 }
 
 #[test]
-fn what_lies_behind_the_camera_is_infinitely_far_in_the_image() {
+fn points_behind_the_camera_have_an_infinite_mspd() {
     let points = ModelPoints::new(&symmetric_model());
     let (front, behind) = (
         Isometry3::translation(0.0, 0.0, 0.5),
@@ -220,17 +222,18 @@ fn spheres_overlap_by_their_projections() {
     let at = |x: f64, z: f64| Isometry3::translation(x, 0.0, z);
     assert!(spheres_overlap(&at(0.0, 1.0), &at(0.099, 1.0), 0.1));
     assert!(!spheres_overlap(&at(0.0, 1.0), &at(0.101, 1.0), 0.1));
-    // One behind the other covers it, however far away.
+    // One behind the other covers it at any distance.
     assert!(spheres_overlap(&at(0.1, 1.0), &at(0.2, 2.0), 0.1));
-    // In units of the focal length: radii of 0.05 / 0.5 and 0.05 / 2, and so 0.125 from centre to centre.
+    // In units of the focal length, the radii are 0.05 / 0.5 and 0.05 / 2, which is 0.125 from
+    // center to center.
     for (x, expected) in [(0.12, true), (0.13, false)] {
         let near = spheres_overlap(&at(0.5 * x, 0.5), &at(0.0, 2.0), 0.1);
         let far = spheres_overlap(&at(0.0, 0.5), &at(2.0 * x, 2.0), 0.1);
         assert_eq!((near, far), (expected, expected), "{x}");
     }
-    // What touches does not overlap.
+    // Touching spheres do not overlap.
     assert!(!spheres_overlap(&at(0.0, 1.0), &at(0.25, 1.0), 0.25));
-    // Behind the camera there is no image, whatever the other one's place.
+    // Behind the camera there is no image, wherever the other one is.
     assert!(!spheres_overlap(&at(0.0, 0.5), &at(0.0, -1.0), 0.1));
     assert!(!spheres_overlap(&at(0.0, -1.0), &at(0.0, 0.5), 0.1));
 }
@@ -247,7 +250,7 @@ fn view(model: &Model, pose: &Isometry3<f64>) -> RenderedView {
     view
 }
 
-/// The part of the image that the model's vertices span.
+/// Returns the part of the image that the model's vertices span.
 fn projected_box(model: &Model, pose: &Isometry3<f64>) -> hicp_core::PixelRegion {
     let mut pixels = Vec::new();
     for vertex in model.mesh().vertices() {
@@ -271,7 +274,7 @@ fn projected_box(model: &Model, pose: &Isometry3<f64>) -> hicp_core::PixelRegion
     }
 }
 
-/// The same from whole images, by the functions that the golden cases of VSD hold.
+/// Computes the same from whole images, with the functions that the golden cases of VSD test.
 fn vsd_of_whole_images(
     test: &DepthImage,
     model: &Model,
@@ -289,7 +292,7 @@ fn vsd_of_whole_images(
 }
 
 #[test]
-fn vsd_of_renders_is_vsd_of_whole_images() {
+fn vsd_of_renders_equals_vsd_of_whole_images() {
     let model = Model::new(wedge());
     let mut numbers = Numbers(813);
     let mut different = 0;
@@ -298,7 +301,7 @@ fn vsd_of_renders_is_vsd_of_whole_images() {
         let size = if round % 2 == 0 { 0.01 } else { 0.04 };
         let shift = numbers.vector() * size;
         let estimate = Isometry3::translation(shift.x, shift.y, shift.z) * truth;
-        // Something in front of a part of it, a wall behind it, and holes.
+        // An occluder in front of a part of it, a wall behind it, and holes.
         let mut pixels = render_depth(&model, &camera(), &truth).pixels().to_vec();
         for (index, z) in pixels.iter_mut().enumerate() {
             match index % 64 {
@@ -325,7 +328,7 @@ fn vsd_of_renders_is_vsd_of_whole_images() {
 }
 
 #[test]
-fn vsd_of_equal_poses_is_zero_and_of_nothing_one() {
+fn vsd_of_equal_poses_is_zero_and_of_invisible_ones_one() {
     let model = Model::new(wedge());
     let truth = pose(0.003, -0.002, 0.25, 0.4, -0.3, 0.2);
     let render = view(&model, &truth);

@@ -1,4 +1,4 @@
-//! ROC areas and reliability tables that can be counted by hand.
+//! Tests of ROC areas and reliability tables, on cases counted by hand.
 
 use hicp_score::{LabeledScore, reliability, roc_area};
 
@@ -20,10 +20,10 @@ fn areas_counted_by_hand() {
     assert_eq!(area(&[(0.9, true), (0.1, false)]), Some(1.0));
     assert_eq!(area(&[(0.1, true), (0.9, false)]), Some(0.0));
     assert_eq!(area(&[(0.4, true), (0.4, false), (0.4, false)]), Some(0.5));
-    // Right 3, 1; wrong 2, 0: of the pairs (3,2) (3,0) (1,2) (1,0) three are in order.
+    // Correct 3, 1; wrong 2, 0: of the pairs (3,2) (3,0) (1,2) (1,0), three are in order.
     let four = [(3.0, true), (2.0, false), (1.0, true), (0.0, false)];
     assert_eq!(area(&four), Some(0.75));
-    // Right 2, 1, 1; wrong 1, 0: (2,1) 1, (2,0) 1, twice (1,1) ½ and (1,0) 1: 5 of 6.
+    // Correct 2, 1, 1; wrong 1, 0: (2,1) 1, (2,0) 1, twice (1,1) ½ and (1,0) 1: 5 of 6.
     let ties = [
         (1.0, true),
         (0.0, false),
@@ -32,7 +32,7 @@ fn areas_counted_by_hand() {
         (1.0, true),
     ];
     assert_eq!(area(&ties), Some(5.0 / 6.0));
-    // 0 and -0 are the same score.
+    // 0 and −0 are the same score.
     assert_eq!(area(&[(0.0, true), (-0.0, false)]), Some(0.5));
     assert_eq!(area(&[(0.5, true), (0.7, true)]), None);
     assert_eq!(area(&[(0.5, false)]), None);
@@ -57,13 +57,13 @@ fn the_area_is_the_share_of_pairs_in_order() {
     }
     let found = area(&list).unwrap_or(f64::NAN);
     assert!((found - won / pairs).abs() < 1e-12, "{found}");
-    // What keeps the order keeps the area.
+    // A map that keeps the order keeps the area.
     let squared: Vec<_> = list.iter().map(|(s, c)| (s * s - 3.0, *c)).collect();
     assert_eq!(area(&squared), area(&list));
 }
 
 #[test]
-fn bins_hold_their_lower_bounds() {
+fn bins_contain_their_lower_bounds() {
     let list = [
         (0.0, false),
         (0.1, false),

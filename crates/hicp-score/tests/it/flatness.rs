@@ -1,4 +1,4 @@
-//! How flat the measured and the rendered surface are: against planes and distances that are known.
+//! Tests of flatness against known planes and distances.
 
 use crate::support::{Numbers, RayCaster, cuboid, pose, render_depth};
 use hicp_core::{
@@ -7,12 +7,12 @@ use hicp_core::{
 };
 use hicp_score::Flatness;
 
-/// Twenty by twenty pixels: all of them are looked at.
+/// A camera of twenty by twenty pixels, which are all compared.
 fn camera() -> PinholeCamera {
     PinholeCamera::new(40.0, 42.0, 9.7, 9.2, 20, 20).unwrap()
 }
 
-/// A cube that turns an edge to the camera: a roof.
+/// A cube with an edge toward the camera, like a roof.
 fn cube() -> Model {
     Model::new(cuboid(0.07, 0.07, 0.07))
 }
@@ -34,7 +34,7 @@ fn observe(
     Observation::new(depth, mask, *camera).unwrap()
 }
 
-/// The depth of a plane through (0, 0, `z`).
+/// Returns the depth of a plane through (0, 0, `z`).
 fn plane(camera: &PinholeCamera, normal: [f64; 3], z: f64) -> impl Fn(u32, u32) -> f64 {
     let (camera, normal) = (*camera, Vector3::from(normal));
     move |u, v| {
@@ -49,7 +49,7 @@ fn flatness(model: &Model, observation: &Observation, pose: &Isometry3<f64>) -> 
     Flatness::at(&mut Context::new(problem, &mut renders), pose)
 }
 
-/// What seven tenths of the distances stay below.
+/// Returns the distance that seven tenths of the distances stay below.
 fn seven_tenths(mut distances: Vec<f64>) -> f64 {
     distances.sort_by(f64::total_cmp);
     distances[(distances.len() as f64 * 0.7) as usize]
@@ -60,13 +60,13 @@ fn near(a: f64, b: f64, tolerance: f64) {
 }
 
 #[test]
-fn a_wall_is_flat_and_the_model_as_far_from_it_as_it_is() {
+fn a_wall_is_flat_and_the_model_has_its_distance_from_it() {
     let (camera, model) = (camera(), cube());
     let rendered = render_depth(&model, &camera, &at());
     let z = |u: u32, v: u32| f64::from(rendered.pixels()[(v * 20 + u) as usize]);
     for normal in [[0.0, 0.0, -1.0], [0.3, 0.2, -1.0], [-0.5, 0.1, -1.0]] {
         let wall = plane(&camera, normal, 0.24);
-        // Holes and pixels beyond the mask are not looked at.
+        // Holes and pixels outside the mask are ignored.
         let measured = |u, v| {
             if (u + v) % 5 == 0 { 0.0 } else { wall(u, v) }
         };
@@ -80,14 +80,14 @@ fn a_wall_is_flat_and_the_model_as_far_from_it_as_it_is() {
         let distances = pixels.iter().map(|&(u, v)| (wall(u, v) - z(u, v)).abs());
         near(flatness.residual, seven_tenths(distances.collect()), 1e-6);
         assert!(flatness.measured < 1e-7, "{flatness:?}");
-        // Two of its faces are seen.
+        // Two of its faces are visible.
         assert!(flatness.rendered > 2e-3, "{flatness:?}");
         assert_eq!(flatness.diameter, model.diameter());
     }
 }
 
 #[test]
-fn where_the_object_is_both_are_the_same() {
+fn at_the_true_pose_both_surfaces_agree() {
     let (camera, model) = (camera(), cube());
     let rendered = render_depth(&model, &camera, &at());
     for offset in [0.0, 0.004] {
@@ -106,7 +106,7 @@ fn where_the_object_is_both_are_the_same() {
 }
 
 #[test]
-fn a_face_is_flat_wherever_it_is_and_a_tenth_of_strays_changes_nothing() {
+fn a_face_is_flat_anywhere_despite_a_tenth_of_outliers() {
     let (camera, model) = (camera(), Model::new(cuboid(0.1, 0.1, 0.04)));
     let face = pose(0.0, 0.0, 0.22, 0.0, 0.0, 0.0);
     let wall = plane(&camera, [0.2, 0.0, -1.0], 0.2);
@@ -124,7 +124,7 @@ fn a_face_is_flat_wherever_it_is_and_a_tenth_of_strays_changes_nothing() {
 }
 
 #[test]
-fn noise_is_flatness() {
+fn noise_determines_the_flatness_of_a_plane() {
     let (camera, model) = (camera(), Model::new(cuboid(0.1, 0.1, 0.04)));
     let mut numbers = Numbers(7);
     let noise: Vec<f64> = (0..400).map(|_| 0.002 * numbers.normal()).collect();
@@ -138,7 +138,7 @@ fn noise_is_flatness() {
 }
 
 #[test]
-fn few_pixels_and_pixels_in_a_line_say_nothing() {
+fn few_pixels_and_pixels_on_a_line_give_no_flatness() {
     let (camera, model) = (camera(), Model::new(cuboid(0.2, 0.2, 0.04)));
     let face = pose(0.0, 0.0, 0.22, 0.0, 0.0, 0.0);
     let wall = plane(&camera, [0.0, 0.0, -1.0], 0.2);
@@ -168,9 +168,9 @@ fn few_pixels_and_pixels_in_a_line_say_nothing() {
     }
 }
 
-/// A large image is looked at through a grid, whatever its proportions.
+/// A large image is compared on a grid, for all proportions.
 #[test]
-fn a_grid_of_pixels_says_the_same() {
+fn a_grid_of_pixels_gives_the_same_flatness() {
     let coarse = flatness_of_cube(1);
     for scale in [3, 8, 13] {
         let fine = flatness_of_cube(scale);
@@ -199,9 +199,11 @@ fn a_grid_of_pixels_says_the_same() {
     }
 }
 
-/// A bar that stands across its box, and a face of which a corner is left: few pixels of the box, and enough in all.
+/// Tests objects with few pixels of their box, but enough in total.
+///
+/// They are a bar across its box, and a face of which only a corner is left.
 #[test]
-fn a_small_part_of_a_large_box_is_looked_at_closely() {
+fn a_small_part_of_a_large_box_is_sampled_densely() {
     let camera = PinholeCamera::new(400.0, 400.0, 99.5, 99.5, 200, 200).unwrap();
     let wall = || plane(&camera, [0.1, 0.2, -1.0], 0.25);
     let bar = Model::new(cuboid(0.2, 0.006, 0.006));
@@ -221,7 +223,7 @@ fn a_small_part_of_a_large_box_is_looked_at_closely() {
     assert_eq!(corners(5), None);
 }
 
-/// A cube before a wall, in an image of so many times twenty pixels.
+/// A cube before a wall, in an image of `scale` times twenty pixels.
 fn flatness_of_cube(scale: u32) -> Flatness {
     let s = f64::from(scale);
     let camera = PinholeCamera::new(40.0 * s, 42.0 * s, 9.7 * s, 9.2 * s, 20 * scale, 20 * scale);
@@ -231,7 +233,7 @@ fn flatness_of_cube(scale: u32) -> Flatness {
 }
 
 #[test]
-fn flat_is_what_a_plane_explains_and_the_model_is_not() {
+fn flat_means_explained_by_a_plane_and_not_by_the_model() {
     let at = |residual: f64, measured: f64, rendered: f64| {
         Flatness::new(residual, measured, rendered, 0.2).is_flat()
     };
@@ -240,9 +242,9 @@ fn flat_is_what_a_plane_explains_and_the_model_is_not() {
     assert!(at(0.0046, 0.003, 0.006) && !at(0.0045, 0.003, 0.006));
     // The model is as flat.
     assert!(at(0.006, 0.003, 0.0031) && !at(0.006, 0.003, 0.003));
-    // What was measured is not flat.
+    // The measured surface is not flat.
     assert!(at(0.03, 0.0059, 0.03) && !at(0.03, 0.006, 0.03));
-    // A hundredth of the diameter is nothing.
+    // A hundredth of the diameter does not count.
     assert!(at(0.0021, 0.0, 0.0021));
     assert!(!at(0.002, 0.0, 0.006) && !at(0.006, 0.0, 0.002));
 }

@@ -1,4 +1,4 @@
-//! ADD and ADI: the golden case of BOP's reference code and the invariances.
+//! Tests of ADD and ADI: the golden case of BOP's reference code, and invariances.
 
 use crate::support::Numbers;
 use hicp_core::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -28,19 +28,20 @@ fn the_golden_case() {
     assert!((add(&estimate, &truth, &corners()) - expected).abs() < 1e-11);
     assert!((adi(&estimate, &truth, &corners()) - expected).abs() < 1e-11);
 
-    // A half turn about z maps the box onto itself: 2 √(20² + 30²) for every corner, and nothing for ADI.
+    // A half turn around z maps the box onto itself: ADD is 2 √(20² + 30²) for every corner, and
+    // ADI is 0.
     let flipped = Isometry3::from_parts(
         truth.translation,
         truth.rotation * rotation(Vector3::z(), std::f64::consts::PI),
     );
     assert!((add(&flipped, &truth, &corners()) - 72.111_025_509_279_78).abs() < 1e-11);
-    // The last place of coordinates of 40 mm is 7e-15, and a rotation of them rounds three times.
+    // The last digit of coordinates of 40 mm is 7e-15, and their rotation rounds three times.
     let found = adi(&flipped, &truth, &corners());
     assert!(found < 2e-14, "{found}");
 }
 
 #[test]
-fn adi_is_never_above_add_and_is_its_definition() {
+fn adi_equals_its_definition_and_is_never_above_add() {
     let mut numbers = Numbers(311);
     for _ in 0..50 {
         let points: Vec<Point3<f32>> = (0..60)
@@ -93,13 +94,13 @@ fn equal_poses_and_no_points_have_no_error() {
         (add(&pose, &other, &[]), adi(&pose, &other, &[])),
         (0.0, 0.0)
     );
-    // A shift is its own error, for every shape.
+    // A translation is its own error, for every shape.
     let shifted = Isometry3::translation(0.3, 0.0, 0.4) * pose;
     assert!((add(&shifted, &pose, &points) - 0.5).abs() < 1e-14);
 }
 
 #[test]
-fn points_in_one_place_and_values_that_are_not_finite() {
+fn points_at_one_place_and_values_that_are_not_finite() {
     let one = vec![Point3::new(0.1_f32, 0.2, 0.3); 200];
     let shifted = Isometry3::translation(0.0, 0.3, 0.4);
     assert!((adi(&shifted, &Isometry3::identity(), &one) - 0.5).abs() < 1e-15);
@@ -109,7 +110,7 @@ fn points_in_one_place_and_values_that_are_not_finite() {
 }
 
 #[test]
-fn adi_is_its_definition_near_and_far_for_points_in_planes_and_in_one_place() {
+fn adi_equals_its_definition_for_planes_points_at_one_place_near_and_far() {
     let mut numbers = Numbers(314);
     for (flat, size) in [(false, 0.01), (true, 0.01), (false, 3.0), (true, 3.0)] {
         let mut points: Vec<Point3<f32>> = (0..400)

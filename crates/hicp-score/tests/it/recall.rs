@@ -1,10 +1,11 @@
-//! Matching and recalls on cases small enough to be counted by hand.
+//! Tests of matching and recalls, on cases small enough to count by hand.
 
 use hicp_score::{PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates};
 
 const DIAMETER: f64 = 0.2;
 
-/// Errors that are all the same share of what their thresholds are stated in: the diameter, and 100 pixels.
+/// Returns errors that are the same share of the units of their thresholds: the diameter, and 100
+/// pixels.
 fn errors(share: f64) -> PoseErrors {
     PoseErrors {
         vsd: [share; 10],
@@ -34,7 +35,7 @@ fn recalls(targets: &[TargetErrors]) -> Recalls {
     recalls
 }
 
-/// AR_VSD, AR_MSSD, AR_MSPD and the recall of AD.
+/// Returns AR_VSD, AR_MSSD, AR_MSPD and the recall of AD.
 fn all(recalls: &Recalls) -> [f64; 4] {
     [recalls.vsd(), recalls.mssd(), recalls.mspd(), recalls.ad()]
 }
@@ -55,7 +56,7 @@ fn a_perfect_estimate_is_found_at_every_threshold() {
 }
 
 #[test]
-fn correct_is_strictly_below_the_threshold() {
+fn correct_errors_are_strictly_below_the_threshold() {
     // 0.12 lies below the thresholds 0.15, …, 0.50: eight of ten.
     assert_all(
         &recalls(&[target(1, vec![vec![errors(0.12)]])]),
@@ -65,14 +66,14 @@ fn correct_is_strictly_below_the_threshold() {
         &recalls(&[target(1, vec![vec![errors(0.099)]])]),
         [0.9, 0.9, 0.9, 1.0],
     );
-    // 0.25 is exact in binary, and not below itself: 0.30, …, 0.50.
+    // 0.25 is exact in binary and not below itself: 0.30, …, 0.50.
     let exact = recalls(&[target(1, vec![vec![errors(0.25)]])]);
     assert_all(&exact, [0.5, 0.5, 0.5, 0.0]);
     assert_all(&recalls(&[target(1, vec![vec![errors(0.5)]])]), [0.0; 4]);
 }
 
 #[test]
-fn every_tolerance_of_vsd_counts_by_itself() {
+fn every_tolerance_of_vsd_counts_separately() {
     let mut one = errors(0.0);
     // Below all ten thresholds at eight tolerances, below nine at the others.
     one.vsd[0] = 0.07;
@@ -83,7 +84,7 @@ fn every_tolerance_of_vsd_counts_by_itself() {
 }
 
 #[test]
-fn mspd_is_stated_for_images_640_pixels_wide() {
+fn mspd_refers_to_images_640_pixels_wide() {
     let mut wide = target(1, vec![vec![errors(0.12)]]);
     // 12 pixels are 6 in an image half as wide: below 10, …, 50.
     wide.image_width = 1280;
@@ -101,7 +102,7 @@ fn ad_is_adi_for_symmetric_objects() {
 }
 
 #[test]
-fn a_diameter_apart_is_wrong_whatever_the_error_says() {
+fn estimates_a_diameter_apart_are_wrong_for_every_error() {
     let mut apart = errors(0.0);
     apart.translation_m = DIAMETER;
     let found = recalls(&[target(1, vec![vec![apart]])]);
@@ -112,7 +113,7 @@ fn a_diameter_apart_is_wrong_whatever_the_error_says() {
 
 #[test]
 fn missing_estimates_count_as_not_found_and_recalls_are_not_averaged() {
-    // One of one, and one of three: two of four, not the mean of 1 and 1/3.
+    // One of one, and one of three: two of four, and not the mean of 1 and 1/3.
     let full = target(1, vec![vec![errors(0.0)]]);
     let sparse = target(3, vec![vec![errors(0.0); 3]]);
     let mut together = recalls(std::slice::from_ref(&full));
@@ -126,7 +127,7 @@ fn missing_estimates_count_as_not_found_and_recalls_are_not_averaged() {
 }
 
 #[test]
-fn an_instance_is_found_once() {
+fn an_instance_is_found_only_once() {
     // Both estimates are right about the first instance and wrong about the second.
     let twice = vec![
         vec![errors(0.0), errors(1.0)],
@@ -137,13 +138,14 @@ fn an_instance_is_found_once() {
 
 #[test]
 fn matching_is_greedy_by_score() {
-    // The first estimate takes what it is nearest to, although the second had no other choice.
+    // The first estimate selects its nearest instance, although the second has no alternative.
     let greedy = [vec![0.1, 0.2], vec![0.05, 9.0]];
     assert_eq!(match_instances(&greedy, 2, 0.5), [Some(0), None]);
-    // Given the other way round, both are served.
+    // In the opposite order, both are matched.
     let turned = [vec![0.05, 9.0], vec![0.1, 0.2]];
     assert_eq!(match_instances(&turned, 2, 0.5), [Some(0), Some(1)]);
-    // Below the threshold is strict; of equal errors the first instance is taken; infinity and NaN match nothing.
+    // The threshold is strict. Of equal errors, the first instance is selected. Infinity and NaN
+    // match nothing.
     assert_eq!(match_instances(&[vec![0.5, 0.5]], 2, 0.5), [None, None]);
     assert_eq!(match_instances(&[vec![0.4, 0.4]], 2, 0.5), [Some(0), None]);
     let useless = [vec![f64::INFINITY, f64::NAN]];
@@ -152,16 +154,16 @@ fn matching_is_greedy_by_score() {
 }
 
 #[test]
-fn the_best_scores_and_the_most_visible_are_kept() {
+fn the_best_scores_and_the_most_visible_are_selected() {
     assert_eq!(top_estimates(&[0.2, 0.9, 0.5], 2), [1, 2]);
-    // Of equal scores, the one that came first.
+    // Of equal scores, the first one.
     assert_eq!(top_estimates(&[0.5, 0.9, 0.5, 0.5], 3), [1, 0, 2]);
     assert_eq!(most_visible(&[0.1, 0.3], 5), [1, 0]);
     assert!(most_visible(&[0.1], 0).is_empty());
 }
 
 #[test]
-fn instances_are_left_with_the_adi_of_their_estimate() {
+fn instances_have_the_adi_of_their_estimate() {
     let two = target(
         2,
         vec![
@@ -170,13 +172,13 @@ fn instances_are_left_with_the_adi_of_their_estimate() {
         ],
     );
     let found = two.adi_of_instances();
-    // The best score takes the second instance, the other estimate what is left.
+    // The best score selects the second instance, and the other estimate gets the remaining one.
     assert_eq!(found, [Some(0.2 * DIAMETER), Some(0.1 * DIAMETER)]);
     assert_eq!(target(1, Vec::new()).adi_of_instances(), [None]);
 }
 
 #[test]
-fn from_a_diameter_on_and_without_a_number_origins_are_apart() {
+fn origins_are_apart_from_a_diameter_on_and_for_nan() {
     let at = |translation_m| PoseErrors {
         translation_m,
         ..errors(0.0)

@@ -1,4 +1,4 @@
-//! The MVE of renders that cover a part of the image, and its ties: what is drawn is given pixel by pixel.
+//! Tests of the MVE for renders that cover a part of the image, and of its ties, with given pixels.
 
 use crate::support::Numbers;
 use hicp_core::{
@@ -7,7 +7,7 @@ use hicp_core::{
 };
 use hicp_score::{MeanVsd, Occlusion, Score, tolerances};
 
-/// Draws the same whatever it is asked for.
+/// A renderer that always draws the same.
 #[derive(Clone, Debug)]
 struct Drawn {
     region: PixelRegion,
@@ -28,8 +28,8 @@ impl Renderer for Drawn {
     }
 }
 
-/// A triangle of which two corners are a metre apart, and no two are farther.
-fn of_one_metre() -> Model {
+/// Returns a triangle with two corners a meter apart, which is its diameter.
+fn of_one_meter() -> Model {
     let corners = [(0.0, 0.0), (1.0, 0.0), (0.25, 0.25)];
     let corners = corners.map(|(x, y)| Point3::new(x, y, 0.0));
     let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap());
@@ -38,7 +38,7 @@ fn of_one_metre() -> Model {
 }
 
 fn mve(mut mean_vsd: MeanVsd, drawn: &Drawn, observation: &Observation) -> f64 {
-    let model = of_one_metre();
+    let model = of_one_meter();
     let mut renders = RenderCache::new(drawn.clone());
     let problem = Problem::new(&model, observation);
     mean_vsd.score(
@@ -47,7 +47,7 @@ fn mve(mut mean_vsd: MeanVsd, drawn: &Drawn, observation: &Observation) -> f64 {
     )
 }
 
-/// §IV-A over all pixels of the image.
+/// Computes §IV-A over all pixels of the image.
 fn by_definition(mean_vsd: MeanVsd, drawn: &Drawn, observation: &Observation) -> f64 {
     let camera = observation.camera();
     let (mut differences, mut union) = (Vec::new(), 0);
@@ -83,10 +83,11 @@ fn by_definition(mean_vsd: MeanVsd, drawn: &Drawn, observation: &Observation) ->
     tolerances().map(error).iter().sum::<f64>() / 10.0
 }
 
-/// Regions of every width up to some blocks of pixels, anywhere in an image whose width is no multiple of anything. The object is as
-/// large as it is far, so that what is not there (0) is within the tolerances of what is.
+/// Regions of every width up to some blocks of pixels, anywhere in an image whose width is prime.
+///
+/// The object is as large as it is far away, so that a missing depth (0) is within the tolerances.
 #[test]
-fn a_part_of_the_image_is_scored_as_the_whole() {
+fn a_part_of_the_image_has_the_score_of_the_whole() {
     let (width, height) = (61, 23);
     let camera = PinholeCamera::new(70.0, 75.0, 29.7, 11.2, width, height).unwrap();
     let mut numbers = Numbers(821);
@@ -127,7 +128,7 @@ fn a_part_of_the_image_is_scored_as_the_whole() {
     assert!(distinct.len() > 90, "{}", distinct.len());
 }
 
-/// Two pixels, one at the principal point, where depths are distances to the bit.
+/// Two pixels, one at the principal point, where depths equal distances to the bit.
 fn two_pixels(measured: [f32; 2], masked: [bool; 2]) -> Observation {
     let camera = PinholeCamera::new(70.0, 75.0, 0.0, 0.0, 2, 1).unwrap();
     Observation::new(
@@ -160,8 +161,9 @@ fn pitfall_24_a_difference_of_exactly_tau_is_wrong_in_the_mve_too() {
 }
 
 #[test]
-fn what_is_exactly_the_tolerance_in_front_does_not_hide() {
-    // The second pixel agrees; the first one is outside the mask, a quarter of a metre behind what was measured.
+fn an_occluder_at_exactly_the_tolerance_does_not_hide() {
+    // The second pixel agrees. The first one is outside the mask, a quarter of a meter behind the
+    // measured surface.
     let observation = two_pixels([0.25, 0.5], [false, true]);
     let found = |tolerance: f64| {
         let mean_vsd = MeanVsd {

@@ -1,4 +1,4 @@
-//! Scores of rendered poses: the MVE against the image, VSD against a true pose.
+//! Tests of scores of rendered poses: the MVE against the image, and VSD against a true pose.
 
 use crate::support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
 use hicp_core::{
@@ -82,7 +82,7 @@ fn a_perfect_pose_scores_zero_and_an_unseen_one_one() {
 }
 
 #[test]
-fn pitfall_24_an_empty_mask_is_wrong_wherever_the_object_is() {
+fn pitfall_24_an_empty_mask_is_wrong_for_every_pose() {
     let model = Model::new(wedge());
     let empty = Mask::new(64, 48, vec![false; 64 * 48]).unwrap();
     let nothing = DepthImage::from_meters(64, 48, vec![0.0; 64 * 48]).unwrap();
@@ -105,7 +105,7 @@ fn pitfall_24_masked_pixels_without_depth_do_not_count() {
     assert!(holes.n_measured() < whole.n_measured() && holes.mask() == whole.mask());
     for mean_vsd in BOTH {
         assert_eq!(mve(mean_vsd, &model, &holes, &at()), 0.0);
-        // Elsewhere: exactly the definition over what was measured.
+        // At all other pixels, it equals the definition over the measured depths.
         let off = pose(0.02, -0.002, 0.27, 0.4, -0.3, 0.2);
         assert_eq!(
             mve(mean_vsd, &model, &holes, &off),
@@ -114,7 +114,7 @@ fn pitfall_24_masked_pixels_without_depth_do_not_count() {
     }
 }
 
-/// The MVE pixel by pixel, from whole images.
+/// Computes the MVE pixel by pixel, from whole images.
 fn by_definition(
     mean_vsd: MeanVsd,
     model: &Model,
@@ -160,10 +160,10 @@ fn by_definition(
 }
 
 #[test]
-fn the_mve_is_its_definition_at_any_pose() {
+fn the_mve_equals_its_definition_at_every_pose() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &at());
-    // A pole in front of the left half, a wall behind everything else.
+    // A pole in front of the left half, and a wall behind everything else.
     let scene = with_depth(&observation, |i, z| match i % 64 {
         20..=27 => 0.18,
         _ if z == 0.0 => 0.6,
@@ -192,7 +192,7 @@ fn the_mve_is_its_definition_at_any_pose() {
 }
 
 #[test]
-fn what_stands_in_front_of_the_object_is_forgiven_if_asked_for() {
+fn occluders_are_tolerated_on_request() {
     let model = Model::new(wedge());
     let whole = observe(&model, &camera(), &at());
     let occluded = |by: f32| {
@@ -215,14 +215,15 @@ fn what_stands_in_front_of_the_object_is_forgiven_if_asked_for() {
     let share = hidden as f64 / whole.n_measured() as f64;
     assert!(share > 0.2);
     assert_eq!(mve(MeanVsd::default(), &model, &near, &at()), 0.0);
-    // The paper's definition counts every rendered pixel outside the mask, and so does an occluder within the tolerance.
+    // The paper's definition counts every rendered pixel outside the mask. So does an occluder
+    // within the tolerance.
     assert!((mve(MeanVsd::paper(), &model, &near, &at()) - share).abs() < 1e-14);
     assert!((mve(MeanVsd::default(), &model, &touching, &at()) - share).abs() < 1e-14);
 }
 
-/// The left part of the object is missing from the mask, and the image as it is.
+/// The left part of the object is missing from the mask, but not from the image.
 #[test]
-fn what_the_mask_misses_is_forgiven_if_asked_for() {
+fn parts_missing_from_the_mask_are_tolerated_on_request() {
     let model = Model::new(wedge());
     let whole = observe(&model, &camera(), &at());
     let mask = (0..64 * 48).map(|i| whole.mask().pixels()[i] && i % 64 >= 30);
@@ -244,12 +245,12 @@ fn what_the_mask_misses_is_forgiven_if_asked_for() {
     let lenient = |observation: &Observation| mve(MeanVsd::lenient(), &model, observation, &at());
     assert_eq!(lenient(&seen(0.0)), 0.0);
     assert_eq!(lenient(&seen(0.01)), 0.0);
-    // The camera looks through the object, or measured nothing.
+    // The camera sees through the object, or has measured nothing.
     assert!(near(lenient(&seen(0.03)), missing));
     let holes = with_depth(&seen(0.0), |i, z| if i % 64 < 30 { 0.0 } else { z });
     assert!(near(lenient(&holes), missing));
 
-    // The estimate from samples agrees, as far as its few pixels do.
+    // The estimate from samples agrees within the limits of its few pixels.
     let sampled = |mut sampled: SampledMve, observation: &Observation| {
         score(&mut sampled, &model, observation, &at())
     };
@@ -262,11 +263,11 @@ fn what_the_mask_misses_is_forgiven_if_asked_for() {
 }
 
 #[test]
-fn vsd_of_poses_is_vsd_of_their_images() {
+fn vsd_of_poses_equals_vsd_of_their_images() {
     let mut numbers = Numbers(302);
     for mesh in [wedge(), cuboid(0.09, 0.06, 0.05)] {
         let model = Model::new(mesh);
-        // The observation lends its camera only.
+        // The observation only provides its camera.
         let observation = observe(&model, &camera(), &pose(0.1, 0.1, 0.5, 0.0, 0.0, 0.0));
         let mut renders = RenderCache::new(RayCaster);
         let mut context = Context::new(Problem::new(&model, &observation), &mut renders);
@@ -287,7 +288,8 @@ fn vsd_of_poses_is_vsd_of_their_images() {
             let expected = vsd(&estimate, &mask, &truth, &truth_mask, model.diameter()).unwrap();
             let found = score.errors(&mut context, &here);
             for (found, expected) in found.iter().zip(expected) {
-                // (zₑ − zₜ) k and zₑ k − zₜ k may differ in the last digit, and so decide one tie in a pixel.
+                // (zₑ − zₜ) k and zₑ k − zₜ k may differ in the last digit and so decide one tie in
+                // a pixel.
                 assert!((found - expected).abs() < 1e-14, "{found} {expected}");
             }
             assert!(
@@ -304,7 +306,7 @@ fn vsd_of_poses_is_vsd_of_their_images() {
 }
 
 #[test]
-fn a_score_renders_a_pose_once_and_boxes_change_nothing() {
+fn a_score_renders_a_pose_once_also_if_boxed() {
     let model = Model::new(wedge());
     let observation = observe(&model, &camera(), &at());
     let here = pose(0.01, 0.0, 0.26, 0.4, -0.3, 0.2);
@@ -330,10 +332,10 @@ fn a_score_renders_a_pose_once_and_boxes_change_nothing() {
 }
 
 #[test]
-fn scores_say_their_names() {
+fn scores_report_their_names() {
     let truth = Vsd::new(at()).name();
     assert_eq!((MeanVsd::default().name(), truth), ("mve", "vsd"));
-    // One that says none is called after its type, boxed too.
+    // A score without a name is called after its type, also if boxed.
     struct Fair;
     impl Score for Fair {
         fn score(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> f64 {

@@ -1,4 +1,4 @@
-//! The sampled MVE against its definition, written out pixel by pixel.
+//! Tests of the sampled MVE against its definition, pixel by pixel.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,8 @@ fn score(
     score.score(&mut Context::new(problem, &mut renders), pose)
 }
 
-/// Samples into the pixels of a coarse image, the nearest of each kept, and the VSD against what was measured there.
+/// Projects samples into the pixels of a coarse image, keeps the nearest of each, and computes the
+/// VSD.
 fn by_definition(
     (samples, pixels): (usize, usize),
     model: &Model,
@@ -82,14 +83,14 @@ fn by_definition(
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
-/// The wedge without its last triangle.
+/// Returns the wedge without its last triangle.
 fn open() -> TriMesh {
     let mesh = wedge();
     let (_, triangles) = mesh.triangles().split_last().unwrap();
     TriMesh::new(mesh.vertices().to_vec(), triangles.to_vec()).unwrap()
 }
 
-/// What was observed, with other depths and another mask.
+/// Returns an observation with changed depths and another mask.
 fn changed(
     observation: &Observation,
     depth: impl Fn(usize, f32) -> f32,
@@ -110,17 +111,17 @@ fn changed(
 }
 
 #[test]
-fn it_is_its_definition() {
+fn the_sampled_mve_equals_its_definition() {
     let mut numbers = Numbers(5);
     let mut distinct = std::collections::BTreeSet::new();
-    // One for all: what it keeps of one score must not show in the next.
+    // One instance for all: the state after one score must not change the next.
     let mut kept = SampledMve::default();
     for mesh in [wedge(), open(), cuboid(0.03, 0.02, 0.04)] {
         let model = Model::new(mesh);
         let plain = observe(&model, &camera(), &at());
         let scenes = [
             changed(&plain, |_, z| z, |_, on| on),
-            // Holes, a wall behind, something in front, half of the mask.
+            // Holes, a wall behind, an occluder in front, half of the mask.
             changed(&plain, |i, z| if i % 3 == 0 { 0.0 } else { z }, |_, on| on),
             changed(&plain, |_, z| if z > 0.0 { z } else { 0.5 }, |_, on| on),
             changed(
@@ -170,13 +171,13 @@ fn it_is_its_definition() {
     );
 }
 
-/// An open triangle in a plane through the origin, seen by every pixel that it can be.
+/// An open triangle in a plane through the origin, seen by every possible pixel.
 fn sheet(corners: [[f32; 3]; 3]) -> Model {
     let corners = corners.map(hicp_core::Point3::from);
     Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap())
 }
 
-/// Everything measured at half a metre, all of it masked but some.
+/// An image with a depth of half a meter everywhere, masked except for one pixel.
 fn wall(camera: PinholeCamera, but: Option<usize>, depth_there: f32) -> Observation {
     let n = (camera.width() * camera.height()) as usize;
     let mut depth = vec![0.5; n];
@@ -192,9 +193,9 @@ fn wall(camera: PinholeCamera, but: Option<usize>, depth_there: f32) -> Observat
     .unwrap()
 }
 
-/// Nothing of it may come back in at another edge.
+/// Samples outside must not enter at another edge.
 #[test]
-fn what_lies_beside_the_image_is_not_in_it() {
+fn samples_outside_the_image_do_not_count() {
     let model = Model::new(wedge());
     let observation = wall(camera(), None, 0.0);
     let mut sampled = SampledMve::new(1500, 100_000);
@@ -211,7 +212,8 @@ fn what_lies_beside_the_image_is_not_in_it() {
     }
 }
 
-/// Pixel centres are at integers, and so the image ends half a pixel after the last; there is nothing on that line.
+/// Pixel centers are at integers, so the image ends half a pixel after the last. That line is
+/// outside.
 #[test]
 fn the_right_and_the_lower_edge_are_not_in_the_image() {
     let pose = Isometry3::translation(0.0, 0.0, 0.5);
@@ -220,7 +222,7 @@ fn the_right_and_the_lower_edge_are_not_in_the_image() {
         let camera = PinholeCamera::new(20.0, 20.0, cx, cy, 8, 8).unwrap();
         score(&mut sampled, model, &wall(camera, None, 0.0), &pose)
     };
-    // Both contain the optical axis, and so are seen from the side: all x, or all y, are zero.
+    // Both contain the optical axis and are seen from the side: all x, or all y, are zero.
     let upright = sheet([[0.0, -0.1, -0.1], [0.0, 0.1, -0.1], [0.0, 0.0, 0.2]]);
     let level = sheet([[-0.1, 0.0, -0.1], [0.1, 0.0, -0.1], [0.0, 0.0, 0.2]]);
     assert_eq!(found(&upright, 7.5, 3.0), 1.0);
@@ -230,10 +232,10 @@ fn the_right_and_the_lower_edge_are_not_in_the_image() {
 }
 
 #[test]
-fn what_is_exactly_the_tolerance_in_front_does_not_hide() {
+fn an_occluder_at_exactly_the_tolerance_does_not_hide() {
     let model = sheet([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 2.0, 0.0]]);
     let pose = Isometry3::translation(0.0, 0.0, 0.5);
-    // Outside the mask is the principal point, where depths are distances to the bit.
+    // The pixel outside the mask is the principal point, where depths equal distances to the bit.
     let camera = PinholeCamera::new(8.0, 8.0, 4.0, 3.0, 8, 8).unwrap();
     let observation = wall(camera, Some(3 * 8 + 4), 0.25);
     let found = |tolerance: f64| {

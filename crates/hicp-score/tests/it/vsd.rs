@@ -1,4 +1,5 @@
-//! VSD: the golden case of BOP's reference code, and the properties of the definition (pitfall 24).
+//! Tests of VSD: the golden case of BOP's reference code, and the properties of the definition
+//! (pitfall 24).
 
 use hicp_core::{DistanceImage, ImageError, Mask, PinholeCamera};
 use hicp_score::{N_TOLERANCES, ScoreError, tolerances, visibility_masks, vsd};
@@ -8,7 +9,9 @@ const WIDTH: u32 = 7;
 const HEIGHT: u32 = 6;
 const N: usize = 42;
 
-/// The reference's depths in millimetres, for the camera fx = 10, fy = 12, cx = 3, cy = 2.5.
+/// The reference's depths in millimeters.
+///
+/// Its camera has fx = 10, fy = 12, cx = 3, cy = 2.5.
 const TEST: [u16; N] = [
     0, 1000, 1000, 1000, 1000, 1000, 1000, //
     1000, 500, 500, 500, 500, 1000, 1000, //
@@ -151,7 +154,7 @@ fn pitfall_24_a_difference_of_exactly_tau_is_wrong() {
 }
 
 #[test]
-fn pitfall_24_an_empty_union_is_all_wrong_and_masks_that_do_not_meet_too() {
+fn pitfall_24_empty_unions_and_disjoint_masks_are_all_wrong() {
     let image = row(&[0.5, 0.5]);
     let none = Mask::new(2, 1, vec![false; 2]).unwrap();
     let (left, right) = (
@@ -177,7 +180,7 @@ fn pitfall_24_an_empty_union_is_all_wrong_and_masks_that_do_not_meet_too() {
 }
 
 #[test]
-fn what_is_not_a_number_agrees_with_nothing() {
+fn nan_agrees_with_nothing() {
     let full = Mask::full(1, 1);
     for (a, b) in [
         (f64::NAN, 0.5),
@@ -192,14 +195,15 @@ fn what_is_not_a_number_agrees_with_nothing() {
 
 #[test]
 fn pitfall_24_missing_depth_is_visible_and_occluded_surface_is_not() {
-    // test: missing, far behind, δ in front of the surface, a hair more than δ, equal
+    // The test distances: missing, far behind, δ in front of the surface, slightly more than δ,
+    // equal.
     let test = row(&[0.0, 2.0, 0.75, 0.75, 1.0]);
     let truth = row(&[1.0, 1.0, 1.0, 1.000_001, 1.0]);
     let nothing = row(&[0.0; 5]);
     let (v_estimate, v_truth) = visibility_masks(&test, &nothing, &truth, 0.25).unwrap();
     assert_eq!(v_truth.pixels(), [true, true, true, false, true]);
     assert_eq!(v_estimate.pixels(), [false; 5]);
-    // Hidden by δ and more, the estimate counts where the truth is visible, and only there.
+    // An estimate hidden by δ or more counts only where the truth is visible.
     let (v_estimate, v_truth) = visibility_masks(&test, &row(&[3.0; 5]), &truth, 0.25).unwrap();
     assert_eq!(v_estimate.pixels(), v_truth.pixels());
     let (v_estimate, _) = visibility_masks(&test, &row(&[3.0; 5]), &nothing, 0.25).unwrap();
@@ -207,7 +211,7 @@ fn pitfall_24_missing_depth_is_visible_and_occluded_surface_is_not() {
 }
 
 #[test]
-fn sizes_and_diameters_that_cannot_be_are_refused() {
+fn invalid_sizes_and_diameters_are_refused() {
     let (a, b) = (row(&[0.5; 3]), row(&[0.5; 2]));
     let (mask_a, mask_b) = (Mask::full(3, 1), Mask::full(2, 1));
     let size = |what| ScoreError::Size {
@@ -254,7 +258,7 @@ fn sizes_and_diameters_that_cannot_be_are_refused() {
     );
 }
 
-/// An image of a dozen pixels: distance and whether it belongs to the mask.
+/// An image of a dozen pixels: the distance, and whether the pixel is in the mask.
 fn side() -> impl Strategy<Value = Vec<(f64, bool)>> {
     proptest::collection::vec((0.4_f64..0.6, proptest::bool::ANY), 12)
 }
@@ -269,7 +273,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
     #[test]
-    fn vsd_is_its_definition_symmetric_and_falls_with_tau(a in side(), b in side(), diameter in 0.05_f64..0.6) {
+    fn vsd_equals_its_definition_is_symmetric_and_falls_with_tau(a in side(), b in side(), diameter in 0.05_f64..0.6) {
         let ((da, ma), (db, mb)) = (images(&a, 1.0), images(&b, 1.0));
         let errors = vsd(&da, &ma, &db, &mb, diameter).unwrap();
         prop_assert_eq!(errors, vsd(&db, &mb, &da, &ma, diameter).unwrap());
