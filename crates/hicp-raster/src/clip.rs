@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::fixed::GUARD_PIXELS;
 
-/// A half-space of homogeneous pixels (u·z, v·z, z): those with `normal · h >= offset`.
+/// The half-space of homogeneous pixels (u·z, v·z, z) with `normal · h >= offset`.
 #[derive(Clone, Copy, Debug)]
 struct HalfSpace {
     normal: DVec3,
@@ -12,13 +12,13 @@ struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Signed distance in no particular unit, not negative inside.
+    /// Returns the signed distance without a particular unit, not negative inside.
     fn distance(&self, h: DVec3) -> f64 {
         self.normal.dot(h) - self.offset
     }
 }
 
-/// Clips triangles; keeps its buffers between calls.
+/// Clips triangles and reuses its buffers between calls.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Clipper {
     polygon: Vec<DVec3>,
@@ -26,23 +26,23 @@ pub(crate) struct Clipper {
 }
 
 impl Clipper {
-    /// Returns the convex polygon that is left of a triangle beyond the near plane and inside the
-    /// guard band, in the triangle's winding; empty when nothing is left.
+    /// Returns the part of a triangle beyond the near plane and inside the guard band.
     ///
-    /// Corners are homogeneous pixels (u·z, v·z, z); all that is returned has z ≥ `near` > 0.
+    /// The result is a convex polygon in the triangle's winding, empty if nothing remains. Corners
+    /// are homogeneous pixels (u·z, v·z, z). All results have z ≥ `near` > 0.
     ///
     /// Invariant: an edge that two triangles share is cut at the identical point in both.
     pub(crate) fn clip(&mut self, triangle: [DVec3; 3], near: f64) -> &[DVec3] {
         self.polygon.clear();
         self.polygon.extend(triangle);
-        // The near plane first: the others mean something only where z is positive.
+        // The near plane comes first: the others are meaningful only for positive z.
         let near_plane = HalfSpace {
             normal: DVec3::Z,
             offset: near,
         };
         self.cut(&near_plane);
         for h in &mut self.polygon {
-            // Interpolation may fall short of the plane by a rounding error.
+            // Interpolation may miss the plane by a rounding error.
             h.z = h.z.max(near);
         }
         for normal in [
@@ -59,7 +59,7 @@ impl Clipper {
         &self.polygon
     }
 
-    /// Sutherland and Hodgman's step for one plane.
+    /// Clips at one plane, a step of the Sutherland–Hodgman algorithm.
     fn cut(&mut self, inside: &HalfSpace) {
         let Some(&last) = self.polygon.last() else {
             return;
@@ -69,8 +69,8 @@ impl Clipper {
         for &to in &self.polygon {
             let to_distance = inside.distance(to);
             if (from_distance >= 0.0) != (to_distance >= 0.0) {
-                // Always from the inside to the outside: both triangles at an edge then round
-                // alike, though they walk it in opposite directions.
+                // Always from the inside to the outside. Both triangles at an edge then round
+                // alike, although they traverse it in opposite directions.
                 self.next.push(if from_distance >= 0.0 {
                     crossing(from, from_distance, to, to_distance)
                 } else {
@@ -86,7 +86,7 @@ impl Clipper {
     }
 }
 
-/// Returns where the edge from a point inside to one outside leaves.
+/// Returns the point where the edge from an inside to an outside point leaves.
 fn crossing(inside: DVec3, inside_distance: f64, outside: DVec3, outside_distance: f64) -> DVec3 {
     let fraction = inside_distance / (inside_distance - outside_distance);
     inside + (outside - inside) * fraction
@@ -99,7 +99,7 @@ mod tests {
     const NEAR: f64 = 0.01;
 
     #[test]
-    fn a_triangle_inside_is_returned_as_it_is() {
+    fn a_triangle_inside_is_returned_unchanged() {
         let triangle = [
             DVec3::new(10.0, 10.0, 1.0),
             DVec3::new(20.0, 10.0, 1.0),
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_behind_or_beside_leaves_nothing() {
+    fn nothing_remains_of_triangles_behind_or_next_to_the_image() {
         let mut clipper = Clipper::default();
         let behind = [DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.009)];
         assert!(clipper.clip(behind, NEAR).is_empty());
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_lies_in_the_guard_band() {
+    fn the_remaining_polygon_lies_in_the_guard_band() {
         let triangle = [
             DVec3::new(-1e9, -1e9, 1.0),
             DVec3::new(1e9, -1e9, 1.0),

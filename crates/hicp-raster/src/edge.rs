@@ -4,29 +4,32 @@ use hicp_core::PixelRegion;
 
 use crate::fixed::{FRACTION_BITS, FixedPoint, first_pixel, last_pixel};
 
-/// Sides below this many grid units (512 px) from the first corner make an extent below twice as
-/// much, and edge functions that fit 64 bits: two products of 2³⁰ by 2³⁰.
+/// Largest side with edge functions in 64 bits, in grid units (512 px).
+///
+/// Sides below it from the first corner limit the extent to twice as much, and the edge functions
+/// to two products of 2³⁰ by 2³⁰.
 const SMALL_SIDE: i64 = 1 << 29;
 
-/// Which triangles are drawn, by the sign of their area in the image (u right, v down).
+/// The drawn triangles, by the sign of their area in the image (u right, v down).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Keep {
-    /// All that have an area.
+    /// All triangles with an area.
     Both,
-    /// Those of negative area: counter-clockwise as seen, the front of an outward-facing mesh.
+    /// Triangles of negative area: counter-clockwise as seen, the front of an outward-facing mesh.
     Negative,
-    /// Those of positive area.
+    /// Triangles of positive area.
     Positive,
 }
 
 /// One edge function over the pixels of a triangle's bounding box.
 ///
-/// The function is kept divided by the grid units of a pixel and rounded down: one pixel changes it
-/// by a multiple of the divisor, so that the sign, which is all that counts, survives exactly and
-/// the numbers stay small.
+/// The function is divided by the grid units of a pixel and rounded down. One pixel changes it by a
+/// multiple of the divisor, so its sign stays exact and the numbers stay small. Only the sign
+/// matters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Edge {
-    /// Value at the first pixel of the bounding box; a pixel is inside where no edge is negative.
+    /// Value at the first pixel of the bounding box. A pixel is inside if no edge is negative
+    /// there.
     pub(crate) value: i64,
     /// Change per column.
     pub(crate) per_u: i64,
@@ -35,14 +38,14 @@ pub(crate) struct Edge {
 }
 
 impl Edge {
-    /// Makes the edge from `p` to `q` of a triangle of positive area, seen from the pixel centre
+    /// Creates the edge from `p` to `q` of a triangle of positive area, evaluated at pixel center
     /// `at`.
     #[inline(always)]
     fn new<const SMALL: bool>(p: FixedPoint, q: FixedPoint, at: FixedPoint) -> Self {
         let (du, dv) = (q.u - p.u, q.v - p.v);
-        // With rows growing downwards and positive area the inside lies below an edge that runs to
-        // the right and to the right of one that runs upwards: these are the top and left edges,
-        // which own the pixel centres on them.
+        // Rows grow downward and the area is positive. The inside therefore lies below an edge that
+        // runs to the right, and to the right of an edge that runs upward. These are the top and
+        // left edges, which own the pixel centers on them.
         let owns = dv < 0 || (dv == 0 && du > 0);
         let (u, v) = (at.u - p.u, at.v - p.v);
         let value = if SMALL {
@@ -59,11 +62,11 @@ impl Edge {
     }
 }
 
-/// Whether all sides lie within plus or minus [`SMALL_SIDE`].
+/// Returns whether all sides are within plus or minus [`SMALL_SIDE`].
 #[inline]
 fn are_small(sides: [i64; 4]) -> bool {
-    // Moved to start at 0 and taken together: one comparison, and negative numbers are large ones
-    // without their sign.
+    // Shifted to start at 0 and combined by OR: one comparison, since negative numbers are large
+    // ones without their sign.
     let together = sides
         .iter()
         .fold(0, |bits, side| bits | (side + SMALL_SIDE).cast_unsigned());
@@ -74,8 +77,10 @@ fn wide_cross(au: i64, av: i64, bu: i64, bv: i64) -> i128 {
     i128::from(au) * i128::from(bv) - i128::from(av) * i128::from(bu)
 }
 
-/// Coordinates reach 2³⁷ units (two guard bands), differences 2³⁸, edge functions 2⁷⁷: a pixel's
-/// worth less is 2⁵⁷.
+/// Converts a value that fits.
+///
+/// Coordinates reach 2³⁷ units (two guard bands), differences 2³⁸, and edge functions 2⁷⁷. Divided
+/// by the units of a pixel, that is 2⁵⁷.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "bounded as the comment above shows"
@@ -84,11 +89,11 @@ fn narrow(value: i128) -> i64 {
     value as i64
 }
 
-/// The pixels of a view that a triangle can cover, and the edges that say which of them it does.
+/// The pixels of a view that a triangle can cover, and the edges that decide which it does.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coverage {
     pub(crate) edges: [Edge; 3],
-    /// First column and row, in the view's region.
+    /// First column and row in the view's region.
     pub(crate) u: i64,
     pub(crate) v: i64,
     /// Number of columns and rows, at least one each.
@@ -97,10 +102,10 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// Sets up a triangle, or returns `None` if it has no area, is not to be kept, or no pixel
-    /// centre of `region` lies in its bounding box.
-    // Half of all triangles end after the area, most of a fine mesh after the bounding box: worth
-    // not being a call.
+    /// Sets up a triangle.
+    ///
+    /// Returns `None` if it has no area, is culled, or if no pixel center of `region` lies in its
+    /// bounding box.
     #[inline(always)]
     pub(crate) fn new(
         a: FixedPoint,

@@ -1,4 +1,4 @@
-//! Depth of covered pixels.
+//! The depth of covered pixels.
 
 use hicp_core::internal::{VectorLoop, Work, vectorized};
 use hicp_core::{PixelRegion, RenderedView};
@@ -6,7 +6,7 @@ use hicp_core::{PixelRegion, RenderedView};
 use crate::edge::{Coverage, Edge};
 use crate::inverse_depth::InverseDepth;
 
-/// The buffers of the view that is filled.
+/// The buffers of the view to fill.
 #[derive(Debug)]
 pub(crate) struct Target<'a> {
     pub(crate) region: PixelRegion,
@@ -27,10 +27,10 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Writes the pixels of a triangle where it is nearer than the depth already there.
+    /// Writes the pixels of a triangle that are nearer than the depth in the view.
     #[inline(always)]
     pub(crate) fn fill(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
-        // Rows that fit a few vectors are tested whole.
+        // Rows that fit a few vectors are tested as a whole.
         match coverage.columns {
             ..5 => self.fill_narrow::<4>(coverage, plane, triangle),
             5..9 => self.fill_narrow::<8>(coverage, plane, triangle),
@@ -39,7 +39,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Tries `N` columns of each row at a time, at least those of the bounding box.
+    /// Tests `N` columns of each row at once, at least those of the bounding box.
     #[inline(always)]
     fn fill_narrow<const N: usize>(
         &mut self,
@@ -73,7 +73,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Computes the ends of each row.
+    /// Fills long rows, whose ends it computes.
     fn fill_wide(&mut self, coverage: &Coverage, plane: &InverseDepth, triangle: u32) {
         vectorized(FillWide {
             target: self,
@@ -90,7 +90,7 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Pixels of a long row that are written at a time.
+/// Pixels of a long row that are written at once.
 const LANES: usize = 8;
 
 struct FillWide<'a, 'view> {
@@ -143,7 +143,7 @@ impl VectorLoop for FillWide<'_, '_> {
 /// The largest edge function in 32 bits.
 const MOST: u64 = i32::MAX.unsigned_abs() as u64;
 
-/// Some columns, the first and those after it.
+/// Returns consecutive columns from the first one on.
 #[inline(always)]
 fn columns_from<const N: usize>(first: f64) -> [f64; N] {
     let mut columns = [0.0; N];
@@ -153,16 +153,17 @@ fn columns_from<const N: usize>(first: f64) -> [f64; N] {
     columns
 }
 
-/// The three edge functions at `N` neighbouring pixels, in 32 bits.
+/// The three edge functions at `N` adjacent pixels, in 32 bits.
 struct LaneEdges<const N: usize> {
     values: [[i32; N]; 3],
     per_v: [i32; 3],
-    /// Negative beyond the columns of the bounding box, which may be cut at the border of the view.
+    /// Negative beyond the columns of the bounding box, which may be clipped at the border of the
+    /// view.
     beyond: [i32; N],
 }
 
 impl<const N: usize> LaneEdges<N> {
-    /// `None` where a value that is needed is out of range.
+    /// Returns `None` if a required value is out of range.
     #[inline(always)]
     fn new(coverage: &Coverage) -> Option<Self> {
         let mut lanes = Self {
@@ -171,7 +172,7 @@ impl<const N: usize> LaneEdges<N> {
             beyond: [0; N],
         };
         for (index, edge) in coverage.edges.iter().enumerate() {
-            // The largest magnitude at any of the pixels tried.
+            // The largest magnitude at any of the tested pixels.
             let reach = edge.value.unsigned_abs()
                 + edge.per_u.unsigned_abs() * N as u64
                 + edge.per_v.unsigned_abs() * coverage.rows.unsigned_abs();
@@ -196,7 +197,7 @@ impl<const N: usize> LaneEdges<N> {
         Some(lanes)
     }
 
-    /// Negative where a pixel is outside.
+    /// Returns numbers that are negative for pixels outside.
     #[inline(always)]
     fn outside(&self) -> [i32; N] {
         let mut outside = self.beyond;
@@ -226,21 +227,22 @@ fn inside_columns(edges: &[Edge; 3], columns: i64) -> (i64, i64) {
         let (value, step) = (edge.value, edge.per_u);
         if step > 0 {
             if value < 0 {
-                // The first column k with value + k step >= 0.
+                // The first column k with value + k·step ≥ 0.
                 first = first.max((step - 1 - value) / step);
             }
         } else if value < 0 {
             return (0, 0);
         } else if step < 0 && value + (columns - 1) * step < 0 {
-            // The last one.
+            // The last such column.
             end = end.min(value / -step + 1);
         }
     }
     (first, end)
 }
 
-/// The nearer depth wins, and of equal ones the first. 0 is no depth; what is outside (negative)
-/// stays as it is.
+/// Stores candidates that are nearer; of equal depths, the first is kept.
+///
+/// A depth of 0 is missing. Pixels outside (negative) do not change.
 #[inline(always)]
 fn keep_nearer<const N: usize>(
     depths: &mut [f32; N],
@@ -249,7 +251,7 @@ fn keep_nearer<const N: usize>(
     outside: &[i32; N],
     triangle: u32,
 ) {
-    // Masks are all-ones or zero, lane by lane: a choice here becomes a branch per lane.
+    // Masks are all-ones or zero in each lane, because a choice would become a branch per lane.
     let mut taken = [0_u32; N];
     for lane in 0..N {
         taken[lane] = !(outside[lane] >> 31).cast_unsigned();
@@ -281,7 +283,7 @@ fn index(offset: i64) -> usize {
     offset as usize
 }
 
-/// Pixel indices are below 2¹⁵ and exact.
+/// Converts a pixel index, which is below 2¹⁵ and exact.
 #[inline(always)]
 fn to_f64(pixel: i64) -> f64 {
     pixel as f64

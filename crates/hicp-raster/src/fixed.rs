@@ -1,18 +1,21 @@
-//! The sub-pixel grid that projected vertices are rounded to.
+//! The sub-pixel grid to which projected vertices are rounded.
 
-/// Binary digits of a pixel. With 20, rounding moves a vertex by less than the `f32` coordinates of
-/// the mesh are good for, and triangles up to 512 px still have edge functions in 64 bits.
+/// Binary digits of a pixel.
+///
+/// With 20, rounding moves a vertex by less than the resolution of the mesh's `f32` coordinates.
+/// Triangles up to 512 px still have edge functions in 64 bits.
 pub(crate) const FRACTION_BITS: u32 = 20;
 
 /// Grid units per pixel.
 pub(crate) const UNITS_PER_PIXEL: f64 = (1_u64 << FRACTION_BITS) as f64;
 
-/// Projected coordinates beyond this many pixels from the origin are clipped. Twice the largest
-/// image side, and a constant, so that the bits of a pixel depend neither on the image nor on the
-/// requested region.
+/// Projected coordinates beyond this many pixels from the origin are clipped.
+///
+/// It is twice the largest image side, and a constant, so that the bits of a pixel do not depend on
+/// the image or on the requested region.
 pub(crate) const GUARD_PIXELS: f64 = 65_536.0;
 
-/// Adding this to a number below 2⁵¹ leaves its nearest integer in the low digits of the mantissa.
+/// Adding this to a number below 2⁵¹ puts its nearest integer into the low digits of the mantissa.
 const ROUNDER: f64 = 1.5 * (1_u64 << 52) as f64;
 
 /// A position in the image plane, in grid units.
@@ -23,7 +26,8 @@ pub(crate) struct FixedPoint {
 }
 
 impl FixedPoint {
-    /// Rounds a position in pixels, at most a few guard bands from the origin, to the grid.
+    /// Rounds a position in pixels to the grid. It must be at most a few guard bands from the
+    /// origin.
     #[inline]
     pub(crate) fn nearest(u: f64, v: f64) -> Self {
         Self {
@@ -33,8 +37,9 @@ impl FixedPoint {
     }
 }
 
-/// Rounds to the nearest integer, half to even. `f64::round` is a library call without SSE4.1, and
-/// this is the hot path.
+/// Rounds to the nearest integer, half to even.
+///
+/// Without SSE4.1, `f64::round` is a library call, and this is the hot path.
 #[inline]
 fn round(x: f64) -> i64 {
     (x + ROUNDER)
@@ -43,13 +48,13 @@ fn round(x: f64) -> i64 {
         .cast_signed()
 }
 
-/// First pixel centre at or after a grid position.
+/// Returns the first pixel center at or after a grid position.
 #[inline]
 pub(crate) fn first_pixel(units: i64) -> i64 {
     (units + ((1 << FRACTION_BITS) - 1)) >> FRACTION_BITS
 }
 
-/// Last pixel centre at or before a grid position.
+/// Returns the last pixel center at or before a grid position.
 #[inline]
 pub(crate) fn last_pixel(units: i64) -> i64 {
     units >> FRACTION_BITS
@@ -78,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn pixel_centres_lie_on_the_grid() {
+    fn pixel_centers_lie_on_the_grid() {
         let p = FixedPoint::nearest(-65_536.0, 32_767.0);
         assert_eq!((first_pixel(p.u), last_pixel(p.u)), (-65_536, -65_536));
         assert_eq!((first_pixel(p.v), last_pixel(p.v)), (32_767, 32_767));

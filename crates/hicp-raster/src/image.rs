@@ -1,4 +1,4 @@
-//! A whole image in one call.
+//! Renders of a whole image in one call.
 
 use hicp_core::{DepthImage, Isometry3, PinholeCamera, RenderedView, Renderer, TriMesh};
 
@@ -6,10 +6,10 @@ use crate::rasterizer::Rasterizer;
 
 /// Renders the depth of a mesh into an image of the camera's size, with the default [`Rasterizer`].
 ///
-/// Depth is along the optical axis in metres, 0 where there is nothing, and 0 beyond
-/// [`MAX_DEPTH_METERS`](hicp_core::MAX_DEPTH_METERS). For tests, tools and first steps: it
-/// allocates everything anew and costs O(image). What renders repeatedly keeps a [`Rasterizer`] and
-/// a [`RenderedView`].
+/// Depth is along the optical axis in meters. It is 0 where there is no surface, and beyond
+/// [`MAX_DEPTH_METERS`](hicp_core::MAX_DEPTH_METERS). It is meant for tests, tools and first steps,
+/// because it allocates all memory again and costs O(image). To render repeatedly, keep a
+/// [`Rasterizer`] and a [`RenderedView`].
 ///
 /// ```
 /// use hicp_core::{Isometry3, PinholeCamera, Point3, TriMesh};

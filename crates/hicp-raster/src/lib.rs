@@ -11,19 +11,18 @@
 //! run and every machine. No, if you need color, texture, anti-aliasing, lens distortion or
 //! transparency. `hicp-core` is re-exported.
 //!
-//! # What is exact and what is not
+//! # Exactness
 //!
 //! - Pixel (u, v) samples the ray through ((u−cx)/fx, (v−cy)/fy, 1). A [`hicp_core::PinholeCamera`]
-//!   has its pixel centres at integers whatever convention its calibration was stated in (see
-//!   [`hicp_core::PixelCenters`]), so there is no half pixel to add here.
+//!   has its pixel centers at integers for every convention of its calibration (see
+//!   [`hicp_core::PixelCenters`]), so half a pixel is never added here.
 //! - Coverage is decided in integers: projected vertices are rounded to a grid of 2⁻²⁰ pixel, and
-//!   edge functions are exact from there on. Triangles that share an edge leave no gap and never
-//!   both cover a pixel, by the top-left rule.
-//! - Depth comes from the plane through the vertices as they were before rounding, in `f64`, and is
-//!   rounded to `f32` once.
-//! - The bits of a pixel do not depend on the requested region, on what was rendered before, or on
-//!   the order of triangles (where two triangles give the same depth, the one that comes first in
-//!   the mesh is named).
+//!   edge functions are exact from there on. By the top-left rule, triangles that share an edge
+//!   leave no gap and never both cover a pixel.
+//! - Depth comes from the plane through the vertices before rounding, in `f64`, and is rounded to
+//!   `f32` once.
+//! - The bits of a pixel do not depend on the requested region, on earlier renders, or on the order
+//!   of triangles. If two triangles have the same depth, the reported one is the first in the mesh.
 //!
 //! # Example
 //!
@@ -49,7 +48,7 @@
 //!
 //! assert_eq!(view.depth_at(320, 240), 0.5);
 //! assert_eq!(view.depth_at(0, 0), 0.0);
-//! assert!(view.region().area() < 250 * 250); // only what the triangle can cover
+//! assert!(view.region().area() < 250 * 250); // only the part that the triangle can cover
 //! # Ok(()) }
 //! ```
 

@@ -11,23 +11,24 @@ use crate::inverse_depth::InverseDepth;
 use crate::projection::{DEFAULT_NEAR_METERS, ProjectedVertex, Projection, effective_near};
 use crate::region::Bounds;
 
-/// Which triangles are skipped because they face away from the camera.
+/// The triangles that are skipped because they face away from the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Culling {
-    /// Skips the back faces of a mesh if it is closed, consistently wound ([`TriMesh::facing`]),
-    /// and beyond the near plane with all its vertices. Draws every other mesh two-sided.
+    /// Skips the back faces of closed meshes, and draws every other mesh two-sided.
     ///
-    /// The depth is that of [`Culling::Never`] for half the work. The two can differ only where a
-    /// mesh intersects itself so that its inside is visible, and at a pixel center within 2⁻²⁰
-    /// pixel of the silhouette, where front and back meet.
+    /// The mesh must be consistently wound ([`TriMesh::facing`]) and beyond the near plane with all
+    /// its vertices. The depth is that of [`Culling::Never`] for half of the work. The two can
+    /// differ only if a mesh intersects itself such that its inside is visible, and at a pixel
+    /// center within 2⁻²⁰ pixel of the silhouette, where front and back meet.
     #[default]
     Auto,
     /// Draws every triangle two-sided.
     Never,
-    /// Skips triangles that are clockwise as seen from the camera. Assumes, without a check, that
-    /// the mesh is wound counter-clockwise seen from outside.
+    /// Skips triangles that are clockwise as seen from the camera.
+    ///
+    /// It assumes, without a check, that the mesh is wound counter-clockwise as seen from outside.
     BackFaces,
 }
 
@@ -35,10 +36,11 @@ pub enum Culling {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RasterConfig {
-    /// Depth of the near plane, meters: nearer surface is cut away. Values below 1 µm and NaN count
-    /// as 1 µm. Default: [`DEFAULT_NEAR_METERS`].
+    /// Depth of the near plane, meters. Default: [`DEFAULT_NEAR_METERS`].
+    ///
+    /// Nearer surface is clipped. Values below 1 µm and NaN count as 1 µm.
     pub near_meters: f64,
-    /// Which triangles are skipped because they face away. Default: [`Culling::Auto`].
+    /// The triangles to skip because they face away. Default: [`Culling::Auto`].
     pub culling: Culling,
 }
 
@@ -53,24 +55,24 @@ impl Default for RasterConfig {
 
 /// Renders depth and visible triangles of meshes on the CPU; implements [`Renderer`].
 ///
-/// Holds its configuration and scratch memory, which grows with the largest mesh seen: 40 bytes per
-/// vertex. The result of a render depends on its arguments and the configuration alone. Use one per
-/// thread.
+/// It has a configuration and scratch memory, which grows with the largest mesh rendered: 40 bytes
+/// per vertex. The result of a render depends only on its arguments and the configuration. Use one
+/// per thread.
 ///
 /// Beyond the contract of [`Renderer`]:
 ///
-/// - The requested region is cut to the image. The view is then reset to
+/// - The requested region is clipped to the image. The view is then reset to
 ///   [`projected_region`](crate::projected_region) over all vertices, used or not, or to an empty
 ///   region at the origin.
-/// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]; of several at the
-///   same depth, the first.
-/// - Depth agrees with the ray's intersection to about 10⁻⁷ of its value, except within 2⁻²⁰ pixel
-///   of an edge and for triangles seen so nearly edge-on that the vertices do not determine it; it
-///   always lies in the depth range of the triangle.
+/// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]. Of several triangles
+///   at the same depth, it is the first.
+/// - Depth agrees with the intersection of the ray to about 10⁻⁷ of its value. Exceptions are
+///   positions within 2⁻²⁰ pixel of an edge, and triangles so nearly edge-on that the vertices do
+///   not determine it. It always lies in the depth range of the triangle.
 /// - A pose that is not finite, or beyond 10³⁰ m, shows nothing.
 ///
-/// Cost: O(vertices + triangles + pixels of the view + pixels covered, counting overdraw). The
-/// first render of a mesh with [`Culling::Auto`] also finds its facing, once per mesh.
+/// Cost: O(vertices + triangles + pixels of the view + covered pixels, including overdraw). The
+/// first render of a mesh with [`Culling::Auto`] also computes its facing, once per mesh.
 #[derive(Clone, Default)]
 pub struct Rasterizer {
     config: RasterConfig,
@@ -117,7 +119,7 @@ impl Rasterizer {
         match self.config.culling {
             Culling::Never => Keep::Both,
             Culling::BackFaces => Keep::Negative,
-            // The near plane opens a closed mesh, and one may look inside.
+            // The near plane opens a closed mesh, so its inside may be visible.
             Culling::Auto if bounds.is_cut() => Keep::Both,
             Culling::Auto => match mesh.facing() {
                 Facing::Outward => Keep::Negative,
@@ -162,7 +164,7 @@ impl Renderer for Rasterizer {
     }
 }
 
-/// The triangles of a mesh, drawn one after the other.
+/// The loop that draws the triangles of a mesh one after the other.
 struct Draw<'a> {
     mesh: &'a TriMesh,
     vertices: &'a [ProjectedVertex],
@@ -194,7 +196,7 @@ impl VectorLoop for Draw<'_> {
     }
 }
 
-/// Draws what the near plane and the guard band leave of a triangle.
+/// Draws the part of a triangle beyond the near plane and inside the guard band.
 #[cold]
 fn draw_clipped(draw: &mut Draw<'_>, id: u32) {
     let (mesh, projection) = (draw.mesh, &draw.projection);
@@ -202,7 +204,7 @@ fn draw_clipped(draw: &mut Draw<'_>, id: u32) {
         .corners(id as usize)
         .map(|corner| projection.homogeneous(&corner));
     let polygon = draw.clipper.clip(triangle, draw.near);
-    // Beyond the range of `f64` there are no pixels: infinities of both signs have met in clipping.
+    // Infinities of both signs have met in clipping: beyond the range of `f64` there are no pixels.
     if !polygon.iter().all(|h| h.is_finite()) {
         return;
     }
@@ -215,7 +217,7 @@ fn draw_clipped(draw: &mut Draw<'_>, id: u32) {
     let plane = InverseDepth::through_homogeneous(triangle, low, high);
     let fixed = |index: usize| {
         let h = polygon[index];
-        // Where coordinates are so large that clipping is inexact, this keeps the integers in their
+        // If coordinates are so large that clipping is inexact, this keeps the integers in their
         // range.
         let limit = 2.0 * GUARD_PIXELS;
         FixedPoint::nearest(

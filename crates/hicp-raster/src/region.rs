@@ -1,14 +1,13 @@
-//! What a mesh can cover.
+//! The part of an image that a mesh can cover.
 
 use hicp_core::{Isometry3, PinholeCamera, PixelRegion, Point3};
 
 use crate::projection::{Projection, effective_near};
 
-/// How far rounding to the sub-pixel grid and in the projection can move an edge, generously, in
-/// pixels.
+/// Upper limit, in pixels, of the shift of an edge by rounding in projection and sub-pixel grid.
 const ROUNDING_MARGIN_PIXELS: f64 = 1.0e-5;
 
-/// Where the vertices of a mesh project to.
+/// The bounding box of the projected vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     u_min: f64,
@@ -19,7 +18,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of nothing.
+    /// The bounds of no vertices.
     pub(crate) const EMPTY: Self = Self {
         u_min: f64::INFINITY,
         u_max: f64::NEG_INFINITY,
@@ -28,35 +27,36 @@ impl Bounds {
         cut: false,
     };
 
-    /// Takes in a vertex beyond the near plane, at pixel (u, v).
+    /// Extends the bounds by a vertex beyond the near plane, at pixel (u, v).
     #[inline]
     pub(crate) fn include(&mut self, u: f64, v: f64) {
-        // Not `f64::min`: a comparison is one instruction, and there is no NaN to look after.
+        // Not `f64::min`: a comparison is one instruction, and NaN cannot occur.
         self.u_min = if u < self.u_min { u } else { self.u_min };
         self.u_max = if u > self.u_max { u } else { self.u_max };
         self.v_min = if v < self.v_min { v } else { self.v_min };
         self.v_max = if v > self.v_max { v } else { self.v_max };
     }
 
-    /// Takes in a vertex in front of the near plane.
+    /// Extends the bounds by a vertex in front of the near plane.
     #[inline]
     pub(crate) fn include_cut(&mut self) {
         self.cut = true;
     }
 
-    /// Whether some vertex lies in front of the near plane.
+    /// Returns whether a vertex lies in front of the near plane.
     pub(crate) fn is_cut(&self) -> bool {
         self.cut
     }
 
-    /// Returns the part of `region` that triangles over these vertices can cover, of area 0 in the
-    /// default place if none.
+    /// Returns the part of `region` that triangles over these vertices can cover.
+    ///
+    /// If there is none, returns the default region, which is empty.
     pub(crate) fn region_within(&self, region: &PixelRegion) -> PixelRegion {
         if self.u_min > self.u_max || region.is_empty() {
             return PixelRegion::default();
         }
         if self.cut {
-            // Triangles that cross the near plane reach to places that no vertex projects to.
+            // Triangles that cross the near plane reach places that no vertex projects to.
             return *region;
         }
         let covered = PixelRegion {
@@ -74,25 +74,26 @@ impl Bounds {
     }
 }
 
-/// Converts to a pixel index; what lies outside saturates, and the intersection with the image does
-/// the rest.
+/// Converts to a pixel index. Values outside saturate, and the intersection with the image clips
+/// them.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "saturation is what is wanted"
+    reason = "saturation is intended"
 )]
 fn to_pixel(x: f64) -> u32 {
     x as u32
 }
 
-/// Returns the part of `region` that the projection of some points, or of any triangles over them,
-/// can cover.
+/// Returns the part of `region` that triangles over some points can cover.
 ///
-/// Points are in metres in the object frame. `region` is cut to the image first. The result is the
-/// bounding box of the projected points, in whole pixels whose centres it holds; all of `region` if
-/// some points lie in front of the near plane (`near_meters` along the optical axis, as in
-/// [`RasterConfig`](crate::RasterConfig)) and some beyond it; empty if all lie in front of it or
-/// nothing projects into `region`.
+/// Points are in meters in the object frame. `region` is first clipped to the image. The result
+/// contains the pixels whose centers lie in the bounding box of the projected points.
+///
+/// The near plane is at `near_meters` along the optical axis, as in
+/// [`RasterConfig`](crate::RasterConfig). If some points lie in front of it and some beyond it, the
+/// result is all of `region`. If all lie in front of it, or nothing projects into `region`, it is
+/// empty.
 ///
 /// [`Rasterizer`](crate::Rasterizer) resets its view to this region over all vertices of the mesh.
 /// Cost: O(points).

@@ -1,4 +1,4 @@
-//! Shared edges: neither gaps nor double hits, wherever the vertices lie.
+//! Tests of shared edges, which must have neither gaps nor double hits for any vertices.
 
 use crate::common::*;
 use hicp_core::{Isometry3, PinholeCamera, Point3, TriMesh};
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 const SIDE: u32 = 24;
 
-/// A camera and plane in which object coordinates are pixels: x = u, y = v, seen from 1 m at 1 px per m.
+/// A camera for which object coordinates at 1 m are pixels: x = u, y = v.
 fn pixel_camera() -> PinholeCamera {
     PinholeCamera::new(1.0, 1.0, 0.0, 0.0, SIDE, SIDE).unwrap()
 }
@@ -17,7 +17,7 @@ fn flat_mesh(points: &[(f32, f32)], triangles: &[[u32; 3]]) -> TriMesh {
     TriMesh::new(vertices.collect(), triangles.to_vec()).unwrap()
 }
 
-/// How many triangles cover every pixel, each rendered alone.
+/// Returns the number of triangles that cover every pixel, each rendered alone.
 fn hits(mesh: &TriMesh, camera: &PinholeCamera, pose: &Isometry3<f64>) -> Vec<u32> {
     let mut hits = vec![0; camera.region().area()];
     for &triangle in mesh.triangles() {
@@ -53,7 +53,7 @@ fn the_top_and_left_edges_own_their_pixels() {
 }
 
 #[test]
-fn a_vertex_on_a_pixel_centre_belongs_to_one_triangle_of_its_fan() {
+fn a_vertex_at_a_pixel_center_belongs_to_one_triangle_of_its_fan() {
     let camera = pixel_camera();
     let centre = (10.0, 10.0);
     let ring = [
@@ -78,7 +78,9 @@ fn a_vertex_on_a_pixel_centre_belongs_to_one_triangle_of_its_fan() {
     }
 }
 
-/// A grid over the whole image whose inner points are moved, by quarters of a pixel so that many fall on centres.
+/// A grid over the whole image whose inner points are moved by quarters of a pixel.
+///
+/// Many points are therefore at pixel centers.
 fn grid() -> impl Strategy<Value = TriMesh> {
     const CELLS: usize = 6;
     let moves = prop::collection::vec(
@@ -115,7 +117,7 @@ fn grid() -> impl Strategy<Value = TriMesh> {
     })
 }
 
-/// Signed area in the image, as wound.
+/// Returns the signed area in the image, as wound.
 fn area(mesh: &TriMesh, triangle: usize) -> f32 {
     let [a, b, c] = mesh.corners(triangle);
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
@@ -126,15 +128,16 @@ proptest! {
 
     #[test]
     fn a_tessellation_covers_every_pixel_once(mesh in grid()) {
-        // A cell may be folded over; then its neighbours cover twice by right.
+        // A cell may be folded over. Its neighbors then rightly cover twice.
         let folded = (0..mesh.triangles().len()).any(|t| area(&mesh, t) < 0.0);
         let hits = hits(&mesh, &pixel_camera(), &one_meter());
         prop_assert!(hits.iter().all(|hit| *hit >= 1));
         prop_assert!(folded || hits.iter().all(|hit| *hit == 1));
     }
 
-    /// The same in general position and in perspective, where rounding decides: every pixel of a plane that fills the
-    /// image is hit once.
+    /// Tests general positions in perspective, where rounding decides.
+    ///
+    /// Every pixel of a plane that fills the image is hit once.
     #[test]
     fn a_tilted_tessellation_covers_every_pixel_once(
         mesh in grid(),
@@ -151,7 +154,9 @@ proptest! {
         prop_assert!(hits.iter().all(|hit| *hit == 1), "{:?}", hits);
     }
 
-    /// Cut by the near plane and the guard band, pieces still fit: a floor below the camera, from behind it to the horizon.
+    /// Pieces clipped by the near plane and the guard band still fit.
+    ///
+    /// The scene is a floor below the camera, from behind it to the horizon.
     #[test]
     fn a_clipped_tessellation_has_neither_gaps_nor_double_hits(
         mesh in grid(),
@@ -166,7 +171,7 @@ proptest! {
             * Isometry3::translation(-12.0, -12.0, 0.0);
         let hits = hits(&mesh, &camera, &pose);
         for (hit, (u, v)) in hits.iter().zip(pixels(&camera)) {
-            // The floor's depth along the pixel's ray, and where it is met.
+            // The floor's depth along the pixel's ray, and the intersection.
             let depth = height / ((f64::from(v) - 2.3) / 12.0);
             let point = camera.unproject(f64::from(u), f64::from(v), depth);
             if depth > 0.011 && depth < 11.0 && point.x.abs() < 7.0 {
@@ -178,11 +183,12 @@ proptest! {
     }
 }
 
-/// A closed mesh seen with its vertices and edges exactly on pixel centres.
+/// A closed mesh with its vertices and edges exactly at pixel centers.
 #[test]
-fn a_closed_mesh_on_pixel_centres_has_no_hole() {
+fn a_closed_mesh_at_pixel_centers_has_no_hole() {
     let camera = PinholeCamera::new(8.0, 8.0, 12.0, 12.0, SIDE, SIDE).unwrap();
-    // An octahedron whose ring lies at depth 1 with corners at whole pixels; its poles project to the centre pixel.
+    // An octahedron whose ring lies at depth 1 with corners at integer pixels. Its poles project to
+    // the center pixel.
     let r = 1.0;
     let mesh = TriMesh::new(
         vec![
@@ -222,7 +228,7 @@ fn a_closed_mesh_on_pixel_centres_has_no_hole() {
     }
 }
 
-/// Triangles larger than 512 px take another path through the arithmetic; it draws the same.
+/// Triangles larger than 512 px use another code path with the same result.
 #[test]
 fn large_triangles_cover_every_pixel_once() {
     let camera = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, 4000, 3).unwrap();

@@ -1,4 +1,4 @@
-//! What must not change the result, to the bit.
+//! Tests of changes that must not change the result, to the bit.
 
 use crate::common::*;
 use hicp_core::{Facing, PixelRegion, RenderedView, Renderer, TriMesh};
@@ -26,7 +26,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn the_order_of_triangles(
+    fn the_order_of_triangles_does_not_matter(
         (mesh, order) in any_mesh().prop_flat_map(|mesh| {
             let order: Vec<usize> = (0..mesh.triangles().len()).collect();
             (Just(mesh), Just(order).prop_shuffle())
@@ -42,7 +42,7 @@ proptest! {
     }
 
     #[test]
-    fn the_requested_region(mesh in any_mesh(), pose in pose(-0.1..0.8), region in region()) {
+    fn the_requested_region_does_not_matter(mesh in any_mesh(), pose in pose(-0.1..0.8), region in region()) {
         let camera = camera();
         let full = render(Culling::Auto, &mesh, &camera, &pose);
         let part = render_region(&mut rasterizer(Culling::Auto), &mesh, &camera, &pose, &region);
@@ -60,7 +60,7 @@ proptest! {
     }
 
     #[test]
-    fn what_was_rendered_before(
+    fn earlier_renders_do_not_matter(
         meshes in [any_mesh(), any_mesh()],
         poses in [pose(-0.1..0.8), pose(-0.1..0.8)],
     ) {
@@ -73,14 +73,14 @@ proptest! {
     }
 
     #[test]
-    fn the_winding_of_a_closed_mesh(mesh in closed_mesh(), pose in pose(-0.1..0.8)) {
+    fn the_winding_of_a_closed_mesh_does_not_matter(mesh in closed_mesh(), pose in pose(-0.1..0.8)) {
         let camera = camera();
         let inward = flipped(&mesh);
         prop_assert_eq!(mesh.facing(), Facing::Outward);
         prop_assert_eq!(inward.facing(), Facing::Inward);
         let outward = render(Culling::Auto, &mesh, &camera, &pose);
         let inward = render(Culling::Auto, &inward, &camera, &pose);
-        // Corners are taken in another order, so the last bit is free.
+        // Corners are processed in another order, so the last bit may differ.
         for (&a, &b) in outward.depth().iter().zip(inward.depth()) {
             prop_assert!((a - b).abs() <= 3e-7 * a, "{} {}", a, b);
         }
@@ -96,10 +96,12 @@ proptest! {
     }
 }
 
-/// Culling drops only what is hidden. Drawn from a fixed seed: at a pixel centre within 2⁻²⁰ pixel of a silhouette, one in
-/// a hundred thousand images, the two may differ by what separates front and back there.
+/// Culling removes only hidden triangles.
+///
+/// The seed is fixed. At a pixel center within 2⁻²⁰ pixel of a silhouette, which occurs in one of a
+/// hundred thousand images, the two may differ by the distance between front and back.
 #[test]
-fn culling_of_a_closed_mesh() {
+fn culling_a_closed_mesh_does_not_matter() {
     let mut runner = TestRunner::new_with_rng(
         Config::default(),
         proptest::test_runner::TestRng::deterministic_rng(

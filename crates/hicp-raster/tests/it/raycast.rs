@@ -1,4 +1,4 @@
-//! The rasterizer against an independent ray-caster.
+//! Tests of the rasterizer against an independent ray caster.
 
 use crate::common::*;
 use hicp_core::{Isometry3, PinholeCamera, PixelCenters, Point3};
@@ -36,9 +36,9 @@ proptest! {
         assert_agrees(&view, &mesh, &camera, &pose, 1e-4);
     }
 
-    /// Away from edges seen edge-on, depth is as good as its `f32`.
+    /// Away from surfaces that are nearly edge-on, depth is accurate to its `f32`.
     #[test]
-    fn depth_of_a_facing_surface_is_good_to_the_last_bits(pose in pose(0.3..2.0)) {
+    fn depth_of_a_facing_surface_is_accurate_to_the_last_bits(pose in pose(0.3..2.0)) {
         let (mesh, camera) = (icosphere(1), camera());
         let view = render(Culling::Auto, &mesh, &camera, &pose);
         for (u, v) in pixels(&camera) {
@@ -53,9 +53,9 @@ proptest! {
         }
     }
 
-    /// The triangle that is named is one that the ray meets at the depth that is given.
+    /// The ray must meet the reported triangle at the reported depth.
     #[test]
-    fn the_triangle_is_the_one_that_is_seen(mesh in soup(), pose in pose(0.2..1.0)) {
+    fn the_reported_triangle_is_the_visible_one(mesh in soup(), pose in pose(0.2..1.0)) {
         let camera = camera();
         let view = render(Culling::Auto, &mesh, &camera, &pose);
         for (u, v) in pixels(&camera) {
@@ -73,7 +73,7 @@ proptest! {
 }
 
 #[test]
-fn the_comparison_sees_surface() {
+fn the_compared_images_show_surface() {
     let (mesh, camera) = (icosphere(2), camera());
     let pose = Isometry3::translation(0.0, -0.1, 0.4);
     let view = render(Culling::Auto, &mesh, &camera, &pose);
@@ -81,7 +81,7 @@ fn the_comparison_sees_surface() {
 }
 
 #[test]
-fn pixel_centres_at_halves_are_half_a_pixel_further() {
+fn pixel_centers_at_halves_shift_by_half_a_pixel() {
     let halves = PixelCenters::AtHalves;
     let camera = PinholeCamera::with_pixel_centers(halves, 40.0, 40.0, 16.0, 16.0, 32, 32).unwrap();
     // A slanted plane z = 1 + x/2 + y/4, large enough to fill the image.
@@ -93,7 +93,7 @@ fn pixel_centres_at_halves_are_half_a_pixel_further() {
     .unwrap();
     let view = render(Culling::Auto, &mesh, &camera, &Isometry3::identity());
     for (u, v) in pixels(&camera) {
-        // By the calibration's own convention: the centre of pixel u is at u + ½.
+        // By the calibration's own convention, the center of pixel u is at u + ½.
         let x = (f64::from(u) + 0.5 - 16.0) / 40.0;
         let y = (f64::from(v) + 0.5 - 16.0) / 40.0;
         let depth = 1.0 / (1.0 - x / 2.0 - y / 4.0);

@@ -1,4 +1,4 @@
-//! Scenes that break renderers.
+//! Tests of scenes that are hard to render.
 
 use crate::common::*;
 use hicp_core::{
@@ -24,7 +24,7 @@ fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::translation(x, y, z)
 }
 
-/// Renders over a view that holds something already.
+/// Renders over a view with previous content.
 fn render_over(
     config: RasterConfig,
     mesh: &TriMesh,
@@ -46,7 +46,7 @@ fn render_over(
 }
 
 #[test]
-fn what_is_not_to_be_seen_leaves_an_empty_view() {
+fn invisible_scenes_give_an_empty_view() {
     let config = RasterConfig::default();
     let image = camera().region();
     let aside = PixelRegion {
@@ -90,7 +90,7 @@ fn what_is_not_to_be_seen_leaves_an_empty_view() {
 }
 
 #[test]
-fn what_fills_the_view_fills_it() {
+fn a_surface_larger_than_the_view_fills_it() {
     let view = render_over(
         RasterConfig::default(),
         &square(3.0),
@@ -103,7 +103,7 @@ fn what_fills_the_view_fills_it() {
 }
 
 #[test]
-fn pixels_without_depth_have_no_triangle_and_the_others_one() {
+fn pixels_have_a_triangle_exactly_if_they_have_depth() {
     let mesh = torus(12, 7);
     for z in [0.0, 0.05, 0.4] {
         let view = render(Culling::Auto, &mesh, &camera(), &at(0.0, 0.0, z));
@@ -118,8 +118,8 @@ fn pixels_without_depth_have_no_triangle_and_the_others_one() {
 }
 
 #[test]
-fn the_near_plane_cuts_where_it_says() {
-    // A floor half a metre below the camera, from behind it to 10 m.
+fn the_near_plane_clips_at_its_distance() {
+    // A floor half a meter below the camera, from behind it to 10 m.
     let camera = PinholeCamera::new(50.0, 50.0, 32.0, 0.0, 65, 200).unwrap();
     let mesh = TriMesh::new(
         vec![
@@ -165,22 +165,22 @@ fn a_closed_mesh_around_the_camera_shows_its_inside() {
     let inside = render(Culling::Auto, &mesh, &camera, &Isometry3::identity());
     assert_eq!(inside.region(), camera.region());
     assert!(inside.depth().iter().all(|z| *z > 0.05));
-    // Its back faces are all that there is to see.
+    // Only its back faces are visible.
     let culled = render(Culling::BackFaces, &mesh, &camera, &Isometry3::identity());
     assert!(culled.depth().iter().all(|z| *z == 0.0));
 }
 
 #[test]
-fn back_faces_go_by_their_winding() {
+fn back_faces_follow_their_winding() {
     let camera = camera();
     let pose = at(0.0, -0.1, 0.4);
     let outward = icosphere(1);
     let auto = render(Culling::Auto, &outward, &camera, &pose);
     assert_eq!(render(Culling::BackFaces, &outward, &camera, &pose), auto);
-    // Turned inside out, the far side is drawn.
+    // With inverted winding, the far side is drawn.
     let inside_out = render(Culling::BackFaces, &flipped(&outward), &camera, &pose);
     assert!(inside_out.depth_at(21, 19) > auto.depth_at(21, 19) + 0.1);
-    // An open mesh is drawn from both sides unless it is told otherwise.
+    // An open mesh is drawn from both sides, unless the configuration says otherwise.
     let (seen, turned) = (flipped(&square(0.1)), square(0.1));
     let count = |mesh: &TriMesh, culling| {
         let view = render(culling, mesh, &camera, &pose);
@@ -200,7 +200,7 @@ fn degenerate_triangles_are_skipped() {
     let camera = camera();
     let square = square(0.2);
     let mut vertices = square.vertices().to_vec();
-    // A point, a line on pixel centres, a repeated corner; all nearer than the square.
+    // A point, a line on pixel centers, and a repeated corner, all nearer than the square.
     vertices.extend([
         Point3::new(0.0, 0.0, -0.1),
         Point3::new(0.1, 0.0, -0.1),
@@ -223,8 +223,8 @@ fn degenerate_triangles_are_skipped() {
 
 #[test]
 fn a_surface_seen_edge_on_stays_in_its_depth_range() {
-    // A wall along the optical axis from 0.8 m to 1.2 m, less than a sub-pixel beside a column of pixel centres: rounding
-    // gives it a width and a pixel, where its plane is at infinity.
+    // A wall along the optical axis from 0.8 m to 1.2 m, less than a sub-pixel next to a column of
+    // pixel centers. Rounding gives it a width and a pixel, where its plane is at infinity.
     let camera = PinholeCamera::new(50.0, 50.0, 20.0, 20.0, 41, 41).unwrap();
     let wall = TriMesh::new(
         vec![
@@ -249,7 +249,7 @@ fn a_surface_seen_edge_on_stays_in_its_depth_range() {
 }
 
 #[test]
-fn a_mesh_a_thousand_kilometres_away_is_rendered() {
+fn a_mesh_a_thousand_kilometers_away_is_rendered() {
     let camera = PinholeCamera::new(1.0e6, 1.0e6, 20.0, 20.0, 41, 41).unwrap();
     let view = render(Culling::Auto, &square(10.0), &camera, &at(0.0, 0.0, 1.0e6));
     // 20 m at 1 m per pixel.
@@ -262,7 +262,7 @@ fn huge_triangles_are_clipped_and_agree_with_rays() {
     let camera = camera();
     let mesh = square(9.0e5);
     let tilted = Isometry3::rotation(hicp_core::Vector3::new(0.3, 0.2, 0.1));
-    // In front; and through the camera's plane.
+    // In front of the camera, and through its plane.
     for pose in [at(0.0, 0.0, 1.5) * tilted, at(0.0, 0.0, 0.02) * tilted] {
         let view = render(Culling::Auto, &mesh, &camera, &pose);
         assert_eq!(
@@ -328,7 +328,7 @@ fn any_near_plane_is_valid() {
 }
 
 #[test]
-fn the_depth_image_is_the_view_in_its_place() {
+fn the_depth_image_contains_the_view() {
     let (mesh, camera) = (torus(12, 7), camera());
     for pose in [at(0.03, -0.1, 0.5), at(0.0, 0.0, 0.05), at(0.0, 0.0, -1.0)] {
         let image = render_depth_image(&mesh, &camera, &pose);
@@ -343,7 +343,7 @@ fn the_depth_image_is_the_view_in_its_place() {
     }
 }
 
-/// Whoever renders the same again gets the same memory: no buffer is made anew.
+/// Rendering the same again uses the same memory.
 #[test]
 fn a_warm_view_keeps_its_buffers() {
     let (mesh, camera) = (torus(12, 7), camera());
@@ -370,10 +370,12 @@ fn a_warm_view_keeps_its_buffers() {
     );
 }
 
-/// Calibrations that no camera has, up to the last that is accepted; beyond it pixels would leave the range of `f64`, and
-/// infinities of both signs meet in clipping.
+/// Tests focal lengths far beyond those of cameras, up to the largest accepted one.
+///
+/// Beyond it, pixels would leave the range of `f64`, and infinities of both signs would meet in
+/// clipping.
 #[test]
-fn the_longest_focal_lengths_are_survived() {
+fn the_longest_focal_lengths_do_not_panic() {
     let corners = [[-0.57, -0.57, 0.125], [0.5, 0.5, 0.42], [0.0, 0.0, -0.1]].map(Point3::from);
     let long = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
     for huge in [1e6, 1e8, MAX_FOCAL_LENGTH] {

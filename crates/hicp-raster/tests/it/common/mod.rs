@@ -1,4 +1,4 @@
-//! Meshes, poses and an independent ray-caster.
+//! Meshes, poses and an independent ray caster.
 
 use hicp_core::{
     Isometry3, PinholeCamera, PixelRegion, Point3, RenderedView, Renderer, Translation3, TriMesh,
@@ -7,7 +7,8 @@ use hicp_core::{
 use hicp_raster::{Culling, DEFAULT_NEAR_METERS, RasterConfig, Rasterizer};
 use proptest::prelude::*;
 
-/// Non-square pixels, an off-centre principal point, a small image: brute force has to keep up.
+/// A camera with non-square pixels, an off-center principal point, and an image small enough for
+/// brute force.
 pub(crate) fn camera() -> PinholeCamera {
     PinholeCamera::new(52.0, 47.5, 21.3, 30.8, 56, 48).unwrap()
 }
@@ -19,7 +20,7 @@ pub(crate) fn rasterizer(culling: Culling) -> Rasterizer {
     })
 }
 
-/// Renders into a view of its own.
+/// Renders into a new view.
 pub(crate) fn render_region(
     rasterizer: &mut Rasterizer,
     mesh: &TriMesh,
@@ -47,7 +48,7 @@ pub(crate) fn render(
     )
 }
 
-/// The depth bits of the whole image.
+/// Returns the depth bits of the whole image.
 pub(crate) fn depth_bits(view: &RenderedView, camera: &PinholeCamera) -> Vec<u32> {
     pixels(camera)
         .map(|(u, v)| view.depth_at(u, v).to_bits())
@@ -59,9 +60,10 @@ pub(crate) fn pixels(camera: &PinholeCamera) -> impl Iterator<Item = (u32, u32)>
     (0..camera.height()).flat_map(move |v| (0..width).map(move |u| (u, v)))
 }
 
-/// The nearest intersection of a pixel's ray with any triangle, either side, at or beyond the near plane.
+/// Returns the nearest intersection of a pixel's ray with any triangle at or beyond the near plane.
 ///
-/// Möller and Trumbore's test in `f64`, in the object frame: nothing is shared with the rasterizer.
+/// Both sides of triangles count. It is Möller and Trumbore's test in `f64`, in the object frame,
+/// and shares nothing with the rasterizer.
 pub(crate) fn cast(
     mesh: &TriMesh,
     camera: &PinholeCamera,
@@ -94,9 +96,9 @@ pub(crate) fn cast(
     nearest
 }
 
-/// Whether a pixel centre is within `margin` pixels of a triangle's edge or of where the near plane cuts one.
+/// Returns whether a pixel center is within `margin` pixels of an edge of the clipped triangle.
 ///
-/// Decided on the outline of the triangle cut at the near plane, projected.
+/// The edges are those of the triangle after clipping at the near plane and projecting.
 pub(crate) fn near_an_edge(
     mesh: &TriMesh,
     camera: &PinholeCamera,
@@ -145,7 +147,9 @@ fn segment_distance(c: (f64, f64), p: (f64, f64), q: (f64, f64)) -> f64 {
     (c.0 - p.0 - t * dx).hypot(c.1 - p.1 - t * dy)
 }
 
-/// Asserts that a view agrees with the ray-caster at every pixel that no edge comes near; returns how many were hit.
+/// Asserts that a view agrees with the ray caster at every pixel away from edges.
+///
+/// Returns the number of hit pixels.
 pub(crate) fn assert_agrees(
     view: &RenderedView,
     mesh: &TriMesh,
@@ -169,7 +173,7 @@ pub(crate) fn assert_agrees(
     hits
 }
 
-/// An icosahedron, subdivided, of radius 0.1 m.
+/// A subdivided icosahedron of radius 0.1 m.
 pub(crate) fn icosphere(subdivisions: u32) -> TriMesh {
     let phi = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut vertices: Vec<Vector3<f64>> = Vec::new();
@@ -178,7 +182,7 @@ pub(crate) fn icosphere(subdivisions: u32) -> TriMesh {
         vertices.push(Vector3::new(a, b, 0.0));
         vertices.push(Vector3::new(b, 0.0, a));
     }
-    // The faces are the triples of neighbours, at distance 2; wound so that they face outwards.
+    // The faces are the triples of neighbors, at distance 2, wound to face outward.
     let mut triangles: Vec<[usize; 3]> = Vec::new();
     let adjacent = |p: &Vector3<f64>, q: &Vector3<f64>| ((p - q).norm() - 2.0).abs() < 1e-9;
     for i in 0..12 {
@@ -270,7 +274,7 @@ pub(crate) fn mesh_of(vertices: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Tr
     .unwrap()
 }
 
-/// The same surface, wound the other way round.
+/// The same surface with the opposite winding.
 pub(crate) fn flipped(mesh: &TriMesh) -> TriMesh {
     let triangles = mesh.triangles().iter().map(|&[a, b, c]| [a, c, b]);
     TriMesh::new(mesh.vertices().to_vec(), triangles.collect()).unwrap()
@@ -303,7 +307,7 @@ pub(crate) fn soup() -> impl Strategy<Value = TriMesh> {
     )
 }
 
-/// Any orientation, at a distance between the given ones, shifted off the axis and partly out of the image.
+/// Poses of any orientation at a distance in a range, off the axis and partly outside of the image.
 pub(crate) fn pose(z: std::ops::Range<f64>) -> impl Strategy<Value = Isometry3<f64>> {
     (
         [-1.0..1.0, -1.0..1.0, -1.0..1.0_f64],
