@@ -1,4 +1,4 @@
-//! Fusing all estimates at once: `average` and `weighted-average`.
+//! Fusers that fuse all estimates at once: `average` and `weighted-average`.
 
 use hicp_core::Matrix6;
 
@@ -9,36 +9,37 @@ use crate::fusion::Fusion;
 use crate::motion::{CameraMotion, Transport};
 use crate::solution::Solution;
 
-/// The weights of estimates.
+/// The source of the weights of estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Weights {
     /// Equal weights, from the unit covariance.
     Constant,
-    /// The inverses of the estimates' own covariances.
+    /// The inverse covariances of the estimates.
     Own,
 }
 
 /// Keeps every estimate and fuses all of them again with every update (§V-A).
 ///
-/// `average` gives the estimates equal covariances; `weighted-average` uses their own. In both
-/// methods the covariance of the result follows from the estimates' own. The covariance of a camera
-/// motion is added to every estimate held. Its errors are the same in all of them, which
+/// `average` weighs the estimates equally; `weighted-average` uses their own covariances. In both
+/// methods, the covariance of the result follows from those of the estimates. The covariance of a
+/// camera motion is added to every held estimate. Its errors are the same in all of them, which
 /// [`crate::RecursiveFuser`] accounts for and this fuser does not.
 ///
-/// Cost of an update: about 1 µs per estimate held, see [`Fusion`]. Memory: about 700 bytes per
+/// Cost of an update: about 1 µs per held estimate, see [`Fusion`]. Memory: about 700 bytes per
 /// estimate, up to the window.
 #[derive(Clone, Debug)]
 pub struct BatchFuser {
     config: FuserConfig,
     weights: Weights,
-    /// In the anchor's frame.
+    /// The held estimates, in the anchor's frame.
     held: Vec<Held>,
-    /// In the current camera frame.
+    /// The fused estimate, in the current camera frame.
     fused: Option<PoseEstimate>,
     /// Invariant: its terms are those of `held`.
     fusion: Fusion,
-    /// From the camera frame in which the estimates are held. Fusing is equivariant, so they need
-    /// not move with the camera.
+    /// The motion from the anchor, the camera frame of the held estimates, to the current frame.
+    ///
+    /// Fusing is equivariant, so held estimates need not move with the camera.
     camera_from_anchor: CameraMotion,
 }
 
@@ -49,7 +50,7 @@ struct Held {
 }
 
 impl BatchFuser {
-    /// Creates `average`: all estimates have equal weights, whatever their covariances.
+    /// Creates `average`: all estimates have equal weights, regardless of their covariances.
     #[must_use]
     pub fn average(config: FuserConfig) -> Self {
         Self::new(config, Weights::Constant)
@@ -72,7 +73,7 @@ impl BatchFuser {
         }
     }
 
-    /// Returns the number of estimates held.
+    /// Returns the number of held estimates.
     #[must_use]
     pub fn len(&self) -> usize {
         self.held.len()
@@ -89,7 +90,7 @@ impl BatchFuser {
         CameraMotion::exact(self.camera_from_anchor.next_camera_from_camera().inverse())
     }
 
-    /// Fuses the estimates held, starting from the last fused estimate.
+    /// Fuses the held estimates, starting from the last fused one.
     fn fuse(&mut self, start: &PoseEstimate) -> Solution {
         let to_anchor = self.anchor_from_camera();
         let start = to_anchor.next_camera_from_camera() * start.camera_from_object;
@@ -107,7 +108,7 @@ impl BatchFuser {
         fused.solution
     }
 
-    /// Moves everything held to the current camera frame.
+    /// Moves all held estimates to the current camera frame.
     fn rebase(&mut self) {
         let motion = std::mem::replace(&mut self.camera_from_anchor, CameraMotion::none());
         for held in &mut self.held {
@@ -137,7 +138,7 @@ impl Fuser for BatchFuser {
             self.fusion
                 .push_weighted(&held.estimate.camera_from_object, &held.weight);
         }
-        // With the adjoint, the carried result is the result of the carried estimates. Kept
+        // With the adjoint, the moved result equals the result of the moved estimates. Kept
         // covariances weigh differently in the new frame.
         if let (Transport::Kept, Some(start), 2..) = (transport, self.fused, self.held.len()) {
             self.fuse(&start);

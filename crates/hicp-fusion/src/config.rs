@@ -1,28 +1,31 @@
-//! What the methods of §V-A are made with.
+//! The options of the methods of §V-A.
 
 use crate::motion::Transport;
 use crate::solution::FusionLimits;
 use crate::unit::UnitCovariance;
 
-/// Options of the six methods. Any value is valid; the default is the paper's reading, but for
-/// covariances carried by the adjoint.
+/// Options of the six methods. Any value is valid.
+///
+/// The defaults are the paper's, except that covariances are transported by the adjoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FuserConfig {
-    /// What happens to covariances when the camera moves.
+    /// The transport of covariances when the camera moves.
     pub transport: Transport,
-    /// The covariance that `average` and `filtering-constant` give to every estimate.
+    /// The covariance of every estimate in `average` and `filtering-constant`.
     pub unit: UnitCovariance,
-    /// When the iteration ends.
+    /// The limits of the iteration.
     pub limits: FusionLimits,
-    /// The most estimates that `average` and `weighted-average` hold, the newest; all of them where
-    /// `None`. At least one is held.
+    /// Largest number of held estimates in `average` and `weighted-average`; `None` for all.
+    ///
+    /// The newest ones are held, and at least one.
     pub window: Option<usize>,
 }
 
 impl FuserConfig {
-    /// The plain reading of §V: covariances are I₆ and e_MVE·I₆, and stay as they are when the
-    /// camera moves.
+    /// Creates the plain reading of §V.
+    ///
+    /// Covariances are I₆ and e_MVE·I₆, and do not change when the camera moves.
     #[must_use]
     pub fn paper() -> Self {
         Self {

@@ -1,16 +1,17 @@
-//! The covariance of a single estimate, from what is known about it.
+//! The covariance of a single estimate, from its MVE and its registration.
 
 use hicp_core::{Isometry3, Matrix6};
 
 use crate::unit::UnitCovariance;
 
-/// The paper's floor is open; this one keeps an exact match (e_MVE = 0) invertible.
+/// The default floor of e_MVE, which keeps an exact match (e_MVE = 0) invertible.
+///
+/// The paper does not state a floor.
 pub const MVE_FLOOR: f64 = 1e-3;
 
-/// e_MVE times a unit covariance: the paper's proxy (§V), which it calls "not theoretically
-/// grounded".
+/// The covariance e_MVE times a unit covariance: the paper's proxy (§V).
 ///
-/// An MVE that is not known counts as 1.
+/// The paper calls it "not theoretically grounded". An unknown MVE counts as 1.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -20,13 +21,14 @@ pub const MVE_FLOOR: f64 = 1e-3;
 /// assert_eq!(paper.covariance(&pose, Some(0.25)), Matrix6::identity() * 0.25);
 /// assert_eq!(paper.covariance(&pose, Some(0.0)), Matrix6::identity() * 1e-3);
 /// ```
-// Deviation: §V weighs by e_MVE as it is; an exact match would weigh infinitely, so e_MVE is floored at 1e-3.
+// Deviation: §V weighs by e_MVE as it is; an exact match would weigh infinitely, so e_MVE is
+// floored at 1e-3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MveCovariance {
-    /// What an MVE of 1 means.
+    /// The covariance at an MVE of 1.
     pub unit: UnitCovariance,
-    /// Smallest factor, dimensionless like the MVE.
+    /// Smallest factor, without unit like the MVE.
     pub floor: f64,
 }
 
@@ -53,39 +55,38 @@ impl MveCovariance {
     }
 }
 
-/// The covariance of the registration itself, inflated by what the MVE says about wrong
-/// correspondences.
+/// The covariance of the registration, inflated by the MVE for wrong correspondences.
 ///
-/// Σ = s² Σ_reg + (f² + (g e^p)²) U with U the unit covariance. Σ_reg (`Quality::covariance` of an
-/// outcome) knows which directions the geometry constrains, but assumes that the pairs are right
-/// and their errors independent; the second term is what it does not know: a floor of f units that
-/// no image is better than (systematic errors of camera and model), and a share that grows with the
-/// MVE e. Where the pairs leave a direction open there is no Σ_reg, and the share is `undetermined`
-/// units instead of f.
+/// Σ = s² Σ_reg + (f² + (g e^p)²) U with the unit covariance U. Σ_reg (`Quality::covariance` of an
+/// outcome) reflects which directions the geometry constrains, but assumes right pairs with
+/// independent errors. The second term adds the rest: a floor of f units for systematic errors of
+/// camera and model, and a share that grows with the MVE e. If the pairs leave a direction
+/// undetermined, there is no Σ_reg, and `undetermined` units replace f.
 ///
-/// With `UnitCovariance::AboutObject` a standard deviation of one unit is a radius and 1 rad. **The
-/// defaults are not calibrated**: fit the factors where the truth is known, until ξᵀΣ⁻¹ξ of the
-/// errors is distributed like χ²₆.
+/// With `UnitCovariance::AboutObject`, a standard deviation of one unit is a radius and 1 rad.
+/// **The defaults are not calibrated**: fit the factors to data with ground truth, until ξᵀΣ⁻¹ξ of
+/// the errors is distributed like χ²₆.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InflatedCovariance {
-    /// What one unit of the factors below means.
+    /// The unit of the factors below.
     pub unit: UnitCovariance,
-    /// s, factor on the standard deviations of the registration.
+    /// Factor s of the standard deviations of the registration.
     pub scale: f64,
-    /// f, standard deviation in units that no estimate is better than.
+    /// Smallest standard deviation f of any estimate, in units.
     pub floor: f64,
-    /// g, standard deviation in units at an MVE of 1.
+    /// Standard deviation g at an MVE of 1, in units.
     pub mve_gain: f64,
-    /// p, how fast it grows with the MVE.
+    /// Exponent p of the MVE.
     pub mve_power: f64,
-    /// Standard deviation in units where the registration determines no covariance.
+    /// Standard deviation in units if the registration does not determine a covariance.
     pub undetermined: f64,
 }
 
 impl InflatedCovariance {
-    /// Makes the model with plausible, uncalibrated factors: s = 3, f = 0.01, g = 1, p = 2,
-    /// undetermined 0.3.
+    /// Creates the model with plausible, uncalibrated factors.
+    ///
+    /// They are s = 3, f = 0.01, g = 1, p = 2, and 0.3 for `undetermined`.
     #[must_use]
     pub fn uncalibrated(unit: UnitCovariance) -> Self {
         Self {
@@ -98,8 +99,9 @@ impl InflatedCovariance {
         }
     }
 
-    /// Returns Σ for an estimate with the given MVE (1 where not known) and covariance of the
-    /// registration.
+    /// Returns Σ for an estimate with an MVE and the covariance of its registration.
+    ///
+    /// An unknown MVE counts as 1.
     #[must_use]
     pub fn covariance(
         &self,
@@ -120,21 +122,21 @@ impl InflatedCovariance {
     }
 }
 
-/// Where the covariance of an estimate comes from.
+/// The source of an estimate's covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CovarianceModel {
-    /// A unit for every estimate.
+    /// The same unit for every estimate.
     Constant(UnitCovariance),
-    /// From the MVE alone, as in the paper.
+    /// From the MVE, as in the paper.
     Mve(MveCovariance),
     /// From the registration, inflated by the MVE.
     Inflated(InflatedCovariance),
 }
 
 impl Default for CovarianceModel {
-    /// The paper's.
+    /// The paper's model.
     fn default() -> Self {
         Self::Mve(MveCovariance::default())
     }
@@ -157,7 +159,7 @@ impl CovarianceModel {
     }
 }
 
-/// An MVE that is not known, or is none, says nothing for the estimate.
+/// Returns the MVE, or 1 if it is unknown or invalid.
 fn known(mve: Option<f64>) -> f64 {
     mve.filter(|e| (0.0..=1.0).contains(e)).unwrap_or(1.0)
 }

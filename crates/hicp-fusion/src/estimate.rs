@@ -11,8 +11,7 @@ pub const MAX_TRANSLATION_METERS: f64 = 1e6;
 /// Largest accepted entry of a covariance, m² or rad².
 pub const MAX_VARIANCE: f64 = 1e60;
 
-/// Share of the largest entry that rounding may take from symmetry and from the smallest
-/// eigenvalue.
+/// Share of the largest entry up to which asymmetry and negative eigenvalues count as rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// An invalid estimate, motion or parameter.
@@ -25,7 +24,7 @@ pub enum FusionError {
         MAX_TRANSLATION_METERS
     )]
     Translation {
-        /// The transform that has the translation.
+        /// The name of the transform.
         what: &'static str,
         /// x.
         x: f64,
@@ -37,7 +36,7 @@ pub enum FusionError {
     /// The quaternion of a rotation is not finite or not of unit length.
     #[error("rotation of {what} has a quaternion of length {norm}, expected 1")]
     Rotation {
-        /// The transform that has the rotation.
+        /// The name of the transform.
         what: &'static str,
         /// Length of the quaternion.
         norm: f64,
@@ -48,9 +47,9 @@ pub enum FusionError {
         MAX_VARIANCE
     )]
     CovarianceEntry {
-        /// Row from 0.
+        /// Row, from 0.
         row: usize,
-        /// Column from 0.
+        /// Column, from 0.
         column: usize,
         /// The value found.
         value: f64,
@@ -64,9 +63,9 @@ pub enum FusionError {
         row: usize,
         /// Column from 0.
         column: usize,
-        /// The value found there.
+        /// The value found.
         value: f64,
-        /// The value at the mirrored place.
+        /// The value at the mirrored position.
         mirrored: f64,
     },
     /// A covariance has a negative eigenvalue.
@@ -91,7 +90,7 @@ pub enum FusionError {
         /// The valid values.
         expected: &'static str,
     },
-    /// There is no estimate to fuse.
+    /// There are no estimates to fuse.
     #[error("no estimate to fuse, expected one or more")]
     Empty,
 }
@@ -125,7 +124,7 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
-    /// Creates an estimate. Asymmetry within rounding is averaged away.
+    /// Creates an estimate. Asymmetry within rounding is averaged.
     ///
     /// # Errors
     ///
@@ -160,7 +159,7 @@ impl PoseEstimate {
         })
     }
 
-    /// The pose.
+    /// The pose, `camera_from_object`.
     #[must_use]
     pub fn camera_from_object(&self) -> &Isometry3<f64> {
         &self.camera_from_object
@@ -172,7 +171,7 @@ impl PoseEstimate {
         &self.covariance
     }
 
-    /// The mean VSD estimate, where known.
+    /// The mean VSD estimate, if known.
     #[must_use]
     pub fn mve(&self) -> Option<f64> {
         self.mve
@@ -189,10 +188,10 @@ impl PoseEstimate {
     }
 }
 
-/// Refuses a transform that is not a rigid motion within ±[`MAX_TRANSLATION_METERS`].
+/// Returns an error unless a transform is a rigid motion within ±[`MAX_TRANSLATION_METERS`].
 pub(crate) fn check_motion(what: &'static str, motion: &Isometry3<f64>) -> Result<(), FusionError> {
     let t = &motion.translation.vector;
-    // Written so that NaN fails.
+    // Written such that NaN fails.
     if !t.iter().all(|x| x.abs() <= MAX_TRANSLATION_METERS) {
         let (x, y, z) = (t.x, t.y, t.z);
         return Err(FusionError::Translation { what, x, y, z });
@@ -205,7 +204,7 @@ pub(crate) fn check_motion(what: &'static str, motion: &Isometry3<f64>) -> Resul
     }
 }
 
-/// Refuses an invalid covariance. Returns a valid one, symmetric to the bit.
+/// Returns a valid covariance, symmetric to the bit, or an error for an invalid one.
 pub(crate) fn checked_covariance(covariance: &Matrix6<f64>) -> Result<Matrix6<f64>, FusionError> {
     for row in 0..6 {
         for column in 0..6 {

@@ -7,24 +7,24 @@ use crate::estimate::PoseEstimate;
 use crate::motion::CameraMotion;
 use crate::solution::Solution;
 
-/// Fuses the estimates that arrive while the camera moves into one, in the current camera frame
-/// (§V).
+/// Fuses the estimates from a moving camera into one, in the current camera frame (§V).
 ///
-/// A custom fuser moves what it holds with [`CameraMotion::carry`] and fuses with
-/// [`Fusion`](crate::Fusion) or in its own way. It reports [`Solution::NONE`] if it solves nothing,
-/// and [`Failure::Custom`] if it rejects an estimate. `hicp-testkit` checks the contract.
+/// A custom fuser moves what it holds with [`CameraMotion::carry`], and fuses with
+/// [`Fusion`](crate::Fusion) or a custom method. It returns [`Solution::NONE`] if it solves
+/// nothing, and [`Failure::Custom`] if it rejects an estimate. `hicp-testkit` checks the contract.
 ///
 /// # Contract
 ///
-/// - [`Fuser::propagate`] takes everything held to the next camera frame. [`Fuser::update`] takes
-///   an estimate in the current frame. [`Fuser::estimate`] returns the fused one there, and `None`
+/// - [`Fuser::propagate`] moves all held estimates to the next frame. [`Fuser::update`] accepts an
+///   estimate in the current frame. [`Fuser::estimate`] returns the fused one there, or `None`
 ///   before the first update.
-/// - After one update the fused estimate is that update's, covariance included, unless it was
-///   rejected.
+/// - After one update, the fused estimate is that of the update, including its covariance, unless
+///   it was rejected.
 /// - A fuser never panics and never returns numbers that are not finite. Estimates and motions are
-///   checked when they are created.
+///   checked on creation.
 /// - Pure: equal calls since the last [`Fuser::reset`] give equal bits.
-/// - A warm update (as many estimates held before, then reset) makes no heap allocation.
+/// - A warm update (with as many estimates held before, and then reset) allocates nothing on the
+///   heap.
 ///
 /// ```
 /// use hicp_fusion::{CameraMotion, Failure, Fuser, PoseEstimate, Solution, Transport, Update};
@@ -69,7 +69,7 @@ use crate::solution::Solution;
             `SymmetryAware` and `SharedError` around a fuser, and by the boxes that `FusionMethod::build` returns"
 )]
 pub trait Fuser {
-    /// Moves everything held to the next camera frame.
+    /// Moves all held estimates to the next camera frame.
     fn propagate(&mut self, motion: &CameraMotion);
 
     /// Fuses or rejects an estimate in the current camera frame.
@@ -122,18 +122,19 @@ forward!(Box<T>, &mut T);
 pub enum Update {
     /// The estimate was fused.
     Accepted(Solution),
-    /// The estimate failed a gate, but stands until a better one arrives, because nothing else is
+    /// The estimate failed a gate. It is kept until a better one arrives, because nothing else is
     /// held.
     Provisional(Failure, Solution),
-    /// The estimate was left out.
+    /// The estimate was not fused.
     Rejected(Failure),
-    /// The estimate contradicts what was held, as those before it did. Everything held was removed,
-    /// and the estimate is the new start.
+    /// The estimate contradicts the held ones, as those before it did.
+    ///
+    /// Everything held was removed, and the estimate is the new start.
     Restarted(Failure, Solution),
 }
 
 impl Update {
-    /// Returns how the fusion ended; `None` if the estimate was rejected.
+    /// Returns the solution of the fusion, or `None` if the estimate was rejected.
     #[must_use]
     pub fn solution(&self) -> Option<&Solution> {
         match self {
@@ -144,7 +145,7 @@ impl Update {
         }
     }
 
-    /// Returns why the estimate failed; `None` if it was accepted.
+    /// Returns the reason of a failure, or `None` if the estimate was accepted.
     #[must_use]
     pub fn failure(&self) -> Option<&Failure> {
         match self {
@@ -155,7 +156,7 @@ impl Update {
         }
     }
 
-    /// Returns whether the estimate is part of what is held now.
+    /// Returns whether the estimate is held now.
     #[must_use]
     pub fn is_taken(&self) -> bool {
         self.solution().is_some()
@@ -186,7 +187,7 @@ pub enum Failure {
         /// The largest MVE that passes.
         limit: f64,
     },
-    /// The pose is too far from what is held, by both covariances.
+    /// The pose is too far from the held estimate, relative to both covariances.
     #[error("squared Mahalanobis distance {found:.1} above {limit:.1}")]
     Mahalanobis {
         /// The squared distance.

@@ -6,20 +6,20 @@ use crate::estimate::{FusionError, PoseEstimate};
 use crate::information::{information, symmetrized};
 use crate::solution::{Fused, FusionLimits, Solution};
 
-/// The fusion of Barfoot & Furgale (T-RO 2014, §V): the pose that minimises V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ
-/// with ξₖ = ln(T Tₖ⁻¹)^∨, by Gauss–Newton on SE(3).
+/// The fusion of Barfoot & Furgale (T-RO 2014, §V), by Gauss–Newton on SE(3).
 ///
-/// Per evaluation, with Gₖ = 𝓙(ξₖ)⁻¹ (the *left* Jacobian for this sign of ξ): A = Σ Gₖᵀ Σₖ⁻¹ Gₖ, b
-/// = Σ Gₖᵀ Σₖ⁻¹ ξₖ, ε = −A⁻¹ b, T ← exp(ε^) T. A step that raises V is halved until it does not, so
-/// that estimates scattered over half turns, between which V has several minima, end in one of
+/// It minimizes V(T) = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ with ξₖ = ln(T Tₖ⁻¹)^∨. With Gₖ = 𝓙(ξₖ)⁻¹ (the *left*
+/// Jacobian for this sign of ξ), an evaluation computes A = Σ Gₖᵀ Σₖ⁻¹ Gₖ and b = Σ Gₖᵀ Σₖ⁻¹ ξₖ.
+/// The step is ε = −A⁻¹ b, T ← exp(ε^) T. A step that raises V is halved until it does not.
+/// Estimates scattered over half turns, between which V has several minima, therefore end in one of
 /// them.
 ///
-/// The workspace keeps its memory: pushing no more estimates than before allocates nothing. Cost:
-/// per estimate an inversion, and per evaluation and estimate a logarithm, a Jacobian and two
+/// The workspace reuses its memory: pushing at most as many estimates as before allocates nothing.
+/// Cost: an inversion per estimate, and per evaluation and estimate a logarithm, a Jacobian and two
 /// products of 6×6 matrices.
 #[derive(Clone, Debug, Default)]
 pub struct Fusion {
-    /// When to end.
+    /// The limits of the iteration.
     pub limits: FusionLimits,
     terms: Vec<Term>,
 }
@@ -32,7 +32,7 @@ struct Term {
     blocks: [Matrix3<f64>; 3],
 }
 
-/// V, its Gauss–Newton Hessian and half its gradient at a pose.
+/// V, its Gauss–Newton Hessian and half of its gradient at a pose.
 struct Linearization {
     cost: f64,
     hessian: Matrix6<f64>,
@@ -54,13 +54,14 @@ impl Fusion {
         self.terms.clear();
     }
 
-    /// Adds an estimate. Directions without variance count as known to
-    /// [`crate::MIN_STANDARD_DEVIATION`].
+    /// Adds an estimate.
+    ///
+    /// Directions without variance get the standard deviation [`crate::MIN_STANDARD_DEVIATION`].
     pub fn push(&mut self, estimate: &PoseEstimate) {
         self.push_weighted(&estimate.camera_from_object, &estimate.covariance);
     }
 
-    /// Adds a pose with the covariance that weighs it.
+    /// Adds a pose with the covariance for its weight.
     pub(crate) fn push_weighted(
         &mut self,
         camera_from_object: &Isometry3<f64>,
@@ -75,7 +76,7 @@ impl Fusion {
         });
     }
 
-    /// Takes out the estimate that was added first.
+    /// Removes the estimate that was added first.
     pub(crate) fn remove_first(&mut self) {
         if !self.terms.is_empty() {
             self.terms.remove(0);
@@ -88,13 +89,13 @@ impl Fusion {
         self.terms.len()
     }
 
-    /// Returns whether there is no estimate.
+    /// Returns whether there are no estimates.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
-    /// Returns V at a pose.
+    /// Returns V at a pose, `camera_from_object`.
     #[must_use]
     pub fn cost(&self, camera_from_object: &Isometry3<f64>) -> f64 {
         let half_square = |term: &Term| {
@@ -104,7 +105,9 @@ impl Fusion {
         self.terms.iter().map(half_square).sum()
     }
 
-    /// Minimizes V from a start. Returns `None` without estimates, or if the start is not finite.
+    /// Minimizes V from a start pose, `camera_from_object`.
+    ///
+    /// Returns `None` without estimates, or if the start is not finite.
     #[must_use]
     pub fn solve(&self, start: &Isometry3<f64>) -> Option<Fused> {
         if !se3::is_finite(start) {
@@ -123,7 +126,7 @@ impl Fusion {
                 break;
             }
             if step.norm() < self.limits.tolerance {
-                // Below the tolerance the step is an improvement beyond question, and not worth an
+                // Below the tolerance, the step certainly improves the pose and is not worth an
                 // evaluation.
                 pose = moved(&pose, &step);
                 converged = true;
@@ -145,8 +148,8 @@ impl Fusion {
                 step *= 0.5;
             };
             if !falls {
-                // The smallest step raises V: as near to a minimum as rounding allows, or out of
-                // evaluations.
+                // The smallest step raises V: the pose is as near to a minimum as rounding allows,
+                // or no evaluations are left.
                 converged = step.norm() < self.limits.tolerance;
                 break;
             }
@@ -162,9 +165,11 @@ impl Fusion {
         })
     }
 
-    /// Returns the covariance of the fused pose when the estimates, weighed as they were pushed,
-    /// have covariances of their own: A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. One
-    /// matrix per estimate, in the order of pushing.
+    /// Returns the covariance of the fused pose for estimates with other covariances than their
+    /// weights.
+    ///
+    /// It is A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. `own` holds one matrix per
+    /// estimate, in the order of pushing.
     pub(crate) fn covariance_from<'a>(
         &self,
         fused: &PoseEstimate,
@@ -182,7 +187,7 @@ impl Fusion {
         symmetrized(&(fused.covariance * middle * fused.covariance))
     }
 
-    /// By blocks: G = [D B; 0 D] and Σ⁻¹ = [W₁₁ W₁₂; W₁₂ᵀ W₂₂], all 3×3.
+    /// Linearizes by 3×3 blocks: G = [D B; 0 D] and Σ⁻¹ = [W₁₁ W₁₂; W₁₂ᵀ W₂₂].
     fn linearize(&self, camera_from_object: &Isometry3<f64>) -> Linearization {
         let mut cost = 0.0;
         let (mut g1, mut g2) = (Vector3::zeros(), Vector3::zeros());
@@ -217,7 +222,7 @@ impl Fusion {
         }
     }
 
-    /// A⁻¹; where rounding left A indefinite, the covariance of the surest estimate.
+    /// Returns A⁻¹, or the covariance of the most certain estimate if rounding made A indefinite.
     fn covariance(&self, at: &Linearization) -> Option<Matrix6<f64>> {
         let inverse = at.hessian.cholesky().map(|factor| factor.inverse());
         if let Some(inverse) = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite())) {
@@ -231,7 +236,7 @@ impl Fusion {
     }
 }
 
-/// exp(ε^) T, its quaternion brought back to unit length.
+/// Returns exp(ε^) T, with a normalized quaternion.
 fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     let mut moved = se3::exp(step) * pose;
     moved.rotation.renormalize();
@@ -240,7 +245,7 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
 
 /// Fuses estimates with [`Fusion`], starting from the one with the smallest tr Σ.
 ///
-/// Allocates; a caller that fuses often keeps a [`Fusion`].
+/// It allocates. A caller that fuses often keeps a [`Fusion`].
 ///
 /// # Errors
 ///
@@ -251,7 +256,7 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
 /// use hicp_core::{Isometry3, Matrix6};
 /// use hicp_fusion::{FusionError, FusionLimits, PoseEstimate, fuse};
 /// # fn main() -> Result<(), FusionError> {
-/// // Two cameras disagree by 2 mm; the second is half as sure (twice the standard deviation).
+/// // Two cameras disagree by 2 mm; the second has twice the standard deviation.
 /// let a = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.500), Matrix6::identity() * 1e-6)?;
 /// let b = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.502), Matrix6::identity() * 4e-6)?;
 /// let fused = fuse(&[a, b], FusionLimits::default())?;

@@ -1,30 +1,32 @@
-//! Estimates that failed do not drag the fused pose.
+//! A gate that keeps failed estimates from moving the fused pose.
 
 use crate::estimate::{FusionError, PoseEstimate};
 use crate::fuser::{Failure, Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::solution::Solution;
 
-/// 99.9 % of a χ² variable with 6 degrees of freedom are below this.
+/// The 99.9 % quantile of the χ² distribution with 6 degrees of freedom.
 pub const CHI_SQUARED_6_999: f64 = 22.458;
 
-/// Which estimates pass.
+/// The conditions under which estimates pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gate {
-    /// Largest MVE that passes; `None` asks for none. An estimate without an MVE passes.
+    /// Largest MVE that passes; `None` for no limit. An estimate without an MVE passes.
     pub max_mve: Option<f64>,
-    /// Largest squared Mahalanobis distance from what is held, by both covariances together; `None`
-    /// asks for none. Only as good as the covariances: χ²₆ if they are right.
+    /// Largest squared Mahalanobis distance from the held estimate; `None` for no limit.
+    ///
+    /// It combines both covariances, and is only as good as they are: χ²₆ if they are right.
     pub max_mahalanobis_squared: Option<f64>,
-    /// Consecutive estimates too far from what is held after which what is held is the one that is
-    /// wrong: it is forgotten, and the last of them starts anew. `None` never gives up, and neither
-    /// does 0.
+    /// Number of consecutive contradicting estimates that restart the fuser.
+    ///
+    /// Then the held estimate is probably the wrong one: it is removed, and the last contradicting
+    /// one is the new start. `None` and 0 never restart.
     pub restart_after: Option<usize>,
 }
 
 impl Default for Gate {
-    /// MVE below the paper's threshold of misalignment, 0.4; the 99.9 % quantile; restart after 3.
+    /// The paper's threshold of misalignment, 0.4; the 99.9 % quantile; restart after 3.
     fn default() -> Self {
         Self {
             max_mve: Some(0.4),
@@ -34,12 +36,11 @@ impl Default for Gate {
     }
 }
 
-/// A fuser behind a [`Gate`]: what fails is not fused.
+/// A fuser behind a [`Gate`]: estimates that fail are not fused.
 ///
-/// While nothing has passed, there is something all the same: the estimate with the lowest MVE, the
-/// first of equals, stands provisionally, alone, until the first one passes.
-///
-/// Inside [`crate::SymmetryAware`], not around it: a symmetric pose is no outlier.
+/// Until an estimate passes, the one with the lowest MVE, and the first of equals, is held alone
+/// and provisionally. Use it inside [`crate::SymmetryAware`] and not around it, because a symmetric
+/// pose is not an outlier.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -58,9 +59,9 @@ impl Default for Gate {
 pub struct Gated<F> {
     inner: F,
     gate: Gate,
-    /// What is held failed the gate.
+    /// Whether the held estimate failed the gate.
     provisional: bool,
-    /// Estimates in a row that were too far away.
+    /// Number of consecutive estimates that were too far away.
     contradictions: usize,
 }
 
@@ -69,7 +70,7 @@ impl<F: Fuser> Gated<F> {
     ///
     /// # Errors
     ///
-    /// [`FusionError::Parameter`] when a limit is NaN or negative.
+    /// [`FusionError::Parameter`] if a limit is NaN or negative.
     pub fn new(inner: F, gate: Gate) -> Result<Self, FusionError> {
         for (name, limit) in [
             ("largest MVE", gate.max_mve),
@@ -82,7 +83,7 @@ impl<F: Fuser> Gated<F> {
                 return Err(FusionError::Parameter {
                     name,
                     value,
-                    expected: "a number from 0",
+                    expected: "0 or more",
                 });
             }
         }
@@ -94,7 +95,7 @@ impl<F: Fuser> Gated<F> {
         })
     }
 
-    /// The fuser behind the gate.
+    /// The inner fuser.
     #[must_use]
     pub fn inner(&self) -> &F {
         &self.inner
@@ -111,11 +112,11 @@ impl<F: Fuser> Gated<F> {
         (found > limit).then_some(Failure::Mahalanobis { found, limit })
     }
 
-    /// Makes the estimate all that is held.
+    /// Replaces everything held by an estimate.
     fn replace(&mut self, estimate: &PoseEstimate) -> Solution {
         self.inner.reset();
         self.contradictions = 0;
-        // The inner fuser may have a gate of its own, and reject the estimate.
+        // The inner fuser may have another gate and reject the estimate.
         let update = self.inner.update(estimate);
         update.solution().copied().unwrap_or(Solution::NONE)
     }
@@ -130,7 +131,7 @@ impl<F: Fuser> Fuser for Gated<F> {
         let held = self.inner.estimate();
         let failure = self.mve_failure(estimate);
         if let (Some(failure), Some(held)) = (failure, &held) {
-            // What is held provisionally gives way to what explains its image better.
+            // A provisional estimate is replaced by one that explains its image better.
             let better = estimate.mve.unwrap_or(1.0) < held.mve.unwrap_or(1.0);
             if !(self.provisional && better) {
                 return Update::Rejected(failure);

@@ -1,15 +1,16 @@
-//! Algebra of 6×6 covariances: transport, inverse and determinant.
+//! Operations on 6×6 covariances: transport, inverse and determinant.
 
 use hicp_core::{Matrix6, Vector6};
 use nalgebra::{Cholesky, SymmetricEigen, U6};
 
-/// Standard deviation, meters and radians, of directions in which a singular covariance has none.
+/// Standard deviation, in meters and radians, for directions in which a singular covariance has
+/// none.
 pub const MIN_STANDARD_DEVIATION: f64 = 1e-6;
 
 /// Share of its diagonal entry below which a pivot of the Cholesky decomposition is rounding.
 const RELATIVE_PIVOT: f64 = 1e-13;
 
-/// More iterations than the eigenvalues of any 6×6 matrix need.
+/// Largest number of eigenvalue iterations, more than any 6×6 matrix needs.
 const EIGEN_ITERATIONS: usize = 1000;
 
 /// Returns (Σ + Σᵀ)/2.
@@ -17,12 +18,14 @@ pub(crate) fn symmetrized(matrix: &Matrix6<f64>) -> Matrix6<f64> {
     (matrix + matrix.transpose()) * 0.5
 }
 
-/// Returns Ad Σ Adᵀ: the same uncertainty, written in the frame that the adjoint leads to.
+/// Returns Ad Σ Adᵀ: the same uncertainty in the frame that the adjoint maps to.
 pub(crate) fn transported(covariance: &Matrix6<f64>, adjoint: &Matrix6<f64>) -> Matrix6<f64> {
     symmetrized(&(adjoint * covariance * adjoint.transpose()))
 }
 
-/// Returns Σ⁻¹. A Σ that is singular to working precision first has its eigenvalues raised to
+/// Returns Σ⁻¹.
+///
+/// If Σ is singular to working precision, its eigenvalues are first raised to
 /// [`MIN_STANDARD_DEVIATION`]².
 pub(crate) fn information(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     if let Some(factor) = regular_factor(covariance) {
@@ -33,8 +36,9 @@ pub(crate) fn information(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     symmetrized(&(vectors * inverse * vectors.transpose()))
 }
 
-/// Returns ln det Σ, with the eigenvalues of a singular Σ raised as in [`information`]. Motions do
-/// not change it: det Ad = 1.
+/// Returns ln det Σ, with the eigenvalues of a singular Σ raised as in [`information`].
+///
+/// Motions do not change it, since det Ad = 1.
 pub(crate) fn log_determinant(covariance: &Matrix6<f64>) -> f64 {
     if let Some(factor) = regular_factor(covariance) {
         let l = factor.l_dirty();

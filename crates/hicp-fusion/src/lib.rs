@@ -13,12 +13,12 @@
 //! use hicp_fusion::hicp_core::{Isometry3, Point3, Vector3};
 //! use hicp_fusion::{CameraMotion, Fuser, FuserConfig, FusionMethod, PoseEstimate, UnitCovariance};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // An object of 6 cm radius about its origin.
+//! // An object with a radius of 6 cm around its origin.
 //! let unit = UnitCovariance::about_object(Point3::origin(), 0.06)?;
 //! let method: FusionMethod = "weighted-average".parse()?;
 //! let mut fuser = method.build(FuserConfig { unit, ..FuserConfig::default() });
 //!
-//! // Half a metre away, seen well; the camera then advances by 10 cm, and the object is seen half as well.
+//! // A good estimate at half a meter. The camera advances by 10 cm, and the next has twice the variance.
 //! let first = Isometry3::translation(0.0, 0.0, 0.500);
 //! fuser.update(&PoseEstimate::new(first, unit.at(&first) * 0.1)?);
 //! fuser.propagate(&CameraMotion::new(Isometry3::translation(0.0, 0.0, -0.100))?);

@@ -1,4 +1,4 @@
-//! The six methods by name.
+//! The six methods of the paper by name.
 
 use std::str::FromStr;
 
@@ -10,7 +10,7 @@ use crate::fuser::Fuser;
 use crate::recursive::RecursiveFuser;
 use crate::single::{LastEstimate, MostConfident};
 
-/// A fuser behind a box: the same bits as without.
+/// A boxed fuser, with the same bits as without the box.
 pub type BoxedFuser = Box<dyn Fuser + Send>;
 
 /// A method of §V-A, by its name in the paper.
@@ -44,7 +44,7 @@ impl FusionMethod {
         Self::MostConfident,
     ];
 
-    /// Name on the command line and in tables.
+    /// Returns the name on the command line and in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -57,25 +57,26 @@ impl FusionMethod {
         }
     }
 
-    /// One line about it.
+    /// Returns a one-line description.
     #[must_use]
     pub fn summary(self) -> &'static str {
         match self {
             Self::LastEstimate => "the latest estimate",
-            Self::Average => "all estimates, weighed alike",
-            Self::WeightedAverage => "all estimates, weighed by their covariances",
+            Self::Average => "all estimates, with equal weights",
+            Self::WeightedAverage => "all estimates, weighted by their covariances",
             Self::FilteringConstant => {
-                "the latest estimate with a unit covariance, fused with what was fused before"
+                "the latest estimate with a unit covariance, fused with the previous result"
             }
             Self::Filtering => {
-                "the latest estimate with its covariance, fused with what was fused before"
+                "the latest estimate with its covariance, fused with the previous result"
             }
             Self::MostConfident => "the estimate with the lowest uncertainty so far",
         }
     }
 
-    /// Returns whether the result depends on the covariances of the estimates, which in the paper
-    /// take an MVE.
+    /// Returns whether the result depends on the covariances of the estimates.
+    ///
+    /// In the paper, these methods need an MVE.
     #[must_use]
     pub fn uses_covariances(self) -> bool {
         matches!(
@@ -104,7 +105,7 @@ impl std::fmt::Display for FusionMethod {
     }
 }
 
-/// A name that no method has.
+/// The error for a name that is not one of the six methods.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("no fusion method is named {name:?}; the names are: {}", FusionMethod::ALL.map(FusionMethod::name).join(", "))]
 pub struct UnknownMethod {

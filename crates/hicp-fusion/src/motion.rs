@@ -5,17 +5,17 @@ use hicp_core::{Isometry3, Matrix6, se3};
 use crate::estimate::{FusionError, PoseEstimate, check_motion, checked_covariance};
 use crate::information::transported;
 
-/// A known motion of the camera, T_C′C of §V: takes coordinates in the previous camera frame to the
-/// next.
+/// A known motion of the camera, T_C′C of §V.
 ///
-/// It may have a covariance, of a left perturbation in the *next* camera frame, for the uncertainty
-/// of the kinematics or the odometry.
+/// It maps coordinates in the previous camera frame to the next. It may have a covariance for the
+/// uncertainty of the kinematics or the odometry, of a left perturbation in the *next* camera
+/// frame.
 ///
 /// ```
 /// use hicp_core::Isometry3;
 /// use hicp_fusion::CameraMotion;
 /// # fn main() -> Result<(), hicp_fusion::FusionError> {
-/// // The camera advances by 1 cm along its optical axis: everything comes nearer.
+/// // The camera advances by 1 cm along its optical axis: all objects come nearer.
 /// let advance = CameraMotion::new(Isometry3::translation(0.0, 0.0, -0.01))?;
 /// assert!(advance.covariance().is_none());
 /// # Ok(()) }
@@ -27,7 +27,7 @@ pub struct CameraMotion {
 }
 
 impl CameraMotion {
-    /// Creates a motion that is known exactly.
+    /// Creates an exactly known motion.
     ///
     /// # Errors
     ///
@@ -39,7 +39,7 @@ impl CameraMotion {
         Ok(Self::exact(next_camera_from_camera))
     }
 
-    /// Creates the motion of a camera that stands still.
+    /// Creates the motion of a camera that does not move.
     #[must_use]
     pub fn none() -> Self {
         Self::exact(Isometry3::identity())
@@ -53,8 +53,9 @@ impl CameraMotion {
         }
     }
 
-    /// Returns the motion with a covariance of ξ = [ρ; φ], a left perturbation in the next camera
-    /// frame.
+    /// Returns the motion with a covariance of ξ = [ρ; φ], a left perturbation.
+    ///
+    /// The perturbation is in the next camera frame.
     ///
     /// # Errors
     ///
@@ -66,13 +67,13 @@ impl CameraMotion {
         })
     }
 
-    /// The motion.
+    /// The transform from the previous to the next camera frame.
     #[must_use]
     pub fn next_camera_from_camera(&self) -> &Isometry3<f64> {
         &self.next_camera_from_camera
     }
 
-    /// Its covariance, where it is not known exactly.
+    /// The covariance, unless the motion is exactly known.
     #[must_use]
     pub fn covariance(&self) -> Option<&Matrix6<f64>> {
         self.covariance.as_ref()
@@ -82,15 +83,15 @@ impl CameraMotion {
     #[must_use]
     pub fn apply(&self, camera_from_object: &Isometry3<f64>) -> Isometry3<f64> {
         let mut moved = self.next_camera_from_camera * camera_from_object;
-        // Without this, the quaternion drifts over thousands of frames.
+        // Without renormalization, the quaternion would drift over thousands of frames.
         moved.rotation.renormalize();
         moved
     }
 
     /// Returns an estimate in the next camera frame.
     ///
-    /// To first order the covariance becomes Σ_A + Ad(A) Σ Ad(A)ᵀ with Σ_A the motion's own
-    /// covariance, or Σ_A + Σ with [`Transport::Kept`]. The MVE stays. A custom
+    /// To first order, the covariance becomes Σ_A + Ad(A) Σ Ad(A)ᵀ, where Σ_A is that of the
+    /// motion. With [`Transport::Kept`] it becomes Σ_A + Σ. The MVE does not change. A custom
     /// [`Fuser`](crate::Fuser) calls this in [`propagate`](crate::Fuser::propagate).
     ///
     /// ```
@@ -101,7 +102,7 @@ impl CameraMotion {
     /// let seen = PoseEstimate::new(Isometry3::translation(0.0, 0.0, 0.5), Matrix6::identity())?;
     /// let next = advance.carry(&seen, Transport::Adjoint);
     /// assert_eq!(next.camera_from_object().translation.z, 0.4);
-    /// // A rotation about the old camera's center also moves what the new camera sees.
+    /// // A rotation around the old camera's center also moves the object in the new frame.
     /// assert!(next.covariance()[(0, 0)] > 1.0);
     /// # Ok(()) }
     /// ```
@@ -134,16 +135,19 @@ impl CameraMotion {
 }
 
 /// The effect of a camera motion A on the covariance of an estimate.
-// Deviation: §V moves poses and is silent on covariances; by default they move along. `Transport::Kept` is the plain reading.
+// Deviation: §V moves poses and does not mention covariances; by default they move along.
+// `Transport::Kept` is the plain reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Transport {
-    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty, written in the next camera frame. The fused
-    /// estimate then does not depend on the frame in which it is fused.
+    /// Σ′ = Ad(A) Σ Ad(A)ᵀ: the same uncertainty in the next camera frame.
+    ///
+    /// The fused estimate then does not depend on the frame in which it is fused.
     #[default]
     Adjoint,
-    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention the
-    /// covariances. The fused estimate depends on the frame.
+    /// Σ′ = Σ, the plain reading of §V-A, which moves the poses and does not mention covariances.
+    ///
+    /// The fused estimate then depends on the frame.
     Kept,
 }

@@ -1,4 +1,4 @@
-//! Fusing each estimate with what was fused before: `filtering` and `filtering-constant`.
+//! Fusers that fuse each estimate with the previous result: `filtering` and `filtering-constant`.
 
 use hicp_core::Matrix6;
 
@@ -10,12 +10,12 @@ use crate::fusion::Fusion;
 use crate::motion::CameraMotion;
 use crate::solution::Solution;
 
-/// Keeps one estimate, and fuses each new one with it (§V-A).
+/// Keeps one estimate and fuses each new one with it (§V-A).
 ///
 /// `filtering-constant` gives every new estimate the unit covariance; `filtering` uses its own. The
 /// pose differs from that of all estimates fused at once by terms of second order in their spread.
-/// The covariance of a camera motion is added to the estimate held, so older estimates lose weight
-/// against newer ones in `filtering`.
+/// The covariance of a camera motion is added to the held estimate, so in `filtering` older
+/// estimates lose weight relative to newer ones.
 ///
 /// Cost of an update: that of fusing two estimates. Memory does not grow.
 #[derive(Clone, Debug)]

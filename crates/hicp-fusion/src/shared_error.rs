@@ -1,16 +1,17 @@
-//! An error that all estimates have in common.
+//! An error that all estimates share.
 
 use crate::estimate::{FusionError, PoseEstimate};
 use crate::fuser::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 
-/// Adds to what a fuser believes the error that its estimates share: that of the model, of the
-/// camera's calibration. However many estimates there are, it does not average away.
+/// Adds to the result of a fuser the error that all estimates share.
 ///
-/// The estimates that go in have the covariances of what differs between them; these alone weigh
-/// and are gated. The covariance that comes out is that of the fuser inside plus σ² U, with U the
-/// unit covariance at the pose: after one update it is larger than that update's.
+/// Such an error, of the model or of the camera's calibration, does not average out with any number
+/// of estimates. The covariances of the estimates describe only their differences; these alone
+/// weigh estimates and pass gates. The resulting covariance is that of the inner fuser plus σ² U,
+/// with the unit covariance U at the pose. After one update, it is therefore larger than that of
+/// the update.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};
@@ -32,11 +33,11 @@ pub struct SharedError<F> {
 }
 
 impl<F: Fuser> SharedError<F> {
-    /// Adds a shared error of a standard deviation in units to a fuser; 0 adds nothing.
+    /// Adds a shared error to a fuser, given its standard deviation in units; 0 adds nothing.
     ///
     /// # Errors
     ///
-    /// [`FusionError::Parameter`] when the standard deviation is not between 0 and 10⁶.
+    /// [`FusionError::Parameter`] if the standard deviation is not between 0 and 10⁶.
     pub fn new(
         inner: F,
         unit: UnitCovariance,
@@ -56,7 +57,7 @@ impl<F: Fuser> SharedError<F> {
         })
     }
 
-    /// The fuser inside, without the shared error.
+    /// The inner fuser, without the shared error.
     #[must_use]
     pub fn inner(&self) -> &F {
         &self.inner

@@ -47,14 +47,15 @@ impl Fuser for LastEstimate {
     }
 }
 
-/// Difference of ln det Σ that is rounding.
+/// Largest difference of ln det Σ that counts as rounding.
 const TIE: f64 = 1e-9;
 
 /// Returns the estimate with the lowest uncertainty so far (§V-A): `most-confident`.
 ///
-/// Uncertainty is det Σ, the size of the ellipsoid. Unlike the trace, a camera motion does not
-/// change it, and for multiples of one matrix it orders as the factor does. The covariance of a
-/// motion makes older estimates less certain than newer ones. Among equals the newest is selected.
+/// The uncertainty is det Σ, the size of the ellipsoid. Unlike the trace, it does not change with
+/// the camera's motion. For multiples of one matrix, it has the order of their factors. The
+/// covariance of a motion makes older estimates less certain than newer ones. Among equals, the
+/// newest is selected.
 #[derive(Clone, Debug, Default)]
 pub struct MostConfident {
     transport: Transport,

@@ -2,19 +2,20 @@
 
 use crate::estimate::PoseEstimate;
 
-/// When the iteration of [`Fusion`](crate::Fusion) ends.
+/// The limits of the iteration of [`Fusion`](crate::Fusion).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FusionLimits {
     /// Largest number of evaluations of the cost.
     pub max_iterations: usize,
-    /// Length |ε| of a step, meters and radians in one, below which it is the last.
+    /// Length |ε| of a step below which it is the last, in meters and radians together.
     pub tolerance: f64,
 }
 
 impl Default for FusionLimits {
-    /// 50 evaluations, 10⁻¹⁰. Estimates that spread over 0.1 rad need about 6 evaluations, over 0.4
-    /// rad about 9.
+    /// 50 evaluations and 10⁻¹⁰.
+    ///
+    /// Estimates that spread over 0.1 rad need about 6 evaluations, and over 0.4 rad about 9.
     fn default() -> Self {
         Self {
             max_iterations: 50,
@@ -23,18 +24,20 @@ impl Default for FusionLimits {
     }
 }
 
-/// How an iteration ended.
+/// The result of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Solution {
-    /// Evaluations of the cost; 0 if nothing was solved.
+    /// Number of evaluations of the cost; 0 if nothing was solved.
     pub iterations: usize,
-    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the pose evaluated last: about 3(K − 1) for K estimates whose
-    /// covariances are right.
+    /// V = ½ Σ ξₖᵀ Σₖ⁻¹ ξₖ at the last evaluated pose.
+    ///
+    /// For K estimates whose covariances are right, it is about 3(K − 1).
     pub cost: f64,
-    /// Whether the last step was shorter than the tolerance. Otherwise the pose is the best one
-    /// evaluated.
+    /// Whether the last step was shorter than the tolerance.
+    ///
+    /// Otherwise the pose is the best evaluated one.
     pub converged: bool,
 }
 
@@ -62,9 +65,11 @@ impl Solution {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Fused {
-    /// The fused pose, without an MVE. Its covariance is A⁻¹ at the minimum (Laplace), which holds
-    /// if the covariances of the estimates are right and their errors independent.
+    /// The fused pose, without an MVE.
+    ///
+    /// Its covariance is A⁻¹ at the minimum (Laplace). It is valid if the covariances of the
+    /// estimates are right and their errors independent.
     pub estimate: PoseEstimate,
-    /// How the iteration ended.
+    /// The result of the iteration.
     pub solution: Solution,
 }

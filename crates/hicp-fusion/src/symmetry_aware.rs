@@ -1,4 +1,4 @@
-//! Estimates of symmetric objects, brought to one representative.
+//! Estimates of symmetric objects, mapped to one representative.
 
 use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, se3, so3};
 
@@ -7,22 +7,24 @@ use crate::fuser::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 
-/// Share of a length that is rounding.
+/// Relative rounding of a length.
 const ROUNDING: f64 = 1e-13;
 
-/// Square of the sine of an angle below which two axes are one, declared twice: ten degrees, for
-/// those of a sphere are far apart.
+/// Squared sine of an angle below which two axes count as one that is declared twice.
+///
+/// It is about ten degrees, since the axes of a sphere are far apart.
 const PARALLEL: f64 = 0.03;
 
-/// A fuser for an object with declared symmetries: each estimate is replaced by the equivalent pose
-/// nearest to what is held.
+/// A fuser for an object with declared symmetries.
 ///
-/// Poses T and T·S are the same to the eye for a symmetry S; averaged as they come, 0° and 180°
-/// make 90°. Nearest is by
-/// |φ|²r² + |Δc|² with φ the rotation between the poses, c the object's centre and r its radius. Continuous symmetries are
-/// solved in closed form for φ (the centre lies on the axis of such an object), for every discrete
-/// one. Two axes make a sphere, for which every rotation about the point where they meet is a
-/// symmetry. The covariance needs no change: it lives in the camera frame, on the other side.
+/// It replaces each estimate by the equivalent pose nearest to the held one. For a symmetry S,
+/// poses T and T·S look the same; without this, the average of 0° and 180° would be 90°.
+///
+/// The distance is √(|φ|²r² + |Δc|²), where φ is the rotation between the poses, c the object's
+/// center and r its radius. Continuous symmetries are solved in closed form for φ, together with
+/// every discrete one, since the center of such an object lies on the axis. Two axes make a sphere,
+/// for which every rotation around their intersection is a symmetry. The covariance does not
+/// change, because it is in the camera frame.
 ///
 /// Cost of an update: well below a microsecond per discrete symmetry and axis.
 ///
@@ -47,20 +49,21 @@ const PARALLEL: f64 = 0.03;
 pub struct SymmetryAware<F> {
     inner: F,
     symmetries: Symmetries,
-    /// Where all rotations are symmetries, the point that they are about.
+    /// The center of all rotations, if every rotation is a symmetry.
     all_turns: Option<Point3<f64>>,
     center: Point3<f64>,
     radius: f64,
 }
 
 impl<F: Fuser> SymmetryAware<F> {
-    /// Makes a fuser of estimates of an object; centre (object frame) and radius (metres) are those
-    /// of `hicp_core::Model`.
+    /// Creates a fuser for the estimates of an object.
+    ///
+    /// The center (object frame) and the radius (meters) are those of `hicp_core::Model`.
     ///
     /// # Errors
     ///
-    /// [`FusionError`] when a discrete symmetry is not a rigid motion, or the centre or radius is
-    /// out of range.
+    /// [`FusionError`] if a discrete symmetry is not a rigid motion, or if the center or the radius
+    /// is out of range.
     pub fn new(
         inner: F,
         symmetries: Symmetries,
@@ -70,7 +73,7 @@ impl<F: Fuser> SymmetryAware<F> {
         for motion in &symmetries.discrete {
             crate::estimate::check_motion("a symmetry", motion)?;
         }
-        // The same limits.
+        // The limits are the same.
         UnitCovariance::about_object(center, radius)?;
         Ok(Self {
             inner,
@@ -81,14 +84,15 @@ impl<F: Fuser> SymmetryAware<F> {
         })
     }
 
-    /// The fuser of the representatives.
+    /// The inner fuser, which receives the representatives.
     #[must_use]
     pub fn inner(&self) -> &F {
         &self.inner
     }
 
-    /// Returns the pose equivalent to `pose` that is nearest to `reference`; `pose` bit for bit if
-    /// it is that itself.
+    /// Returns the pose equivalent to `pose` that is nearest to `reference`.
+    ///
+    /// If `pose` itself is the nearest, it is returned bit for bit.
     #[must_use]
     pub fn representative(
         &self,
@@ -100,8 +104,8 @@ impl<F: Fuser> SymmetryAware<F> {
         let rounding = ROUNDING * (self.radius + places);
         let mut consider = |candidate: Isometry3<f64>| {
             let distance = self.distance(&candidate, reference);
-            // By more than the rounding of the lengths that it is a difference of: what is nearest
-            // already stays as it is.
+            // The gain must exceed the rounding of the lengths, so that a pose that is already
+            // nearest does not change.
             if distance < best.1 - rounding {
                 best = (candidate, distance);
             }
@@ -123,7 +127,7 @@ impl<F: Fuser> SymmetryAware<F> {
         best.0
     }
 
-    /// √(|φ|²r² + |Δc|²), metres.
+    /// Returns the distance √(|φ|²r² + |Δc|²), in meters.
     fn distance(&self, pose: &Isometry3<f64>, reference: &Isometry3<f64>) -> f64 {
         let (angle, _) = se3::pose_distance(pose, reference);
         let apart = pose * self.center - reference * self.center;
@@ -131,8 +135,9 @@ impl<F: Fuser> SymmetryAware<F> {
     }
 }
 
-/// The point where two axes of a sphere meet (the one nearest to both, as declared axes are
-/// rounded); `None` where all are one.
+/// Returns the intersection of two axes of a sphere, or `None` if all axes are one.
+///
+/// Declared axes are rounded, so it is the point nearest to both.
 fn center_of_all_turns(axes: &[SymmetryAxis]) -> Option<Point3<f64>> {
     let (first, others) = axes.split_first()?;
     others.iter().find_map(|second| {
@@ -150,10 +155,10 @@ fn center_of_all_turns(axes: &[SymmetryAxis]) -> Option<Point3<f64>> {
     })
 }
 
-/// Turns the object about an axis of its own so that its rotation comes nearest to the reference's.
+/// Rotates the object around an axis such that its rotation is nearest to the reference's.
 ///
 /// tr(C_refᵀ C R(θ)) = const + p cos θ + q sin θ, with p = tr M − aᵀMa and q = tr(M a^) for M =
-/// C_refᵀ C: largest at atan2(q, p).
+/// C_refᵀ C. It is largest at θ = atan2(q, p).
 fn turned(
     pose: &Isometry3<f64>,
     reference: &Isometry3<f64>,
@@ -166,7 +171,7 @@ fn turned(
     let cosine = m.trace() - direction.dot(&(m * direction));
     let sine = (m * so3::hat(&direction)).trace();
     if cosine.hypot(sine) < 1e-12 {
-        // The axes are opposite: every angle is as far.
+        // The axes are opposite: all angles have the same distance.
         return *pose;
     }
     let mut turned = pose * axis.rotation(sine.atan2(cosine));

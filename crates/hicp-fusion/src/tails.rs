@@ -1,19 +1,19 @@
-//! How probable it is that an error lies within an ellipsoid.
+//! The probability that an error lies within an ellipsoid.
 
 /// Returns the probability that ξᵀΣ⁻¹ξ of a pose's error ξ is at most `mahalanobis_squared`.
 ///
-/// With `degrees_of_freedom` ν the error follows Student's distribution in six dimensions with
-/// scale matrix Σ: outliers that no covariance foresees give it heavy tails. ν = ∞ is the normal
-/// distribution, and the result that of χ²₆. What is not between 0 and ∞ (NaN included) has
-/// probability 0; a ν that is not positive counts as ∞, and so does one from 10⁷ on.
+/// With `degrees_of_freedom` ν, the error follows Student's distribution in six dimensions with
+/// scale matrix Σ. Its heavy tails allow for outliers that no covariance predicts. ν = ∞ is the
+/// normal distribution, with the result of χ²₆. A distance of 0 or less, or NaN, has probability 0,
+/// and an infinite one 1. A ν that is not positive, or 10⁷ or more, counts as ∞.
 ///
-/// With u = x/(x + ν) and b = ν/2 it is the regularised incomplete beta function I_u(3, b) = 1 − (1
-/// − u)ᵇ (1 + b u + b (b + 1) u²/2).
+/// The result is the regularized incomplete beta function I_u(3, b), with u = x/(x + ν) and b =
+/// ν/2. In closed form it is 1 − (1 − u)ᵇ (1 + b u + b (b + 1) u²/2).
 ///
 /// ```
 /// use hicp_fusion::{CHI_SQUARED_6_999, probability_within};
 /// assert!((probability_within(CHI_SQUARED_6_999, f64::INFINITY) - 0.999).abs() < 1e-5);
-/// // 90 % of Student's distribution with ν = 4 are within 24.06: six times the quantile of F(6, 4).
+/// // 90 % of Student's distribution with ν = 4 is within 24.06, six times the quantile of F(6, 4).
 /// assert!((probability_within(24.06, 4.0) - 0.9).abs() < 1e-4);
 /// ```
 #[must_use]
@@ -28,7 +28,7 @@ pub fn probability_within(mahalanobis_squared: f64, degrees_of_freedom: f64) -> 
     let nu = degrees_of_freedom;
     if nu > 0.0 && nu < 1e7 {
         let (u, b) = (x / (x + nu), 0.5 * nu);
-        // (1 − u)ᵇ without the loss of digits of 1 − u.
+        // (1 − u)ᵇ without the cancellation in 1 − u.
         let power = (-b * (x / nu).ln_1p()).exp();
         1.0 - power * (1.0 + b * u + 0.5 * b * (b + 1.0) * u * u)
     } else {
@@ -41,9 +41,9 @@ pub fn probability_within(mahalanobis_squared: f64, degrees_of_freedom: f64) -> 
 mod tests {
     use super::probability_within;
 
-    /// The density of x = ξᵀΣ⁻¹ξ, integrated.
+    /// Compares with the integrated density of x = ξᵀΣ⁻¹ξ.
     #[test]
-    fn it_is_the_integral_of_the_density() {
+    fn the_probability_is_the_integral_of_the_density() {
         for nu in [1.0, 2.5, 4.0, 30.0] {
             // Γ((ν + 6)/2)/(Γ(ν/2) Γ(3) ν³) x² (1 + x/ν)^(−(ν + 6)/2), with Γ(b + 3)/Γ(b) = b (b +
             // 1) (b + 2).
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_distance_has_no_probability() {
+    fn invalid_distances_have_probability_zero() {
         for nu in [4.0, 0.0, f64::INFINITY, f64::NAN, -1.0] {
             assert_eq!(probability_within(0.0, nu), 0.0);
             assert_eq!(probability_within(-1.0, nu), 0.0);

@@ -1,44 +1,46 @@
-//! The covariance that stands for "one unit of uncertainty".
+//! The covariance of "one unit of uncertainty".
 
 use hicp_core::{Isometry3, Matrix6, Point3, Translation3, Vector6, se3};
 
 use crate::estimate::FusionError;
 use crate::information::transported;
 
-/// The shape of a covariance whose size is a single number, as the paper's e_MVE·I₆ and I₆ are.
+/// The shape of a covariance whose size is a single number, such as the paper's e_MVE·I₆ and I₆.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum UnitCovariance {
-    /// I₆ in the camera frame, the paper's: metres and radians count alike, and a rotation is one
-    /// about the *camera's* origin, which takes the object along. What is fused depends on the
-    /// camera's place.
+    /// I₆ in the camera frame, as in the paper.
+    ///
+    /// Meters and radians count alike. A rotation is around the *camera's* origin and moves the
+    /// object along. The fused pose therefore depends on the camera's place.
     #[default]
     Identity,
-    /// diag(r², r², r², 1, 1, 1) about the object's centre: a rotation by 1 rad counts as a
-    /// translation by the object's radius. Isotropic there, so that Ad(A) takes it to itself,
-    /// whatever the motion A.
+    /// diag(r², r², r², 1, 1, 1) around the object's center.
+    ///
+    /// A rotation by 1 rad counts as a translation by the object's radius. It is isotropic there,
+    /// so Ad(A) does not change it for any motion A.
     AboutObject {
-        /// The point that the object turns about, object frame, metres.
+        /// The center of the object's rotations, object frame, meters.
         center: Point3<f64>,
-        /// The object's radius r, metres.
+        /// The object's radius r, meters.
         radius: f64,
     },
 }
 
 impl UnitCovariance {
-    /// Makes the unit about an object; `center` and `radius` are those of `hicp_core::Model`.
+    /// Creates the unit for an object; `center` and `radius` are those of `hicp_core::Model`.
     ///
     /// # Errors
     ///
-    /// [`FusionError::Parameter`] when the radius is not between 10⁻⁶ and 10⁶ m or the centre not
-    /// within 10⁶ m.
+    /// [`FusionError::Parameter`] if the radius is not between 10⁻⁶ and 10⁶ m, or if a coordinate
+    /// of the center exceeds 10⁶ m.
     pub fn about_object(center: Point3<f64>, radius: f64) -> Result<Self, FusionError> {
         let farthest = center.coords.amax();
         for (name, value, least, expected) in [
             ("object radius", radius, 1e-6, "1e-6 to 1e6 m"),
             (
-                "distance of the object's centre",
+                "largest coordinate of the object's center",
                 farthest,
                 0.0,
                 "0 to 1e6 m",

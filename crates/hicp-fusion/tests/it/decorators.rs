@@ -1,6 +1,4 @@
-//! Gates, and errors that estimates share.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of gates and of shared errors.
 
 use crate::common::{Random, estimate, relative};
 use hicp_core::{Isometry3, Matrix6, Point3, Symmetries, Vector3, se3};
@@ -30,7 +28,7 @@ fn x(fuser: &impl Fuser) -> f64 {
 }
 
 #[test]
-fn an_estimate_that_does_not_explain_its_image_is_left_out() {
+fn an_estimate_that_does_not_explain_its_image_is_rejected() {
     let mut fuser = average(Gate {
         max_mahalanobis_squared: None,
         ..Gate::default()
@@ -52,7 +50,7 @@ fn an_estimate_that_does_not_explain_its_image_is_left_out() {
 }
 
 #[test]
-fn one_wild_outlier_does_not_drag_the_pose() {
+fn one_wild_outlier_does_not_move_the_pose() {
     for method in FusionMethod::ALL {
         let gate = Gate {
             max_mve: None,
@@ -74,7 +72,7 @@ fn one_wild_outlier_does_not_drag_the_pose() {
 
 #[test]
 fn the_gate_passes_what_its_covariances_allow() {
-    // 99.9 % of consistent estimates pass: of 4000, about 4 do not.
+    // 99.9 % of consistent estimates pass: of 4000, about 4 fail.
     let mut random = Random(31);
     let gate = Gate {
         restart_after: None,
@@ -101,7 +99,7 @@ fn the_gate_passes_what_its_covariances_allow() {
 }
 
 #[test]
-fn while_nothing_passes_the_best_stands_alone() {
+fn until_one_passes_the_best_is_held_alone() {
     let mut fuser = average(Gate {
         max_mahalanobis_squared: None,
         ..Gate::default()
@@ -117,16 +115,16 @@ fn while_nothing_passes_the_best_stands_alone() {
         Update::Provisional(..)
     ));
     assert_eq!(x(&fuser), 0.2);
-    // The first that passes takes its place; after it, failures are left out again.
+    // The first one that passes replaces it. After that, failures are rejected again.
     assert!(matches!(fuser.update(&at(0.0, 0.2)), Update::Accepted(_)));
     assert_eq!(x(&fuser), 0.0);
     assert!(matches!(fuser.update(&at(0.2, 0.5)), Update::Rejected(_)));
     assert_eq!(x(&fuser), 0.0);
 }
 
-/// Of estimates that fail alike, the first stands.
+/// Of estimates that fail alike, the first is kept.
 #[test]
-fn as_bad_is_not_better() {
+fn an_equally_bad_estimate_is_not_better() {
     let mut fuser = average(Gate::default());
     fuser.update(&at(0.3, 0.8));
     let update = fuser.update(&at(0.4, 0.8));
@@ -134,9 +132,9 @@ fn as_bad_is_not_better() {
     assert_eq!(x(&fuser), 0.3);
 }
 
-/// A limit is the largest that passes, 0 too.
+/// A limit is the largest value that passes, including 0.
 #[test]
-fn what_is_held_passes_any_limit() {
+fn the_held_estimate_passes_any_limit() {
     let mut fuser = average(Gate {
         max_mve: Some(0.0),
         max_mahalanobis_squared: Some(0.0),
@@ -151,14 +149,14 @@ fn what_is_held_passes_any_limit() {
 }
 
 #[test]
-fn what_all_contradict_is_forgotten() {
+fn an_estimate_that_all_others_contradict_is_dropped() {
     let mut fuser = average(Gate::default());
     fuser.update(&at(0.2, 0.3));
     assert!(matches!(fuser.update(&at(0.0, 0.1)), Update::Rejected(_)));
     assert!(matches!(fuser.update(&at(0.0, 0.1)), Update::Rejected(_)));
     assert!(matches!(fuser.update(&at(0.0, 0.1)), Update::Restarted(..)));
     assert_eq!(x(&fuser), 0.0);
-    // Agreement in between starts the count anew.
+    // Agreement in between resets the count.
     let mut fuser = average(Gate::default());
     for offset in [0.0, 0.2, 0.2, 0.0, 0.2, 0.2] {
         assert!(!matches!(
@@ -188,7 +186,7 @@ fn a_gate_of_nan_is_refused() {
 }
 
 #[test]
-fn a_shared_error_is_stated_but_moves_nothing() {
+fn a_shared_error_adds_covariance_and_keeps_the_pose() {
     let unit = UnitCovariance::about_object(Point3::new(0.01, 0.0, 0.02), 0.08).unwrap();
     let mut random = Random(36);
     let make = || BatchFuser::weighted_average(FuserConfig::default());
@@ -218,7 +216,7 @@ fn a_shared_error_is_stated_but_moves_nothing() {
     assert_eq!(shared.estimate(), None);
 }
 
-/// A fuser that does not say its name is called after its type.
+/// A fuser without a name is called after its type.
 #[test]
 fn a_fuser_without_a_name_has_that_of_its_type() {
     struct Deaf;
@@ -241,7 +239,7 @@ fn a_fuser_without_a_name_has_that_of_its_type() {
 }
 
 #[test]
-fn what_stands_around_a_fuser_says_its_name() {
+fn decorators_report_their_names() {
     let inner = || BatchFuser::average(FuserConfig::default());
     assert_eq!(average(Gate::default()).name(), "gated");
     assert_eq!(aware().name(), "symmetry-aware");
@@ -251,7 +249,7 @@ fn what_stands_around_a_fuser_says_its_name() {
 }
 
 #[test]
-fn what_stands_around_a_fuser_moves_and_forgets_with_it() {
+fn decorators_forward_propagation_and_reset() {
     let inner = || BatchFuser::average(FuserConfig::default());
     let unit = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
     let around: [Box<dyn Fuser>; 4] = [

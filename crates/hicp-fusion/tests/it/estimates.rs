@@ -1,4 +1,5 @@
-//! What estimates may be, their distances, singular covariances, and which methods look at covariances.
+//! Tests of valid estimates, their distances, singular covariances, and methods that use
+//! covariances.
 
 use crate::common::{EXACT, Random, apart, estimate, fusion};
 use hicp_core::{Isometry3, Matrix6, Vector6, se3};
@@ -9,7 +10,7 @@ use hicp_fusion::{
 
 #[test]
 fn the_squared_mahalanobis_distance_is_that_of_the_difference() {
-    // Two centimetres apart with standard deviations of 1 cm each: 4 / 2.
+    // Two centimeters apart with standard deviations of 1 cm each: 4 / 2.
     let at = |x| {
         estimate(
             Isometry3::translation(x, 0.0, 0.5),
@@ -48,7 +49,7 @@ fn a_cleared_workspace_fuses_as_a_new_one() {
 }
 
 #[test]
-fn the_methods_that_use_covariances_are_those_whose_pose_depends_on_them() {
+fn uses_covariances_is_true_if_the_pose_depends_on_them() {
     let mut random = Random(5);
     let center = random.pose(1.0);
     let poses: Vec<Isometry3<f64>> = (0..4)
@@ -76,7 +77,7 @@ fn the_methods_that_use_covariances_are_those_whose_pose_depends_on_them() {
 }
 
 #[test]
-fn an_estimate_says_what_it_was_made_of() {
+fn an_estimate_returns_its_parts() {
     let bare = estimate(Isometry3::identity(), Matrix6::identity());
     assert_eq!(bare.mve(), None);
     assert_eq!(bare.with_mve(0.25).unwrap().mve(), Some(0.25));
@@ -88,9 +89,9 @@ fn an_estimate_says_what_it_was_made_of() {
     assert!(fuser.is_empty());
 }
 
-/// Whether a matrix is a covariance does not depend on the units that it is written in.
+/// The validity of a covariance does not depend on its units.
 #[test]
-fn what_is_a_covariance_is_one_at_any_scale() {
+fn a_valid_covariance_is_valid_at_any_scale() {
     let mut random = Random(6);
     let verdict = |covariance: Matrix6<f64>, scale: f64| {
         PoseEstimate::new(Isometry3::identity(), covariance * scale).map(|e| *e.covariance())
@@ -100,7 +101,7 @@ fn what_is_a_covariance_is_one_at_any_scale() {
         let size = good.amax();
         let mut rounded = good;
         rounded[(4, 1)] += 1e-11 * size;
-        // What rounding did to symmetry is averaged away.
+        // The effect of rounding on symmetry is averaged.
         let found = verdict(rounded, scale).unwrap();
         assert_eq!(found, found.transpose());
         let middle = f64::midpoint(rounded[(4, 1)], good[(4, 1)]);
@@ -115,7 +116,8 @@ fn what_is_a_covariance_is_one_at_any_scale() {
                 ..
             })
         ));
-        // Flat in two directions; what rounding leaves below zero there is no reason to refuse it, what is clearly below is.
+        // Flat in two directions. Negative eigenvalues within rounding are accepted, and clearly
+        // negative ones are refused.
         let turn = se3::adjoint(&Isometry3::rotation(hicp_core::Vector3::new(
             0.3, -0.2, 0.5,
         )));
@@ -134,14 +136,15 @@ fn what_is_a_covariance_is_one_at_any_scale() {
     }
 }
 
-/// An orthogonal matrix that mixes all six directions.
+/// Returns an orthogonal matrix that mixes all six directions.
 fn mixed() -> Matrix6<f64> {
     Random(7).covariance(1.0).symmetric_eigen().eigenvectors
 }
 
-/// ξᵀΣ⁻¹ξ by eigenvalues, where those that are none count as the smallest standard deviation, whatever direction they belong to.
+/// ξᵀΣ⁻¹ξ by eigenvalues, where missing ones count as the smallest standard deviation, in any
+/// direction.
 #[test]
-fn directions_without_variance_count_as_known_to_a_micrometre() {
+fn directions_without_variance_count_as_known_to_a_micrometer() {
     let least = MIN_STANDARD_DEVIATION * MIN_STANDARD_DEVIATION;
     let directions = mixed();
     let truth = Isometry3::identity();
@@ -154,15 +157,16 @@ fn directions_without_variance_count_as_known_to_a_micrometre() {
             let xi = directions.column(axis).into_owned() * 1e-6;
             let found = estimate(se3::exp(&xi), a).mahalanobis_squared(&estimate(truth, b));
             let expected = 1e-12 / values[axis].max(least);
-            // The 1e-16 that rounding adds to the eigenvalues, and the variance of others seen from a direction 1e-6 long.
+            // Rounding adds 1e-16 to the eigenvalues, and a direction of length 1e-6 has a share of
+            // the other variances.
             assert!((found / expected - 1.0).abs() < 1e-3, "{axis}: {found}");
         }
     }
 }
 
-/// Standard deviations above 1e-10 are used as they are, those below count as none.
+/// Standard deviations above 1e-10 are used as they are, and those below count as missing.
 #[test]
-fn what_is_too_small_to_be_regular() {
+fn tiny_standard_deviations_count_as_missing() {
     let squared = |variance: f64| {
         let half = Matrix6::identity() * (0.5 * variance);
         let offset = Isometry3::translation(1e-9, 0.0, 0.0);
@@ -172,7 +176,7 @@ fn what_is_too_small_to_be_regular() {
     assert!((squared(0.99e-20) / 1e-6 - 1.0).abs() < 1e-6);
 }
 
-/// The size of a flat ellipsoid is that with its flat directions a micrometre thick.
+/// The size of a flat ellipsoid is that with a micrometer in its flat directions.
 #[test]
 fn flat_and_round_covariances_are_compared_by_their_determinants() {
     let flat = Vector6::new(1.0, 1.0, 1.0, 1.0, 1.0, 0.0);
@@ -185,7 +189,7 @@ fn flat_and_round_covariances_are_compared_by_their_determinants() {
         fuser.update(&estimate(other, b));
         fuser.estimate().unwrap().camera_from_object() == &Isometry3::identity()
     };
-    // A determinant of 1e-12 against those of 0.99e-12 and 1.01e-12.
+    // A determinant of 1e-12 compared with 0.99e-12 and 1.01e-12.
     for (determinant, round_is_surer) in [(0.99e-12_f64, true), (1.01e-12, false)] {
         let round = Matrix6::identity() * determinant.powf(1.0 / 6.0);
         assert_eq!(surer(round, flat), round_is_surer);

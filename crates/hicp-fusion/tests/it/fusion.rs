@@ -1,6 +1,5 @@
-//! Barfoot & Furgale's fusion: the golden case, and what must hold for any estimates.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of Barfoot & Furgale's fusion: the golden case, and properties that hold for any
+//! estimates.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,7 +7,7 @@ use crate::common::{EXACT, Random, apart, estimate, fused, fusion, relative};
 use hicp_core::{Isometry3, Matrix6, Vector3, Vector6, se3};
 use hicp_fusion::{FusionError, FusionLimits, PoseEstimate, fuse};
 
-/// The published set-up with measurements that are not random: T_k = exp((chol(Σ_k) z_k)^) T_true.
+/// The published setup with measurements that are not random: T_k = exp((chol(Σ_k) z_k)^) T_true.
 fn golden() -> Vec<PoseEstimate> {
     let truth = se3::exp(&Vector6::new(1.0, 0.0, 0.0, 0.0, 0.0, PI / 6.0));
     let alpha = 5.0;
@@ -92,7 +91,8 @@ fn the_golden_case() {
 
 #[test]
 fn the_costs_of_the_golden_case_iteration_by_iteration() {
-    // Invariant of the method: the plain Gauss–Newton step, so the costs are the published iteration's.
+    // Invariant of the method: the plain Gauss–Newton step, so the costs are those of the published
+    // iteration.
     let expected = [
         2.016_058_13,
         0.843_684_31,
@@ -109,7 +109,7 @@ fn the_costs_of_the_golden_case_iteration_by_iteration() {
         let fused = fusion.solve(&Isometry3::identity()).unwrap();
         assert!((fused.solution.cost - expected).abs() < 1e-8, "{fused:?}");
         assert_eq!(fused.solution.iterations, max_iterations);
-        // Running out of evaluations is said.
+        // Running out of evaluations is reported.
         assert!(!fused.solution.converged);
     }
 }
@@ -131,7 +131,7 @@ fn the_gradient_is_zero_at_the_result() {
             };
             let (ahead, behind) = (at(step), at(-step));
             let gradient = (ahead - behind) / (2.0 * h);
-            // What the step of the wrong sign leaves is of the order of the spread.
+            // A step of the wrong sign would leave a gradient of the order of the spread.
             assert!(
                 gradient.abs() < 1e-5 * hessian[(axis, axis)] * spread,
                 "{spread} {axis}: {gradient}"
@@ -198,7 +198,7 @@ fn fusing_is_equivariant_under_the_adjoint() {
             ) < 1e-12
         );
 
-        // And it is the covariances that make it so: kept as they are, the result is another.
+        // The covariances cause this: if they are kept, the result differs.
         let kept: Vec<PoseEstimate> = estimates
             .iter()
             .map(|e| estimate(motion * e.camera_from_object(), *e.covariance()))
@@ -208,7 +208,7 @@ fn fusing_is_equivariant_under_the_adjoint() {
 }
 
 #[test]
-fn a_single_estimate_is_itself() {
+fn a_single_estimate_is_returned_unchanged() {
     let mut random = Random(5);
     let only = random.estimates(1, 0.3);
     let fusion = fusion(&only, EXACT);
@@ -229,12 +229,12 @@ fn one_wild_outlier_is_averaged_in_by_its_covariance() {
     let pose = random.pose(1.0);
     let wild = random.pose(1.0) * pose;
     let mut estimates = vec![estimate(pose, Matrix6::identity() * 1e-4); 9];
-    // As sure as the others: it drags the pose by about a tenth of the way.
+    // As certain as the others: it moves the pose by about a tenth of the distance.
     estimates.push(estimate(wild, Matrix6::identity() * 1e-4));
     let dragged = fused(&estimates);
     let share = apart(dragged.estimate.camera_from_object(), &pose) / apart(&wild, &pose);
     assert!((0.05..0.2).contains(&share), "{share}");
-    // A hundred times as unsure it hardly counts, and its weight is a 90,000th.
+    // With a hundred times the standard deviation, it hardly counts: its weight is a 90,000th.
     estimates[9] = estimate(wild, Matrix6::identity());
     let share = apart(fused(&estimates).estimate.camera_from_object(), &pose) / apart(&wild, &pose);
     assert!(share < 1e-4, "{share}");
@@ -242,8 +242,9 @@ fn one_wild_outlier_is_averaged_in_by_its_covariance() {
 
 #[test]
 fn estimates_spread_over_half_a_turn() {
-    // V has several minima here, and corners where a logarithm jumps from π to −π. Whichever is found: no NaN, no rise of V,
-    // and a gradient of zero where convergence is claimed.
+    // V has several minima here, and corners where a logarithm jumps from π to −π. For every
+    // minimum, there must be no NaN and no rise of V, and a zero gradient if convergence is
+    // reported.
     let about = |degrees: f64| Isometry3::rotation(Vector3::z() * degrees.to_radians());
     for (angles, start) in [
         (vec![0.0, 179.0], 0.0),
@@ -283,7 +284,7 @@ fn estimates_spread_over_half_a_turn() {
     let fused = fused(&pair);
     let angle = fused.estimate.camera_from_object().rotation.angle();
     assert!((angle - 89.5_f64.to_radians()).abs() < 1e-12, "{angle}");
-    // At half a turn and on either side of the cut the mean is between, not at zero.
+    // At half a turn, and on either side of the cut, the mean is between them and not at zero.
     let pair = [
         estimate(about(170.0), Matrix6::identity() * 0.01),
         estimate(about(-170.0), Matrix6::identity() * 0.01),
@@ -323,7 +324,7 @@ fn zero_and_huge_covariances() {
             mean.estimate.camera_from_object()
         ) < 1e-9
     );
-    // An estimate that knows nothing changes nothing.
+    // An estimate without information changes nothing.
     let huge = with([unit, unit, Matrix6::identity() * 1e30]);
     assert!(
         apart(
@@ -331,7 +332,7 @@ fn zero_and_huge_covariances() {
             mean.estimate.camera_from_object()
         ) < 1e-12
     );
-    // If none knows anything, it is their average all the same.
+    // If none has information, the result is their average.
     for factor in [1e30, 1e60] {
         let all = with([Matrix6::identity() * factor; 3]);
         let alike = with([unit; 3]);
@@ -344,7 +345,7 @@ fn zero_and_huge_covariances() {
         let ratio = all.estimate.covariance()[(0, 0)] / factor;
         assert!((0.2..0.5).contains(&ratio), "{ratio}");
     }
-    // Known in some directions only: the others come from elsewhere.
+    // Known only in some directions: the others come from elsewhere.
     let mut partly = Matrix6::zeros();
     partly[(2, 2)] = 1e30;
     let split = with([partly, unit, unit]);
@@ -356,7 +357,7 @@ fn zero_and_huge_covariances() {
 
 #[test]
 fn the_mean_cost_is_that_of_its_degrees_of_freedom() {
-    // V is half a χ² of 6K − 6 degrees of freedom where the noise is small: 6 for three estimates.
+    // V is half a χ² of 6K − 6 degrees of freedom if the noise is small: 6 for three estimates.
     let mut random = Random(8);
     let truth = random.pose(1.0);
     let runs = 2000;
@@ -382,7 +383,7 @@ fn the_mean_cost_is_that_of_its_degrees_of_freedom() {
 }
 
 #[test]
-fn what_is_no_estimate_is_refused() {
+fn invalid_estimates_are_refused() {
     let pose = Isometry3::translation(0.0, 0.0, 0.5);
     let unit = Matrix6::identity();
     let nan = Isometry3::translation(0.0, f64::NAN, 0.5);
@@ -434,9 +435,10 @@ fn what_is_no_estimate_is_refused() {
     }
 }
 
-/// Covariances that are regular are used as they are, however small; only what is singular to working precision is raised.
+/// Regular covariances are used as they are, however small. Only those that are singular to working
+/// precision are raised.
 #[test]
-fn small_regular_covariances_weigh_by_what_they_say() {
+fn small_regular_covariances_keep_their_weight() {
     // Far below the floor of singular ones: standard deviations of 1e-8 and 2e-8.
     let covariance = |deviation: f64| Matrix6::identity() * (deviation * deviation);
     let offset = Vector6::new(1e-9, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -447,7 +449,7 @@ fn small_regular_covariances_weigh_by_what_they_say() {
     let both = fusion(&estimates, EXACT)
         .solve(&Isometry3::identity())
         .unwrap();
-    // A fifth of the way: the weights are as four to one.
+    // A fifth of the distance, since the weights are as four to one.
     let x = both.estimate.camera_from_object().translation.x;
     assert!((x - 0.2e-9).abs() < 1e-14, "{x}");
     let expected = covariance(1e-8) * 0.8;

@@ -1,6 +1,4 @@
-//! The six methods of §V-A, by what the paper says of each.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of the six methods of §V-A, by the paper's descriptions.
 
 use crate::common::{EXACT, Random, apart, estimate, fused, relative};
 use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
@@ -27,7 +25,7 @@ fn run(fuser: &mut dyn Fuser, estimates: &[PoseEstimate]) -> PoseEstimate {
 }
 
 #[test]
-fn names_read_back() {
+fn names_parse_to_their_methods() {
     for method in FusionMethod::ALL {
         assert_eq!(method.name().parse(), Ok(method));
         assert_eq!(
@@ -46,7 +44,7 @@ fn names_read_back() {
 }
 
 #[test]
-fn nothing_is_believed_before_the_first_estimate_and_the_first_as_it_is() {
+fn the_first_estimate_is_returned_unchanged() {
     let mut random = Random(11);
     let first = random.estimates(1, 0.2)[0].with_mve(0.3).unwrap();
     for method in FusionMethod::ALL {
@@ -69,7 +67,7 @@ fn last_estimate_is_the_last() {
 }
 
 #[test]
-fn most_confident_is_the_surest_wherever_the_camera_went() {
+fn most_confident_is_the_most_certain_for_any_camera_motion() {
     let mut random = Random(13);
     let unit = exact().unit;
     let mut fuser = MostConfident::new(Transport::Adjoint);
@@ -85,7 +83,7 @@ fn most_confident_is_the_surest_wherever_the_camera_went() {
     }
     let found = fuser.estimate().unwrap();
     assert!(apart(found.camera_from_object(), &(carried * poses[1])) < 1e-12);
-    // Among equals the newest.
+    // Among equals, the newest.
     let mut fuser = MostConfident::default();
     let pair = [poses[0], poses[1]].map(|pose| estimate(pose, Matrix6::identity() * 0.1));
     assert_eq!(run(&mut fuser, &pair), pair[1]);
@@ -106,7 +104,7 @@ fn weighted_average_fuses_all_by_their_covariances() {
 }
 
 #[test]
-fn average_weighs_alike_whatever_the_covariances() {
+fn average_weighs_equally_for_all_covariances() {
     let mut random = Random(15);
     let estimates = random.estimates(8, 0.3);
     let config = FuserConfig {
@@ -125,7 +123,8 @@ fn average_weighs_alike_whatever_the_covariances() {
             expected.estimate.camera_from_object()
         ) < 1e-13
     );
-    // Its covariance is what follows from those of the estimates: a mean of K has the K-th part of their mean.
+    // Its covariance follows from those of the estimates: that of a mean of K is a K-th of their
+    // mean.
     let pose = random.pose(0.5);
     let together: Vec<PoseEstimate> = estimates
         .iter()
@@ -136,8 +135,10 @@ fn average_weighs_alike_whatever_the_covariances() {
     assert!(relative(found.covariance(), &(sum / 64.0)) < 1e-12);
 }
 
-/// A⁻¹ (Σ Gₖᵀ Hₖ Cₖ Hₖᵀ Gₖ) A⁻¹ with A = Σ Gₖᵀ Gₖ, Gₖ = 𝓙(ξₖ)⁻¹ and Hₖ = 𝓙(−ξₖ)⁻¹ where all weigh as I₆: the errors of the estimates,
-/// through the normal equations.
+/// The errors of estimates propagate through the normal equations.
+///
+/// With equal weights I₆, the covariance is A⁻¹ (Σ Gₖᵀ Hₖ Cₖ Hₖᵀ Gₖ) A⁻¹ with A = Σ Gₖᵀ Gₖ, Gₖ =
+/// 𝓙(ξₖ)⁻¹ and Hₖ = 𝓙(−ξₖ)⁻¹.
 #[test]
 fn the_covariance_of_scattered_estimates_goes_through_the_normal_equations() {
     let estimates = Random(161).estimates(5, 0.6);
@@ -163,7 +164,7 @@ fn the_covariance_of_scattered_estimates_goes_through_the_normal_equations() {
 }
 
 #[test]
-fn the_covariance_of_the_average_is_what_monte_carlo_finds() {
+fn monte_carlo_confirms_the_covariance_of_the_average() {
     let mut random = Random(16);
     let truth = Isometry3::translation(0.05, -0.02, 0.6);
     let unit = exact().unit;
@@ -201,7 +202,7 @@ fn the_covariance_of_the_average_is_what_monte_carlo_finds() {
 }
 
 #[test]
-fn filtering_is_the_batch_to_second_order() {
+fn filtering_equals_the_batch_to_second_order() {
     for (recursive, batch) in [
         (
             RecursiveFuser::filtering as fn(_) -> _,
@@ -222,7 +223,7 @@ fn filtering_is_the_batch_to_second_order() {
         // A tenth of the spread, a hundredth of the difference.
         assert!(fine < coarse / 50.0, "{coarse} {fine}");
     }
-    // Exact where the poses commute.
+    // Exact if the poses commute.
     let mut random = Random(17);
     let estimates: Vec<PoseEstimate> = (0..6)
         .map(|_| {
@@ -236,7 +237,7 @@ fn filtering_is_the_batch_to_second_order() {
 }
 
 #[test]
-fn a_window_forgets_the_oldest() {
+fn a_window_drops_the_oldest() {
     let estimates = Random(21).estimates(7, 0.2);
     let config = FuserConfig {
         window: Some(3),
@@ -255,7 +256,7 @@ fn a_window_forgets_the_oldest() {
 }
 
 #[test]
-fn the_unit_about_an_object_is_the_same_from_everywhere() {
+fn the_unit_around_an_object_does_not_depend_on_the_camera() {
     let mut random = Random(22);
     let unit = exact().unit;
     for _ in 0..20 {
@@ -264,7 +265,7 @@ fn the_unit_about_an_object_is_the_same_from_everywhere() {
         let carried = adjoint * unit.at(&pose) * adjoint.transpose();
         assert!(relative(&unit.at(&(motion * pose)), &carried) < 1e-13);
     }
-    // At the camera's origin and without a centre it is the diagonal that its documentation states.
+    // At the camera's origin and without a center, it is the documented diagonal.
     let plain = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
     let expected = Matrix6::from_diagonal(&Vector6::new(0.01, 0.01, 0.01, 1.0, 1.0, 1.0));
     assert!((plain.at(&Isometry3::identity()) - expected).amax() < 1e-15);
@@ -275,7 +276,7 @@ fn the_unit_about_an_object_is_the_same_from_everywhere() {
 }
 
 #[test]
-fn the_covariance_models_do_what_their_formulas_say() {
+fn the_covariance_models_equal_their_formulas() {
     let unit = exact().unit;
     let pose = Isometry3::translation(0.1, 0.0, 0.7);
     let registration = Random(23).covariance(1e-3);

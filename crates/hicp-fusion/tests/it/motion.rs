@@ -1,6 +1,4 @@
-//! What a moving camera does to what is held.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of the effect of a moving camera on held estimates.
 
 use crate::common::{EXACT, Random, apart, estimate, fused, relative};
 use hicp_core::{Isometry3, Matrix6, Point3, se3};
@@ -59,7 +57,7 @@ fn a_moved_camera_changes_only_the_frame() {
 }
 
 #[test]
-fn kept_covariances_stay_as_they_are() {
+fn kept_covariances_do_not_change() {
     let mut random = Random(19);
     let motion = CameraMotion::new(random.pose(1.0)).unwrap();
     let estimates = random.estimates(2, 0.3);
@@ -75,7 +73,7 @@ fn kept_covariances_stay_as_they_are() {
         let expected = motion.apply(estimates[0].camera_from_object());
         assert!(apart(held.camera_from_object(), &expected) < 1e-14);
     }
-    // All estimates in the new frame with the old covariances: that is what the batch fuses.
+    // The batch fuses all estimates in the new frame with the old covariances.
     let mut fuser = BatchFuser::weighted_average(FuserConfig {
         limits: EXACT,
         ..FuserConfig::paper()
@@ -113,7 +111,7 @@ fn an_uncertain_motion_adds_its_covariance() {
         let added = unsure.covariance() - sure.covariance();
         assert!(relative(&added, &own) < 1e-10, "{method}");
     }
-    // An estimate that came by an uncertain motion counts less.
+    // An estimate that was moved by an uncertain motion counts less.
     let here = estimate(
         Isometry3::translation(0.0, 0.0, 0.50),
         Matrix6::identity() * 1e-4,
@@ -142,17 +140,17 @@ fn an_uncertain_motion_adds_its_covariance() {
     ));
 }
 
-/// Ad(A) Σ Ad(A)ᵀ.
+/// Returns Ad(A) Σ Ad(A)ᵀ.
 fn carried(covariance: &Matrix6<f64>, motion: &Isometry3<f64>) -> Matrix6<f64> {
     let adjoint = se3::adjoint(motion);
     adjoint * covariance * adjoint.transpose()
 }
 
-/// An estimate, taken along by hand.
+/// An estimate that is moved by hand.
 struct Held {
     pose: Isometry3<f64>,
     covariance: Matrix6<f64>,
-    /// I₆ where it was seen.
+    /// I₆ at the time of the estimate.
     weight: Matrix6<f64>,
 }
 
@@ -174,9 +172,10 @@ impl Held {
     }
 }
 
-/// Motions that are known and motions that are not, in turn: every estimate goes through all of them since it came.
+/// With alternating known and uncertain motions, every estimate is moved by all motions since its
+/// update.
 #[test]
-fn estimates_held_go_through_every_motion() {
+fn held_estimates_are_moved_by_every_motion() {
     let mut random = Random(24);
     let (mut center, own) = (random.pose(1.0), random.covariance(0.02));
     let motions: Vec<CameraMotion> = (0..4)
@@ -243,7 +242,7 @@ fn estimates_held_go_through_every_motion() {
     );
 }
 
-/// The next fusion starts where the last one ended, wherever the camera has gone in between.
+/// The next fusion starts at the end of the last one, for any motion in between.
 #[test]
 fn a_motion_costs_no_evaluations() {
     let mut random = Random(25);

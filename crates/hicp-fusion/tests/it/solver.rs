@@ -1,6 +1,6 @@
-//! How the iteration of the fusion ends: where steps raise the cost, where rounding hides the minimum, and without evaluations left.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of the end of the iteration.
+//!
+//! They cover steps that raise the cost, a minimum hidden by rounding, and no evaluations left.
 
 use crate::common::{Random, apart, estimate, fusion};
 use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
@@ -13,8 +13,9 @@ fn limits(max_iterations: usize) -> FusionLimits {
     }
 }
 
-/// Poses turned by anything, as far as half a turn from each other: full steps often raise V. The covariances are large, so that V is
-/// about 1, or as small.
+/// Returns poses with arbitrary rotations, up to half a turn from each other.
+///
+/// Full steps often raise V. The covariances are large, so that V is about 1, or as small.
 fn scattered(seed: u64) -> Vec<PoseEstimate> {
     let mut random = Random(seed);
     (0..3)
@@ -48,7 +49,7 @@ fn the_cost_is_half_the_sum_of_the_squared_distances() {
     assert!((found / expected - 1.0).abs() < 1e-12);
 }
 
-/// However few evaluations there are: the pose is the best so far, and its cost is the one that is stated.
+/// For every number of evaluations, the pose is the best so far, and its cost is the reported one.
 #[test]
 fn no_evaluation_makes_the_pose_worse() {
     let mut halved = 0;
@@ -60,9 +61,9 @@ fn no_evaluation_makes_the_pose_worse() {
                 estimate, solution, ..
             } = solved(&estimates, max_iterations);
             assert!(solution.iterations <= max_iterations);
-            // It ends before only where it has converged.
+            // It ends before only if it has converged.
             assert!(solution.converged || solution.iterations == max_iterations);
-            // By no more than rounding.
+            // Not by more than rounding.
             assert!(
                 solution.cost <= before * (1.0 + 1e-11),
                 "{seed} {max_iterations}"
@@ -82,9 +83,9 @@ fn no_evaluation_makes_the_pose_worse() {
     );
 }
 
-/// Where it says that it converged, V has no slope.
+/// If convergence is reported, V has no slope.
 #[test]
-fn where_it_converges_the_slope_is_zero() {
+fn the_slope_is_zero_at_convergence() {
     let mut converged = 0;
     for seed in 0..40 {
         let estimates = scattered(seed);
@@ -108,7 +109,7 @@ fn where_it_converges_the_slope_is_zero() {
     assert!(converged > 30, "{converged}");
 }
 
-/// No step is shorter than nothing: what is asked for is never reached, and every evaluation is used.
+/// A tolerance of zero is never reached, so every evaluation is used.
 #[test]
 fn a_tolerance_of_zero_uses_every_evaluation() {
     let here = [estimate(Isometry3::identity(), Matrix6::identity())];
@@ -122,10 +123,12 @@ fn a_tolerance_of_zero_uses_every_evaluation() {
     assert!(!fused.solution.converged && fused.solution.cost == 0.0);
 }
 
-/// A kilometre from an object of 10 cm, turns and shifts are all but one, and V is what is left of large numbers: no step may be found that
-/// lowers it, but it ends, and in the place where it does without rounding, which is that of the same estimates seen from nearby.
+/// Rotations and translations nearly coincide at a kilometer from an object of 10 cm.
+///
+/// V is then a small difference of large numbers. No step may lower it, but the iteration must end,
+/// at the pose where the same estimates end nearby and without rounding.
 #[test]
-fn it_ends_where_rounding_hides_the_minimum() {
+fn the_iteration_ends_if_rounding_hides_the_minimum() {
     let unit = UnitCovariance::about_object(Point3::origin(), 0.1).unwrap();
     let away = Isometry3::translation(0.0, 1000.0, 1000.0);
     for seed in 0..40 {
@@ -144,7 +147,8 @@ fn it_ends_where_rounding_hides_the_minimum() {
         assert!(far.solution.converged, "{:?}", far.solution);
         assert!(far.solution.iterations < 500, "{:?}", far.solution);
         let found = away.inverse() * far.estimate.camera_from_object();
-        // V is flat at its minimum: what it loses to rounding, some 1e-10 of it, is the square of what the pose does.
+        // V is flat at its minimum. It loses about 1e-10 of its value to rounding, which is the
+        // square of the change of the pose.
         assert!(apart(&found, near.estimate.camera_from_object()) < 1e-5);
     }
 }

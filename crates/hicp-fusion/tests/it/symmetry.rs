@@ -1,6 +1,4 @@
-//! Estimates of symmetric objects.
-
-// Helpers outside of test functions may fail like tests.
+//! Tests of estimates of symmetric objects.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -50,12 +48,12 @@ fn half_turns_of_a_symmetric_object_do_not_fuse_to_a_quarter() {
         (poses[0].rotation.inverse() * e.unwrap().camera_from_object().rotation).angle()
     };
     assert!((turn(fuser.estimate()) - slightly / 2.0).abs() < 1e-9);
-    // Without the symmetry they do: the test can fail.
+    // Without the symmetry they do, so the test can fail.
     assert!((turn(naive.estimate()) - FRAC_PI_2).abs() < 0.02);
 }
 
 #[test]
-fn every_symmetric_pose_is_brought_home() {
+fn every_symmetric_pose_is_mapped_to_the_representative() {
     let cube: Vec<Isometry3<f64>> = (0..4)
         .flat_map(|quarter| {
             let about_z =
@@ -87,7 +85,7 @@ fn every_symmetric_pose_is_brought_home() {
         let reference = random.pose(0.5);
         let near = se3::exp(&random.twist(0.05)) * reference;
         for symmetry in &cube {
-            // A group: the inverse of every symmetry is one.
+            // A group: the inverse of every symmetry is a symmetry.
             let found = fuser.representative(&(near * symmetry), &reference);
             assert!(apart(&found, &near) < 1e-12);
         }
@@ -96,10 +94,10 @@ fn every_symmetric_pose_is_brought_home() {
 }
 
 #[test]
-fn any_turn_about_an_axis_is_brought_home() {
+fn every_rotation_around_an_axis_is_mapped_to_the_representative() {
     let offset = Point3::new(0.03, -0.01, 0.0);
     let axis = SymmetryAxis::new(Vector3::new(0.2, 1.0, -0.3), offset).unwrap();
-    // The centre of a body of revolution is on its axis.
+    // The center of a body of revolution is on its axis.
     let inner = BatchFuser::average(FuserConfig::default());
     let symmetries = Symmetries {
         discrete: vec![],
@@ -112,7 +110,7 @@ fn any_turn_about_an_axis_is_brought_home() {
         let found = fuser.representative(&(reference * axis.rotation(angle)), &reference);
         assert!(apart(&found, &reference) < 1e-7, "{angle}");
     }
-    // The closed form against a search, for poses that are off in other directions too.
+    // The closed form against a search, for poses that also differ in other directions.
     let mut random = Random(33);
     for _ in 0..10 {
         let pose = random.pose(0.5) * reference * axis.rotation(PI * random.uniform());
@@ -130,7 +128,7 @@ fn any_turn_about_an_axis_is_brought_home() {
 }
 
 #[test]
-fn a_bottle_upside_down_and_turned_is_brought_home() {
+fn an_inverted_and_rotated_bottle_is_mapped_to_the_representative() {
     let axis = SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap();
     let flip = Isometry3::rotation(Vector3::x() * PI);
     let fuser = aware(Symmetries {
@@ -142,9 +140,9 @@ fn a_bottle_upside_down_and_turned_is_brought_home() {
     assert!(apart(&fuser.representative(&pose, &reference), &reference) < 1e-7);
 }
 
-/// Two axes are enough, wherever on them their points are said to be, and however little they miss each other by rounding.
+/// Two axes suffice, with any points on them, and even if rounding separates them slightly.
 #[test]
-fn a_sphere_has_no_rotation() {
+fn every_rotation_of_a_sphere_is_a_symmetry() {
     let center = Point3::new(0.03, -0.01, 0.02);
     let through = |direction: Vector3<f64>, along: f64, beside: f64| {
         let beside = Vector3::z() * beside;
@@ -162,7 +160,7 @@ fn a_sphere_has_no_rotation() {
             through(Vector3::x(), 0.4, 1e-7),
             through(-oblique, 0.7, -1e-7),
         ],
-        // The first two are one.
+        // The first two are the same.
         vec![
             through(Vector3::z(), 0.1, 0.0),
             through(-Vector3::z(), 0.1, 0.0),
@@ -179,15 +177,17 @@ fn a_sphere_has_no_rotation() {
             let (reference, pose) = (random.pose(1.0), random.pose(2.0));
             let found = fuser.representative(&pose, &reference);
             assert!(se3::pose_distance(&found, &reference).0 < 1e-14);
-            // The ball stays where it was seen.
+            // The ball stays at its observed position.
             assert!((found * center - pose * center).norm() < 1e-14);
         }
     }
 }
 
-/// An axis that is declared twice, a little differently, is one: a body of revolution that leans does not stand up.
+/// An axis that is declared twice with a small difference counts as one.
+///
+/// A leaning body of revolution therefore does not become upright.
 #[test]
-fn an_axis_declared_twice_makes_no_sphere() {
+fn an_axis_declared_twice_does_not_make_a_sphere() {
     let about = |tilt: f64, along: f64| {
         let offset = Point3::new(0.0, 0.0, along);
         SymmetryAxis::new(Vector3::new(tilt, 0.0, 1.0), offset).unwrap()
@@ -202,8 +202,10 @@ fn an_axis_declared_twice_makes_no_sphere() {
     assert!(apart(&found, &leaning) < 3e-2);
 }
 
-/// The definition: of pose · S the nearest, where turns weigh by the radius and shifts are those of the centre. The motions are no
-/// group, so that S and S⁻¹ are two things.
+/// The definition: the nearest pose · S, where rotations count with the radius and translations are
+/// those of the center.
+///
+/// The motions are not a group, so S and S⁻¹ differ.
 #[test]
 fn the_representative_is_the_nearest_of_all() {
     let mut random = Random(37);
@@ -235,7 +237,7 @@ fn the_representative_is_the_nearest_of_all() {
     assert_eq!(chosen.len(), 7, "each is the nearest now and then");
 }
 
-/// What is where it should be stays bit for bit, of unit length or not quite.
+/// A pose that is already the nearest does not change in any bit, of unit length or nearly.
 #[test]
 fn a_pose_represents_itself() {
     let fuser = aware(Symmetries {
@@ -253,9 +255,10 @@ fn a_pose_represents_itself() {
     }
 }
 
-/// Near what is held, and at any distance from the camera, where the renormalised pose is nearer by rounding only.
+/// Near the held pose and at any distance from the camera, where a renormalized pose is nearer only
+/// by rounding.
 #[test]
-fn a_pose_without_a_nearer_partner_stays_as_it_is() {
+fn a_pose_without_a_nearer_equivalent_does_not_change() {
     let symmetries = Symmetries {
         discrete: vec![
             Isometry3::identity(),
@@ -283,9 +286,9 @@ fn a_pose_without_a_nearer_partner_stays_as_it_is() {
     }
 }
 
-/// However small it is, and however little it is turned.
+/// For every small object and every small rotation.
 #[test]
-fn a_screw_is_turned_back_by_a_nanoradian() {
+fn a_rotation_by_a_nanoradian_is_reversed() {
     let axis = SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap();
     let symmetries = Symmetries {
         discrete: vec![],
@@ -293,7 +296,7 @@ fn a_screw_is_turned_back_by_a_nanoradian() {
     };
     let inner = BatchFuser::average(FuserConfig::default());
     let fuser = SymmetryAware::new(inner, symmetries, Point3::origin(), 1e-3).unwrap();
-    // Far away a turn must be larger to be more than rounding: of 2e-13 m per metre.
+    // Far away, a rotation must be larger to exceed rounding: 2e-13 m per meter.
     for (far, angle, tolerance) in [(0.0, 1e-9, 1e-14), (1.0, 1e-9, 1e-14), (1e3, 1e-5, 1e-12)] {
         let mut reference = turned(Vector3::y(), 0.7);
         reference.translation.vector *= far;
@@ -302,9 +305,10 @@ fn a_screw_is_turned_back_by_a_nanoradian() {
     }
 }
 
-/// Upside down every angle about the axis is as far, and what rounding makes of it does not turn the object.
+/// Upside down, every angle around the axis has the same distance, and rounding must not rotate the
+/// object.
 #[test]
-fn an_object_upside_down_is_not_turned_by_rounding() {
+fn an_inverted_object_is_not_rotated_by_rounding() {
     let fuser = aware(Symmetries {
         discrete: vec![],
         continuous: vec![SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap()],
@@ -335,7 +339,7 @@ fn the_representative_keeps_its_covariance_and_moves_with_the_camera() {
     .unwrap();
     let mut fuser = SymmetryAware::new(inner, symmetries, Point3::origin(), 0.1).unwrap();
     fuser.update(&estimate(pose, covariance));
-    // The gate inside sees the representative: a symmetric pose is no outlier.
+    // The inner gate receives the representative: a symmetric pose is not an outlier.
     let update = fuser.update(&estimate(pose * half_turn, covariance));
     assert!(matches!(update, Update::Accepted(_)), "{update:?}");
     let found = fuser.estimate().unwrap();
@@ -350,7 +354,7 @@ fn the_representative_keeps_its_covariance_and_moves_with_the_camera() {
     assert!(SymmetryAware::new(inner, symmetries, Point3::origin(), 0.1).is_err());
 }
 
-/// Of poses that are equally near, the one that is there stays, bit for bit.
+/// Of equally near poses, the given one is kept, bit for bit.
 #[test]
 fn a_tie_changes_nothing() {
     let fuser = aware(Symmetries {
@@ -361,7 +365,7 @@ fn a_tie_changes_nothing() {
         let pose = turned(Vector3::z(), 0.3);
         let reference = pose * Isometry3::rotation(Vector3::z() * PI * turns);
         assert_eq!(fuser.representative(&pose, &reference), pose);
-        // A little beyond, and it is the other.
+        // Slightly beyond, it is the other.
         let beyond = pose * Isometry3::rotation(Vector3::z() * (FRAC_PI_2 + 1e-6));
         assert_ne!(fuser.representative(&pose, &beyond), pose);
     }

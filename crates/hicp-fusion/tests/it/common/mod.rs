@@ -1,13 +1,13 @@
-//! Random estimates, the same with every run.
+//! Random estimates, the same in every run.
 
 use hicp_core::{Isometry3, Matrix6, Vector6, se3};
 use hicp_fusion::{Fused, Fusion, FusionLimits, PoseEstimate};
 
-/// Splitmix64.
+/// The SplitMix64 generator.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    /// Uniform in −1…1.
+    /// Returns a number, uniform in −1…1.
     pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -17,7 +17,7 @@ impl Random {
         (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// Standard normal, by Box and Muller.
+    /// Returns a standard normal number (Box–Muller).
     pub(crate) fn normal(&mut self) -> f64 {
         let u = f64::midpoint(self.uniform(), 1.0).max(1e-300);
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::PI * self.uniform()).cos()
@@ -31,13 +31,13 @@ impl Random {
         se3::exp(&self.twist(size))
     }
 
-    /// A full covariance with standard deviations of about `size`.
+    /// Returns a full covariance with standard deviations of about `size`.
     pub(crate) fn covariance(&mut self, size: f64) -> Matrix6<f64> {
         let root = Matrix6::from_fn(|_, _| self.uniform());
         (root * root.transpose() + Matrix6::identity() * 0.1) * (size * size)
     }
 
-    /// Estimates scattered about a pose.
+    /// Returns estimates scattered around a pose.
     pub(crate) fn estimates(&mut self, count: usize, spread: f64) -> Vec<PoseEstimate> {
         let center = self.pose(1.0);
         (0..count)
@@ -53,7 +53,7 @@ pub(crate) fn estimate(pose: Isometry3<f64>, covariance: Matrix6<f64>) -> PoseEs
     PoseEstimate::new(pose, covariance).expect("valid")
 }
 
-/// To the last digits: what the iteration itself can reach.
+/// Limits at which the iteration reaches its last digits.
 pub(crate) const EXACT: FusionLimits = FusionLimits {
     max_iterations: 100,
     tolerance: 1e-14,
@@ -76,12 +76,12 @@ pub(crate) fn fused(estimates: &[PoseEstimate]) -> Fused {
     fused
 }
 
-/// |ln(A B⁻¹)|.
+/// Returns |ln(A B⁻¹)|.
 pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     se3::log(&(a * b.inverse())).norm()
 }
 
-/// Largest difference of two matrices relative to the largest entry.
+/// Returns the largest difference of two matrices, relative to the largest entry.
 pub(crate) fn relative(found: &Matrix6<f64>, expected: &Matrix6<f64>) -> f64 {
     (found - expected).amax() / expected.amax()
 }
