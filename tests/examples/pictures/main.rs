@@ -1,0 +1,46 @@
+//! Draws the pictures of the book from simulated scenes: `cargo xtask pictures`.
+
+// Pixels and counts become places in a picture.
+#![allow(clippy::cast_possible_truncation)]
+
+mod chart;
+#[path = "../../../crates/hybrid-icp-cli/src/picture/contour.rs"]
+#[allow(dead_code)]
+mod contour;
+mod curves;
+mod gallery;
+mod pairs;
+mod scene;
+mod svg;
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use svg::Svg;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/pictures");
+    let folder = std::env::args().nth(1).map_or(docs, PathBuf::from);
+    std::fs::create_dir_all(&folder)?;
+    type Draw = fn() -> Result<Svg, Box<dyn Error>>;
+    let pictures: [(&str, Draw); 9] = [
+        ("before-after", gallery::before_after),
+        ("selection", pairs::selection),
+        ("correspondences", pairs::correspondences),
+        ("rejection", pairs::rejection),
+        ("convergence", curves::convergence),
+        ("switch", curves::switch),
+        ("basin", curves::basin),
+        ("successes", gallery::successes),
+        ("failures", gallery::failures),
+    ];
+    let chosen = std::env::args().nth(2);
+    for (name, draw) in pictures {
+        if chosen.as_ref().is_none_or(|chosen| chosen == name) {
+            let path = folder.join(name).with_extension("svg");
+            draw()?.write(&path)?;
+            println!("{}", path.display());
+        }
+    }
+    Ok(())
+}
