@@ -14,7 +14,7 @@ use crate::covered::covered_pixels;
 /// - Their measured point lies in the model's bounding box at the estimate, grown on every side by `margin` times the diameter.
 ///
 /// Anything else in that box is in the mask too. So this is for estimates that are near, for objects that stand free, and for
-/// projective pipelines. If there is a segmentation, it is better (`docs/bop.md` has figures).
+/// projective pipelines. If there is a segmentation, it is better (`docs/results.md` has figures).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
     /// The growth of the boxes on every side, relative to their size.
