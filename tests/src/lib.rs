@@ -174,7 +174,26 @@ pub fn symmetric_pose_distance(
         .expect("the identity is among the motions")
 }
 
-/// Runs the examples of the guide.
+/// Runs the Rust blocks of the README and the book.
 #[cfg(doctest)]
-#[doc = include_str!("../../docs/build-your-own.md")]
-struct Guide;
+mod book {
+    macro_rules! pages {
+        ($($name:ident: $path:literal),+) => {
+            $(
+                #[doc = include_str!(concat!("../../", $path))]
+                struct $name;
+            )+
+        };
+    }
+    pages!(
+        Readme: "README.md",
+        Problem: "docs/book/problem.md",
+        FirstRefinement: "docs/book/first-refinement.md",
+        HowIcpWorks: "docs/book/how-icp-works.md",
+        WhyItSwitches: "docs/book/why-it-switches.md",
+        BuildYourOwn: "docs/book/build-your-own.md",
+        Trust: "docs/book/trust.md",
+        Sequences: "docs/book/sequences.md",
+        Presets: "docs/presets.md"
+    );
+}

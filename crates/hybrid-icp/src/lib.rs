@@ -1,35 +1,26 @@
-//! Refine 6D object poses in depth images.
+//! Refines the 6D pose of a known object in a depth image, and scores the result.
 //!
-//! A detector gives a segmentation mask and a rough pose. [`Refiner`] returns a better pose and a score that says how well
-//! it explains the image:
+//! A detector gives a segmentation mask and a rough pose. One call returns a better pose and its
+//! mean VSD estimate (MVE): 0 if the pose explains the image everywhere, 1 if nowhere.
 //!
 //! ```
 //! use hybrid_icp::prelude::*;
-//! # fn one_call(model: Model, observation: Observation, init: Isometry3<f64>) {
-//! let refined = Refiner::preset(Preset::Auto).refine(&model, &observation, &init);
-//! if refined.mve < 0.3 && refined.warnings().is_empty() {
-//!     println!("{}", refined.outcome.camera_from_object);
+//!
+//! fn better(model: &Model, observation: &Observation, rough: &Isometry3<f64>) -> Option<Isometry3<f64>> {
+//!     let refined = Refiner::preset(Preset::Auto).refine(model, observation, rough);
+//!     let trusted = refined.mve < 0.3 && refined.warnings().is_empty();
+//!     trusted.then_some(refined.outcome.camera_from_object)
 //! }
-//! # }
 //! ```
 //!
-//! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is enough. Depend on one of
-//! those alone only if you write a component and want few dependencies. `hicp-io` reads files (meshes, PNGs, BOP datasets).
+//! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is
+//! enough. Depend on one of those alone if you write a component and want few dependencies. `hicp-io`
+//! reads files (meshes, PNGs, BOP datasets).
 //!
-//! | module | contents | custom component |
-//! |---|---|---|
-//! | [`core`] | poses, cameras, images, models, pairs; [`nalgebra`] is re-exported | `core::Renderer` |
-//! | [`association`] | which points are paired, and which pairs are kept | `PointSelection`, `DataAssociation`, `OutlierFilter` |
-//! | [`metric`] | what is minimized | `ErrorMetric`, `Minimize`, `RobustKernel` |
-//! | [`icp`] | the loop, stop rules, stages made of stages | `Stage`, `StopRule`, `Observer` |
-//! | [`score`] | how well a pose explains the image; BOP's errors | `Score` |
-//! | [`switch`] | which stage runs | `Switcher` |
-//! | [`fusion`] | estimates of a moving camera | `Fuser` |
-//! | [`raster`] | the software renderer | |
-//! | [`presets`] | the paper's pipelines and those beyond it | |
-//! | `pipeline` | pipelines from TOML files (feature `pipeline`) | |
+//! # Compose your own
 //!
-//! Hybrid ICP (Dreczkowski & Johns), which chooses the registration from the image, is one configured pipeline:
+//! [`Preset`] lists the pipelines that ship. All of them are made of public parts. This is Hybrid ICP
+//! (Dreczkowski & Johns), which selects the registration from the image:
 //!
 //! ```
 //! use hybrid_icp::prelude::*;
@@ -37,23 +28,44 @@
 //! let stop = (Divergence::strict(), Convergence::default(), IterationLimit(50));
 //! let visible = VisibleSurface::default();
 //! let nearest = NearestNeighbor::default();
-//! let hybrid = Repeat {
-//!     times: 2,
-//!     stage: Switch {
-//!         switcher: Threshold { score: MeanVsd::default(), alpha: 0.4 },
-//!         aligned: Cascade((
-//!             Icp { selection: visible, association: Projective, filter: (), metric: PointToPoint, stop },
-//!             Icp { selection: visible, association: Projective, filter: (), metric: PointToPlane, stop },
-//!         )),
-//!         misaligned: Icp { selection: AllSamples, association: nearest, filter: (), metric: PointToPoint, stop },
-//!     },
-//! };
+//! let far = Icp { selection: AllSamples, association: nearest, filter: (), metric: PointToPoint, stop };
+//! let near = Cascade((
+//!     Icp { selection: visible, association: Projective, filter: (), metric: PointToPoint, stop },
+//!     Icp { selection: visible, association: Projective, filter: (), metric: PointToPlane, stop },
+//! ));
+//! let switcher = Threshold { score: MeanVsd::default(), alpha: 0.4 };
+//! let hybrid = Repeat { times: 2, stage: Switch { switcher, aligned: near, misaligned: far } };
 //! let refiner = Refiner::new(hybrid);
 //! # let _ = refiner;
 //! ```
 //!
-//! Conventions: meters, radians; `camera_from_object` takes object coordinates to the camera's; cameras look along +z with x
-//! right and y down; pixel centers are at integers.
+//! # Parts by role
+//!
+//! Every role is a trait. The last column names the example to copy for a custom part, in the folder
+//! `examples` of this crate.
+//!
+//! | role | trait | what ships | example |
+//! |---|---|---|---|
+//! | points to register | [`PointSelection`](association::PointSelection) | [`AllSamples`](association::AllSamples), [`VisibleSurface`](association::VisibleSurface), [`StableSampling`](association::StableSampling), … | `09_own_selection` |
+//! | which points belong together | [`DataAssociation`](association::DataAssociation) | [`NearestNeighbor`](association::NearestNeighbor), [`Projective`](association::Projective), [`ObservationToModel`](association::ObservationToModel), … | `05_own_association` |
+//! | which pairs count | [`OutlierFilter`](association::OutlierFilter) | [`MaxDistance`](association::MaxDistance), [`MaxNormalAngle`](association::MaxNormalAngle), [`Trimmed`](association::Trimmed), … | `10_own_filter` |
+//! | error of a pair | [`ErrorMetric`](metric::ErrorMetric) | [`PointToPoint`](metric::PointToPoint), [`PointToPlane`](metric::PointToPlane), [`Symmetric`](metric::Symmetric), [`Generalized`](metric::Generalized), … | `06_own_metric` |
+//! | step over all pairs | [`Minimize`](metric::Minimize) | [`Robust`](metric::Robust), [`PosePrior`](metric::PosePrior), [`LevenbergMarquardt`](metric::LevenbergMarquardt), … | |
+//! | when a stage ends | [`StopRule`](icp::StopRule) | [`Divergence`](icp::Divergence), [`Convergence`](icp::Convergence), [`SmallMotion`](icp::SmallMotion), … | `07_own_stop_rule` |
+//! | pose to better pose | [`Stage`](icp::Stage) | [`Icp`](icp::Icp), [`Cascade`](icp::Cascade), [`Repeat`](icp::Repeat), [`Guard`](icp::Guard), … | `12_own_stage` |
+//! | how well a pose fits | [`Score`](score::Score) | [`MeanVsd`](score::MeanVsd), [`SampledMve`](score::SampledMve), [`Vsd`](score::Vsd) | `11_own_score` |
+//! | which stage runs | [`Switcher`](switch::Switcher) | [`Threshold`](switch::Threshold), [`Thresholds`](switch::Thresholds) | `08_own_switcher` |
+//! | fusion of estimates | [`Fuser`](fusion::Fuser) | the paper's six methods ([`FusionMethod`](fusion::FusionMethod)), [`Gated`](fusion::Gated), … | `14_own_fuser` |
+//! | depth of a model | [`Renderer`](core::Renderer) | [`Rasterizer`](raster::Rasterizer) | `13_own_renderer` |
+//! | observes a run | [`Observer`](icp::Observer) | [`Trace`] | `04_observer` |
+//!
+//! With the feature `pipeline`, which is on by default, the module `pipeline` reads the same
+//! compositions from TOML files. `hicp-testkit` checks custom parts against the laws of their trait.
+//!
+//! # Conventions
+//!
+//! Meters and radians. `camera_from_object` takes object coordinates to those of the camera. Cameras
+//! look along +z with x right and y down. Pixel centers are at integers. [`nalgebra`] is re-exported.
 
 mod calibration;
 mod checks;
@@ -110,8 +122,3 @@ pub mod prelude {
     pub use hicp_score::{MeanVsd, Score};
     pub use hicp_switch::{Switch, Threshold};
 }
-
-/// Compiles the README's examples.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;

@@ -21,8 +21,9 @@ pub struct Refinement {
     pub mve_initial: f64,
     /// The mean VSD estimate of the returned pose.
     ///
-    /// Do not trust a pose above about 0.4. Above `mve_initial`, the refinement made the pose worse. If
-    /// `mve_initial` is 0.9 or more, it may be the pose of another object ([`Self::warnings`]).
+    /// Accept a pose below 0.3 if there is no warning. Above `mve_initial`, the refinement made the pose
+    /// worse. If `mve_initial` is 0.9 or more, it may be the pose of another object
+    /// ([`Self::warnings`]).
     pub mve: f64,
     /// Flatness of the measured and the rendered surface at the returned pose, which tells whether a
     /// plane would explain the depth better. `None` if fewer than 64 pixels show both.
@@ -61,9 +62,17 @@ impl Refinement {
 /// let observation = Observation::new(depth, mask, camera)?;
 /// let init = Isometry3::translation(0.0, 0.0, 0.54);
 ///
-/// let refined = Refiner::preset(Preset::Hybrid).refine(&model, &observation, &init);
+/// let refined = Refiner::preset(Preset::Auto).refine(&model, &observation, &init);
 /// assert!((refined.outcome.camera_from_object.translation.z - 0.5).abs() < 1e-4);
 /// assert!(refined.mve < refined.mve_initial);
+///
+/// // Many poses on all cores, with a refiner per thread. The bits are those of one thread.
+/// use rayon::prelude::*;
+/// let poses = [init; 8];
+/// let refined: Vec<_> = poses.par_iter()
+///     .map_init(|| Refiner::preset(Preset::Auto), |refiner, init| refiner.refine(&model, &observation, init))
+///     .collect();
+/// # assert_eq!(refined.len(), 8);
 /// # Ok(()) }
 /// ```
 pub struct Refiner<S = BoxedStage> {
