@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
@@ -40,3 +41,26 @@ def test_meshes_of_other_libraries_are_taken():
 @pytest.mark.parametrize("readme", [FOLDER.parent / "README.md", FOLDER.parents[2] / "README.md"])
 def test_the_examples_of_the_readmes_improve_a_pose(readme):
     assert "Result(refined" in run("smoke.py", readme)
+
+
+@pytest.mark.parametrize("page", ["book/first-refinement.md", "coming-from.md", "python.md"])
+def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    from scene import bracket, scene
+
+    frame = scene()
+    vertices, faces = bracket()
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz")
+    head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [f"{x} {y} {z}" for x, y, z in vertices] + [f"3 {a} {b} {c}" for a, b, c in faces]
+    (tmp_path / "mug.ply").write_text(head + "\n".join(rows) + "\n")
+    monkeypatch.chdir(tmp_path)
+    names = {
+        "depth_m": frame.depth, "mask": frame.mask, "masks": [frame.mask], "K": frame.camera.K, "T_co": frame.rough,
+        "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model, "grasp": lambda pose: None,
+    }
+    blocks = (FOLDER.parents[2] / "docs" / page).read_text().split("```python\n")[1:]
+    assert blocks
+    for block in blocks:
+        exec(compile(block.split("```")[0], page, "exec"), names)

@@ -9,6 +9,7 @@
 mod allocations;
 mod allocations_custom;
 mod beyond;
+mod book;
 mod catalogue;
 mod concurrency;
 mod cross;

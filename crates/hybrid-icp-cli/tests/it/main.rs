@@ -9,6 +9,7 @@
     reason = "helpers of tests"
 )]
 
+mod book;
 mod bop_chain;
 mod bop_compare;
 mod bop_eval;
