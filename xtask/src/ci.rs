@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::bench::BENCHES;
 use crate::process::{cargo, execute};
-use crate::{counts, instructions, licenses, python, read, tidy, valgrind};
+use crate::{book, counts, instructions, licenses, python, read, tidy, valgrind};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run() -> Result<()> {
@@ -20,6 +20,7 @@ pub(crate) fn run() -> Result<()> {
     })?;
     step("tidy", tidy::run)?;
     step("licenses", licenses::run)?;
+    step("book, without dead links", book::check)?;
     if std::env::var_os("HICP_TESTED").is_none() {
         step("tests", || execute(&mut cargo("test")))?;
     }

@@ -1,6 +1,7 @@
 //! Automation of the workspace: `cargo xtask help` lists the commands.
 
 mod bench;
+mod book;
 mod ci;
 mod counts;
 mod cycles;
@@ -11,7 +12,9 @@ mod licenses;
 mod miri;
 mod mutants;
 mod peers;
+mod pictures;
 mod process;
+mod prose;
 mod python;
 mod repro;
 mod scale;
@@ -30,8 +33,14 @@ cargo xtask COMMAND
 
   ci        everything that must pass before a change lands
   tidy      layer table, import cycles, confined libraries, crate documentation, open ends, docs/deviations.md
+  prose     every finding about the style of comments and Markdown
   licenses  licenses and sources of all dependencies, against deny.toml
   bless     writes docs/deviations.md from the `// Deviation:` comments in the code
+
+  book      builds the book into target/book/site; fails on dead links
+  pictures [--data]
+            draws the pictures of the book from simulated scenes into docs/pictures; with --data those of real
+            frames into target/pictures (needs BOP_PATH)
 
   python [--ray] [--open3d] [PYTEST OPTIONS]
             builds and tests the Python module: pytest, doctests, mypy, examples; --ray and --open3d add the
@@ -77,6 +86,10 @@ fn dispatch(words: &[&str]) -> Result<()> {
     match words {
         ["ci"] => ci::run(),
         ["tidy"] => tidy::run(),
+        ["prose"] => prose::check(true).map(|_| ()),
+        ["book"] => book::build(),
+        ["pictures"] => pictures::draw(),
+        ["pictures", "--data"] => pictures::draw_data(),
         ["licenses"] => licenses::run(),
         ["bless"] => deviations::bless(),
         ["python", options @ ..] => python::check(options),
@@ -116,14 +129,24 @@ fn read(path: impl AsRef<Path>) -> Result<String> {
 
 /// Returns every Rust source file below a folder, in a fixed order.
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    files(folder, &["rs"])
+}
+
+/// Returns every file below a folder with one of some extensions, in a fixed order, without build
+/// artifacts and hidden folders.
+fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
             let path = entry.path();
+            let name = entry.file_name();
+            let extension = path.extension().and_then(|extension| extension.to_str());
             if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs") {
+                if name != "target" && !name.to_string_lossy().starts_with('.') {
+                    folders.push(path);
+                }
+            } else if extension.is_some_and(|e| extensions.contains(&e)) {
                 files.push(path);
             }
         }

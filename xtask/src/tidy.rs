@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 
-use crate::{cycles, deviations, read, rust_files};
+use crate::{cycles, deviations, prose, read, rust_files};
 
 /// Every crate and its level. Dependencies within the workspace point to a lower level.
 const LAYERS: &[(&str, u32)] = &[
@@ -60,6 +60,7 @@ pub(crate) fn run() -> Result<()> {
     }
     left_open(&mut findings)?;
     findings.extend(deviations::check()?);
+    findings.extend(prose::check(false)?);
     ensure!(findings.is_empty(), "{}", findings.join("\nxtask: "));
     Ok(())
 }

@@ -1,0 +1,123 @@
+//! The style of comments and Markdown: sentences and lines that are hard to read, and links to files that
+//! do not exist.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::{files, read};
+
+/// Openings that hide the subject of a sentence, unless it is a question.
+const OPENINGS: [&str; 5] = ["What ", "Which ", "Where ", "How ", "Whoever "];
+/// Words with a plainer replacement, each with a space in front; split so that this file is clean.
+const WORDS: [(&str, &str); 8] = [
+    (" an", "ew"),
+    (" al", "oud"),
+    (" men", "ded"),
+    (" who", "ever"),
+    (" of one's", " own"),
+    (" is", " told"),
+    (" are", " told"),
+    (" held", " to"),
+];
+/// The longest line of a comment or of Markdown, characters.
+const COLUMNS: usize = 100;
+/// Pages that a program writes, and a record of the past.
+const EXCEPT: [&str; 4] = [
+    "docs/catalogue.md",
+    "docs/deviations.md",
+    "docs/study/",
+    "CHANGELOG.md",
+];
+/// Where a finding is an error. Findings elsewhere are printed.
+const CLEAN: [&str; 4] = ["README.md", "docs/", "mkdocs.yml", "xtask/src/prose.rs"];
+
+/// Prints the number of findings per folder, or all of them, and returns those in [`CLEAN`] folders.
+pub(crate) fn check(print: bool) -> Result<Vec<String>> {
+    let mut findings = Vec::new();
+    for path in files(Path::new("."), &["rs", "md"]) {
+        let name = path.to_string_lossy().replacen("./", "", 1);
+        if !EXCEPT.iter().any(|except| name.starts_with(except)) {
+            let (markdown, text) = (name.ends_with(".md"), read(&path)?);
+            let mut found = |line: usize, what| findings.push(format!("{name}:{line}: {what}"));
+            lines(&text, markdown, &mut found);
+            if markdown {
+                links(&path, &text, &mut found);
+            }
+        }
+    }
+    if print {
+        findings.iter().for_each(|finding| println!("{finding}"));
+    }
+    println!(
+        "xtask tidy: {} findings about prose (`cargo xtask prose` lists them)",
+        findings.len()
+    );
+    findings.retain(|finding| CLEAN.iter().any(|clean| finding.starts_with(clean)));
+    Ok(findings)
+}
+
+/// Checks lines outside of code blocks, tables and headings.
+fn lines(text: &str, markdown: bool, found: &mut impl FnMut(usize, String)) {
+    let (mut in_code, mut sentence) = (false, String::new());
+    for (number, line) in (1..).zip(text.lines()) {
+        let comment = line.trim_start().strip_prefix("//");
+        let prose = comment
+            .map_or(line, |c| c.trim_start_matches(['/', '!']))
+            .trim();
+        in_code = (in_code ^ prose.starts_with("```")) && (markdown || comment.is_some());
+        let skipped = in_code || prose.starts_with("```") || prose.starts_with(['|', '#']);
+        if skipped || prose.is_empty() || !(markdown || comment.is_some()) {
+            sentence.clear();
+            continue;
+        }
+        let width = line.chars().count();
+        if width > COLUMNS && !prose.contains("](") && !prose.starts_with(['<', '!']) {
+            found(
+                number,
+                format!("{width} columns, expected at most {COLUMNS}"),
+            );
+        }
+        let spaced = format!(
+            " {} ",
+            prose.to_lowercase().replace(['.', ',', ';', ':', '('], " ")
+        );
+        for word in WORDS.map(|(head, tail)| format!("{head}{tail} ")) {
+            if spaced.contains(&word) {
+                found(number, format!("avoid \"{}\"", word.trim()));
+            }
+        }
+        for part in format!("{prose} ").split_inclusive(['.', '?', '!']) {
+            sentence.push_str(part);
+            if sentence.ends_with(['.', '!']) {
+                let start = sentence.trim_start_matches([' ', '-', '*', '"', '(']);
+                if let Some(opening) = OPENINGS.iter().find(|opening| start.starts_with(**opening))
+                {
+                    found(
+                        number,
+                        format!("a sentence opens with \"{}\"", opening.trim()),
+                    );
+                }
+            }
+            if sentence.ends_with(['.', '?', '!']) {
+                sentence.clear();
+            }
+        }
+    }
+}
+
+/// Checks that relative links lead to files.
+fn links(path: &Path, text: &str, found: &mut impl FnMut(usize, String)) {
+    for (number, line) in (1..).zip(text.lines()) {
+        for link in line
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split([')', '#']).next())
+        {
+            let target = path.parent().unwrap_or(path).join(link);
+            if !link.is_empty() && !link.contains(":/") && !target.exists() {
+                found(number, format!("the link {link} leads nowhere"));
+            }
+        }
+    }
+}
