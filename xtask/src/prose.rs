@@ -30,7 +30,7 @@ const EXCEPT: [&str; 4] = [
     "CHANGELOG.md",
 ];
 /// Where a finding is an error. Findings elsewhere are printed.
-const CLEAN: [&str; 4] = ["README.md", "docs/", "mkdocs.yml", "xtask/src/prose.rs"];
+const CLEAN: [&str; 4] = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/"];
 
 /// Prints the number of findings per folder, or all of them, and returns those in [`CLEAN`] folders.
 pub(crate) fn check(print: bool) -> Result<Vec<String>> {

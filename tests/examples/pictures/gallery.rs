@@ -125,7 +125,7 @@ pub(crate) fn before_after() -> Drawn {
     let case = Try::near(scene, 0.015, 20.0, 4)?;
     let refined = case.refine(Preset::Auto);
     let pose = refined.outcome.camera_from_object;
-    let crop = (200, 130, 260, 210);
+    let crop = (212, 130, 248, 200);
     let mut svg = Svg::new(840.0, 400.0);
     let model = case.init.model.clone();
     let after = Placed {

@@ -12,12 +12,15 @@ use crate::common::*;
 fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
     let fence = format!("```{language}\n");
     let rest = page.split(fence.as_str()).skip(1);
-    rest.filter_map(|block| block.split("\n```").next()).collect()
+    rest.filter_map(|block| block.split("\n```").next())
+        .collect()
 }
 
 /// Runs the `sh` blocks of a page; those marked `bash` need data or tools that are not here.
 fn run_page(name: &str) {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
+    let page = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../docs")
+        .join(name);
     let page = std::fs::read_to_string(page).unwrap();
     let scene = Scene::new();
     let depth = render_depth_image(&car(), &camera(), &truth());
@@ -34,7 +37,9 @@ fn run_page(name: &str) {
     assert!(!blocks.is_empty(), "{name}: no `sh` block");
     for block in blocks {
         let mut shell = Command::new("sh");
-        shell.args(["-e", "-c", block]).current_dir(scene.folder.path());
+        shell
+            .args(["-e", "-c", block])
+            .current_dir(scene.folder.path());
         let output = shell.env("PATH", &path).output().unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{name}: {block}\n{errors}");
