@@ -101,7 +101,7 @@ impl<'a> RawMesh<'a> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "the range is checked"
+        reason = "the index is a whole number in range"
     )]
     pub(super) fn add_corners(
         &mut self,
@@ -110,8 +110,8 @@ impl<'a> RawMesh<'a> {
         corners: &[f64],
     ) -> Result<(), IoError> {
         let count = self.vertices.len();
-        let mut indices = corners.iter();
-        if let Some(index) = indices.find(|index| !(0.0..count as f64).contains(*index)) {
+        let is_vertex = |index: &f64| (0.0..count as f64).contains(index) && index.fract() == 0.0;
+        if let Some(index) = corners.iter().find(|index| !is_vertex(index)) {
             let expected = match count.checked_sub(1) {
                 None => "no face, because there are no vertices".to_owned(),
                 Some(last) => format!("vertices from 0 to {last}"),

@@ -8,7 +8,7 @@ use crate::source::text_bytes;
 /// The longest header that is read. Its elements take a multiple of its size, so the size of the file is not a bound.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// The properties of a vertex that are read, by slot: its position and its normal.
+/// The properties of a vertex that are read: its position and its normal.
 pub(super) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,10 +57,6 @@ impl Scalar {
         let scalar = scalars.find(|scalar| scalar.names.split(' ').any(|known| known == name));
         scalar.ok_or_else(grammar)
     }
-
-    pub(super) fn is_integer(&self) -> bool {
-        !self.names.contains("float")
-    }
 }
 
 /// A value of each element of a kind: a number, or a list of numbers.
@@ -70,6 +66,8 @@ pub(super) struct Property {
     /// The type of the length of a list.
     pub(super) count: Option<&'static Scalar>,
     pub(super) scalar: &'static Scalar,
+    /// Where a reader stores its values: 0 to 5 for [`VERTEX_NAMES`], 0 for the corners of a face, `None` if nothing reads them.
+    pub(super) slot: Option<usize>,
     line: usize,
 }
 
@@ -84,46 +82,16 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Returns the slot of a property that can be read: the axis of a vertex or its normal, or 0 for the corners of a face.
-    pub(super) fn slot(&self, property: &Property) -> Option<usize> {
-        match (&*self.name, &*property.name, property.count) {
-            ("vertex", name, None) => VERTEX_NAMES.iter().position(|known| *known == name),
-            ("face", "vertex_indices" | "vertex_index", Some(_)) => Some(0),
-            _ => None,
-        }
-    }
-
     /// Refuses elements without the properties of the first slots.
     pub(super) fn require(&self, path: &Path, slots: usize, expected: &str) -> Result<(), IoError> {
         let properties = &self.properties;
-        let has = |slot| properties.iter().any(|p| self.slot(p) == Some(slot));
+        let has = |slot| properties.iter().any(|p| p.slot == Some(slot));
         if self.count == 0 || (0..slots).all(has) {
             return Ok(());
         }
         let names: Vec<&str> = properties.iter().map(|p| &*p.name).collect();
         let found = format!("an element `{}` with properties {names:?}", self.name);
         Err(IoError::new(path, Place::Line(self.line), found, expected))
-    }
-
-    fn declare(&mut self, property: Property) -> Result<(), String> {
-        if let Some(slot) = self.slot(&property) {
-            let mut others = self.properties.iter();
-            if let Some(first) = others.find(|other| self.slot(other) == Some(slot)) {
-                let (name, line) = (property.name, first.line);
-                return Err(format!(
-                    "no second `{name}` of a {}: line {line} declares one",
-                    self.name
-                ));
-            }
-            let is_integer = |count: &Scalar| count.is_integer() && property.scalar.is_integer();
-            if !property.count.is_none_or(is_integer) {
-                let expected = "integer types for the number of a face's corners and for each of them, \
-                    as in `property list uchar int vertex_indices`";
-                return Err(expected.to_owned());
-            }
-        }
-        self.properties.push(property);
-        Ok(())
     }
 
     /// Returns the bytes that an element takes at least.
@@ -247,12 +215,28 @@ fn declare(
         [] | ["ply" | "comment" | "obj_info", ..] | ["end_header"] => return Ok(()),
         _ => return Err(grammar()),
     };
-    elements.last_mut().ok_or_else(grammar)?.declare(Property {
+    let count = count.map(Scalar::parse).transpose()?;
+    let element = elements.last_mut().ok_or_else(grammar)?;
+    let slot = match (&*element.name, name, count) {
+        ("vertex", _, None) => VERTEX_NAMES.iter().position(|known| *known == name),
+        ("face", "vertex_indices" | "vertex_index", Some(_)) => Some(0),
+        _ => None,
+    };
+    let mut others = element.properties.iter();
+    if let Some(first) = others.find(|other| slot.is_some() && other.slot == slot) {
+        let (element, line) = (&element.name, first.line);
+        return Err(format!(
+            "no second `{name}` of a {element}: line {line} declares one"
+        ));
+    }
+    element.properties.push(Property {
         name: name.to_owned(),
-        count: count.map(Scalar::parse).transpose()?,
+        count,
         scalar: Scalar::parse(scalar)?,
+        slot,
         line,
-    })
+    });
+    Ok(())
 }
 
 #[cfg(test)]
@@ -471,29 +455,6 @@ mod tests {
                     ..
                 }) if found.contains("UTF-16 BE")
             ));
-        }
-    }
-
-    #[test]
-    fn corners_are_integers() {
-        for (types, accepted) in [
-            ("uchar int", true),
-            ("int8 uint16", true),
-            ("uchar float", false),
-            ("double int", false),
-        ] {
-            let text = format!(
-                "ply\nformat ascii 1.0\nelement odd 0\nproperty float vertex_index\nelement face 1\nproperty uchar a\n\
-                 property list {types} vertex_index\nend_header\n0 3 0 1 2\n"
-            );
-            match parse(&text) {
-                Ok(_) => assert!(accepted, "{types}"),
-                Err(IoError { found, place, .. }) => {
-                    assert!(!accepted, "{types}");
-                    assert_eq!(place, Some(Place::Line(7)));
-                    assert_eq!(found, format!("\"property list {types} vertex_index\""));
-                }
-            }
         }
     }
 }

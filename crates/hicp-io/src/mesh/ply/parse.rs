@@ -110,7 +110,7 @@ fn read_vertices(
 ) -> Result<(), IoError> {
     let slots = if with_faces { 3 } else { 6 };
     let properties = element.properties.iter();
-    let order = properties.filter_map(|p| element.slot(p).filter(|slot| *slot < slots));
+    let order = properties.filter_map(|p| p.slot.filter(|slot| *slot < slots));
     let order: Vec<usize> = order.collect();
     let reading = mesh.reading;
     rows.read(&reading, element, slots, |place, numbers| {

@@ -48,7 +48,7 @@ impl<'a> Rows<'a> {
         slots: usize,
         mut take: impl FnMut(Place, &[f64]) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
-        let is_kept = |p| element.slot(p).is_some_and(|slot| slot < slots);
+        let is_kept = |p: &Property| p.slot.is_some_and(|slot| slot < slots);
         let properties: Vec<_> = element.properties.iter().map(|p| (p, is_kept(p))).collect();
         let mut numbers = Vec::new();
         for row in 0..element.count {
@@ -110,12 +110,8 @@ impl<'a> Rows<'a> {
         match self {
             Self::Ascii { words, .. } => {
                 let word = words.next()?;
-                match scalar.is_integer() {
-                    // A number that is not kept may be any word: exporters write what does not fit the type.
-                    _ if !kept => Some(0.0),
-                    true => word.parse::<i64>().ok().map(|integer| integer as f64),
-                    false => word.parse().ok(),
-                }
+                // A number that is not kept may be any word: exporters write what does not fit the type.
+                if kept { word.parse().ok() } else { Some(0.0) }
             }
             Self::Binary {
                 rest, big_endian, ..
@@ -135,12 +131,10 @@ impl<'a> Rows<'a> {
 
 impl Property {
     fn expected(&self, element: &str, kept: bool) -> String {
-        let form = match (self.count, kept) {
-            (None, false) => "a word",
-            (None, true) if self.scalar.is_integer() => "an integer",
-            (None, true) => "a number",
-            (Some(_), false) => "a count and that many words",
-            (Some(_), true) => "a count and that many integers",
+        let word = if kept { "number" } else { "word" };
+        let form = match self.count {
+            None => format!("a {word}"),
+            Some(_) => format!("a count and that many {word}s"),
         };
         format!("property `{}` of element `{element}` as {form}", self.name)
     }
