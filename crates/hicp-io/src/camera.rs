@@ -23,7 +23,7 @@ pub struct CameraFile {
     pub depth_scale: Option<f64>,
 }
 
-/// All that the forms of a camera state.
+/// The keys of all forms of a camera.
 #[derive(Debug, Deserialize)]
 pub(crate) struct CameraRecord {
     #[serde(rename = "cam_K")]
@@ -101,7 +101,7 @@ impl ReadLimits {
         image_size: (u32, u32),
     ) -> Result<CameraFile, IoError> {
         let path = path.as_ref();
-        let content = self.read(path, Limit::SmallJsonBytes)?;
+        let content = self.read(path, Limit::SMALL_JSON_BYTES)?;
         let text = text_bytes(path, &content)?;
         let keys: BTreeMap<String, IgnoredAny> = json::parse(path, text)?;
         if keys.is_empty() || keys.keys().any(|key| key.parse::<u32>().is_err()) {

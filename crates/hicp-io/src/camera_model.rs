@@ -1,16 +1,18 @@
 //! Camera models by name: BOP's `cam_model`, as HOT3D has it.
 
 use hicp_core::Matrix3;
-use serde::Deserialize;
+use serde::de::{Deserialize, Deserializer, Error};
 
 use crate::error::quote;
 
 /// A camera without distortion.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, serde::Deserialize)]
 pub(crate) struct CameraModel {
-    #[serde(rename = "projection_model_type")]
-    _name: Pinhole,
-    projection_params: Intrinsics,
+    #[serde(rename = "projection_model_type", deserialize_with = "undistorted")]
+    _name: (),
+    /// fx, fy, cx, cy, pixels.
+    #[serde(deserialize_with = "intrinsics")]
+    projection_params: [f64; 4],
     image_width: Option<u32>,
     image_height: Option<u32>,
 }
@@ -18,7 +20,7 @@ pub(crate) struct CameraModel {
 impl CameraModel {
     /// Returns the calibration matrix, pixels.
     pub(crate) fn matrix(&self) -> Matrix3<f64> {
-        let Intrinsics([fx, fy, cx, cy]) = self.projection_params;
+        let [fx, fy, cx, cy] = self.projection_params;
         Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
     }
 
@@ -28,44 +30,31 @@ impl CameraModel {
     }
 }
 
-/// The name of a model without distortion.
-#[derive(Debug, Deserialize)]
-#[serde(try_from = "String")]
-struct Pinhole;
-
-impl TryFrom<String> for Pinhole {
-    type Error = String;
-
-    fn try_from(name: String) -> Result<Self, String> {
-        // HOT3D writes the prefix.
-        let short = name.strip_prefix("CameraModelType.").unwrap_or(&name);
-        if ["PinholePlane", "PINHOLE", "LINEAR"].contains(&short) {
-            return Ok(Self);
-        }
-        Err(format!(
-            "the model {}, expected a model without distortion (PinholePlane, PINHOLE or LINEAR): depth images of other \
-             models must be undistorted first, and their camera stated by `cam_K`",
-            quote(&name)
-        ))
+/// Reads the name of a model, and refuses models with distortion.
+fn undistorted<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+    let name = String::deserialize(deserializer)?;
+    // HOT3D writes the prefix.
+    let short = name.strip_prefix("CameraModelType.").unwrap_or(&name);
+    if ["PinholePlane", "PINHOLE", "LINEAR"].contains(&short) {
+        return Ok(());
     }
+    Err(D::Error::custom(format!(
+        "the model {}, expected a model without distortion (PinholePlane, PINHOLE or LINEAR): depth images of other \
+         models must be undistorted first, and their camera stated by `cam_K`",
+        quote(&name)
+    )))
 }
 
-/// fx, fy, cx, cy; in files also f, cx, cy if both focal lengths are the same.
-#[derive(Debug, Deserialize)]
-#[serde(try_from = "Vec<f64>")]
-struct Intrinsics([f64; 4]);
-
-impl TryFrom<Vec<f64>> for Intrinsics {
-    type Error = String;
-
-    fn try_from(numbers: Vec<f64>) -> Result<Self, String> {
-        match numbers[..] {
-            [fx, fy, cx, cy] => Ok(Self([fx, fy, cx, cy])),
-            [f, cx, cy] => Ok(Self([f, f, cx, cy])),
-            _ => Err(format!(
-                "{} numbers, expected fx, fy, cx and cy, or f, cx and cy",
-                numbers.len()
-            )),
+/// Reads fx, fy, cx, cy, or f, cx, cy if both focal lengths are the same.
+fn intrinsics<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 4], D::Error> {
+    let numbers = Vec::deserialize(deserializer)?;
+    match numbers[..] {
+        [fx, fy, cx, cy] => Ok([fx, fy, cx, cy]),
+        [f, cx, cy] => Ok([f, f, cx, cy]),
+        _ => {
+            let count = numbers.len();
+            let text = format!("{count} numbers, expected fx, fy, cx and cy, or f, cx and cy");
+            Err(D::Error::custom(text))
         }
     }
 }

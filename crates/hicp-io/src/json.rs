@@ -230,7 +230,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.json");
         std::fs::write(&path, text).unwrap();
-        read(&ReadLimits::DEFAULT, &path, Limit::JsonBytes)
+        read(&ReadLimits::DEFAULT, &path, Limit::JSON_BYTES)
     }
 
     #[test]

@@ -54,8 +54,8 @@ pub use point_cloud::{PointCloud, read_point_cloud_ply, write_point_cloud_ply};
 
 mod image;
 pub use image::{
-    MAX_IMAGE_PIXELS, read_depth_png, read_mask_png, read_png_size, read_rgb_png, write_depth_png,
-    write_mask_png, write_rgb_png,
+    read_depth_png, read_mask_png, read_png_size, read_rgb_png, write_depth_png, write_mask_png,
+    write_rgb_png,
 };
 
 mod json;

@@ -44,16 +44,19 @@ pub struct ReadLimits {
     pub max_rows: u64,
 }
 
-/// A field of [`ReadLimits`].
+/// A field of [`ReadLimits`]: its name, which ends in the things that are counted, and its value.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Limit {
-    FileBytes,
-    JsonBytes,
-    SmallJsonBytes,
-    Vertices,
-    Triangles,
-    Pixels,
-    Rows,
+pub(crate) struct Limit(&'static str, fn(&ReadLimits) -> u64);
+
+impl Limit {
+    pub(crate) const FILE_BYTES: Self = Self("max_file_bytes", |l| l.max_file_bytes);
+    pub(crate) const JSON_BYTES: Self = Self("max_json_bytes", |l| l.max_json_bytes);
+    pub(crate) const SMALL_JSON_BYTES: Self =
+        Self("max_small_json_bytes", |l| l.max_small_json_bytes);
+    pub(crate) const VERTICES: Self = Self("max_vertices", |l| l.max_vertices);
+    pub(crate) const TRIANGLES: Self = Self("max_triangles", |l| l.max_triangles);
+    pub(crate) const PIXELS: Self = Self("max_pixels", |l| l.max_pixels);
+    pub(crate) const ROWS: Self = Self("max_rows", |l| l.max_rows);
 }
 
 impl ReadLimits {
@@ -85,29 +88,22 @@ impl ReadLimits {
     ///
     /// [`IoError`] that names the limit.
     pub fn check_rows(&self, path: &Path, line: usize, rows: u64) -> Result<(), IoError> {
-        self.check(Limit::Rows, path, Place::Line(line), rows)
+        self.check(Limit::ROWS, path, Place::Line(line), rows)
     }
 
     pub(crate) fn check(
         &self,
-        limit: Limit,
+        Limit(field, value): Limit,
         path: &Path,
         place: impl Into<Option<Place>>,
         count: u64,
     ) -> Result<(), IoError> {
-        let (what, field, most) = match limit {
-            Limit::FileBytes => ("bytes", "max_file_bytes", self.max_file_bytes),
-            Limit::JsonBytes => ("bytes", "max_json_bytes", self.max_json_bytes),
-            Limit::SmallJsonBytes => ("bytes", "max_small_json_bytes", self.max_small_json_bytes),
-            Limit::Vertices => ("vertices", "max_vertices", self.max_vertices),
-            Limit::Triangles => ("triangles", "max_triangles", self.max_triangles),
-            Limit::Pixels => ("pixels", "max_pixels", self.max_pixels),
-            Limit::Rows => ("rows", "max_rows", self.max_rows),
-        };
+        let most = value(self);
         if count <= most {
             return Ok(());
         }
         let option = field.replace('_', "-");
+        let what = field.rsplit('_').next().unwrap_or_default();
         let expected = format!(
             "at most {most} {what}: raise the limit (--{option} N, ReadLimits::{field}) if that is meant"
         );

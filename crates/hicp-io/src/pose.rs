@@ -112,7 +112,7 @@ impl ReadLimits {
     ///
     /// As [`read_pose_json`].
     pub fn read_pose_json(&self, path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
-        let record: PoseRecord = json::read(self, path.as_ref(), Limit::SmallJsonBytes)?;
+        let record: PoseRecord = json::read(self, path.as_ref(), Limit::SMALL_JSON_BYTES)?;
         Ok(PoseFile {
             camera_from_object: record.rotation.with_translation(&record.translation_mm),
             rotation: record.rotation.numbers,

@@ -91,7 +91,7 @@ impl RowLog {
             let text = "another run has it open, expected one run at a time";
             return Err(failed(io::Error::new(io::ErrorKind::ResourceBusy, text)));
         }
-        limits.check(Limit::FileBytes, path, None, metadata.len())?;
+        limits.check(Limit::FILE_BYTES, path, None, metadata.len())?;
         let mut content = Vec::new();
         file.read_to_end(&mut content)
             .map_err(|e| IoError::read(path, e))?;

@@ -95,7 +95,7 @@ impl ReadLimits {
     ///
     /// [`IoError`] if it is not a regular file, above the limit, changed while it was read, or not UTF-8.
     pub fn read_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
-        self.text(path.as_ref(), Limit::FileBytes)
+        self.text(path.as_ref(), Limit::FILE_BYTES)
     }
 
     /// Reads a JSON file of at most `max_small_json_bytes` for a caller that parses it; drops a byte order mark.
@@ -119,7 +119,7 @@ impl ReadLimits {
     /// # Ok(()) }
     /// ```
     pub fn read_small_json_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
-        self.text(path.as_ref(), Limit::SmallJsonBytes)
+        self.text(path.as_ref(), Limit::SMALL_JSON_BYTES)
     }
 
     /// Reads a file of at most `max_file_bytes` as it is.
@@ -141,7 +141,7 @@ impl ReadLimits {
     /// # Ok(()) }
     /// ```
     pub fn read_bytes(&self, path: impl AsRef<Path>) -> Result<Vec<u8>, IoError> {
-        self.read(path.as_ref(), Limit::FileBytes)
+        self.read(path.as_ref(), Limit::FILE_BYTES)
     }
 
     fn text(&self, path: &Path, limit: Limit) -> Result<String, IoError> {
@@ -212,7 +212,7 @@ mod tests {
                 .open(&path)
                 .unwrap();
             change(&mut file);
-            let read = ReadLimits::DEFAULT.read_opened(&path, Limit::FileBytes, opened);
+            let read = ReadLimits::DEFAULT.read_opened(&path, Limit::FILE_BYTES, opened);
             let error = read.unwrap_err();
             assert!(!error.found.starts_with("8 bytes"), "{name}: {error}");
             assert!(error.expected.starts_with("the 8 bytes"), "{name}: {error}");

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// The unit in which a file states lengths. Mesh formats do not say theirs, so the reader must be told.
+/// The unit in which a file states lengths. Mesh formats do not state theirs, so callers must.
 ///
 /// ```
 /// use hicp_io::LengthUnit;
@@ -18,7 +18,7 @@ pub enum LengthUnit {
     Meters,
     /// mm: CAD files, BOP models.
     Millimeters,
-    /// cm: some modelling programs.
+    /// cm: some modeling programs.
     Centimeters,
 }
 

@@ -117,6 +117,6 @@ pub(super) fn by_image<T: DeserializeOwned>(
     if is_absent(path) {
         return Ok(None);
     }
-    let ById(values) = json::read(limits, path, Limit::JsonBytes)?;
+    let ById(values) = json::read(limits, path, Limit::JSON_BYTES)?;
     Ok(Some(values))
 }

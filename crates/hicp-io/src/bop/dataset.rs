@@ -15,7 +15,7 @@ use crate::unit::LengthUnit;
 
 /// A dataset in BOP's layout: a folder with models, and with scenes in folders such as `test` or `test_primesense`.
 ///
-/// Opening one looks at nothing but the folder; what is missing in it is reported by whoever needs it.
+/// Opening a dataset checks only that the folder exists. Each method reports the files that it misses.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), hicp_io::IoError> {
@@ -56,26 +56,26 @@ impl Dataset {
         self
     }
 
-    /// The folder.
+    /// Returns the folder.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Returns the folder of the models: `models`, or `models_eval` where there is no other.
+    /// Returns the folder of the models: `models`, or `models_eval` if it is the only one.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is neither.
     pub fn models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models", "models_eval"])
     }
 
-    /// Returns the folder of the models that BOP's errors are stated over: `models_eval`, or `models` where there is no other.
+    /// Returns the folder of the models that BOP's errors are stated over: `models_eval`, or `models` if it is the only one.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is neither.
     pub fn eval_models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models_eval", "models"])
     }
@@ -103,7 +103,7 @@ impl Dataset {
         models.join(format!("obj_{obj_id:06}.ply"))
     }
 
-    /// Reads the mesh of an object; metres.
+    /// Reads the mesh of an object, in meters.
     ///
     /// # Errors
     ///

@@ -55,7 +55,7 @@ impl ReadLimits {
     ///
     /// As [`read_detections`].
     pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
-        json::read(self, path.as_ref(), Limit::JsonBytes)
+        json::read(self, path.as_ref(), Limit::JSON_BYTES)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Datasets, detections and results in the formats of the BOP benchmark for 6D object pose estimation.
 //!
-//! Files are in millimetres, everything here is in metres unless its name says otherwise. Reading order: [`Dataset`],
-//! [`Scene`], [`ModelInfo`], [`Target`], [`Detection`] with its [`Rle`], [`ResultRow`].
+//! Files are in millimeters. All values here are in meters, unless their names state another unit.
 
 mod annotations;
 mod dataset;

@@ -117,7 +117,7 @@ impl ReadLimits {
         &self,
         path: impl AsRef<Path>,
     ) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
-        let ById(infos) = json::read(self, path.as_ref(), Limit::JsonBytes)?;
+        let ById(infos) = json::read(self, path.as_ref(), Limit::JSON_BYTES)?;
         Ok(infos)
     }
 }

@@ -21,12 +21,12 @@ pub struct ResultFileName {
     pub split: String,
     /// The sensor or kind of the split, such as `primesense`.
     pub split_type: Option<String>,
-    /// What tells several results of one method apart.
+    /// Distinguishes several results of one method.
     pub id: Option<String>,
 }
 
 impl ResultFileName {
-    /// Takes the name of a file apart, or returns `None` when it is not of this form.
+    /// Parses the name of a file, or returns `None` if it does not have this form.
     #[must_use]
     pub fn parse(path: impl AsRef<Path>) -> Option<Self> {
         let name = path.as_ref().file_name()?.to_str()?.strip_suffix(".csv")?;

@@ -39,7 +39,7 @@ pub struct ResultRow {
 }
 
 impl ResultRow {
-    /// Makes a row with score 1 and unknown time; the pose is in meters.
+    /// Creates a row with score 1 and unknown time; the pose is in meters.
     #[must_use]
     pub fn new(scene_id: u32, im_id: u32, obj_id: u32, camera_from_object: Isometry3<f64>) -> Self {
         let (rotation, translation_mm) = pose_to_bop(&camera_from_object);

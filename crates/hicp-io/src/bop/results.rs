@@ -62,10 +62,8 @@ pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), I
                 ("t", &row.translation_mm),
                 ("time", row.time_s.as_slice()),
             ];
-            if let Some((name, _)) = numbers
-                .iter()
-                .find(|(_, n)| !n.iter().all(|x| x.is_finite()))
-            {
+            let is_bad = |(_, numbers): &&(_, &[f64])| numbers.iter().any(|x| !x.is_finite());
+            if let Some((name, _)) = numbers.iter().find(is_bad) {
                 return Err(not_finite(&format!("{name} of row {number}")));
             }
             writeln!(writer, "{row}")?;
@@ -102,10 +100,11 @@ fn parse(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Vec<ResultR
             let expected = format!("{fields} as in the header");
             return Err(IoError::new(path, Place::Line(line()), found, expected));
         }
-        let row = row_of(&record, columns).map_err(|(column, source)| {
+        let cells = columns.map(|column| record.get(column).unwrap_or_default());
+        let row = row_of(&cells).map_err(|(column, source)| {
             let (name, expected) = COLUMNS[column];
             let place = Place::Field(format!("line {}, column {name:?}", line()));
-            let error = IoError::new(path, place, quote(cell(&record, columns, column)), expected);
+            let error = IoError::new(path, place, quote(cells[column]), expected);
             match source {
                 None => error,
                 Some(source) => error.with_source(source),
@@ -126,12 +125,9 @@ fn parse(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Vec<ResultR
 fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError> {
     let mut columns = [0; 7];
     for (column, (name, _)) in columns.iter_mut().zip(COLUMNS) {
-        let found = header
-            .iter()
-            .enumerate()
-            .filter(|(_, found)| *found == name);
-        let found: Vec<usize> = found.map(|(index, _)| index).collect();
-        let [index] = found[..] else {
+        let names = header.iter().enumerate();
+        let found: Vec<_> = names.filter(|(_, found)| *found == name).collect();
+        let [(index, _)] = found[..] else {
             let text = quote(&header.iter().collect::<Vec<_>>().join(","));
             let times = found.len();
             let found = format!("a header in which column {name:?} appears {times} times: {text}");
@@ -142,24 +138,13 @@ fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError>
     Ok(columns)
 }
 
-fn cell<'a>(record: &'a StringRecord, columns: &[usize; 7], column: usize) -> &'a str {
-    record.get(columns[column]).unwrap_or_default()
-}
-
-/// Parses a row. The error is the column at fault, and the reason if its numbers are not a rotation.
-fn row_of(
-    record: &StringRecord,
-    columns: &[usize; 7],
-) -> Result<ResultRow, (usize, Option<RotationError>)> {
-    let integer = |column| {
-        cell(record, columns, column)
-            .parse()
-            .map_err(|_| (column, None))
-    };
-    let rotation = numbers(cell(record, columns, 4)).ok_or((4, None))?;
-    let translation_mm = numbers(cell(record, columns, 5)).ok_or((5, None))?;
-    let [score] = numbers(cell(record, columns, 3)).ok_or((3, None))?;
-    let [time] = numbers(cell(record, columns, 6)).ok_or((6, None))?;
+/// Parses the cells of [`COLUMNS`]. The error is the column at fault, and the reason if its numbers are not a rotation.
+fn row_of(cells: &[&str; 7]) -> Result<ResultRow, (usize, Option<RotationError>)> {
+    let integer = |column: usize| cells[column].parse().map_err(|_| (column, None));
+    let [score] = numbers(cells[3]).ok_or((3, None))?;
+    let rotation = numbers(cells[4]).ok_or((4, None))?;
+    let translation_mm = numbers(cells[5]).ok_or((5, None))?;
+    let [time] = numbers(cells[6]).ok_or((6, None))?;
     let pose = pose_from_bop(&rotation, &translation_mm);
     Ok(ResultRow {
         scene_id: integer(0)?,
@@ -179,18 +164,13 @@ fn line_of(text: &[u8], position: Option<&csv::Position>) -> usize {
     let (before, rest) = text.split_at(usize::try_from(start).unwrap_or(0));
     let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
     let end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
-    1 + before
-        .iter()
-        .chain(blank)
-        .filter(|byte| **byte == end)
-        .count()
+    let bytes = before.iter().chain(blank);
+    1 + bytes.filter(|byte| **byte == end).count()
 }
 
 /// Parses N finite numbers separated by spaces.
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
-    let numbers = text
-        .split_whitespace()
-        .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
-    let numbers: Option<Vec<f64>> = numbers.collect();
-    numbers?.try_into().ok()
+    let words = text.split_whitespace();
+    let numbers = words.map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
+    numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
 }

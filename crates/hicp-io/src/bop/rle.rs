@@ -6,7 +6,10 @@ use serde::de::{Deserialize, Deserializer, Error as _};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::image::MAX_IMAGE_PIXELS;
+use crate::limits::ReadLimits;
+
+/// The largest number of pixels of a mask.
+const MAX_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
 
 /// A mask as the lengths of its runs, column by column, alternating between background and object, background first.
 ///
@@ -47,12 +50,13 @@ impl Rle {
     ///
     /// # Errors
     ///
-    /// [`RleError`] if they do not sum to width × height, or if there are more than [`MAX_IMAGE_PIXELS`].
+    /// [`RleError`] if they do not sum to width × height, or if the image has more than the `max_pixels` of
+    /// [`ReadLimits::DEFAULT`].
     pub fn from_counts(width: u32, height: u32, counts: Vec<u32>) -> Result<Self, RleError> {
         let pixels = u64::from(width) * u64::from(height);
-        if pixels > MAX_IMAGE_PIXELS {
+        if pixels > MAX_PIXELS {
             let found = format!("a mask of {width}x{height} pixels");
-            return refuse(found, format!("at most {MAX_IMAGE_PIXELS}"));
+            return refuse(found, format!("at most {MAX_PIXELS}"));
         }
         let sum: u64 = counts.iter().map(|count| u64::from(*count)).sum();
         if sum != pixels {

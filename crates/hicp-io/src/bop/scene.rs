@@ -25,7 +25,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) without the folder or its cameras, otherwise [`IoError`] that names the key.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the folder or its cameras do not exist, otherwise [`IoError`] that names the key.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
         Self::open_within(ReadLimits::DEFAULT, dir)
     }
@@ -58,13 +58,13 @@ impl Scene {
         self
     }
 
-    /// The folder.
+    /// Returns the folder.
     #[must_use]
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// The ids of the images, ascending.
+    /// Returns the ids of the images, ascending.
     pub fn image_ids(&self) -> impl Iterator<Item = u32> + '_ {
         self.cameras.keys().copied()
     }
@@ -86,7 +86,7 @@ impl Scene {
         IoError::new(path, Place::Field(key.to_owned()), found, expected)
     }
 
-    /// Returns the pose of the world in the camera frame of an image, metres: by these the motion of the camera is known.
+    /// Returns the pose of the world in the camera frame of an image, meters. The poses of two images give the camera motion.
     ///
     /// # Errors
     ///
@@ -103,13 +103,13 @@ impl Scene {
         })
     }
 
-    /// Returns the true poses of an image in the file's order, or `None` where they are not known.
+    /// Returns the true poses of an image in the file's order, or `None` if they are not known.
     #[must_use]
     pub fn ground_truth(&self, im_id: u32) -> Option<&[GroundTruth]> {
         Some(self.ground_truth.as_ref()?.get(&im_id)?)
     }
 
-    /// Returns the visibility of the instances of an image in the file's order, or `None` where it is not known.
+    /// Returns the visibility of the instances of an image in the file's order, or `None` if it is not known.
     #[must_use]
     pub fn ground_truth_info(&self, im_id: u32) -> Option<&[GroundTruthInfo]> {
         Some(self.info.as_ref()?.get(&im_id)?)
@@ -135,7 +135,7 @@ impl Scene {
         Err(IoError::missing(png, "depth image"))
     }
 
-    /// Reads the depth image of an image, metres.
+    /// Reads the depth image of an image, meters.
     ///
     /// # Errors
     ///
@@ -150,7 +150,7 @@ impl Scene {
         self.limits.read_depth_png(path, scale)
     }
 
-    /// Returns the path of the colour or gray image of an image, or `None` when there is neither.
+    /// Returns the path of the color or gray image of an image, or `None` if there is neither.
     #[must_use]
     pub fn color_path(&self, im_id: u32) -> Option<PathBuf> {
         ["rgb", "gray"]

@@ -1,4 +1,4 @@
-//! The instances that a method is asked for.
+//! The instances that a method has to find.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ impl ReadLimits {
     ///
     /// As [`read_targets`].
     pub fn read_targets(&self, path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
-        json::read(self, path.as_ref(), Limit::JsonBytes)
+        json::read(self, path.as_ref(), Limit::JSON_BYTES)
     }
 }
 

@@ -16,9 +16,8 @@ use crate::limits::ReadLimits;
 /// # Errors
 ///
 /// [`IoError`] for a scale that is not finite and positive, for anything but 16-bit gray, for a side above
-/// `hicp_core::MAX_IMAGE_SIDE` or more than [`MAX_IMAGE_PIXELS`](crate::MAX_IMAGE_PIXELS) (before allocating;
-/// [`ReadLimits::read_depth_png`] raises it), for a header whose image the file is too small to hold, and for a file that
-/// cannot be read or decoded.
+/// `hicp_core::MAX_IMAGE_SIDE` or more pixels than [`ReadLimits::DEFAULT`] allows (before allocating), for a header whose
+/// image the file is too small to hold, and for a file that cannot be read or decoded.
 pub fn read_depth_png(
     path: impl AsRef<Path>,
     millimeters_per_unit: f64,

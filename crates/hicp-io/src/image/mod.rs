@@ -7,5 +7,5 @@ mod rgb;
 
 pub use depth::{read_depth_png, write_depth_png};
 pub use mask::{read_mask_png, write_mask_png};
-pub use pixels::{MAX_IMAGE_PIXELS, read_png_size};
+pub use pixels::read_png_size;
 pub use rgb::{read_rgb_png, write_rgb_png};

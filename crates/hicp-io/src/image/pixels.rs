@@ -11,9 +11,6 @@ use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
 use crate::source::read_head;
 
-/// Largest number of pixels of an image by default: 2²⁵, four times those of a 4K camera.
-pub const MAX_IMAGE_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
-
 /// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image of its header.
 const MAX_COMPRESSION: u64 = 1032;
 
@@ -57,7 +54,7 @@ pub(super) fn read(
         let expected = format!("sides of 1 to {MAX_IMAGE_SIDE}");
         return Err(IoError::new(path, Place::Byte(16), found, expected));
     }
-    let within = limits.check(Limit::Pixels, path, Place::Byte(16), count);
+    let within = limits.check(Limit::PIXELS, path, Place::Byte(16), count);
     within.map_err(|mut error| {
         error.found = found;
         error

@@ -21,29 +21,33 @@ mod write;
 use raw::{RawMesh, Reading};
 pub use write::{write_obj, write_ply};
 
-/// Reads a triangle mesh; the extension tells the format, in either case: `.obj`, `.off`, `.ply` or `.stl`.
+/// Reads a triangle mesh. The format follows from the extension, in either case: `.obj`, `.off`, `.ply` or `.stl`.
 ///
-/// Only geometry is read: materials, colors, normals and texture coordinates are skipped, lines and points too, and all
-/// objects and groups of a file make one mesh. Polygons are triangulated, concave ones by ear clipping. Coordinates are
-/// multiplied by `unit` in `f64` (STL files hold `f32`) and only then rounded to `f32`. The vertices of STL files are
-/// welded where their positions are equal; in OBJ files vertices that no face uses are dropped.
+/// Only geometry is read. Materials, colors, normals, texture coordinates, lines and points are skipped. All objects and
+/// groups of a file make one mesh. Polygons are triangulated, concave ones by ear clipping. Coordinates are converted from
+/// `unit` in `f64` (STL files hold `f32`) and then rounded to `f32`. In STL files, vertices at equal positions become one.
+/// In OBJ files, vertices that no face uses are dropped.
 ///
-/// - OBJ: relative indices, line continuations, comments after a record and any line ending are understood; of a vertex the first three
-///   numbers are read.
-/// - OFF: text with or without normals and colors, comments, counts on the first line or the second.
-/// - PLY: ASCII and binary of either byte order, any numeric types of coordinates, integer ones of faces, which stand in `vertex_indices` or `vertex_index`.
-/// - STL: ASCII with any number of solids, and binary, also where the header starts with `solid`.
+/// - OBJ: relative indices, continued lines, comments after a record and any line ending are read. Of a vertex, the first
+///   three numbers are read.
+/// - OFF: text with or without normals and colors, with comments, and with the counts on the first line or the second.
+/// - PLY: ASCII and binary of either byte order. Coordinates and faces may have any type of numbers. The list of a face is
+///   `vertex_indices` or `vertex_index`.
+/// - STL: ASCII with any number of solids, and binary, also if the header starts with `solid`.
 ///
-/// Cost: the whole file is held in memory, and a small multiple of it while it is parsed, within [`ReadLimits::DEFAULT`];
-/// [`ReadLimits::read_mesh`] is the same within others.
+/// Cost: the whole file is held in memory, and a small multiple of it while it is parsed, within [`ReadLimits::DEFAULT`].
+/// [`ReadLimits::read_mesh`] reads within other limits.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the file and the place of the fault: what is not a regular file, or above a limit, an unknown
-/// extension, text that is not UTF-8, a malformed or truncated file, a header that promises more than the file holds, a face
-/// whose vertex is not there, a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`, concave polygons
-/// that take more than a fraction of a second to cut (of some ten thousand corners), a file without faces, and whatever else
-/// [`TriMesh::new`] refuses.
+/// [`IoError`] that names the file and the place of the fault:
+/// - a file that is not a regular file, that is above a limit, or that has an unknown extension;
+/// - text that is not UTF-8;
+/// - a malformed or truncated file, or a header that promises more than the file holds;
+/// - a file without faces, or a face with a vertex that the file does not have;
+/// - a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`;
+/// - concave polygons that take more than a second to cut, typically with more than several thousand corners;
+/// - every mesh that [`TriMesh::new`] refuses.
 pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
     ReadLimits::DEFAULT.read_mesh(path, unit)
 }

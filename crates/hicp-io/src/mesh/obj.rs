@@ -34,13 +34,11 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     for tobj::Model { mesh: part, .. } in models {
         let positions = part.positions.chunks_exact(3);
         mesh.vertices = positions.map(Point3::from_slice).collect();
-        let arities = match part.face_arities.is_empty() {
-            true => vec![3; records.faces.len()],
-            false => part.face_arities,
-        };
         let mut rest = part.indices.as_slice();
-        for (arity, line) in arities.iter().zip(&records.faces) {
-            let (corners, others) = rest.split_at(*arity as usize);
+        for (index, line) in records.faces.iter().enumerate() {
+            // If all faces are triangles, their arities are not listed.
+            let arity = part.face_arities.get(index).copied().unwrap_or(3);
+            let (corners, others) = rest.split_at(arity as usize);
             mesh.add_face(Place::Line(*line), corners)?;
             rest = others;
         }
@@ -93,7 +91,7 @@ impl Records {
         match words.next() {
             Some("v") => {
                 self.vertices += 1;
-                reading.check(Limit::Vertices, place, self.vertices)?;
+                reading.check(Limit::VERTICES, place, self.vertices)?;
                 self.text.push('v');
                 // Colors follow, or one number: the weight of a curve, or a confidence.
                 for word in words.take(3) {
@@ -104,7 +102,7 @@ impl Records {
             // Fewer corners do not make a face. They are dropped, because any number of such records would pass the limit.
             Some("f") if words.clone().nth(2).is_some() => {
                 self.triangles += words.clone().count() - 2;
-                reading.check(Limit::Triangles, place, self.triangles)?;
+                reading.check(Limit::TRIANGLES, place, self.triangles)?;
                 self.faces.push(number);
                 self.text.push('f');
                 for word in words {

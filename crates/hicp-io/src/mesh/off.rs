@@ -11,8 +11,8 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     let text = lossy_text(reading.path, &content)?;
     let mut lines = Lines::new(&text);
     let (line, vertices, faces) = parse_counts(&reading, &mut lines)?;
-    reading.check(Limit::Vertices, lines.place(), vertices)?;
-    reading.check(Limit::Triangles, lines.place(), faces)?;
+    reading.check(Limit::VERTICES, lines.place(), vertices)?;
+    reading.check(Limit::TRIANGLES, lines.place(), faces)?;
 
     let mut mesh = RawMesh::new(reading, reading.refuse(lines.place(), quote(line), FACE));
     mesh.vertices.reserve_exact(vertices);

@@ -2,7 +2,9 @@
 
 use hicp_core::{Point2, Point3, Vector3};
 
-/// Looks at points that clipping ears may cost for all polygons of a file, a fraction of a second: it is quadratic at best.
+/// The comparisons with corners that clipping may cost for all polygons of a file: about a second.
+///
+/// Ear clipping takes quadratic time at best, so that a hostile file could keep a program busy for hours.
 pub(super) const CLIPPING_BUDGET: u64 = 1 << 28;
 
 /// Appends the n − 2 triangles of a polygon of n corners, with its winding; nothing for fewer than three corners.

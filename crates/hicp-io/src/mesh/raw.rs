@@ -81,7 +81,7 @@ impl<'a> RawMesh<'a> {
         self.reading.check_position(place.clone(), &position)?;
         self.vertices.push(position.into());
         self.reading
-            .check(Limit::Vertices, place, self.vertices.len())
+            .check(Limit::VERTICES, place, self.vertices.len())
     }
 
     /// Adds a vertex if there is none at the position, and returns its index. For files that repeat vertices with every facet.
@@ -126,7 +126,7 @@ impl<'a> RawMesh<'a> {
     /// Adds a face. Its corners must be vertices that are there.
     pub(super) fn add_face(&mut self, place: Place, corners: &[u32]) -> Result<(), IoError> {
         let count = self.triangles.len() + corners.len().saturating_sub(2);
-        self.reading.check(Limit::Triangles, place.clone(), count)?;
+        self.reading.check(Limit::TRIANGLES, place.clone(), count)?;
         let budget = &mut self.clipping_budget;
         if polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget) {
             return Ok(());

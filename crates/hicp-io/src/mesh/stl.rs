@@ -20,7 +20,7 @@ const START: &str = "`solid`, or a binary header of 84 bytes";
 /// Refuses a binary file by its header, if it has the triangles that it promises and they are too many.
 pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
     match triangle_count(head) {
-        Some(count) if fits(count, bytes) => reading.check(Limit::Triangles, COUNT, count as usize),
+        Some(count) if fits(count, bytes) => reading.check(Limit::TRIANGLES, COUNT, count as usize),
         _ => Ok(()),
     }
 }
@@ -79,7 +79,7 @@ fn parse_binary<'a>(reading: Reading<'a>, content: &[u8]) -> Result<RawMesh<'a>,
         let expected = format!("{there}, which the file has bytes for");
         return Err(reading.refuse(COUNT, found, expected));
     }
-    reading.check(Limit::Triangles, COUNT, there)?;
+    reading.check(Limit::TRIANGLES, COUNT, there)?;
     let mut mesh = RawMesh::new(reading, reading.refuse(COUNT, found, FACE));
     mesh.triangles.reserve_exact(there);
     for (start, triangle) in (HEADER_BYTES..)
@@ -116,8 +116,7 @@ fn parse_ascii<'a>(reading: Reading<'a>, text: &str) -> Result<RawMesh<'a>, IoEr
         if word.is("facet") {
             open = true;
             let corners = parse_facet(&mut words, &mut mesh)?;
-            mesh.triangles.push(corners);
-            reading.check(Limit::Triangles, word.place, mesh.triangles.len())?;
+            mesh.add_face(word.place, &corners)?;
         } else if word.is("solid") || word.is("endsolid") {
             open = word.is("solid");
             words.skip_name();

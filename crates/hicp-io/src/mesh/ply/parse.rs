@@ -19,7 +19,7 @@ pub(crate) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Resu
 }
 
 fn check_counts(reading: &Reading<'_>, header: &Header) -> Result<(), IoError> {
-    for (name, limit) in [("vertex", Limit::Vertices), ("face", Limit::Triangles)] {
+    for (name, limit) in [("vertex", Limit::VERTICES), ("face", Limit::TRIANGLES)] {
         if let Some(element) = header.element(name) {
             reading.check(limit, Place::Line(element.line), element.count)?;
         }
