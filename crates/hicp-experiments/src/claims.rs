@@ -64,7 +64,9 @@ pub struct Claim {
 /// Contrasts with the texts that stand before them.
 pub(crate) type Evidence = Vec<(String, Interval)>;
 
-/// Tests the claims of a section on an analysis.
+/// Tests the claims of a section on an analysis, whose groups and variants it finds by name.
+///
+/// Every test returns `None` if the study lacks a group or a variant of it.
 #[derive(Clone, Copy)]
 pub(crate) struct Judge<'a> {
     pub(crate) analysis: &'a Analysis,
@@ -74,26 +76,47 @@ pub(crate) struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
+    /// Returns the variants whose names start with a prefix.
+    pub(crate) fn family(self, prefix: &str) -> Vec<&'a str> {
+        let names = self.analysis.variants().iter().map(String::as_str);
+        names.filter(|name| name.starts_with(prefix)).collect()
+    }
+
+    /// Returns the labels of the single bins or levels.
+    pub(crate) fn steps(self) -> impl Iterator<Item = &'a str> {
+        let groups = self.analysis.groups().iter();
+        groups
+            .filter(|group| group.single)
+            .map(|group| &*group.label)
+    }
+
+    /// Returns a sum of means times factors; a term is a group, a variant and a factor.
+    pub(crate) fn contrast(self, metric: Metric, terms: &[(&str, &str, f64)]) -> Option<Interval> {
+        let find = |(group, variant, factor): &(&str, &str, f64)| {
+            Some((
+                self.analysis.group(group)?,
+                self.analysis.variant(variant)?,
+                *factor,
+            ))
+        };
+        let terms: Option<Vec<_>> = terms.iter().map(find).collect();
+        self.analysis.contrast(metric, &terms?)
+    }
+
     /// Returns the mean VSD of a variant in a group.
-    pub(crate) fn vsd(self, group: usize, variant: usize) -> Option<Interval> {
-        self.analysis.mean(Metric::Vsd, group, variant)
+    pub(crate) fn vsd(self, group: &str, variant: &str) -> Option<Interval> {
+        self.contrast(Metric::Vsd, &[(group, variant, 1.0)])
     }
 
     /// Returns the paired difference of the mean VSD of two variants in a group.
-    pub(crate) fn difference(self, group: usize, a: usize, b: usize) -> Option<Interval> {
-        self.analysis.difference(Metric::Vsd, group, a, b)
+    pub(crate) fn difference(self, group: &str, a: &str, b: &str) -> Option<Interval> {
+        self.contrast(Metric::Vsd, &[(group, a, 1.0), (group, b, -1.0)])
     }
 
-    /// Returns the name of a variant.
-    pub(crate) fn name(self, variant: usize) -> &'a str {
-        &self.analysis.variants()[variant]
-    }
-
-    /// Returns the variants whose names start with a prefix.
-    pub(crate) fn family(self, prefix: &str) -> Vec<usize> {
-        let mut all: Vec<usize> = (0..self.analysis.variants().len()).collect();
-        all.retain(|v| self.name(*v).starts_with(prefix));
-        all
+    /// Returns the variant with the lowest mean VSD in a group, with that mean.
+    pub(crate) fn lowest(self, group: &str, among: &[&'a str]) -> Option<(&'a str, Interval)> {
+        let means = among.iter().filter_map(|v| Some((*v, self.vsd(group, v)?)));
+        means.min_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))
     }
 
     /// Returns a claim with its verdict.
@@ -125,6 +148,15 @@ impl<'a> Judge<'a> {
         let (digits, labeled) = (self.digits, labels.iter().zip(&contrasts));
         let figures = labeled.map(|(label, i)| format!("{label}{i:+.digits$}"));
         self.claim(text, rule(&contrasts), listed(figures))
+    }
+
+    /// Decides whether a contrast is negative.
+    pub(crate) fn negative(
+        self,
+        text: impl Into<String>,
+        found: Option<Interval>,
+    ) -> Option<Claim> {
+        self.decide(text, ClaimVerdict::negative, vec![(String::new(), found?)])
     }
 }
 

@@ -58,7 +58,7 @@ pub use sequential::{
     FusionRule, TrajectoryClock, TrajectoryConfig, TrajectoryStep, UnderlyingRecord,
     watch_trajectories,
 };
-pub use single::{Condition, Config, Experiment, MaskFault, TABLE_I, claims};
+pub use single::{Condition, Config, Experiment, TABLE_I, claims};
 pub use study::{
     ALL, CONFIG_FILE, CameraRecord, Column, Columns, Design, FAULTY_MASK, Fields, Group, HIGH, LOW,
     Layout, MAX_BINS, MAX_CELLS, MAX_OBJECTS, Measured, Models, NOISY, NOISY_DEPTH, NOISY_MODEL,

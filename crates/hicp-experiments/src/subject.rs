@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hicp_core::{Isometry3, Model, Point3};
-use hicp_io::{LengthUnit, read_mesh};
+use hicp_io::{IoError, LengthUnit, read_mesh};
 use hicp_score::{add, adi};
 use hicp_sim::Household;
 
@@ -44,7 +44,7 @@ impl Subject {
     ///
     /// [`ExperimentError`] when the folder or a file cannot be read, or there is no mesh.
     pub fn read_folder(folder: &Path) -> Result<Vec<Self>, ExperimentError> {
-        let entries = std::fs::read_dir(folder).map_err(ExperimentError::file(folder))?;
+        let entries = std::fs::read_dir(folder).map_err(ExperimentError::folder(folder))?;
         let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         files.retain(|path| {
             let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -52,9 +52,8 @@ impl Subject {
         });
         files.sort();
         if files.is_empty() {
-            return Err(ExperimentError::NoMeshes {
-                path: folder.to_owned(),
-            });
+            let expected = "files that end in .obj, .off, .ply or .stl";
+            return Err(IoError::new(folder, None, "no mesh", expected).into());
         }
         let read = files.iter().map(|path| {
             let text = |part: Option<&std::ffi::OsStr>| {

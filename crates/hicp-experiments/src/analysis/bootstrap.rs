@@ -50,14 +50,16 @@ impl Analysis {
         let config = &study.config;
         let (layout, variants) = (config.layout(), config.compared());
         let (cells, n_bins) = (layout.rows_per_case(), layout.n_bins());
-        let index = layout.index();
+        let objects = indices(layout.objects.iter().map(|object| &*object.name));
+        let settings = indices(layout.settings.iter().copied());
+        let columns = indices(layout.variants.iter().copied());
         let mut places = HashMap::new();
         let mut units: Vec<Unit> = Vec::new();
         for row in &study.rows {
-            let [Some(object), Some(setting), Some(variant)] = index.find(row) else {
-                continue;
-            };
-            let Some(measured) = &row.measured else {
+            let (object, setting) = (objects.get(&*row.object), settings.get(&*row.setting));
+            let (Some(&object), Some(&setting), Some(&column), Some(measured)) =
+                (object, setting, columns.get(&*row.variant), &row.measured)
+            else {
                 continue;
             };
             let place = *places.entry((object, row.case)).or_insert_with(|| {
@@ -68,19 +70,19 @@ impl Analysis {
                 });
                 units.len() - 1
             });
-            let cell = setting * layout.variants.len() + variant;
+            let cell = setting * layout.variants.len() + column;
             units[place].measured[cell] = Some(measured.clone());
         }
         let mut analysis = Self {
             n_levels: cells.checked_div(variants.len()).unwrap_or(0),
             variants,
             groups: config.groups(),
-            diameters_mm: config.objects().iter().map(|o| o.diameter_mm).collect(),
+            diameters_mm: layout.objects.iter().map(|o| o.diameter_mm).collect(),
             n_bins,
             units,
             replicates: Vec::new(),
         };
-        analysis.replicates = analysis.bootstrap(config.seed());
+        analysis.replicates = analysis.bootstrap(layout.seed);
         analysis
     }
 
@@ -279,4 +281,9 @@ impl Analysis {
         }
         replicates
     }
+}
+
+/// Returns the indices of names.
+fn indices<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<&'a str, usize> {
+    names.zip(0..).collect()
 }

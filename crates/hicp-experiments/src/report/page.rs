@@ -7,7 +7,7 @@ use hicp_io::{write_atomically, write_rgb_png};
 use super::figure::Figure;
 use super::html::{Table, page};
 use super::tables::texts;
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, REPLICATES};
 use crate::claims::Claim;
 use crate::error::ExperimentError;
 use crate::study::{Design, StudyOf};
@@ -25,23 +25,19 @@ pub struct Entry<D> {
     pub claims: Vec<Claim>,
 }
 
-/// What a report of a kind of study contains.
+/// The content of a report of a kind of study, next to what all reports have.
 #[derive(Debug)]
 pub struct Document {
     /// Title of the page.
     pub title: &'static str,
-    /// What was run, and how to read the page as HTML.
-    pub what_was_run: (Table, String),
-    /// Heading of the claims.
-    pub claims: &'static str,
+    /// How to read the page, as HTML.
+    pub note: String,
     /// Figures: name of the file, heading, figure.
     pub figures: Vec<(&'static str, &'static str, Figure)>,
     /// Results, as HTML.
     pub results: String,
-    /// Heading of the cases that could not be made.
-    pub unmade: &'static str,
-    /// Heading of the differences.
-    pub differences: (&'static str, Table),
+    /// The paired differences.
+    pub differences: Table,
     /// Other tables, with the names of their files.
     pub tables: Vec<(&'static str, Table)>,
 }
@@ -51,8 +47,20 @@ pub trait Reported: Design {
     /// Tests the claims about a study.
     fn claims(&self, analysis: &Analysis) -> Vec<Claim>;
 
+    /// Describes what was run, next to objects, seed and camera: names and values.
+    fn described(&self) -> Vec<(&'static str, String)>;
+
     /// Describes the report of some studies.
     fn document(entries: &[Entry<Self>]) -> Document;
+}
+
+/// The part of a note that concerns every study, as HTML.
+pub(crate) fn note_on_intervals() -> String {
+    format!(
+        "VSD is the mean over tolerances of 5 % to 50 % of the diameter, against the true pose of the original model. Brackets \
+         hold 95 % intervals: percentiles of {REPLICATES} bootstrap samples over objects and, within each, over cases (of a bin); \
+         differences are paired."
+    )
 }
 
 /// A report of studies, before it is written.
@@ -105,7 +113,7 @@ impl<D: Reported> ReportOf<D> {
     ///
     /// [`ExperimentError`] when a figure cannot be drawn or a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), ExperimentError> {
-        std::fs::create_dir_all(folder).map_err(ExperimentError::file(folder))?;
+        std::fs::create_dir_all(folder).map_err(ExperimentError::folder(folder))?;
         let write = |name: &str, text: &str| {
             write_atomically(folder.join(name), |w| w.write_all(text.as_bytes()))
         };
@@ -121,28 +129,43 @@ impl<D: Reported> ReportOf<D> {
         }
         let claims = self.claims_table();
         write("claims.csv", &claims.csv())?;
-        write("differences.csv", &document.differences.1.csv())?;
+        write("differences.csv", &document.differences.csv())?;
         for (name, table) in &document.tables {
             write(name, &table.csv())?;
         }
         let section = |heading: &str, html: &str| format!("<h2>{heading}</h2>\n{html}");
         let unmade = Some(self.unmade()).filter(|table| !table.rows.is_empty());
-        let unmade = unmade.map(|table| section(document.unmade, &table.html()));
-        let (heading, differences) = (document.differences.0, document.differences.1.html());
+        let unmade = unmade.map(|table| section("Cases that could not be made", &table.html()));
         let differences = format!(
-            "<details><summary>All paired differences</summary>\n{differences}</details>\n"
+            "<details><summary>All paired differences</summary>\n{}</details>\n",
+            document.differences.html()
         );
         let body = [
-            section("What was run", &document.what_was_run.0.html()),
-            format!("<p>{}</p>\n", document.what_was_run.1),
-            section(document.claims, &claims.html()),
+            section("What was run", &self.what_was_run().html()),
+            format!("<p>{}</p>\n", document.note),
+            section("Claims", &claims.html()),
             figures,
             document.results,
             unmade.unwrap_or_default(),
-            section(heading, &differences),
+            section("Differences of the mean VSD, by group", &differences),
         ];
         write("report.html", &page(document.title, &body.concat()))?;
         Ok(())
+    }
+
+    /// Returns a column per study, and a line per field of its configuration.
+    fn what_was_run(&self) -> Table {
+        let mut table = Table::new(&["study"]);
+        for (index, entry) in self.entries.iter().enumerate() {
+            table.head.push(entry.name.clone());
+            for (line, (name, value)) in entry.described().into_iter().enumerate() {
+                if index == 0 {
+                    table.rows.push(vec![name.to_owned()]);
+                }
+                table.rows[line].push(value);
+            }
+        }
+        table
     }
 
     fn claims_table(&self) -> Table {
@@ -169,19 +192,23 @@ impl<D: Reported> ReportOf<D> {
     }
 }
 
-impl<D: Design> Entry<D> {
-    /// Returns the names of the objects for people.
-    pub(crate) fn objects(&self) -> String {
-        self.study.config.layout().objects.join(", ")
-    }
-
-    /// Returns the number of rows, and how many there will be.
-    pub(crate) fn rows(&self) -> String {
+impl<D: Reported> Entry<D> {
+    fn described(&self) -> Vec<(&'static str, String)> {
         let layout = self.study.config.layout();
+        let objects: Vec<&str> = layout.objects.iter().map(|o| o.name.as_str()).collect();
         let expected = layout.n_cases().saturating_mul(layout.rows_per_case());
-        match self.study.rows.len() {
+        let rows = match self.study.rows.len() {
             rows if rows == expected => rows.to_string(),
             rows => format!("{rows} of {expected}: not finished"),
-        }
+        };
+        let (width, height, fx) = (layout.camera.width, layout.camera.height, layout.camera.fx);
+        let mut all = vec![
+            ("objects", objects.join(", ")),
+            ("rows", rows),
+            ("seed", layout.seed.to_string()),
+            ("camera", format!("{width}×{height}, f = {fx:.1}")),
+        ];
+        all.extend(self.study.config.described());
+        all
     }
 }

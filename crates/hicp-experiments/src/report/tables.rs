@@ -1,7 +1,7 @@
 //! Fields and tables that all reports share.
 
 use super::html::Table;
-use crate::analysis::{Analysis, Interval, Metric};
+use crate::analysis::{Analysis, Cell, Interval, Metric};
 
 /// Returns a number with fixed digits; empty if there is none.
 pub(crate) fn fixed(value: Option<f64>, digits: usize) -> String {
@@ -20,6 +20,37 @@ pub(crate) fn ends(interval: Option<Interval>) -> [String; 3] {
 /// Returns fields as text.
 pub(crate) fn texts(fields: &[&str]) -> Vec<String> {
     fields.iter().map(|field| (*field).to_owned()).collect()
+}
+
+/// Returns the count, the initial VSD and some means with intervals of a variant in a group, for
+/// programs; `None` if there is no row.
+pub(crate) fn figures(
+    analysis: &Analysis,
+    metrics: &[Metric],
+    group: usize,
+    variant: usize,
+) -> Option<(Cell, Vec<String>)> {
+    let cell = analysis.cell(group, variant)?;
+    let mut figures = vec![cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)];
+    let means = metrics
+        .iter()
+        .map(|metric| analysis.mean(*metric, group, variant));
+    figures.extend(means.flat_map(ends));
+    Some((cell, figures))
+}
+
+/// Returns the paired differences of two variants in a group with their intervals, for programs.
+pub(crate) fn differences(
+    analysis: &Analysis,
+    metrics: &[Metric],
+    group: usize,
+    [a, b]: [usize; 2],
+) -> Option<Vec<String>> {
+    let found = metrics
+        .iter()
+        .map(|metric| analysis.difference(*metric, group, a, b));
+    let found: Vec<Interval> = found.collect::<Option<_>>()?;
+    Some(found.into_iter().flat_map(|i| ends(Some(i))).collect())
 }
 
 /// Returns the mean VSD per variant and group.

@@ -3,7 +3,7 @@
 use super::config::TrajectoryConfig;
 use crate::analysis::{Analysis, Interval, Metric};
 use crate::claims::{Claim, ClaimVerdict, Evidence, Judge, listed};
-use crate::study::{HIGH, LOW};
+use crate::study::{ALL, HIGH, LOW};
 
 /// The methods of the paper that use uncertainty, each with its counterpart that does not.
 const WEIGHTED: [(&str, &str); 2] = [
@@ -33,11 +33,10 @@ pub(super) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Clai
         let pipeline = Pipeline {
             judge,
             underlying: &underlying.name,
-            methods: &methods,
         };
         found.extend([
-            pipeline.no_clear_best(),
-            pipeline.average_as_good(),
+            pipeline.no_clear_best(&methods),
+            pipeline.average_as_good(&methods),
             pipeline.weighting_no_better(),
         ]);
         found.extend(BEYOND.map(|method| pipeline.better_than_average(method)));
@@ -48,40 +47,35 @@ pub(super) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Clai
 }
 
 /// Tests claims about the methods with one underlying pipeline.
+#[derive(Clone, Copy)]
 struct Pipeline<'a> {
     judge: Judge<'a>,
     underlying: &'a str,
-    /// Those of the paper.
-    methods: &'a [&'a str],
 }
 
 impl Pipeline<'_> {
-    fn variant(&self, method: &str) -> Option<usize> {
-        let name = TrajectoryConfig::variant(self.underlying, method);
-        self.judge.analysis.variant(&name)
+    fn variant(self, method: &str) -> String {
+        TrajectoryConfig::variant(self.underlying, method)
     }
 
-    fn text(&self, text: &str) -> String {
+    fn text(self, text: &str) -> String {
         format!("{}: {text}", self.underlying)
     }
 
     /// Returns the paired difference of the mean VSD of two methods over all bins.
-    fn difference(&self, a: &str, b: &str) -> Option<Interval> {
-        let all = self.judge.analysis.overall();
+    fn difference(self, a: &str, b: &str) -> Option<Interval> {
         self.judge
-            .difference(all, self.variant(a)?, self.variant(b)?)
+            .difference(ALL, &self.variant(a), &self.variant(b))
     }
 
-    fn no_clear_best(&self) -> Option<Claim> {
-        let all = self.judge.analysis.overall();
-        let mean = |method| Some(self.judge.vsd(all, self.variant(method)?)?.estimate);
-        let means = self.methods.iter().filter_map(|m| Some((mean(m)?, *m)));
+    fn no_clear_best(self, methods: &[&str]) -> Option<Claim> {
+        let mean = |method| Some(self.judge.vsd(ALL, &self.variant(method))?.estimate);
+        let means = methods.iter().filter_map(|m| Some((mean(m)?, *m)));
         let mut ranked: Vec<(f64, &str)> = means.collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let ((mean, best), others) = ranked.split_first()?;
-        let against = others
-            .iter()
-            .filter_map(|(_, m)| Some((m, self.difference(best, m)?)));
+        let against = others.iter();
+        let against = against.filter_map(|(_, m)| Some((m, self.difference(best, m)?)));
         let against: Vec<_> = against.collect();
         against.first()?;
         let is_clear = against.iter().all(|(_, i)| i.high < 0.0);
@@ -93,34 +87,34 @@ impl Pipeline<'_> {
         self.judge.claim(self.text(text), verdict, listed(figures))
     }
 
-    fn average_as_good(&self) -> Option<Claim> {
-        let others = self.methods.iter().filter(|m| **m != AVERAGE);
-        let difference = |m| Some((format!("− {m}: "), self.difference(AVERAGE, m)?));
-        let evidence = others.filter_map(|m| difference(m)).collect();
+    fn average_as_good(self, methods: &[&str]) -> Option<Claim> {
+        let others = methods.iter().filter(|m| **m != AVERAGE);
+        let evidence =
+            others.filter_map(|m| Some((format!("− {m}: "), self.difference(AVERAGE, m)?)));
         let text = self.text("average is at least as good as each other method");
         self.judge
-            .decide(text, ClaimVerdict::not_positive, evidence)
+            .decide(text, ClaimVerdict::not_positive, evidence.collect())
     }
 
-    fn weighting_no_better(&self) -> Option<Claim> {
-        let label = |with, without| format!("{without} − {with}: ");
+    fn weighting_no_better(self) -> Option<Claim> {
         let evidence = WEIGHTED.iter().filter_map(|(with, without)| {
-            Some((label(with, without), self.difference(without, with)?))
+            Some((
+                format!("{without} − {with}: "),
+                self.difference(without, with)?,
+            ))
         });
         let text = self.text("weighting by the MVE is no better than weighing all alike");
         self.judge
             .decide(text, ClaimVerdict::not_positive, evidence.collect())
     }
 
-    fn better_than_average(&self, method: &str) -> Option<Claim> {
-        let section = "beyond §V";
+    fn better_than_average(self, method: &str) -> Option<Claim> {
         let judge = Judge {
-            section,
+            section: "beyond §V",
             ..self.judge
         };
-        let evidence = vec![(String::new(), self.difference(method, AVERAGE)?)];
         let text = self.text(&format!("{method} is better than average"));
-        judge.decide(text, ClaimVerdict::negative, evidence)
+        judge.negative(text, self.difference(method, AVERAGE))
     }
 }
 
@@ -128,29 +122,24 @@ impl Pipeline<'_> {
 fn is_better(
     judge: Judge<'_>,
     methods: &[&str],
-    label: &str,
+    group: &str,
     [better, worse]: [&str; 2],
 ) -> Option<Claim> {
-    let group = judge.analysis.group(label)?;
-    let of = |underlying, m| {
-        let name = TrajectoryConfig::variant(underlying, m);
-        judge.analysis.variant(&name)
-    };
-    let pairs = methods
-        .iter()
-        .filter_map(|m| Some((m, of(better, m)?, of(worse, m)?)));
-    let pairs: Vec<_> = pairs.collect();
+    let names = |m: &&str| [better, worse].map(|pipeline| TrajectoryConfig::variant(pipeline, m));
+    let pairs = methods.iter().map(|m| (m, names(m)));
+    let pairs =
+        pairs.filter(|(_, names)| names.iter().all(|n| judge.analysis.variant(n).is_some()));
+    let pairs: Vec<(&&str, [String; 2])> = pairs.collect();
     pairs.first()?;
     let share = 1.0 / pairs.len() as f64;
-    let terms = |(_, a, b): &(_, usize, usize)| [(group, *a, share), (group, *b, -share)];
-    let terms: Vec<_> = pairs.iter().flat_map(terms).collect();
-    let together = judge.analysis.contrast(Metric::Vsd, &terms)?;
-    let mut evidence: Evidence = vec![("mean over the methods: ".to_owned(), together)];
-    for (method, a, b) in &pairs {
-        let difference = judge.difference(group, *a, *b)?;
-        evidence.push((format!("{method}: "), difference));
+    let terms = pairs.iter();
+    let terms = terms.flat_map(|(_, [a, b])| [(group, &**a, share), (group, &**b, -share)]);
+    let together = judge.contrast(Metric::Vsd, &terms.collect::<Vec<_>>());
+    let mut evidence: Evidence = vec![("mean over the methods: ".to_owned(), together?)];
+    for (method, [a, b]) in &pairs {
+        evidence.push((format!("{method}: "), judge.difference(group, a, b)?));
     }
-    let text = format!("{better} is better than {worse} at {label} initial VSD");
+    let text = format!("{better} is better than {worse} at {group} initial VSD");
     // The mean decides.
     judge.decide(text, |all| ClaimVerdict::negative(&all[..1]), evidence)
 }

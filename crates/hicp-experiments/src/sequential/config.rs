@@ -136,8 +136,7 @@ impl TrajectoryConfig {
             methods: FusionRule::ALL.map(FusionRule::name).to_vec(),
             objects: subjects.iter().map(ObjectRecord::from).collect(),
         };
-        config.check(Fields::new())?;
-        ObjectRecord::fit(&config.objects, config.start_distance_m - config.path_m)?;
+        config.check(&Fields::new(&config))?;
         Ok(config)
     }
 

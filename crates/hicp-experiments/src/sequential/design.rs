@@ -1,13 +1,12 @@
 //! The sequential study as a kind of study.
 
+use hicp_io::IoError;
+
 use super::config::{SEQUENTIAL, TrajectoryConfig};
 use super::rule::FusionRule;
 use super::runner::TrajectoryRunner;
 use crate::error::ExperimentError;
-use crate::study::{
-    ALL, Column, Columns, Design, Fields, Group, Layout, MAX_BINS, Models, ObjectRecord, Worker,
-    quoted,
-};
+use crate::study::{ALL, Column, Columns, Design, Fields, Group, Layout, Models, Worker, quoted};
 use crate::subject::Subject;
 
 /// Most trajectories per object and bin.
@@ -33,57 +32,44 @@ impl Design for TrajectoryConfig {
         ("note", Column::Note),
     ];
 
-    fn check(&self, fields: Fields<'_>) -> Result<(), ExperimentError> {
+    fn check(&self, fields: &Fields<'_>) -> Result<(), IoError> {
         let (is_valid, found) = (self.experiment == SEQUENTIAL, quoted(&self.experiment));
         fields.require(is_valid, "experiment", found, quoted(SEQUENTIAL))?;
-        fields.count("trajectories", self.trajectories, MAX_TRAJECTORIES)?;
-        fields.count("bins", self.bins as u64, MAX_BINS as u64)?;
-        fields.not_negative(&[
-            ("max_translation_m", self.max_translation_m),
-            ("path_m", self.path_m),
-            ("axis_offset_m", self.axis_offset_m),
-            ("target_offset_m", self.target_offset_m),
-            (
-                "reconstruction_translation_m",
-                self.reconstruction_translation_m,
-            ),
-            (
-                "reconstruction_rotation_deg",
-                self.reconstruction_rotation_deg,
-            ),
+        fields.count("trajectories", MAX_TRAJECTORIES)?;
+        fields.at_least_0(&[
+            "max_translation_m",
+            "path_m",
+            "axis_offset_m",
+            "target_offset_m",
+            "reconstruction_translation_m",
+            "reconstruction_rotation_deg",
         ])?;
-        fields.positive(&[
-            ("start_distance_m", self.start_distance_m),
-            ("speed_m_s", self.speed_m_s),
-            ("reconstruction_voxel_m", self.reconstruction_voxel_m),
-            (
-                "reconstruction_max_distance_m",
-                self.reconstruction_max_distance_m,
-            ),
+        fields.above_0(&[
+            "start_distance_m",
+            "speed_m_s",
+            "reconstruction_voxel_m",
+            "reconstruction_max_distance_m",
         ])?;
-        let layout = self.layout();
-        fields.names("underlying", MAX_UNDERLYING, &layout.settings)?;
+        fields.names("underlying", MAX_UNDERLYING)?;
         for (index, underlying) in self.underlying.iter().enumerate() {
-            let field = format!("underlying[{index}].seconds_per_estimate");
-            fields.positive(&[(&field, underlying.seconds_per_estimate)])?;
+            let field = format_args!("underlying[{index}].seconds_per_estimate");
+            fields.between(field, underlying.seconds_per_estimate, f64::INFINITY)?;
         }
-        fields.names("methods", MAX_METHODS, &layout.variants)?;
+        fields.names("methods", MAX_METHODS)?;
         for (index, method) in self.methods.iter().enumerate() {
             let is_known = FusionRule::from_name(method).is_some();
             let field = format_args!("methods[{index}]");
             fields.require(is_known, field, quoted(method), FusionRule::EXPECTED)?;
         }
-        fields.common(
-            &self.camera,
-            &self.objects,
-            &layout,
-            ["underlying", "methods"],
-        )
+        let nearest = self.start_distance_m - self.path_m;
+        fields.common(&self.layout(), nearest, ["underlying", "methods"])
     }
 
     fn layout(&self) -> Layout<'_> {
         Layout {
-            objects: self.objects.iter().map(|o| o.name.as_str()).collect(),
+            seed: self.seed,
+            camera: &self.camera,
+            objects: &self.objects,
             settings: self.underlying.iter().map(|u| u.name.as_str()).collect(),
             variants: self.methods.iter().map(String::as_str).collect(),
             cases: self.trajectories.saturating_mul(self.bins as u64),
@@ -103,14 +89,6 @@ impl Design for TrajectoryConfig {
         Ok(Box::new(move |object, case| {
             runner.outcomes(object, case, &mut |_| ())
         }))
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn objects(&self) -> &[ObjectRecord] {
-        &self.objects
     }
 
     fn compared(&self) -> Vec<String> {

@@ -3,18 +3,58 @@
 use super::calibration;
 use super::claims::claims;
 use super::config::{TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
-use crate::analysis::{Analysis, FAILURE_VSD, Metric, REPLICATES};
+use crate::analysis::{Analysis, FAILURE_VSD, Metric};
 use crate::claims::{Claim, listed};
 use crate::report::{
-    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, means, texts,
+    Curve, Document, Entry, Figure, Panel, Reported, Table, differences, figures, fixed, means,
+    note_on_intervals, texts,
 };
 
 const AVERAGE: &str = "average";
-const PER_BIN: &str = "trajectories per object and bin";
+/// The columns of `summary.csv`.
+const SUMMARY: &str = "underlying|method|group|trajectories|vsd_initial|vsd_final|vsd_final_low|\
+    vsd_final_high|failure_share|failure_low|failure_high|add_median_mm|n_estimates";
+/// The columns of `differences.csv`.
+const DIFFERENCES: &str = "underlying|group|method|against|vsd_difference|low|high";
 
 impl Reported for TrajectoryConfig {
     fn claims(&self, analysis: &Analysis) -> Vec<Claim> {
         claims(self, analysis)
+    }
+
+    fn described(&self) -> Vec<(&'static str, String)> {
+        let cost = |(index, u): (usize, &UnderlyingRecord)| {
+            let (name, seconds) = (&u.name, u.seconds_per_estimate);
+            let (step, images) = (self.step_m(index), self.n_images(index));
+            match self.clock {
+                TrajectoryClock::Cost => {
+                    format!("{name}: {seconds} s per estimate, {step:.4} m, {images} images")
+                }
+                TrajectoryClock::Real => format!("{name}: as long as it took"),
+            }
+        };
+        let costs = self.underlying.iter().enumerate().map(cost);
+        let (from, over, speed) = (self.start_distance_m, self.path_m, self.speed_m_s);
+        let path = format!("from {from} m over {over} m at {speed} m/s");
+        let (images, voxel) = (self.reconstruction_images, self.reconstruction_voxel_m);
+        let (meters, degrees) = (
+            self.reconstruction_translation_m,
+            self.reconstruction_rotation_deg,
+        );
+        let reconstruction =
+            format!("{images} images, {meters} m, {degrees}°, voxels of {voxel} m");
+        let [c0, c1, c2] = self.depth_noise_m;
+        vec![
+            ("version", self.version.clone()),
+            (
+                "trajectories per object and bin",
+                self.trajectories.to_string(),
+            ),
+            ("pipelines", listed(costs)),
+            ("path", path),
+            ("reconstruction", reconstruction),
+            ("depth noise", format!("σ = {c0} + {c1} z + {c2} z² m")),
+        ]
     }
 
     fn document(entries: &[Entry<Self>]) -> Document {
@@ -27,31 +67,24 @@ impl Reported for TrajectoryConfig {
         let means: String = tables.collect();
         let results = format!(
             "<h2>Mean VSD by initial VSD</h2>\n{means}\
-             <h2>Are the covariances what the errors say?</h2>\n<p>Share of the final errors inside the ellipsoids that should hold \
+             <h2>Do the errors match the covariances?</h2>\n<p>Share of the final errors inside the ellipsoids that should hold \
              50, 90 and 99 %, by χ²₆, for the calibrated methods by Student's distribution; objects that turn freely about an axis \
              are left out. A trajectory failed whose final VSD is above {FAILURE_VSD}.</p>\n{}",
             calibration.html()
         );
-        let summary = table(
-            "underlying|method|group|trajectories|vsd_initial|vsd_final|vsd_final_low|vsd_final_high|\
-             failure_share|failure_low|failure_high|add_median_mm|n_estimates",
-            Entry::summary,
-        );
-        let head = "underlying|group|method|against|vsd_difference|low|high";
-        let differences = table(head, Entry::differences);
         let rows = entries.iter().map(Entry::panels).collect();
         let as_in_paper = "Mean VSD after the trajectory, as in Figure 7 of the paper";
-        let run = table("what|value", Entry::what_was_run);
         let is_real = |e: &Entry<Self>| e.study.config.clock == TrajectoryClock::Real;
         Document {
             title: "Sequential ICP, the study of §VI-C rerun",
-            what_was_run: (run, note(entries.iter().any(is_real))),
-            claims: "The paper's findings",
+            note: note(entries.iter().any(is_real)),
             figures: vec![("figure", as_in_paper, Figure { rows })],
             results,
-            unmade: "Trajectories that could not be made",
-            differences: ("Differences from average, by group", differences),
-            tables: vec![("summary.csv", summary), ("calibration.csv", calibration)],
+            differences: table(DIFFERENCES, Entry::differences),
+            tables: vec![
+                ("summary.csv", table(SUMMARY, Entry::summary)),
+                ("calibration.csv", calibration),
+            ],
         }
     }
 }
@@ -59,20 +92,17 @@ impl Reported for TrajectoryConfig {
 fn note(is_real: bool) -> String {
     let clock = match is_real {
         false => {
-            "The clock is a stored cost, what Table I of the paper says on average: all methods of a \
-             pipeline see the same images."
+            "The clock is a stored cost, the mean of Table I of the paper: all methods of a pipeline see the same images."
         }
         true => {
-            "The clock was the processor's: an estimate took as long as it took, every method saw images \
-             of its own, and no run repeats this one."
+            "The clock was the processor's measured time: every method saw different images, and no run repeats this one."
         }
     };
     format!(
         "{clock} Both pipelines get the same paths, starts and models. Covariances are e_MVE·U with U the unit about the object, moved \
          by the adjoint; <i>gated</i> leaves out estimates with an MVE above 0.4 and brings symmetric poses together; \
-         <i>calibrated</i> does so with the covariance of the registration, fitted on other objects, and a stricter gate. VSD is the mean over tolerances of 5 % to 50 % of the diameter, against the true pose of the original model, \
-         at the path's start and end. Brackets hold 95 % intervals: percentiles of {REPLICATES} bootstrap samples over objects \
-         and, within each, over trajectories of a bin; differences are paired."
+         <i>calibrated</i> does so with the covariance of the registration, fitted on other objects, and a stricter gate. {}",
+        note_on_intervals()
     )
 }
 
@@ -88,20 +118,19 @@ impl Entry<TrajectoryConfig> {
 
     /// Returns everything per bin, pipeline and method.
     fn summary(&self) -> Vec<Vec<String>> {
-        let (analysis, mut rows) = (&self.analysis, Vec::new());
+        let (analysis, metrics) = (&self.analysis, [Metric::Vsd, Metric::Failure]);
+        let mut rows = Vec::new();
         for (underlying, method, index) in self.pairs() {
             for (group, described) in analysis.groups().iter().enumerate() {
-                let Some(cell) = analysis.cell(group, index) else {
+                let Some((cell, figures)) = figures(analysis, &metrics, group, index) else {
                     continue;
                 };
-                let mut row = texts(&[underlying, method, &described.label]);
-                row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
-                for metric in [Metric::Vsd, Metric::Failure] {
-                    row.extend(ends(analysis.mean(metric, group, index)));
-                }
-                row.push(fixed(Some(cell.add_median_mm), 3));
-                row.push(fixed(Some(cell.steps), 2));
-                rows.push(row);
+                let labels = texts(&[underlying, method, &described.label]);
+                let others = [
+                    fixed(Some(cell.add_median_mm), 3),
+                    fixed(Some(cell.steps), 2),
+                ];
+                rows.push([&labels[..], &figures, &others].concat());
             }
         }
         rows
@@ -116,10 +145,9 @@ impl Entry<TrajectoryConfig> {
                 continue;
             };
             for (group, described) in analysis.groups().iter().enumerate() {
-                let difference = analysis.difference(Metric::Vsd, group, index, average);
-                let mut row = texts(&[underlying, &described.label, method, AVERAGE]);
-                row.extend(ends(difference));
-                rows.extend(difference.map(|_| row));
+                let ends = differences(analysis, &[Metric::Vsd], group, [index, average]);
+                let labels = texts(&[underlying, &described.label, method, AVERAGE]);
+                rows.extend(ends.map(|ends| [labels, ends].concat()));
             }
         }
         rows
@@ -162,45 +190,5 @@ impl Entry<TrajectoryConfig> {
         }
         panels.push(panel("average, and beyond the paper", together));
         panels
-    }
-
-    fn what_was_run(&self) -> Vec<Vec<String>> {
-        let c = &self.study.config;
-        let cost = |(index, u): (usize, &UnderlyingRecord)| {
-            let (name, seconds) = (&u.name, u.seconds_per_estimate);
-            let (step, images) = (c.step_m(index), c.n_images(index));
-            match c.clock {
-                TrajectoryClock::Cost => {
-                    format!("{name}: {seconds} s per estimate, {step:.4} m, {images} images")
-                }
-                TrajectoryClock::Real => format!("{name}: as long as it took"),
-            }
-        };
-        let costs = c.underlying.iter().enumerate().map(cost);
-        let (from, over, speed) = (c.start_distance_m, c.path_m, c.speed_m_s);
-        let (images, voxel) = (c.reconstruction_images, c.reconstruction_voxel_m);
-        let (meters, degrees) = (
-            c.reconstruction_translation_m,
-            c.reconstruction_rotation_deg,
-        );
-        let reconstruction =
-            format!("{images} images, {meters} m, {degrees}°, voxels of {voxel} m");
-        let [c0, c1, c2] = c.depth_noise_m;
-        let fields = [
-            ("version", c.version.clone()),
-            ("seed", c.seed.to_string()),
-            ("objects", self.objects()),
-            (PER_BIN, c.trajectories.to_string()),
-            ("rows", self.rows()),
-            ("pipelines", listed(costs)),
-            (
-                "path",
-                format!("from {from} m over {over} m at {speed} m/s"),
-            ),
-            ("reconstruction", reconstruction),
-            ("depth noise", format!("σ = {c0} + {c1} z + {c2} z² m")),
-        ];
-        let line = |(name, value): (&str, String)| vec![name.to_owned(), value];
-        fields.into_iter().map(line).collect()
     }
 }

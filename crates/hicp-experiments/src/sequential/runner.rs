@@ -64,7 +64,7 @@ pub fn watch_trajectories(
     trajectories: Range<u64>,
     watch: &mut dyn FnMut(&TrajectoryStep<'_>),
 ) -> Result<(), ExperimentError> {
-    config.check(Fields::new())?;
+    config.check(&Fields::new(config))?;
     let models = Models::new(subjects.len());
     let mut runner = TrajectoryRunner::new(config, subjects, &models)?;
     for index in trajectories {

@@ -1,7 +1,7 @@
 //! The aims of the presets beyond the paper, tested.
 
 use crate::analysis::Metric::{self, CpuMs, Failure, Vsd, Worse};
-use crate::claims::{Claim, ClaimVerdict, Evidence, Judge};
+use crate::claims::{Claim, ClaimVerdict, Judge};
 use crate::study::{ALL, FAULTY_MASK};
 
 const HYBRID: &str = "hybrid";
@@ -43,13 +43,9 @@ pub(super) fn aims(judge: Judge<'_>) -> Vec<Option<Claim>> {
 
 fn test(
     judge: Judge<'_>,
-    (name, label, metric, limit): (&str, &str, Metric, Limit),
+    (name, group, metric, limit): (&str, &str, Metric, Limit),
 ) -> Option<Claim> {
-    let analysis = judge.analysis;
-    let (variant, hybrid) = (analysis.variant(name)?, analysis.variant(HYBRID));
-    let group = analysis.group(label).unwrap_or(analysis.overall());
-    let mean = |variant| analysis.mean(metric, group, variant);
-    let images = match label {
+    let images = match group {
         "perfect" => "perfect images",
         "depth-3" => "3 % depth noise",
         ALL => "all conditions",
@@ -61,26 +57,27 @@ fn test(
         CpuMs => "time",
         Worse => "ends worse",
     };
+    let ours = judge.contrast(metric, &[(group, name, 1.0)])?;
+    let hybrids = judge.contrast(metric, &[(group, HYBRID, 1.0)]);
     match limit {
         Hybrid(share) => {
-            let terms = [(group, variant, 1.0), (group, hybrid?, -share)];
-            let (ours, hybrids) = (mean(variant)?, mean(hybrid?)?);
+            let terms = [(group, name, 1.0), (group, HYBRID, -share)];
+            let (hybrids, excess) = (hybrids?, judge.contrast(metric, &terms)?);
             let ratio = ours.estimate / hybrids.estimate;
             judge.claim(
                 format!("{name} has at most {share} × hybrid's: {figure}, {images}"),
-                ClaimVerdict::negative(&[analysis.contrast(metric, &terms)?]),
+                ClaimVerdict::negative(&[excess]),
                 format!("{ratio:.2} ×: {ours} against {hybrids}"),
             )
         }
         Share(share) => {
             let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-            let found = mean(variant)?;
-            let [estimate, low, high] = found.ends().map(percent);
-            let hybrids = hybrid.and_then(mean).map(|i| percent(i.estimate));
-            let hybrids = hybrids.map_or(String::new(), |share| format!("; hybrid {share}"));
+            let [estimate, low, high] = ours.ends().map(percent);
+            let hybrids = hybrids.map(|i| format!("; hybrid {}", percent(i.estimate)));
+            let hybrids = hybrids.unwrap_or_default();
             judge.claim(
                 format!("{name} below {}: {figure}, {images}", percent(share)),
-                ClaimVerdict::negative(&[found.minus(share)]),
+                ClaimVerdict::negative(&[ours.minus(share)]),
                 format!("{estimate} [{low}, {high}]{hybrids}"),
             )
         }
@@ -89,18 +86,13 @@ fn test(
 
 /// Tests that `local` is better in every bin below 0.8.
 fn better_in_bins(judge: Judge<'_>) -> Option<Claim> {
-    let analysis = judge.analysis;
-    let (local, hybrid) = (analysis.variant("local")?, analysis.variant(HYBRID)?);
-    let end = BETTER_TENTHS * analysis.n_bins();
-    let mut evidence = Evidence::new();
-    for (index, group) in analysis.groups().iter().enumerate() {
-        let bins = group.bins.as_ref().filter(|_| group.single);
-        if bins.is_some_and(|bins| 10 * bins.end <= end)
-            && let Some(difference) = judge.difference(index, local, hybrid)
-        {
-            evidence.push((format!("{}: ", group.label), difference));
-        }
-    }
+    let end = BETTER_TENTHS * judge.analysis.n_bins();
+    let groups = judge.analysis.groups().iter().filter(|group| group.single);
+    let low = groups.filter(|g| g.bins.as_ref().is_some_and(|bins| 10 * bins.end <= end));
+    let evidence = low.filter_map(|group| {
+        let difference = judge.difference(&group.label, "local", HYBRID)?;
+        Some((format!("{}: ", group.label), difference))
+    });
     let text = "local has a lower mean VSD than hybrid in every bin of the initial VSD below 0.8, perfect images";
-    judge.decide(text, ClaimVerdict::negative, evidence)
+    judge.decide(text, ClaimVerdict::negative, evidence.collect())
 }

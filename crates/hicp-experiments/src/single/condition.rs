@@ -1,54 +1,37 @@
 //! The conditions under which a study presents a case.
 
+use hicp_sim::{Corruption, DepthNoise, RelativeGaussian};
+
 /// The conditions under which a case is presented.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// Whether the initial pose is drawn into bins of the initial VSD (§VI-B.1), or is 6.2 mm and
     /// 9.5° off.
     pub binned: bool,
-    /// Standard deviation of the depth noise, percent of the depth.
-    pub depth_percent: f64,
+    /// What makes the image and the mask imperfect.
+    pub corruption: Corruption,
     /// 0 for the original model, 1 to 4 for a reconstruction.
     pub model_level: u32,
     /// The threshold α, if it is what is studied.
     pub alpha: Option<f64>,
-    /// The fault of the mask.
-    pub mask: MaskFault,
 }
-
-/// The fault of a condition's mask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MaskFault {
-    /// None.
-    None,
-    /// Eroded by 3 pixels.
-    Eroded,
-    /// Dilated by 3 pixels, over a wall 10 cm behind the object.
-    Dilated,
-    /// A straight cut removed 20 % of it.
-    Missing,
-    /// A board in front of the object hides 30 % of it.
-    Occluded,
-}
-
-/// Perfect images of the original model, and binned initial poses.
-pub(super) const PERFECT: Condition = Condition {
-    binned: true,
-    depth_percent: 0.0,
-    model_level: 0,
-    alpha: None,
-    mask: MaskFault::None,
-};
-
-/// The same from initial poses that are 6.2 mm and 9.5° off.
-pub(super) const OFF: Condition = Condition {
-    binned: false,
-    ..PERFECT
-};
 
 impl Condition {
+    /// Perfect images of the original model, from initial poses that are `binned` or not.
+    pub(super) fn perfect(binned: bool) -> Self {
+        let perfect = Self {
+            binned,
+            corruption: Corruption::default(),
+            model_level: 0,
+            alpha: None,
+        };
+        perfect.depth(0)
+    }
+
+    /// Depth noise in percent of the depth.
     pub(super) fn depth(mut self, percent: u32) -> Self {
-        self.depth_percent = f64::from(percent);
+        let percent = f64::from(percent);
+        self.corruption.sensor.noise = DepthNoise::Relative(RelativeGaussian { percent });
         self
     }
 
@@ -62,8 +45,8 @@ impl Condition {
         self
     }
 
-    pub(super) fn mask(mut self, fault: MaskFault) -> Self {
-        self.mask = fault;
+    pub(super) fn corrupt(mut self, how: fn(&mut Corruption)) -> Self {
+        how(&mut self.corruption);
         self
     }
 }

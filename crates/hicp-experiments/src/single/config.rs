@@ -79,10 +79,9 @@ impl Config {
             variants: variants.to_vec(),
             objects: subjects.iter().map(ObjectRecord::from).collect(),
         };
-        config.check(Fields::new())?;
+        config.check(&Fields::new(&config))?;
         let alpha = experiment.condition(0, 0).alpha;
         variants.iter().try_for_each(|v| v.build(alpha).map(drop))?;
-        ObjectRecord::fit(&config.objects, config.max_distance_m)?;
         Ok(config)
     }
 

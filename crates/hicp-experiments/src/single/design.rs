@@ -1,11 +1,12 @@
 //! Studies of single images as a kind of study.
 
+use hicp_io::IoError;
+
 use super::config::Config;
 use super::runner::Runner;
 use crate::error::ExperimentError;
 use crate::study::{
-    Column, Columns, Design, Fields, Group, Layout, MAX_BINS, MAX_CELLS, Models, ObjectRecord,
-    Worker, quoted,
+    Column, Columns, Design, Fields, Group, Layout, MAX_CELLS, Models, Worker, quoted,
 };
 use crate::subject::Subject;
 
@@ -29,18 +30,17 @@ impl Design for Config {
         ("note", Column::Note),
     ];
 
-    fn check(&self, fields: Fields<'_>) -> Result<(), ExperimentError> {
-        fields.count("poses", self.poses, MAX_POSES)?;
-        fields.count("bins", self.bins as u64, MAX_BINS as u64)?;
-        fields.not_negative(&[
-            ("max_translation_m", self.max_translation_m),
-            ("translation_m", self.translation_m),
-            ("rotation_deg", self.rotation_deg),
-            ("axis_offset_m", self.axis_offset_m),
+    fn check(&self, fields: &Fields<'_>) -> Result<(), IoError> {
+        fields.count("poses", MAX_POSES)?;
+        fields.at_least_0(&[
+            "max_translation_m",
+            "translation_m",
+            "rotation_deg",
+            "axis_offset_m",
         ])?;
-        fields.positive(&[("max_distance_m", self.max_distance_m)])?;
-        let (layout, known) = (self.layout(), self.experiment.levels());
-        fields.names("levels", known.len(), &layout.settings)?;
+        fields.above_0(&["max_distance_m"])?;
+        let known = self.experiment.levels();
+        fields.names("levels", known.len())?;
         // The meaning of a level follows from its index. A study may have only the first levels.
         for (index, (level, known)) in self.levels.iter().zip(&known).enumerate() {
             let name = self.experiment.name();
@@ -48,15 +48,17 @@ impl Design for Config {
             let field = format_args!("levels[{index}]");
             fields.require(level == known, field, quoted(level), expected)?;
         }
-        fields.names("variants", MAX_CELLS, &layout.variants)?;
-        fields.common(&self.camera, &self.objects, &layout, ["levels", "variants"])
+        fields.names("variants", MAX_CELLS)?;
+        fields.common(&self.layout(), self.max_distance_m, ["levels", "variants"])
     }
 
     fn layout(&self) -> Layout<'_> {
         let levels = 0..self.levels.len();
         let is_binned = levels.map(|level| self.experiment.condition(level, 0).binned);
         Layout {
-            objects: self.objects.iter().map(|o| o.name.as_str()).collect(),
+            seed: self.seed,
+            camera: &self.camera,
+            objects: &self.objects,
             settings: self.levels.iter().map(String::as_str).collect(),
             variants: self.variants.iter().map(|v| v.name.as_str()).collect(),
             cases: self.poses,
@@ -73,14 +75,6 @@ impl Design for Config {
     ) -> Result<Worker<'a>, ExperimentError> {
         let mut runner = Runner::new(self, subjects, models)?;
         Ok(Box::new(move |object, case| runner.outcomes(object, case)))
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn objects(&self) -> &[ObjectRecord] {
-        &self.objects
     }
 
     fn groups(&self) -> Vec<Group> {

@@ -1,9 +1,9 @@
 //! The studies of single images, and their levels.
 
-use hicp_sim::Household;
+use hicp_sim::{Corruption, Household};
 use serde::{Deserialize, Serialize};
 
-use super::condition::{Condition, MaskFault, OFF, PERFECT};
+use super::condition::Condition;
 use crate::study::{ALL, FAULTY_MASK, Group, NOISY, NOISY_DEPTH, NOISY_MODEL};
 
 /// A study of §VI-B of the paper, or the tuning of α in §IV-A.
@@ -27,12 +27,17 @@ pub enum Experiment {
     Beyond,
 }
 
-/// The mask faults of [`Experiment::Beyond`], with their names.
-const MASKS: [(&str, MaskFault); 4] = [
-    ("eroded", MaskFault::Eroded),
-    ("dilated", MaskFault::Dilated),
-    ("missing", MaskFault::Missing),
-    ("occluded", MaskFault::Occluded),
+/// A name, and a change of an image.
+type Named = (&'static str, fn(&mut Corruption));
+/// The imperfect masks of [`Experiment::Beyond`], with their names. A dilated mask needs a wall
+/// behind the object, since the added pixels need a depth.
+const MASKS: [Named; 4] = [
+    ("eroded", |image| image.mask.erosion_pixels = 3),
+    ("dilated", |image| {
+        (image.mask.dilation_pixels, image.wall_behind_meters) = (3, Some(0.1));
+    }),
+    ("missing", |image| image.mask.missing_share = 0.2),
+    ("occluded", |image| image.occluded_share = 0.3),
 ];
 /// The groups of imperfect images of [`Experiment::Beyond`], and how the names of their levels
 /// start.
@@ -85,19 +90,6 @@ impl Experiment {
         }
     }
 
-    /// Returns the heading of the levels.
-    #[must_use]
-    pub fn level_title(self) -> &'static str {
-        match self {
-            Self::InitNoise => "initial VSD",
-            Self::DepthNoise => "depth noise, % of the depth",
-            Self::ModelNoise => "model noise level (0: the original)",
-            Self::Timing => "conditions",
-            Self::Alpha => "α",
-            Self::Beyond => "initial VSD (perfect images), then by condition (all starts)",
-        }
-    }
-
     /// Returns the objects that it runs on by default (§VI-A.1).
     #[must_use]
     pub fn household(self) -> [Household; 10] {
@@ -129,40 +121,47 @@ impl Experiment {
     #[must_use]
     pub fn condition(self, level: usize, case: u64) -> Condition {
         let nth = self.conditions(case).into_iter().nth(level);
-        nth.map_or(PERFECT, |(_, condition)| condition)
+        nth.map_or_else(|| Condition::perfect(true), |(_, condition)| condition)
     }
 
     /// Returns the levels with their conditions.
     fn conditions(self, case: u64) -> Vec<(String, Condition)> {
-        let mut all = Vec::new();
+        let (binned, off) = (Condition::perfect(true), Condition::perfect(false));
         match self {
-            Self::InitNoise => all.push(("0".to_owned(), PERFECT)),
+            Self::InitNoise => vec![("0".to_owned(), binned)],
             Self::DepthNoise => {
-                all.extend((0..=DEPTH_STEPS).map(|p| (p.to_string(), OFF.depth(p))));
+                let levels = 0..=DEPTH_STEPS;
+                levels.map(|p| (p.to_string(), off.depth(p))).collect()
             }
             Self::ModelNoise => {
-                all.extend((0..=MODEL_STEPS).map(|l| (l.to_string(), OFF.model(l))));
+                let levels = 0..=MODEL_STEPS;
+                levels.map(|l| (l.to_string(), off.model(l))).collect()
             }
             Self::Timing => {
-                for study in [Self::InitNoise, Self::DepthNoise, Self::ModelNoise] {
+                let one = |study: Self| {
                     let mut levels = study.conditions(0);
                     #[allow(clippy::cast_possible_truncation)] // Below the number of levels.
                     let turn = (case % levels.len() as u64) as usize;
-                    all.push((study.name().to_owned(), levels.swap_remove(turn).1));
-                }
+                    (study.name().to_owned(), levels.swap_remove(turn).1)
+                };
+                [Self::InitNoise, Self::DepthNoise, Self::ModelNoise]
+                    .map(one)
+                    .into()
             }
-            Self::Alpha => all.extend((0..=ALPHA_STEPS).map(|step| {
-                let alpha = f64::from(step) / f64::from(ALPHA_STEPS);
-                (format!("{alpha:.2}"), PERFECT.alpha(alpha))
-            })),
+            Self::Alpha => {
+                let alphas = (0..=ALPHA_STEPS).map(|step| f64::from(step) / f64::from(ALPHA_STEPS));
+                alphas
+                    .map(|alpha| (format!("{alpha:.2}"), binned.alpha(alpha)))
+                    .collect()
+            }
             Self::Beyond => {
-                all.push(("perfect".to_owned(), PERFECT));
-                all.extend((1..=DEPTH_STEPS).map(|p| (format!("depth-{p}"), PERFECT.depth(p))));
-                all.extend((1..=MODEL_STEPS).map(|l| (format!("model-{l}"), PERFECT.model(l))));
-                all.extend(MASKS.map(|(name, m)| (format!("mask-{name}"), PERFECT.mask(m))));
+                let mut all = vec![("perfect".to_owned(), binned)];
+                all.extend((1..=DEPTH_STEPS).map(|p| (format!("depth-{p}"), binned.depth(p))));
+                all.extend((1..=MODEL_STEPS).map(|l| (format!("model-{l}"), binned.model(l))));
+                all.extend(MASKS.map(|(name, how)| (format!("mask-{name}"), binned.corrupt(how))));
+                all
             }
         }
-        all
     }
 
     /// Returns the groups of a study with some levels.
@@ -197,7 +196,16 @@ impl Experiment {
 
 #[cfg(test)]
 mod tests {
+    use hicp_sim::DepthNoise;
+
     use super::*;
+
+    fn percent(condition: Condition) -> f64 {
+        match condition.corruption.sensor.noise {
+            DepthNoise::Relative(noise) => noise.percent,
+            other => panic!("{other:?}"),
+        }
+    }
 
     #[test]
     fn levels_are_those_of_the_paper() {
@@ -205,7 +213,7 @@ mod tests {
             Experiment::DepthNoise.levels(),
             ["0", "1", "2", "3", "4", "5"]
         );
-        assert_eq!(Experiment::DepthNoise.condition(3, 7).depth_percent, 3.0);
+        assert_eq!(percent(Experiment::DepthNoise.condition(3, 7)), 3.0);
         assert_eq!(Experiment::ModelNoise.levels().len(), 5);
         assert_eq!(Experiment::ModelNoise.condition(4, 0).model_level, 4);
         assert!(!Experiment::ModelNoise.condition(4, 0).binned);
@@ -213,10 +221,8 @@ mod tests {
         assert_eq!((beyond.len(), beyond[3].as_str()), (14, "depth-3"));
         assert_eq!(Experiment::Beyond.condition(9, 0).model_level, 4);
         let occluded = Experiment::Beyond.condition(13, 0);
-        assert_eq!(
-            (occluded.mask, occluded.binned),
-            (MaskFault::Occluded, true)
-        );
+        assert_eq!(occluded.corruption.occluded_share, 0.3);
+        assert!(occluded.binned);
         let alphas = Experiment::Alpha.levels();
         assert_eq!((alphas.len(), alphas[8].as_str()), (21, "0.40"));
         assert_eq!(Experiment::Alpha.condition(8, 0).alpha, Some(0.4));
@@ -225,7 +231,7 @@ mod tests {
     #[test]
     fn timing_goes_through_every_level_of_the_others() {
         let percents: Vec<f64> = (0..6)
-            .map(|c| Experiment::Timing.condition(1, c).depth_percent)
+            .map(|c| percent(Experiment::Timing.condition(1, c)))
             .collect();
         assert_eq!(percents, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         let models: Vec<u32> = (0..5)

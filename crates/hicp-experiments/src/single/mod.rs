@@ -11,7 +11,7 @@ mod runner;
 mod table_one;
 
 pub use claims::claims;
-pub use condition::{Condition, MaskFault};
+pub use condition::Condition;
 pub use config::Config;
 pub use experiment::Experiment;
 pub use table_one::TABLE_I;

@@ -4,17 +4,34 @@ use super::claims::claims;
 use super::config::Config;
 use super::experiment::Experiment;
 use super::table_one::TABLE_I;
-use crate::analysis::{Analysis, Interval, Metric, REPLICATES};
+use crate::analysis::{Analysis, Interval, Metric};
 use crate::claims::Claim;
 use crate::report::{
-    Curve, Document, Entry, Figure, Panel, Reported, Table, ends, fixed, html_escaped, means, texts,
+    Curve, Document, Entry, Figure, Panel, Reported, Table, differences, figures, fixed,
+    html_escaped, means, note_on_intervals, texts,
 };
 
 const YARDSTICK: &str = "nn-point-to-point";
+/// The columns of `summary.csv`.
+const SUMMARY: &str = "study|experiment|group|variant|rows|vsd_initial|vsd_final|vsd_final_low|\
+    vsd_final_high|failure_share|failure_low|failure_high|worse_share|worse_low|worse_high|\
+    add_median_mm|add_below_tenth_diameter|iterations|cpu_ms|cpu_ms_deviation|\
+    cpu_ratio_to_nn_point_to_point";
+/// The columns of `differences.csv`.
+const DIFFERENCES: &str = "study|group|variant|against|vsd_difference|low|high|\
+    failure_difference|failure_low|failure_high";
 
 impl Reported for Config {
     fn claims(&self, analysis: &Analysis) -> Vec<Claim> {
         claims(self.experiment, analysis)
+    }
+
+    fn described(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("experiment", self.experiment.name().to_owned()),
+            ("version", self.version.clone()),
+            ("cases per object", self.poses.to_string()),
+        ]
     }
 
     fn document(entries: &[Entry<Self>]) -> Document {
@@ -25,26 +42,26 @@ impl Reported for Config {
             Figure { rows }
         };
         let paper_figure = "Mean VSD after ICP, as in Figure 6 of the paper";
-        let by_group = "Differences of the mean VSD, by group";
         let note = format!(
-            "Every variant refines the same images from the same initial poses. VSD is the mean over tolerances of 5 % to 50 % \
-             of the diameter, against the true pose of the original model. Brackets hold 95 % intervals: percentiles of {REPLICATES} \
-             bootstrap samples over objects and, within each, over cases; differences are paired. ADD(-S) is ADI where an object \
-             declares symmetries. CPU time is the processor time of one thread from depth image and mask to pose, with normals and \
-             search trees; compare its ratios."
+            "Every variant refines the same images from the same initial poses. {} ADD(-S) is ADI where an object declares \
+             symmetries. CPU time is the processor time of one thread from depth image and mask to pose, with normals and \
+             search trees; compare its ratios.",
+            note_on_intervals()
         );
+        let table = |head, rows: fn(&Entry<Self>) -> Vec<Vec<String>>| Table {
+            rows: entries.iter().flat_map(rows).collect(),
+            ..Table::headed(head)
+        };
         Document {
             title: "The single-image studies of Hybrid ICP, rerun",
-            what_was_run: (what_was_run(entries), note),
-            claims: "The paper's claims",
+            note,
             figures: vec![
                 ("figure", paper_figure, figure(false)),
                 ("alpha", "The threshold α", figure(true)),
             ],
             results: entries.iter().map(Entry::results).collect(),
-            unmade: "Cases that could not be made",
-            differences: (by_group, differences(entries)),
-            tables: vec![("summary.csv", summary(entries))],
+            differences: table(DIFFERENCES, Entry::differences),
+            tables: vec![("summary.csv", table(SUMMARY, Entry::summary))],
         }
     }
 }
@@ -68,12 +85,10 @@ impl Entry<Config> {
     }
 
     fn results(&self) -> String {
-        let experiment = self.experiment();
         format!(
-            "<h2>{}</h2>\n<h3>All rows</h3>\n{}<h3>Mean VSD by {}</h3>\n{}",
-            html_escaped(&format!("{}: {}", self.name, experiment.title())),
+            "<h2>{}</h2>\n<h3>All rows</h3>\n{}<h3>Mean VSD by group</h3>\n{}",
+            html_escaped(&format!("{}: {}", self.name, self.experiment().title())),
             self.overall().html(),
-            experiment.level_title(),
             means(&self.analysis).html()
         )
     }
@@ -172,73 +187,38 @@ impl Entry<Config> {
         let panels = panels.into_iter().map(panel);
         panels.filter(|panel| !panel.curves.is_empty()).collect()
     }
-}
 
-fn what_was_run(entries: &[Entry<Config>]) -> Table {
-    let mut table =
-        Table::headed("study|experiment|version|seed|objects|cases per object|rows|camera");
-    table.rows.extend(entries.iter().map(|entry| {
-        let c = &entry.study.config;
-        let camera = &c.camera;
-        vec![
-            entry.name.clone(),
-            c.experiment.name().to_owned(),
-            c.version.clone(),
-            c.seed.to_string(),
-            entry.objects(),
-            c.poses.to_string(),
-            entry.rows(),
-            format!("{}×{}, f = {:.1}", camera.width, camera.height, camera.fx),
-        ]
-    }));
-    table
-}
-
-/// Returns everything per group and variant, for programs.
-fn summary(entries: &[Entry<Config>]) -> Table {
-    let mut table = Table::headed(
-        "study|experiment|group|variant|rows|vsd_initial|vsd_final|vsd_final_low|vsd_final_high|\
-         failure_share|failure_low|failure_high|worse_share|worse_low|worse_high|add_median_mm|\
-         add_below_tenth_diameter|iterations|cpu_ms|cpu_ms_deviation|cpu_ratio_to_nn_point_to_point",
-    );
-    for entry in entries {
-        let (analysis, experiment) = (&entry.analysis, entry.experiment().name());
-        for (group, label, variant, name) in analysis.grid() {
-            let Some(cell) = analysis.cell(group, variant) else {
-                continue;
-            };
-            let mut row = texts(&[&entry.name, experiment, label, name]);
-            row.extend([cell.count.to_string(), fixed(Some(cell.vsd_initial), 4)]);
-            for metric in [Metric::Vsd, Metric::Failure, Metric::Worse] {
-                row.extend(ends(analysis.mean(metric, group, variant)));
-            }
-            let [time, ratio] = entry.time(group, variant);
-            row.push(fixed(Some(cell.add_median_mm), 3));
-            row.push(fixed(Some(cell.add_success), 4));
-            row.push(fixed(Some(cell.steps), 2));
-            row.extend([time, cell.cpu_deviation_ms, ratio].map(|x| fixed(x, 3)));
-            table.rows.push(row);
-        }
+    /// Returns everything per group and variant, for programs.
+    fn summary(&self) -> Vec<Vec<String>> {
+        let (analysis, experiment) = (&self.analysis, self.experiment().name());
+        let metrics = [Metric::Vsd, Metric::Failure, Metric::Worse];
+        let row = |(group, label, variant, name)| {
+            let (cell, figures) = figures(analysis, &metrics, group, variant)?;
+            let [time, ratio] = self.time(group, variant);
+            let others = [
+                fixed(Some(cell.add_median_mm), 3),
+                fixed(Some(cell.add_success), 4),
+                fixed(Some(cell.steps), 2),
+                fixed(time, 3),
+                fixed(cell.cpu_deviation_ms, 3),
+                fixed(ratio, 3),
+            ];
+            let labels = texts(&[&self.name, experiment, label, name]);
+            Some([&labels[..], &figures, &others].concat())
+        };
+        analysis.grid().filter_map(row).collect()
     }
-    table
-}
 
-/// Returns the paired differences of hybrid from each other variant, per group.
-fn differences(entries: &[Entry<Config>]) -> Table {
-    let mut table = Table::headed(
-        "study|group|variant|against|vsd_difference|low|high|failure_difference|failure_low|failure_high",
-    );
-    for entry in entries {
-        let (analysis, ours) = (&entry.analysis, entry.reference());
-        for (group, label, other, name) in analysis.grid().filter(|cell| cell.2 != ours) {
-            let of = |metric| analysis.difference(metric, group, ours, other);
-            let (Some(vsd), Some(failure)) = (of(Metric::Vsd), of(Metric::Failure)) else {
-                continue;
-            };
-            let mut row = texts(&[&entry.name, label, &analysis.variants()[ours], name]);
-            row.extend([vsd, failure].into_iter().flat_map(|i| ends(Some(i))));
-            table.rows.push(row);
-        }
+    /// Returns the paired differences of the reference from each other variant, per group.
+    fn differences(&self) -> Vec<Vec<String>> {
+        let (analysis, ours) = (&self.analysis, self.reference());
+        let metrics = [Metric::Vsd, Metric::Failure];
+        let row = |(group, label, other, name)| {
+            let ends = differences(analysis, &metrics, group, [ours, other])?;
+            let labels = texts(&[&self.name, label, &analysis.variants()[ours], name]);
+            Some([labels, ends].concat())
+        };
+        let others = analysis.grid().filter(|cell| cell.2 != ours);
+        others.filter_map(row).collect()
     }
-    table
 }

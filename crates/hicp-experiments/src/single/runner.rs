@@ -3,24 +3,18 @@
 use std::sync::Arc;
 
 use hicp_core::{DepthImage, Isometry3, Mask, Model, Observation, Problem};
-use hicp_sim::{
-    Case, CaseMaker, Corruption, DepthNoise, DepthSensor, MaskDefects, Reconstruction,
-    ReconstructionNoise, RelativeGaussian,
-};
+use hicp_sim::{Case, CaseMaker, Reconstruction, ReconstructionNoise};
 use hybrid_icp::BoxedStage;
 use hybrid_icp::icp::{Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
 
-use super::condition::{Condition, MaskFault};
+use super::condition::Condition;
 use super::config::Config;
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
 use crate::study::{Measured, Models, Outcome};
 use crate::subject::Subject;
 
-/// Distance of the wall behind an object whose mask is dilated, meters: the added pixels need a
-/// depth.
-const WALL_METERS: f64 = 0.1;
 /// More renders than a workspace remembers.
 const FORGET: u32 = 8;
 
@@ -117,7 +111,8 @@ impl<'a> Runner<'a> {
     where
         'a: 'c,
     {
-        let (depth, mask) = corruption(condition)
+        let (depth, mask) = condition
+            .corruption
             .apply(case)
             .map_err(|e| e.to_string())?;
         Ok(Presented {
@@ -181,26 +176,5 @@ impl<'a> Runner<'a> {
             cpu_ms: self.config.times.then_some(1e3 * time.as_secs_f64()),
             mahalanobis_squared: None,
         })
-    }
-}
-
-/// Returns what turns the perfect image of a case into that of a condition.
-fn corruption(condition: &Condition) -> Corruption {
-    let is = |fault| condition.mask == fault;
-    let noise = DepthNoise::Relative(RelativeGaussian {
-        percent: condition.depth_percent,
-    });
-    Corruption {
-        wall_behind_meters: is(MaskFault::Dilated).then_some(WALL_METERS),
-        occluded_share: if is(MaskFault::Occluded) { 0.3 } else { 0.0 },
-        sensor: DepthSensor {
-            noise,
-            ..DepthSensor::default()
-        },
-        mask: MaskDefects {
-            missing_share: if is(MaskFault::Missing) { 0.2 } else { 0.0 },
-            erosion_pixels: if is(MaskFault::Eroded) { 3 } else { 0 },
-            dilation_pixels: if is(MaskFault::Dilated) { 3 } else { 0 },
-        },
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::analysis::{Interval, Metric};
 use crate::claims::{Claim, ClaimVerdict, Judge};
+use crate::study::ALL;
 
 /// The order of Table I, fastest first: means and standard deviations of the times, seconds.
 pub const TABLE_I: [(&str, f64, f64); 9] = [
@@ -19,23 +20,21 @@ pub const TABLE_I: [(&str, f64, f64); 9] = [
 const NN: &str = "nn-point-to-point";
 
 /// Returns the difference of the mean times of two variants.
-fn time(judge: Judge<'_>, a: usize, b: usize) -> Option<Interval> {
-    let all = judge.analysis.overall();
-    judge.analysis.difference(Metric::CpuMs, all, a, b)
+fn time(judge: Judge<'_>, a: &str, b: &str) -> Option<Interval> {
+    judge.contrast(Metric::CpuMs, &[(ALL, a, 1.0), (ALL, b, -1.0)])
 }
 
 /// Tests that projective association is faster than everything else.
 pub(super) fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
     let projective = judge.family("projective-");
     let mut slow = judge.family("");
-    slow.retain(|v| !projective.contains(v));
+    slow.retain(|name| !projective.contains(name));
     let pairs = projective
         .iter()
-        .flat_map(|p| slow.iter().map(|s| (*p, *s)));
+        .flat_map(|p| slow.iter().map(move |s| (p, s)));
     let contrasts: Vec<Interval> = pairs.filter_map(|(p, s)| time(judge, p, s)).collect();
-    let nearest = contrasts
-        .iter()
-        .max_by(|a, b| a.estimate.total_cmp(&b.estimate))?;
+    let by_estimate = |a: &&Interval, b: &&Interval| a.estimate.total_cmp(&b.estimate);
+    let nearest = contrasts.iter().max_by(by_estimate)?;
     judge.claim(
         "every projective variant is faster than hybrid and than every variant with nearest neighbours",
         ClaimVerdict::negative(&contrasts),
@@ -45,25 +44,25 @@ pub(super) fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
 
 /// Tests the order of the table.
 pub(super) fn table_order(judge: Judge<'_>) -> Option<Claim> {
-    let all = judge.analysis.overall();
-    let order = TABLE_I.iter().map(|row| judge.analysis.variant(row.0));
-    let order: Vec<usize> = order.collect::<Option<_>>()?;
+    let order = TABLE_I.map(|row| row.0);
     let pairs = order.windows(2).map(|pair| time(judge, pair[0], pair[1]));
     let pairs: Vec<Interval> = pairs.collect::<Option<_>>()?;
-    let mean = |v| Some(judge.analysis.mean(Metric::CpuMs, all, v)?.estimate);
-    let unit = mean(judge.analysis.variant(NN)?)?;
-    // The places in Table I and the ratios, fastest here first.
-    let ratios = order.iter().filter_map(|v| Some((mean(*v)? / unit, *v)));
-    let mut ranked: Vec<(usize, (f64, usize))> = ratios.enumerate().collect();
-    ranked.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
-    let later = |(i, one): (usize, &(usize, _))| {
-        let others = ranked[i..].iter();
-        others.filter(|later| later.0 > one.0).count()
+    let mean = |name| Some(judge.contrast(Metric::CpuMs, &[(ALL, name, 1.0)])?.estimate);
+    let unit = mean(NN)?;
+    let ratios = order
+        .iter()
+        .filter_map(|name| Some((mean(name)? / unit, *name)));
+    let ratios: Vec<(f64, &str)> = ratios.collect();
+    let not_faster = |(place, (ratio, _)): (usize, &(f64, &str))| {
+        let later = ratios[place + 1..].iter();
+        later.filter(|later| later.0 >= *ratio).count()
     };
-    let agreeing: usize = ranked.iter().enumerate().map(later).sum();
+    let agreeing: usize = ratios.iter().enumerate().map(not_faster).sum();
+    let mut ranked = ratios.clone();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ranked = ranked
         .iter()
-        .map(|(_, (ratio, v))| format!("{} {ratio:.2}", judge.name(*v)));
+        .map(|(ratio, name)| format!("{name} {ratio:.2}"));
     let ranked = ranked.collect::<Vec<_>>().join(", ");
     judge.claim(
         "the order of Table I, every neighbouring pair of it",

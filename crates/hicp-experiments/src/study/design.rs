@@ -2,6 +2,7 @@
 
 use std::fmt::Debug;
 
+use hicp_io::IoError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -9,7 +10,6 @@ use super::fields::Fields;
 use super::group::Group;
 use super::layout::Layout;
 use super::models::Models;
-use super::records::ObjectRecord;
 use super::row::{Columns, Outcome};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
@@ -30,8 +30,8 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Field`] that names the first wrong field.
-    fn check(&self, fields: Fields<'_>) -> Result<(), ExperimentError>;
+    /// [`IoError`] that names the first wrong field.
+    fn check(&self, fields: &Fields<'_>) -> Result<(), IoError>;
 
     /// Returns the rows that the study has, and their order.
     fn layout(&self) -> Layout<'_>;
@@ -47,20 +47,11 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
         models: &'a Models,
     ) -> Result<Worker<'a>, ExperimentError>;
 
-    /// Returns the seed of everything random.
-    fn seed(&self) -> u64;
-
-    /// Returns the objects.
-    fn objects(&self) -> &[ObjectRecord];
-
     /// Returns the names of what the analysis compares, one or more per case: by default the
     /// variants.
     fn compared(&self) -> Vec<String> {
-        self.layout()
-            .variants
-            .into_iter()
-            .map(str::to_owned)
-            .collect()
+        let variants = self.layout().variants.into_iter();
+        variants.map(str::to_owned).collect()
     }
 
     /// Returns the rows that are averaged together: single bins or levels first, all rows last.

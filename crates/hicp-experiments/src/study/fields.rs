@@ -4,10 +4,12 @@ use std::collections::HashSet;
 use std::fmt::Display;
 use std::path::Path;
 
+use hicp_io::{IoError, Place};
+use serde::Serialize;
+use serde_json::Value;
+
 use super::layout::Layout;
-use super::records::{CameraRecord, ObjectRecord};
 use super::row::quoted;
-use crate::error::ExperimentError;
 
 /// Most bins of the initial VSD in a study; the paper has ten.
 pub const MAX_BINS: usize = 1000;
@@ -16,28 +18,31 @@ pub const MAX_OBJECTS: usize = 10_000;
 /// Most settings × variants × bins of a study: its analysis holds about 128 kB per cell.
 pub const MAX_CELLS: usize = 10_000;
 
-type Checked = Result<(), ExperimentError>;
+type Checked = Result<(), IoError>;
 
-/// Checks the fields of a configuration, and names the file in its errors.
-#[derive(Clone, Copy, Debug)]
+/// The fields of a configuration by their names in its file, which errors state with the path.
+#[derive(Debug)]
 pub struct Fields<'a> {
     path: &'a Path,
+    values: Value,
 }
 
 impl<'a> Fields<'a> {
-    /// Checks a configuration that is not from a file.
-    pub(crate) fn new() -> Self {
-        Self::of(Path::new("configuration"))
+    /// For a configuration that is not from a file.
+    pub(crate) fn new(config: &impl Serialize) -> Self {
+        Self::of(Path::new("configuration"), config)
     }
 
     /// `path` is the file that the configuration is from, or is written to.
-    pub(crate) fn of(path: &'a Path) -> Self {
-        Self { path }
+    pub(crate) fn of(path: &'a Path, config: &impl Serialize) -> Self {
+        // A configuration has no map whose keys are not text, so it always is JSON.
+        let values = serde_json::to_value(config).unwrap_or_default();
+        Self { path, values }
     }
 
     /// Refuses a field unless `is_valid`.
     pub(crate) fn require(
-        self,
+        &self,
         is_valid: bool,
         field: impl Display,
         found: impl Display,
@@ -46,51 +51,58 @@ impl<'a> Fields<'a> {
         if is_valid {
             return Ok(());
         }
-        Err(ExperimentError::Field {
-            path: self.path.to_owned(),
-            field: field.to_string(),
-            found: found.to_string(),
-            expected: expected.to_string(),
-        })
+        let place = Place::Field(field.to_string());
+        let (found, expected) = (found.to_string(), expected.to_string());
+        Err(IoError::new(self.path, place, found, expected))
     }
 
     /// Refuses a count that is not from 1 to `most`.
-    pub(crate) fn count(self, field: &str, count: u64, most: u64) -> Checked {
-        let expected = format_args!("1 to {most}");
-        self.require((1..=most).contains(&count), field, count, expected)
+    pub(crate) fn count(&self, field: &str, most: u64) -> Checked {
+        let found = &self.values[field];
+        let is_valid = found.as_u64().is_some_and(|n| (1..=most).contains(&n));
+        self.require(is_valid, field, found, format_args!("1 to {most}"))
     }
 
-    /// Refuses numbers that are not finite, or negative.
-    pub(crate) fn not_negative(self, numbers: &[(&str, f64)]) -> Checked {
-        numbers.iter().try_for_each(|(field, x)| {
-            let is_valid = x.is_finite() && *x >= 0.0;
-            self.require(
-                is_valid,
-                field,
-                format_args!("{x:?}"),
-                "a number of at least 0",
-            )
+    /// Refuses numbers that are negative or not finite, which JSON stores as null.
+    pub(crate) fn at_least_0(&self, fields: &[&str]) -> Checked {
+        fields.iter().try_for_each(|field| {
+            let found = &self.values[field];
+            let is_valid = found.as_f64().is_some_and(|x| x >= 0.0);
+            self.require(is_valid, field, found, "a number of at least 0")
         })
     }
 
-    /// Refuses numbers that are not finite, or not above 0.
-    pub(crate) fn positive(self, numbers: &[(&str, f64)]) -> Checked {
-        numbers.iter().try_for_each(|(field, x)| {
-            let is_valid = x.is_finite() && *x > 0.0;
-            self.require(is_valid, field, format_args!("{x:?}"), "a number above 0")
-        })
+    /// Refuses numbers that are not above 0, or not finite.
+    pub(crate) fn above_0(&self, fields: &[&str]) -> Checked {
+        let number = |field| self.values[field].as_f64().unwrap_or(f64::NAN);
+        fields
+            .iter()
+            .try_for_each(|field| self.between(field, number(field), f64::INFINITY))
     }
 
-    /// Refuses an empty list of names, more than `most`, and a name that is there twice.
-    pub(crate) fn names(self, field: &str, most: usize, names: &[&str]) -> Checked {
-        let is_valid = (1..=most).contains(&names.len());
-        let found = match names.len() {
+    /// Refuses a number that is not above 0 and below `limit`.
+    pub(crate) fn between(&self, field: impl Display, found: f64, limit: f64) -> Checked {
+        let is_valid = found > 0.0 && found < limit;
+        let expected = match limit.is_finite() {
+            true => format!("a number above 0 and below {limit:?}"),
+            false => "a number above 0".to_owned(),
+        };
+        self.require(is_valid, field, format_args!("{found:?}"), expected)
+    }
+
+    /// Refuses an empty list, more than `most` elements, and a name that is there twice.
+    pub(crate) fn names(&self, field: &str, most: usize) -> Checked {
+        let found = self.values[field].as_array().map_or(&[][..], Vec::as_slice);
+        let n = match found.len() {
             0 => "none".to_owned(),
             n => n.to_string(),
         };
-        self.require(is_valid, field, found, format_args!("1 to {most}"))?;
+        let is_valid = (1..=most).contains(&found.len());
+        self.require(is_valid, field, n, format_args!("1 to {most}"))?;
         let mut seen = HashSet::new();
-        names.iter().try_for_each(|name| {
+        found.iter().try_for_each(|element| {
+            let name = element.as_str().or(element["name"].as_str());
+            let name = name.unwrap_or_default();
             let found = format_args!("{} twice", quoted(name));
             self.require(seen.insert(name), field, found, "different names")
         })
@@ -98,23 +110,19 @@ impl<'a> Fields<'a> {
 
     /// Checks what every configuration has: camera, objects, bins and the size of the analysis.
     ///
-    /// `names` are the fields that list the settings and the variants.
-    pub(crate) fn common(
-        self,
-        camera: &CameraRecord,
-        objects: &[ObjectRecord],
-        layout: &Layout<'_>,
-        names: [&str; 2],
-    ) -> Checked {
-        if let Err(error) = camera.pinhole() {
+    /// Objects must be smaller than their distance from the camera, meters. `names` are the fields
+    /// that list the settings and the variants.
+    pub(crate) fn common(&self, layout: &Layout<'_>, distance: f64, names: [&str; 2]) -> Checked {
+        if let Err(error) = layout.camera.pinhole() {
             let found = format_args!("invalid numbers ({error})");
             self.require(false, "camera", found, "a camera")?;
         }
-        self.names("objects", MAX_OBJECTS, &layout.objects)?;
-        for (index, object) in objects.iter().enumerate() {
-            let field = format!("objects[{index}].diameter_mm");
-            self.positive(&[(&field, object.diameter_mm)])?;
+        self.names("objects", MAX_OBJECTS)?;
+        for (index, object) in layout.objects.iter().enumerate() {
+            let field = format_args!("objects[{index}].diameter_mm");
+            self.between(field, object.diameter_mm, 1e3 * distance)?;
         }
+        self.count("bins", MAX_BINS as u64)?;
         let (settings, variants, bins) =
             (layout.settings.len(), layout.variants.len(), layout.bins);
         let cells = settings.saturating_mul(variants).saturating_mul(bins);

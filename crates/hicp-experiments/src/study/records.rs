@@ -1,10 +1,8 @@
 //! Cameras and objects as a configuration stores them.
 
 use hicp_core::{CameraError, PinholeCamera};
-use hicp_sim::SimError;
 use serde::{Deserialize, Serialize};
 
-use crate::error::ExperimentError;
 use crate::subject::Subject;
 
 /// A camera in a configuration.
@@ -67,21 +65,6 @@ impl From<&Subject> for ObjectRecord {
             diameter_mm: subject.model.diameter() * 1e3,
             symmetric: subject.is_symmetric(),
             fingerprint: format!("{:016x}", subject.fingerprint()),
-        }
-    }
-}
-
-impl ObjectRecord {
-    /// Refuses objects that are not smaller than a distance to the camera, meters.
-    pub(crate) fn fit(objects: &[Self], max_distance: f64) -> Result<(), ExperimentError> {
-        let is_too_large = |object: &&Self| object.diameter_mm / 1e3 >= max_distance;
-        match objects.iter().find(is_too_large) {
-            None => Ok(()),
-            Some(object) => Err(ExperimentError::Sim(SimError::TooLarge {
-                object: object.name.clone(),
-                diameter: object.diameter_mm / 1e3,
-                max_distance,
-            })),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The rows of a study, and how they are written and read.
 
+use std::str::FromStr;
+
 /// The result of one variant for one case in one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
@@ -66,26 +68,47 @@ pub enum Column {
 /// The columns of a file of rows, in order, with their names.
 pub type Columns = [(&'static str, Column)];
 
+/// The columns that say which row it is.
+const PLACE: [Column; 5] = [
+    Column::Object,
+    Column::Case,
+    Column::Setting,
+    Column::Variant,
+    Column::Bin,
+];
 /// The termination of a case that could not be made.
 const NOT_MADE: &str = "not_made";
 /// Most characters of a value that a message shows.
 const SHOWN: usize = 60;
 
+/// The value that was found in a line, and the one that was expected.
+pub(crate) type Mismatch = (String, String);
+
 impl Row {
+    /// Adds the figures to a row, or the reason why there are none.
+    pub(crate) fn with(self, outcome: Outcome) -> Self {
+        Self {
+            bin: self.bin.filter(|_| outcome.is_ok()),
+            note: outcome.as_ref().err().cloned().unwrap_or_default(),
+            measured: outcome.ok(),
+            ..self
+        }
+    }
+
     /// Returns rows as CSV, one per line, without a header. Numbers have a fixed number of digits.
     pub(crate) fn to_csv(columns: &Columns, rows: &[Self]) -> String {
-        let fields =
-            |row: &Self| -> Vec<String> { columns.iter().map(|c| row.field(c.1)).collect() };
-        to_csv(rows.iter().map(fields))
+        to_csv(
+            rows.iter()
+                .map(|row| columns.iter().map(|c| row.field(c.1))),
+        )
     }
 
     fn field(&self, column: Column) -> String {
         let measured = self.measured.as_ref();
-        let number =
-            |digits: usize, value: fn(&Measured) -> Option<f64>| match measured.and_then(value) {
-                Some(x) => format!("{x:.digits$}"),
-                None => String::new(),
-            };
+        let number = |digits: usize, value: fn(&Measured) -> Option<f64>| {
+            let value = measured.and_then(value);
+            value.map_or_else(String::new, |x| format!("{x:.digits$}"))
+        };
         let count = |count: Option<usize>| count.map_or_else(String::new, |n| n.to_string());
         match column {
             Column::Object => self.object.clone(),
@@ -104,50 +127,35 @@ impl Row {
         }
     }
 
-    /// Reads a row; the error names the wrong column.
-    pub(crate) fn parse(columns: &Columns, record: &csv::StringRecord) -> Result<Self, String> {
-        if record.len() != columns.len() {
-            let (found, expected) = (record.len(), columns.len());
-            return Err(format!("{found} fields, expected {expected}"));
+    /// Reads a line as this row, of which everything but the figures is given.
+    pub(crate) fn read(
+        self,
+        columns: &Columns,
+        line: &csv::StringRecord,
+    ) -> Result<Self, Mismatch> {
+        if line.len() != columns.len() {
+            let (found, expected) = (line.len(), columns.len());
+            return Err((format!("{found} fields"), expected.to_string()));
         }
-        let fields = Record { columns, record };
-        let text = |column| fields.get(column).1;
-        let is_made = match text(Column::Termination) {
-            "" => !text(Column::Steps).is_empty(),
+        let line = Line { columns, line };
+        let is_made = match line.text(Column::Termination) {
+            "" => !line.text(Column::Steps).is_empty(),
             termination => termination != NOT_MADE,
         };
-        let vsd = |column| fields.number(column, |x| (0.0..=1.0).contains(x), " from 0 to 1");
-        let measure = |column| {
-            let is_valid = |x: &f64| x.is_finite() && *x >= 0.0;
-            fields.number(column, is_valid, " of at least 0")
-        };
-        let optional = |column| match text(column) {
-            "" => Ok(None),
-            _ => measure(column).map(Some),
-        };
-        let measured = || -> Result<Measured, String> {
-            Ok(Measured {
-                vsd_initial: vsd(Column::VsdInitial)?,
-                vsd_final: vsd(Column::VsdFinal)?,
-                add_final_mm: measure(Column::AddFinalMm)?,
-                steps: fields.number(Column::Steps, |_| true, "")?,
-                termination: text(Column::Termination).to_owned(),
-                cpu_ms: optional(Column::CpuMs)?,
-                mahalanobis_squared: optional(Column::MahalanobisSquared)?,
-            })
-        };
-        Ok(Self {
-            object: text(Column::Object).to_owned(),
-            case: fields.number(Column::Case, |_| true, "")?,
-            setting: text(Column::Setting).to_owned(),
-            variant: text(Column::Variant).to_owned(),
-            bin: match text(Column::Bin) {
-                "" => None,
-                _ => Some(fields.number(Column::Bin, |_| true, "")?),
-            },
-            measured: is_made.then(measured).transpose()?,
-            note: text(Column::Note).to_owned(),
-        })
+        let row = self.with(match is_made {
+            true => Ok(line.measured()?),
+            false => Err(line.text(Column::Note).to_owned()),
+        });
+        for column in PLACE {
+            let (name, found) = line.get(column);
+            let expected = row.field(column);
+            if found != expected {
+                let (found, expected) = (quoted(found), quoted(&expected));
+                let why = "by config.json and the order in which a run writes rows";
+                return Err((format!("{name} {found}"), format!("{expected}, {why}")));
+            }
+        }
+        Ok(row)
     }
 }
 
@@ -176,31 +184,53 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("{shown:?}{more}")
 }
 
-/// A record whose fields are found by their columns.
-#[derive(Clone, Copy)]
-struct Record<'a> {
+/// A line whose fields are found by their columns.
+struct Line<'a> {
     columns: &'a Columns,
-    record: &'a csv::StringRecord,
+    line: &'a csv::StringRecord,
 }
 
-impl<'a> Record<'a> {
+impl<'a> Line<'a> {
     /// Returns the name and the text of a column; two empty texts if the file has no such column.
-    fn get(self, column: Column) -> (&'static str, &'a str) {
-        let mut fields = self.columns.iter().zip(self.record);
+    fn get(&self, column: Column) -> (&'static str, &'a str) {
+        let mut fields = self.columns.iter().zip(self.line);
         let field = fields.find(|(c, _)| c.1 == column);
         field.map_or(("", ""), |(column, text)| (column.0, text))
     }
 
-    /// Parses a number; `range` continues the message "expected a number".
-    fn number<T: std::str::FromStr>(
-        self,
+    fn text(&self, column: Column) -> &'a str {
+        self.get(column).1
+    }
+
+    fn measured(&self) -> Result<Measured, Mismatch> {
+        let share = |x: &f64| (0.0..=1.0).contains(x);
+        let share = |column| self.number(column, share, "a number from 0 to 1");
+        let positive = |x: &f64| x.is_finite() && *x >= 0.0;
+        let positive = |column| self.number(column, positive, "a number of at least 0");
+        let optional = |column| match self.text(column) {
+            "" => Ok(None),
+            _ => positive(column).map(Some),
+        };
+        Ok(Measured {
+            vsd_initial: share(Column::VsdInitial)?,
+            vsd_final: share(Column::VsdFinal)?,
+            add_final_mm: positive(Column::AddFinalMm)?,
+            steps: self.number(Column::Steps, |_| true, "a number")?,
+            termination: self.text(Column::Termination).to_owned(),
+            cpu_ms: optional(Column::CpuMs)?,
+            mahalanobis_squared: optional(Column::MahalanobisSquared)?,
+        })
+    }
+
+    fn number<T: FromStr>(
+        &self,
         column: Column,
         is_valid: fn(&T) -> bool,
-        range: &str,
-    ) -> Result<T, String> {
+        expected: &str,
+    ) -> Result<T, Mismatch> {
         let (name, text) = self.get(column);
         let value = text.parse().ok().filter(is_valid);
-        value.ok_or_else(|| format!("{name} is {}, expected a number{range}", quoted(text)))
+        value.ok_or_else(|| (format!("{name} {}", quoted(text)), expected.to_owned()))
     }
 }
 
@@ -242,8 +272,14 @@ mod tests {
             let mut reader = csv::ReaderBuilder::new()
                 .has_headers(false)
                 .from_reader(text.as_bytes());
-            let record = reader.records().next().unwrap().unwrap();
-            assert_eq!(Row::parse(COLUMNS, &record), Ok(row));
+            let line = reader.records().next().unwrap().unwrap();
+            let place = Row {
+                bin: Some(2),
+                measured: None,
+                note: String::new(),
+                ..row.clone()
+            };
+            assert_eq!(place.read(COLUMNS, &line), Ok(row));
         }
     }
 
@@ -251,7 +287,9 @@ mod tests {
     fn a_wrong_field_is_named() {
         let mut fields: Vec<String> = COLUMNS.iter().map(|c| row().field(c.1)).collect();
         fields[6] = "NaN".to_owned();
-        let told = Row::parse(COLUMNS, &csv::StringRecord::from(fields)).unwrap_err();
-        assert!(told.contains("vsd_final") && told.contains("NaN"), "{told}");
+        let (found, _) = row()
+            .read(COLUMNS, &csv::StringRecord::from(fields))
+            .unwrap_err();
+        assert_eq!(found, "vsd_final \"NaN\"");
     }
 }

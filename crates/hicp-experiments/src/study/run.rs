@@ -6,13 +6,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use hicp_io::{IoErrorKind, ReadLimits, RowLog, is_absent, write_atomically};
+use hicp_io::{IoError, IoErrorKind, Place, ReadLimits, RowLog, is_absent, write_atomically};
 
 use super::design::Design;
 use super::fields::Fields;
 use super::models::Models;
-use super::row::{Columns, Row, header};
-use super::stored::{CONFIG_FILE, check_order, read_config};
+use super::row::{Row, header};
+use super::stored::{CONFIG_FILE, parse_rows, read_config};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
 
@@ -50,11 +50,11 @@ pub fn run<D: Design>(
     progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
 ) -> Result<(), ExperimentError> {
     let stored = folder.join(CONFIG_FILE);
-    config.check(Fields::of(&stored))?;
+    config.check(&Fields::of(&stored, config))?;
     let models = Models::new(subjects.len());
     // Report a pipeline that cannot be built before there is a file.
     drop(config.worker(subjects, &models)?);
-    std::fs::create_dir_all(folder).map_err(ExperimentError::file(folder))?;
+    std::fs::create_dir_all(folder).map_err(ExperimentError::folder(folder))?;
     let (log, first) = open(config, folder, options)?;
     let mut report = |cases| match progress(cases) {
         ControlFlow::Continue(()) => Ok(()),
@@ -78,7 +78,7 @@ pub fn run<D: Design>(
                         return;
                     }
                     let (object, case) = layout.case(n);
-                    let rows = layout.rows(object, case, worker(object, case));
+                    let rows = layout.rows(n, worker(object, case));
                     // The receiver is gone when the study stops.
                     if sender.send(Ok((n, rows))).is_err() {
                         return;
@@ -87,29 +87,19 @@ pub fn run<D: Design>(
             });
         }
         drop(sender);
-        write_in_order(D::COLUMNS, &log, receiver, first, &mut report)
-    })
-}
-
-/// Writes the rows of cases in the order of the cases.
-fn write_in_order(
-    columns: &Columns,
-    log: &RowLog,
-    receiver: mpsc::Receiver<Result<(usize, Vec<Row>), ExperimentError>>,
-    first: usize,
-    report: &mut dyn FnMut(usize) -> Result<(), ExperimentError>,
-) -> Result<(), ExperimentError> {
-    let (mut early, mut cases) = (BTreeMap::new(), first);
-    for message in receiver {
-        let (case, rows) = message?;
-        early.insert(case, rows);
-        while let Some(rows) = early.remove(&cases) {
-            log.append(Row::to_csv(columns, &rows).trim_end_matches('\n'))?;
-            cases += 1;
-            report(cases)?;
+        // Write the rows of the cases in the order of the cases.
+        let (mut early, mut cases) = (BTreeMap::new(), first);
+        for message in receiver {
+            let (case, rows) = message?;
+            early.insert(case, rows);
+            while let Some(rows) = early.remove(&cases) {
+                log.append(Row::to_csv(D::COLUMNS, &rows).trim_end_matches('\n'))?;
+                cases += 1;
+                report(cases)?;
+            }
         }
-    }
-    Ok(log.sync()?)
+        Ok(log.sync()?)
+    })
 }
 
 /// Opens the file of rows; returns the number of cases in it.
@@ -119,43 +109,36 @@ fn open<D: Design>(
     options: RunOptions,
 ) -> Result<(RowLog, usize), ExperimentError> {
     let (path, stored) = (folder.join(D::ROWS_FILE), folder.join(CONFIG_FILE));
-    let ours = serde_json::to_string_pretty(config).unwrap_or_default() + "\n";
+    let limits = &options.limits;
+    let text = |config: &D| serde_json::to_string_pretty(config).unwrap_or_default() + "\n";
+    let ours = text(config);
     if is_absent(&path) {
         write_atomically(&stored, |w| w.write_all(ours.as_bytes()))?;
     } else if !options.resume {
-        return Err(ExperimentError::AlreadyThere { path });
+        let (found, expected) = ("the rows of a study", "another folder, or --resume");
+        return Err(IoError::new(path, None, found, expected).into());
     } else {
         // Compare what this version would write.
-        let theirs: D = read_config(&options.limits, &stored)?;
-        let theirs = serde_json::to_string_pretty(&theirs).unwrap_or_default() + "\n";
-        if let Some(difference) = difference(&ours, &theirs) {
-            let path = stored;
-            return Err(ExperimentError::OtherConfiguration { path, difference });
+        let theirs = text(&read_config(limits, &stored)?);
+        let lines = theirs.lines().zip(ours.lines()).zip(1..);
+        let mut different = lines.filter(|((theirs, ours), _)| theirs != ours);
+        if let Some(((theirs, ours), line)) = different.next() {
+            let [found, ours] = [theirs, ours].map(|line| line.trim().trim_end_matches(','));
+            let expected =
+                format!("{ours}, as in the command that started the study, or another folder");
+            return Err(IoError::new(stored, Place::Line(line), found, expected).into());
         }
     }
     let (header, rows_per_case) = (header(D::COLUMNS), config.layout().rows_per_case());
-    let resumed = RowLog::resume(&path, header.trim_end(), rows_per_case, &options.limits);
-    let (log, cases) = resumed.map_err(|error| match options.limits.read_text(&path) {
+    let resumed = RowLog::resume(&path, header.trim_end(), rows_per_case, limits);
+    let (log, cases) = resumed.map_err(|error| match limits.read_text(&path) {
         Err(encoding) if encoding.kind == IoErrorKind::Encoding => encoding,
         _ => error,
     })?;
-    let text = header + &cases.join("\n");
-    check_order(config, &options.limits, &path, &text, cases.len())?;
-    Ok((log, cases.len()))
-}
-
-/// Returns the first lines in which two configurations differ; `None` if they are equal.
-fn difference(ours: &str, theirs: &str) -> Option<String> {
-    let (mut ours, mut theirs) = (ours.lines(), theirs.lines());
-    loop {
-        let (ours, theirs) = (ours.next(), theirs.next());
-        if ours != theirs {
-            let text = |line: Option<&str>| match line {
-                Some(line) => line.trim().trim_end_matches(',').to_owned(),
-                None => "nothing".to_owned(),
-            };
-            return Some(format!("{} there, {} now", text(theirs), text(ours)));
-        }
-        ours?;
+    let rows = parse_rows(config, limits, &path, &(header + &cases.join("\n")))?.len();
+    if rows != cases.len() * rows_per_case {
+        let expected = format!("{}, one per line", cases.len() * rows_per_case);
+        return Err(IoError::new(path, None, format!("{rows} rows"), expected).into());
     }
+    Ok((log, cases.len()))
 }

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use hicp_io::ReadLimits;
+use hicp_io::{IoError, Place, ReadLimits};
 
 use super::design::Design;
 use super::fields::Fields;
-use super::layout::Places;
-use super::row::{Row, header, quoted};
+use super::row::{Mismatch, Row, header, quoted};
 use crate::error::ExperimentError;
 
 /// Name of the file of the configuration.
@@ -41,103 +40,69 @@ impl<D: Design> StudyOf<D> {
     pub fn read_within(limits: &ReadLimits, folder: &Path) -> Result<Self, ExperimentError> {
         let config: D = read_config(limits, &folder.join(CONFIG_FILE))?;
         let path = folder.join(D::ROWS_FILE);
-        let mut rows = Vec::new();
-        let text = limits.read_text(&path)?;
-        each_row(&config, limits, &path, &text, |row, _| {
-            rows.push(row);
-            Ok(())
-        })?;
+        let rows = parse_rows(&config, limits, &path, &limits.read_text(&path)?)?;
         if rows.iter().all(|row| row.measured.is_none()) {
-            return Err(ExperimentError::Empty { path });
+            return Err(IoError::new(path, None, "no finished row", "at least one").into());
         }
         Ok(Self { config, rows })
     }
 }
 
 /// Reads and checks a configuration.
-pub(crate) fn read_config<D: Design>(
-    limits: &ReadLimits,
-    path: &Path,
-) -> Result<D, ExperimentError> {
+pub(crate) fn read_config<D: Design>(limits: &ReadLimits, path: &Path) -> Result<D, IoError> {
     let text = limits.read_small_json_text(path)?;
-    let config: D =
-        serde_json::from_str(&text).map_err(|source| ExperimentError::Configuration {
-            path: path.to_owned(),
-            source,
-        })?;
-    config.check(Fields::of(path))?;
+    let config: D = serde_json::from_str(&text).map_err(|error| {
+        IoError::new(
+            path,
+            None,
+            error.to_string(),
+            "the configuration of a study",
+        )
+    })?;
+    config.check(&Fields::of(path, &config))?;
     Ok(config)
 }
 
-/// Calls `each` with every row in the text of a file, and with the number of rows that a run writes
-/// before it.
-///
-/// Refuses rows that the study cannot have, with the line.
-pub(crate) fn each_row<D: Design>(
+/// Reads the text of a file of rows: the first rows of a run, in the order in which it writes them.
+pub(crate) fn parse_rows<D: Design>(
     config: &D,
     limits: &ReadLimits,
     path: &Path,
     text: &str,
-    mut each: impl FnMut(Row, u64) -> Result<(), String>,
-) -> Result<(), ExperimentError> {
-    let wrong = |line: u64, what: String| ExperimentError::Row {
-        path: path.to_owned(),
-        line: usize::try_from(line).unwrap_or(usize::MAX),
-        what,
-    };
+) -> Result<Vec<Row>, IoError> {
+    let wrong =
+        |line, (found, expected): Mismatch| IoError::new(path, Place::Line(line), found, expected);
     let header = header(D::COLUMNS);
-    if !text.starts_with(&header) {
+    let Some(lines) = text.strip_prefix(&header) else {
         let found = quoted(text.split('\n').next().unwrap_or_default());
-        let what = format!("found {found}, expected the columns {}", header.trim_end());
-        return Err(wrong(1, what));
+        let expected = format!("the columns {}", header.trim_end());
+        return Err(wrong(1, (found, expected)));
+    };
+    let layout = config.layout();
+    let mut rows = Vec::new();
+    // `Row::read` checks the number of fields.
+    let mut reader = csv::ReaderBuilder::new();
+    let reader = reader.flexible(true).has_headers(false);
+    for record in reader.from_reader(lines.as_bytes()).records() {
+        // Reading text that is in memory cannot fail.
+        let record = record.unwrap_or_default();
+        let line = record
+            .position()
+            .map_or(1, |place| number(place.line()) + 1);
+        limits.check_rows(path, line, rows.len() as u64 + 1)?;
+        let place = layout.row(rows.len()).filter(|_| line == rows.len() + 2);
+        let Some(place) = place else {
+            let most = layout.n_cases().saturating_mul(layout.rows_per_case());
+            let expected = format!("at most {most}, each on one line");
+            return Err(wrong(line, ("another row".to_owned(), expected)));
+        };
+        let row = place.read(D::COLUMNS, &record);
+        rows.push(row.map_err(|mismatch| wrong(line, mismatch))?);
     }
-    let mut places = Places::new(config.layout(), D::COLUMNS);
-    // `Row::parse` checks the number of fields.
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .from_reader(text.as_bytes());
-    for (record, rows) in reader.records().zip(1..) {
-        let record = record.map_err(|error| {
-            wrong(
-                error.position().map_or(1, csv::Position::line),
-                error.to_string(),
-            )
-        })?;
-        let line = record.position().map_or(1, csv::Position::line);
-        limits.check_rows(path, usize::try_from(line).unwrap_or(usize::MAX), rows)?;
-        let row = Row::parse(D::COLUMNS, &record).map_err(|what| wrong(line, what))?;
-        let place = places.take(&row).map_err(|what| wrong(line, what))?;
-        each(row, place).map_err(|what| wrong(line, what))?;
-    }
-    Ok(())
+    Ok(rows)
 }
 
-/// Refuses rows that are not the first ones of a study, those of so many cases.
-///
-/// A run keeps what is there, and continues after it.
-pub(crate) fn check_order<D: Design>(
-    config: &D,
-    limits: &ReadLimits,
-    path: &Path,
-    text: &str,
-    cases: usize,
-) -> Result<(), ExperimentError> {
-    let mut rows = 0;
-    each_row(config, limits, path, text, |_, place| {
-        rows += 1;
-        match place + 1 {
-            found if found == rows => Ok(()),
-            found => Err(format!(
-                "found row {found} of the study, expected row {rows}: a run goes on only after rows in the order in which it writes them"
-            )),
-        }
-    })?;
-    match cases.saturating_mul(config.layout().rows_per_case()) as u64 {
-        expected if expected == rows => Ok(()),
-        expected => Err(ExperimentError::Row {
-            path: path.to_owned(),
-            line: text.lines().count(),
-            what: format!("found {rows} rows up to here, expected {expected}: one per line"),
-        }),
-    }
+/// Returns the number of a line, which is below that of the bytes in memory.
+fn number(line: u64) -> usize {
+    usize::try_from(line).unwrap_or(usize::MAX)
 }

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::{Args, Subcommand, ValueEnum};
-use hicp_experiments::{Config, Experiment, Report, Study, Variant};
+use hicp_experiments::{Config, Experiment, Variant};
 use hicp_sim::Household;
 use hybrid_icp::{Preset, UnknownPreset};
 
-use self::study::{StudyOptions, conclude};
+use self::study::{StudyOptions, report};
 use crate::choice::Source;
-use crate::limits::{limits, pipeline_limits};
+use crate::limits::pipeline_limits;
 
 /// Rerun the paper's studies, on its kind of objects or on any meshes.
 ///
@@ -104,7 +104,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Alpha(arguments) => study(Experiment::Alpha, arguments),
         Command::Beyond(arguments) => study(Experiment::Beyond, arguments),
         Command::Sequential(arguments) => sequential::run(arguments),
-        Command::Report(arguments) => report(&arguments.studies, &arguments.out),
+        Command::Report(arguments) => report_folders(&arguments.studies, &arguments.out),
     }
 }
 
@@ -125,7 +125,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let threads = matches!(experiment, Experiment::Timing).then_some(1);
     let names = [experiment.name(), "cases"];
     options.run(&config, &subjects, &out, names, threads)?;
-    report(std::slice::from_ref(&out), &out)
+    report_folders(std::slice::from_ref(&out), &out)
 }
 
 fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Variant>> {
@@ -149,18 +149,14 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
     Ok(variants)
 }
 
-fn report(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
-    let mut studies = Vec::new();
-    for folder in folders {
+/// Writes the report of studies that are named like their folders.
+fn report_folders(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
+    let name = |folder: &PathBuf| {
         let name = folder.file_name().unwrap_or(folder.as_os_str());
-        let study = Study::read_within(&limits(), folder)?;
-        studies.push((name.to_string_lossy().into_owned(), study));
-    }
-    let report = Report::of(studies);
-    report.write(out)?;
-    let claims = report.claims();
-    conclude(
-        claims.map(|(study, claim)| (format!("{study}: "), claim)),
-        out,
-    )
+        name.to_string_lossy().into_owned()
+    };
+    let names: Vec<String> = folders.iter().map(name).collect();
+    let studies = names.iter().zip(folders);
+    let studies: Vec<_> = studies.map(|(name, folder)| (&**name, &**folder)).collect();
+    report::<Config>(&studies, out)
 }

@@ -1,13 +1,10 @@
 //! `hybrid-icp experiment sequential`.
 
 use clap::{Args, ValueEnum};
-use hicp_experiments::{
-    Experiment, TrajectoryClock, TrajectoryConfig, TrajectoryReport, TrajectoryStudy,
-};
+use hicp_experiments::{Experiment, TrajectoryClock, TrajectoryConfig};
 use hybrid_icp::Preset;
 
-use super::study::{StudyOptions, conclude};
-use crate::limits::limits;
+use super::study::{StudyOptions, report};
 
 /// Fusing estimates while the camera moves: trajectories toward an object, six methods and more (§VI-C).
 ///
@@ -57,9 +54,5 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let out = options.folder("sequential");
     let names = ["sequential", "trajectories"];
     options.run(&config, &subjects, &out, names, None)?;
-    let study = TrajectoryStudy::read_within(&limits(), &out)?;
-    let report = TrajectoryReport::of(vec![("sequential".to_owned(), study)]);
-    report.write(&out)?;
-    let claims = report.claims();
-    conclude(claims.map(|(_, claim)| (String::new(), claim)), &out)
+    report::<TrajectoryConfig>(&[("sequential", &out)], &out)
 }

@@ -1,10 +1,12 @@
-//! What all studies share: their options, their progress, and their conclusions.
+//! The options, the progress and the report of every study.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use hicp_experiments::{Claim, Design, ExperimentError, RunOptions, Subject, run};
+use hicp_experiments::{
+    Design, ExperimentError, ReportOf, Reported, RunOptions, StudyOf, Subject, run,
+};
 use hicp_sim::Household;
 
 use crate::interrupt;
@@ -84,15 +86,21 @@ impl StudyOptions {
     }
 }
 
-/// Prints the claims of studies, each with its verdict, and the name of the report's page.
-pub(super) fn conclude<'a>(
-    claims: impl IntoIterator<Item = (String, &'a Claim)>,
-    out: &Path,
-) -> anyhow::Result<()> {
-    for (study, claim) in claims {
+/// Writes the report of named studies, and prints their claims and the name of the page.
+pub(super) fn report<D: Reported>(studies: &[(&str, &Path)], out: &Path) -> anyhow::Result<()> {
+    let read = |(name, folder): &(&str, &Path)| -> anyhow::Result<_> {
+        Ok((
+            (*name).to_owned(),
+            StudyOf::<D>::read_within(&limits(), folder)?,
+        ))
+    };
+    let studies = studies.iter().map(read).collect::<anyhow::Result<_>>()?;
+    let report = ReportOf::of(studies);
+    report.write(out)?;
+    for (study, claim) in report.claims() {
         let (verdict, text, figures) = (claim.verdict.name(), &claim.text, &claim.figures);
-        say(format_args!("{study}{verdict}: {text} ({figures})"))?;
+        say(format_args!("{study}: {verdict}: {text} ({figures})"))?;
     }
     let page = out.join("report.html");
-    say(format_args!("{} holds it all", page.display()))
+    say(format_args!("{} contains all results", page.display()))
 }

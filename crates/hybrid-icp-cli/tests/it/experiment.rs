@@ -191,7 +191,7 @@ fn variants_are_names_and_files() {
     // What is there was made with other variants.
     run(folder.path(), arguments("hybrid"))
         .exits(1)
-        .complains(&["was begun otherwise"]);
+        .complains(&["config.json", "as in the command that started the study"]);
     run(folder.path(), arguments("hybird"))
         .exits(2)
         .complains(&["did you mean \"hybrid\"?"]);
@@ -250,18 +250,18 @@ fn files_that_are_not_those_of_a_study_are_refused() {
     refused(
         "config.json",
         other.to_string(),
-        &["is not the configuration of a study", "line 1"],
+        &["expected the configuration of a study", "line 1"],
     );
     std::fs::write(out.join("config.json"), &config).unwrap();
     refused(
         "cases.csv",
         cases.replace("book", "mug"),
-        &["line 2: object is \"mug\", expected one of config.json: \"book\""],
+        &["line 2: found object \"mug\", expected \"book\", by config.json"],
     );
     refused(
         "cases.csv",
         cases.replace(",hybrid,", ",local,"),
-        &["line 2: variant is \"local\""],
+        &["line 2: found variant \"local\""],
     );
     // The limits are those of the command line.
     std::fs::write(out.join("cases.csv"), &cases).unwrap();
