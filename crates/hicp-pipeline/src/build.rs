@@ -175,7 +175,7 @@ impl<'a> Context<'a> {
 /// what was expected.
 #[derive(Debug, Default)]
 pub struct Parameters<'a> {
-    /// What the part does, where it comes from and what it costs, for the catalog.
+    /// Description for the catalog: effect, source and cost.
     pub about: &'static str,
     /// `None` while the parameters are being listed.
     pub(crate) reading: Option<(&'a Context<'a>, Fields<'a>)>,

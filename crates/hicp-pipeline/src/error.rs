@@ -57,7 +57,7 @@ pub enum PipelineError {
     /// Text that is not TOML.
     #[error("{place}: not TOML: {message}")]
     Syntax {
-        /// Where.
+        /// The place in the file.
         place: Box<Place>,
         /// The message of the parser.
         message: String,
@@ -75,7 +75,7 @@ pub enum PipelineError {
     Unknown {
         /// The field.
         place: Box<Place>,
-        /// What is unknown.
+        /// The message: the unknown name and its kind.
         problem: String,
         /// The known name nearest to it.
         suggestion: Option<String>,
@@ -112,7 +112,7 @@ pub enum PipelineError {
     Override {
         /// The override as given.
         assignment: String,
-        /// What is wrong with it.
+        /// The defect.
         problem: String,
     },
 }

@@ -1,6 +1,6 @@
 //! The kinds of parts.
 
-/// What a part does in a pipeline.
+/// The role of a part in a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PartKind {
     /// A composition or an ICP stage.

@@ -3,11 +3,11 @@
 /// The work that a pipeline file may request before it is refused with
 /// [`PipelineError::Limit`](crate::PipelineError::Limit).
 ///
-/// A file can come from anywhere, and a few words of it can request years of work. The defaults
-/// are more than a hundred times what any preset needs in the worst case.
+/// A file can come from anywhere, and a few words of it can request years of work. The defaults are
+/// more than a hundred times what any preset needs in the worst case.
 /// [`PipelineFile::build`](crate::PipelineFile::build) uses them, and
-/// [`PipelineFile::build_within`](crate::PipelineFile::build_within) accepts others. Stages that are
-/// composed in Rust are not limited.
+/// [`PipelineFile::build_within`](crate::PipelineFile::build_within) accepts others. Stages that
+/// are composed in Rust are not limited.
 ///
 /// ```
 /// use hicp_pipeline::{PipelineFile, PipelineLimits};

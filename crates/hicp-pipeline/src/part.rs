@@ -4,17 +4,17 @@ use std::fmt;
 
 use crate::kind::PartKind;
 
-/// A part: its names, what it does, and its parameters.
+/// A part: its names, its role and its parameters.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Part {
-    /// What it does in a pipeline.
+    /// Its role in a pipeline.
     pub kind: PartKind,
     /// Name in files.
     pub name: &'static str,
     /// Name of the type in Rust.
     pub rust: &'static str,
-    /// What it does, where it comes from, and what it costs.
+    /// Its effect, source and cost.
     pub about: &'static str,
     /// Its parameters, in the order in which they are read.
     pub parameters: Vec<Parameter>,
@@ -28,7 +28,7 @@ pub struct Parameter {
     pub name: &'static str,
     /// Unit; empty for none.
     pub unit: &'static str,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
     /// The values that it accepts, and the default.
     pub accepts: Accepts,

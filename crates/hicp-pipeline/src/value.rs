@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::error::PipelineError;
 
-/// Where a value that an override set starts: it has no place in the file.
+/// The position of a value that an override set, which has no place in the file.
 pub(crate) const NOWHERE: usize = usize::MAX;
 
 /// Returns the name of a value in messages.
@@ -109,8 +109,8 @@ pub(crate) fn set<'a>(
     Ok(())
 }
 
-/// Parses the value of an override. What is not TOML is a text, so that quotes need not survive a
-/// shell. Returns `None` for several lines that are not one value.
+/// Parses the value of an override. Anything that is not TOML is a text, so that quotes need not
+/// survive a shell. Returns `None` for several lines that are not one value.
 fn parse(value: &str) -> Option<DeValue<'_>> {
     match DeValue::parse(value) {
         Ok(value) => Some(value.into_inner()),

@@ -14,12 +14,13 @@ use hybrid_icp::{Preset, Refiner};
 mod scene;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Yours come from a camera, a segmentation and a pose estimator; `hicp-io` reads PNGs and meshes.
+    // Real inputs come from a camera, a segmentation and a pose estimator; `hicp-io` reads the
+    // files.
     let given = scene::Scene::new()?;
 
     let observation = Observation::new(given.depth, given.mask, given.camera)?; // Once per image.
     let model = Model::new(given.mesh); // Once per object.
-    let mut refiner = Refiner::preset(Preset::Hybrid); // Once per thread.
+    let mut refiner = Refiner::preset(Preset::Auto); // Once per thread.
 
     let refined = refiner.refine(&model, &observation, &given.detected);
 

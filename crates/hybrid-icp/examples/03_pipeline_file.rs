@@ -14,14 +14,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     // `PipelineFile::read` takes a path; this text lies beside the example.
     let text = include_str!("03_pipeline.toml");
     let mut file = PipelineFile::parse(text, "03_pipeline.toml")?;
-    file.set("stage.selection.points=2000")?; // What `--set` does.
+    file.set("stage.selection.points=2000")?; // As `--set` does.
 
     let given = scene::Scene::new()?;
     given.refine(file.build()?)?;
 
-    // What is wrong is said with its place, and with what may have been meant.
-    let misspelt = text.replace("\"projective\"", "\"projectiv\"");
-    if let Err(message) = PipelineFile::parse(&misspelt, "03_pipeline.toml")?.build() {
+    // Errors name the place, and suggest a similar name.
+    let misspelled = text.replace("\"projective\"", "\"projectiv\"");
+    if let Err(message) = PipelineFile::parse(&misspelled, "03_pipeline.toml")?.build() {
         println!("\n{message}");
     }
     Ok(())

@@ -18,8 +18,8 @@ impl ErrorMetric for DepthDifference {
     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
         let model = pair.source.point.cast::<f64>();
         let observed = pair.target.point.cast::<f64>();
-        // One row: where the point is, the direction in which moving it changes the residual, and the residual. Gauss–Newton,
-        // information, covariance and observability follow from it.
+        // One row: the point, the direction in which its motion changes the residual, and the
+        // residual. Gauss–Newton, information, covariance and observability follow from it.
         let residual = model.z - observed.z;
         system.add_row(&model, &Vector3::z(), residual, f64::from(pair.weight));
     }
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         selection: VisibleSurface::default(),
         association: Projective,
         filter: (),
-        // Depths alone leave three directions free; point-to-plane holds them.
+        // Depth alone leaves three directions free; point-to-plane determines them.
         metric: WeightedSum {
             terms: ((1.0, PointToPlane), (0.2, DepthDifference)),
         },

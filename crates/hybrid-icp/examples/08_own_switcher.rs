@@ -24,7 +24,7 @@ impl Switcher for BesideTheMask {
         camera_from_object: &Isometry3<f64>,
     ) -> RegimeEvent {
         let problem = context.problem;
-        // The context renders once per pose: the stage that selects from this render gets it for free.
+        // The context renders once per pose; the next stage reuses this render.
         let (Some(observation), Some(view)) =
             (problem.observation(), context.view(camera_from_object))
         else {

@@ -18,7 +18,8 @@ struct Narrowing {
 }
 
 impl OutlierFilter for Narrowing {
-    // The limit follows from the index alone, not from the limit before: a stage goes back by one after a rejected pose.
+    // The limit depends on the index alone and not on the previous limit, because a stage goes back
+    // by one iteration after a rejected pose.
     fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let halvings = i32::try_from(iteration.index).unwrap_or(i32::MAX);
         let limit = (self.first_meters * 0.5_f32.powi(halvings)).max(self.last_meters);

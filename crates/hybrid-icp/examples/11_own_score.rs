@@ -11,8 +11,9 @@ use hybrid_icp::score::Score;
 
 mod scene;
 
-/// The mean difference of depth over the masked pixels, each up to a limit, which is also the cost of
-/// a pixel without a render.
+/// The mean difference of depth over the masked pixels.
+///
+/// The limit bounds each difference. It is also the value of a pixel without a render.
 struct DepthError {
     limit_meters: f32,
 }

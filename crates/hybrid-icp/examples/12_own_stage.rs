@@ -11,8 +11,9 @@ use hybrid_icp::score::{MeanVsd, Score};
 
 mod scene;
 
-/// Starts another stage from several distances along the viewing ray, where detectors that use color
-/// err most, and returns the pose that explains the image best.
+/// Starts another stage from several distances along the viewing ray, and returns the best pose.
+///
+/// Detectors that use color have their largest errors along this ray.
 struct AlongTheRay<S> {
     stage: S,
     offsets_meters: Vec<f64>,
@@ -40,7 +41,7 @@ impl<S: Stage> Stage for AlongTheRay<S> {
             let start = Translation3::from(ray * *offset) * init;
             let outcome = self.stage.run(problem, &start, session);
             iterations += outcome.iterations;
-            // A start that was kept was never evaluated: a stage returns what was, or the initial pose.
+            // A stage that keeps its start has not evaluated it.
             if outcome.verdict == Verdict::Refined {
                 let score = mve(session, &outcome);
                 if score < best_mve {

@@ -16,8 +16,10 @@ use hybrid_icp::{Preset, SequentialConfig, SequentialEstimator};
 
 mod scene;
 
-/// A filter that forgets: with every image the held uncertainty grows by a factor, so that newer images
-/// count more. It rejects estimates that are too far from the held one.
+/// A filter that forgets: the uncertainty grows by a factor with every image, so that newer images
+/// count more.
+///
+/// It rejects estimates that are too far from the current one.
 struct Forgetting {
     factor: f64,
     max_jump_meters: f64,

@@ -6,8 +6,8 @@ use crate::preset::Preset;
 
 /// Factors that match the covariance of a pipeline's registration to its errors.
 ///
-/// They are the factors of [`InflatedCovariance`] in units of the object (its radius and 1 rad), the
-/// error that all estimates along a trajectory share, and the tails of the errors.
+/// They are the factors of [`InflatedCovariance`] in units of the object (its radius and 1 rad),
+/// the error that all estimates along a trajectory share, and the tails of the errors.
 ///
 /// The constants are fitted along trajectories toward the tuning objects, reconstructed with errors
 /// of 5 mm and 1.1° and seen with the noise of a D435 (`cargo run --release -p hicp-experiments
@@ -28,7 +28,8 @@ pub struct Calibration {
     pub undetermined: f64,
     /// Standard deviation of the error that all estimates share: that of the model.
     pub shared: f64,
-    /// ν of Student's distribution of the errors; ∞ for normal errors. See [`Calibration::probability_within`].
+    /// ν of Student's distribution of the errors; ∞ for normal errors. See
+    /// [`Calibration::probability_within`].
     pub degrees_of_freedom: f64,
     /// Estimates that are not fused.
     pub gate: Gate,
@@ -58,7 +59,8 @@ impl Calibration {
         ..Self::HYBRID
     };
 
-    /// Returns the factors that were fitted to a preset; for all but the two above, those of `hybrid`.
+    /// Returns the factors that were fitted to a preset; those of `hybrid` for all but the two
+    /// above.
     #[must_use]
     pub fn of(preset: Preset) -> Self {
         match preset {
@@ -80,8 +82,8 @@ impl Calibration {
         }
     }
 
-    /// Returns the probability that the squared Mahalanobis distance of the fused pose from the truth,
-    /// by the stated covariance, is at most `mahalanobis_squared`.
+    /// Returns the probability that the squared Mahalanobis distance of the fused pose from the
+    /// truth, by the stated covariance, is at most `mahalanobis_squared`.
     #[must_use]
     pub fn probability_within(&self, mahalanobis_squared: f64) -> f64 {
         probability_within(mahalanobis_squared, self.degrees_of_freedom)

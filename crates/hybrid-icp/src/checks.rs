@@ -22,22 +22,24 @@ const MASK_RATIO: f64 = 10.0;
 
 /// Largest number of pixels of the smallest side of the model's box, as a multiple of the mask's.
 ///
-/// Nineteen twentieths may be occluded. A unit that is wrong by ten makes a hundred times the pixels.
+/// Up to 95 % of the object may be occluded. A unit that is wrong by a factor of 10 gives 100 times
+/// as many pixels.
 const SLIVER_RATIO: f64 = 20.0;
 
-/// MVE from which on an initial pose explains nothing of the mask ([`Warning::FoundElsewhere`]).
+/// MVE at and above which an initial pose explains nothing of the mask
+/// ([`Warning::FoundElsewhere`]).
 ///
-/// Of 71 poses that four estimators gave for their own object one has it, and so has everything that
-/// was found in the mask of another object (`docs/robustness.md`).
+/// Of 71 poses that four estimators gave for the right object, one is above it. All poses that were
+/// found in the mask of another object are above it (`docs/robustness.md`).
 pub const EXPLAINS_NOTHING: f64 = 0.9;
 
-/// Share of the mesh's diameter by which a stated one may differ: BOP's are those of other versions
-/// of the mesh, with more vertices.
+/// Share of the mesh's diameter by which a stated one may differ. BOP states the diameters of other
+/// versions of the mesh, with more vertices.
 const DIAMETER_TOLERANCE: f64 = 0.05;
 
-/// Returns what looks wrong about the inputs of a refinement; `init` is camera from object, meters.
+/// Returns warnings about the inputs of a refinement; `init` is camera from object, meters.
 ///
-/// Nothing is refused for it. Cost: O(pixels of the mask's box + vertices).
+/// A warning refuses nothing. Cost: O(pixels of the mask's box + vertices).
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};
@@ -118,12 +120,12 @@ pub fn warning_of_distance(distance: f64, median_depth: Option<f64>) -> Option<W
     })
 }
 
-/// Returns what looks wrong about a model by itself: the [`warnings`] that need no image.
+/// Returns the [`warnings`] about a model that need no image.
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// // A mesh of 80 mm that was read as metres.
+/// // A mesh of 80 mm that was read as meters.
 /// let corners = [[0., 0., 0.], [80., 0., 0.], [0., 80., 0.]].map(Point3::from);
 /// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
 /// assert!(matches!(warnings_of_model(&model)[..], [Warning::Diameter { .. }]));
@@ -143,12 +145,13 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
     warnings
 }
 
-/// Returns [`Warning::StatedDiameter`] if the diameter that a model was created with differs by more
-/// than a twentieth from that of its mesh ([`ModelConfig::diameter`](hicp_core::ModelConfig::diameter)).
+/// Returns [`Warning::StatedDiameter`] if a model's stated diameter differs by more than 5 % from
+/// that of its mesh.
 ///
-/// The file of a dataset can be wrong or belong to other models, and everything that is measured in
-/// diameters is then wrong. [`warnings_of_model`] does not include this check, because it costs
-/// about O(n log n) of the vertices: call it once per model.
+/// The stated diameter is [`ModelConfig::diameter`](hicp_core::ModelConfig::diameter). A dataset's
+/// file can be wrong or belong to other models; all lengths in diameters are then wrong.
+/// [`warnings_of_model`] does not include this check, because it costs about O(n log n) of the
+/// vertices: call it once per model.
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};
@@ -169,7 +172,7 @@ pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
     differ.then_some(Warning::StatedDiameter { stated, measured })
 }
 
-/// Returns what looks wrong about the result of a refinement, by the scores of its two poses.
+/// Returns warnings about the result of a refinement, from the scores of its two poses.
 ///
 /// The arguments are [`Refinement::mve_initial`](crate::Refinement::mve_initial),
 /// [`Refinement::mve`](crate::Refinement::mve) and
@@ -212,7 +215,7 @@ pub fn warnings_of_result(mve_initial: f64, mve: f64, flatness: Option<Flatness>
     warnings
 }
 
-/// Area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
+/// Returns the area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
 fn smallest_side(model: &Model) -> f64 {
     let vertices: Vec<_> = model.mesh().used_points().collect();
     let mut sides = [0, 1, 2].map(|axis| {
@@ -226,7 +229,7 @@ fn smallest_side(model: &Model) -> f64 {
     sides[0] * sides[1]
 }
 
-/// Whether the mask may continue beyond the image.
+/// Returns whether the mask may continue beyond the image.
 fn touches_border(observation: &Observation) -> bool {
     let (camera, region) = (observation.camera(), observation.region());
     region.u_min == 0
@@ -235,7 +238,7 @@ fn touches_border(observation: &Observation) -> bool {
         || region.v_max == camera.height()
 }
 
-/// The number of pixels of the mask, and the median of their measured depths, meters.
+/// Returns the number of pixels of the mask and the median of their measured depths in meters.
 fn inside_mask(observation: &Observation) -> (usize, Option<f64>) {
     let width = observation.camera().width() as usize;
     let region = observation.region();

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::presets;
 
-/// Declares the presets: per line the variant, the name, the function in [`presets`], and a summary.
+/// Declares the presets: per line the variant, the name, the function in [`presets`], a summary.
 macro_rules! declare {
     ($($variant:ident, $name:literal, $function:ident, $summary:literal;)*) => {
         /// A pipeline that ships with the library: Hybrid ICP or one of the eight baselines, by its

@@ -27,7 +27,7 @@
 //! # let _ = refiner;
 //! ```
 //!
-//! To put in a part of another type, move the others over:
+//! To replace a part with one of another type, move the others over:
 //!
 //! ```
 //! use hybrid_icp::metric::{Kernel, PointToPlane, Robust, Scale};
@@ -55,12 +55,12 @@ use hicp_metric::{PointToPlane, PointToPoint};
 use hicp_score::MeanVsd;
 use hicp_switch::{PAPER_ALPHA, Switch, Threshold};
 
-/// When a stage of the paper's variants ends (§IV-B).
+/// The stop rules of the paper's variants (§IV-B).
 pub type PaperStop = (Divergence, Convergence, IterationLimit);
 
-// Deviation: §IV-B states the divergence rules for Cascading ICP; here they end the single-metric baselines too, so that all
-// variants differ in association and metric alone.
-/// Returns the paper's rules: divergence as written, convergence of the loss, at most 50 iterations.
+// Deviation: §IV-B states the divergence rules for Cascading ICP; here they end the single-metric
+// baselines too, so that all variants differ in association and metric alone.
+/// Returns the paper's rules: divergence as written, convergence of the loss, 50 iterations.
 #[must_use]
 pub fn paper_stop() -> PaperStop {
     (
@@ -159,7 +159,8 @@ pub fn nn_cascade_plane_point() -> NearestCascade<PointToPlane, PointToPoint> {
 
 /// `hybrid`: Hybrid ICP (§IV-C). Twice: score the estimate by the MVE; below α = 0.4 run the
 /// projective cascade, else nearest-neighbor point-to-point.
-// Deviation: occluded pixels do not count toward the MVE; where nothing stands in front of the object it is the paper's MVE exactly.
+// Deviation: occluded pixels do not count toward the MVE; if nothing stands in front of the object,
+// it is exactly the paper's MVE.
 #[must_use]
 pub fn hybrid() -> Hybrid {
     Repeat {

@@ -14,19 +14,19 @@ use crate::warning::Warning;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Refinement {
-    /// The pose (`outcome.camera_from_object`), the reason why the pipeline ended, and the numbers at
-    /// that pose.
+    /// The pose (`outcome.camera_from_object`), the reason why the pipeline ended, and the numbers
+    /// at that pose.
     pub outcome: Outcome,
     /// The mean VSD estimate of the initial pose: 0 agrees with the image everywhere, 1 nowhere.
     pub mve_initial: f64,
     /// The mean VSD estimate of the returned pose.
     ///
-    /// Accept a pose below 0.3 if there is no warning. Above `mve_initial`, the refinement made the pose
-    /// worse. If `mve_initial` is 0.9 or more, it may be the pose of another object
+    /// Accept a pose below 0.3 if there is no warning. Above `mve_initial`, the refinement made the
+    /// pose worse. If `mve_initial` is 0.9 or more, it may be the pose of another object
     /// ([`Self::warnings`]).
     pub mve: f64,
-    /// Flatness of the measured and the rendered surface at the returned pose, which tells whether a
-    /// plane would explain the depth better. `None` if fewer than 64 pixels show both.
+    /// Flatness of the measured and the rendered surface at the returned pose, which tells whether
+    /// a plane would explain the depth better. `None` if fewer than 64 pixels show both.
     pub flatness: Option<Flatness>,
 }
 
@@ -41,8 +41,8 @@ impl Refinement {
 /// A pipeline with its scratch memory and renderer, for any number of refinements: create one per
 /// thread.
 ///
-/// The pipeline is any stage, by default a boxed one. [`Refiner::stage_mut`] changes it in place, and
-/// [`Refiner::into_stage`] returns it.
+/// The pipeline is any stage, by default a boxed one. [`Refiner::stage_mut`] changes it in place,
+/// and [`Refiner::into_stage`] returns it.
 ///
 /// ```
 /// use hybrid_icp::core::{
@@ -55,7 +55,7 @@ impl Refinement {
 ///     Point3::new(-0.1, -0.1, 0.0), Point3::new(0.1, -0.1, 0.0), Point3::new(0.1, 0.1, 0.0), Point3::new(-0.1, 0.1, 0.0),
 /// ];
 /// let model = Model::new(TriMesh::new(plate, vec![[0, 2, 1], [0, 3, 2]])?);
-/// // The plate stands half a meter in front of the camera; the detector is four centimetres off.
+/// // The plate stands half a meter in front of the camera; the detector is 4 cm off.
 /// let depth = (0..64 * 64).map(|i| if (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64)) { 0.5 } else { 0.0 });
 /// let depth = DepthImage::from_meters(64, 64, depth.collect())?;
 /// let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
@@ -129,9 +129,9 @@ impl<S: Stage> Refiner<S> {
 
     /// Refines a pose (`camera_from_object`, meters).
     ///
-    /// Never fails on data: without overlap, or with degenerate geometry, the outcome has the initial
-    /// pose and states the reason. Deterministic. Cost: that of the pipeline, and one render for the
-    /// final score.
+    /// Never fails on data: without overlap, or with degenerate geometry, the outcome has the
+    /// initial pose and states the reason. Deterministic. Cost: that of the pipeline, and one
+    /// render for the final score.
     pub fn refine(
         &mut self,
         model: &Model,

@@ -87,7 +87,8 @@ impl SequentialEstimator {
     ///
     /// # Errors
     ///
-    /// [`FusionError`] as for [`SequentialEstimator::new`], or when the model's size is out of range.
+    /// [`FusionError`] as for [`SequentialEstimator::new`], or when the model's size is out of
+    /// range.
     pub fn for_object(
         stage: impl Stage + Send + 'static,
         method: FusionMethod,
@@ -115,7 +116,8 @@ impl SequentialEstimator {
     ///
     /// # Errors
     ///
-    /// [`FusionError`] as for [`SequentialEstimator::for_object`], or when a factor of the calibration is out of range.
+    /// [`FusionError`] as for [`SequentialEstimator::for_object`], or when a factor of the
+    /// calibration is out of range.
     pub fn calibrated(
         stage: impl Stage + Send + 'static,
         method: FusionMethod,
@@ -148,8 +150,8 @@ impl SequentialEstimator {
 
     /// Creates the estimator of §V to the letter.
     ///
-    /// Covariances are e_MVE·I₆ and do not change when the camera moves. There is no gate. The MVE is
-    /// computed only for the methods that need it.
+    /// Covariances are e_MVE·I₆ and do not change when the camera moves. There is no gate. The MVE
+    /// is computed only for the methods that need it.
     ///
     /// # Errors
     ///
@@ -217,8 +219,8 @@ impl SequentialEstimator {
         self.step_observed(model, observation, motion, &mut ())
     }
 
-    /// Registers an image as [`SequentialEstimator::step`] does, and reports every step of ICP to an
-    /// observer.
+    /// Registers an image as [`SequentialEstimator::step`] does, and reports every step of ICP to
+    /// an observer.
     pub fn step_observed(
         &mut self,
         model: &Model,

@@ -8,7 +8,7 @@ const FINEST: f64 = 1e-3;
 
 /// Something that looks wrong about the inputs of a refinement or about its result.
 ///
-/// Nothing is refused for it. Lengths are meters.
+/// A warning refuses nothing. Lengths are in meters.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -41,7 +41,7 @@ pub enum Warning {
         diameter: f64,
     },
     /// The object is behind the camera at the initial pose, or the pose is not finite.
-    #[error("the object's centre is at z = {}, behind the camera, which looks along +z", Meters(*z))]
+    #[error("the object's center is at z = {}, behind the camera, which looks along +z", Meters(*z))]
     BehindCamera {
         /// z of the center of the object in the camera frame.
         z: f64,
@@ -116,7 +116,7 @@ pub enum Warning {
     },
     /// The initial pose explained nothing of the mask, but the returned one does.
     ///
-    /// The mask may be that of another object, which looks enough like this one from one side.
+    /// The mask may show another object that looks like this one from one side.
     #[error(
         "the initial pose explained nothing of the mask (MVE {mve_initial:.3}): what was found there (MVE {mve:.3}) may be another object"
     )]
@@ -137,7 +137,7 @@ pub enum Warning {
         Meters(flatness.residual)
     )]
     Flat {
-        /// How flat the two surfaces are, and how far one is from the other.
+        /// Flatness of the two surfaces and their distance from each other.
         flatness: Flatness,
     },
 }

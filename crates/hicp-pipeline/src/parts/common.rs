@@ -8,7 +8,7 @@ use crate::range::Range;
 
 /// The tilt of a surface.
 pub(super) const TILT: Range = Range::new(0.0, 90.0, "degrees");
-/// What a largest tilt means.
+/// The meaning of a largest tilt.
 pub(super) const EDGE: &str = "a steeper surface is a depth edge";
 /// A length whose unit another parameter states.
 const OF_UNIT: Range = Range::positive("of `unit`");

@@ -6,7 +6,7 @@ use crate::catalog::Catalog;
 use crate::range::Range;
 use crate::work::Limited::Samples;
 
-/// What an occlusion tolerance means.
+/// The meaning of an occlusion tolerance.
 const HIDES: &str = "what something outside the mask must stand in front of the object to hide it; below 0 it may \
     also lie that far behind, where the mask misses a part; inf is the paper's definition";
 /// Any; a meter behind the object is nowhere near it.

@@ -13,7 +13,7 @@ use hybrid_icp::core::{
 use hybrid_icp::icp::Stage;
 use hybrid_icp::raster::render_depth_image;
 
-/// An image, what is known about it, and what a detector made of it. Lengths in metres, poses are camera from object.
+/// A simulated image with its ground truth and a detected pose (meters, camera from object).
 pub(crate) struct Scene {
     pub(crate) mesh: TriMesh,
     pub(crate) camera: PinholeCamera,
@@ -45,13 +45,15 @@ impl Scene {
         })
     }
 
-    /// The two sides of a registration.
+    /// Returns the two sides of a registration.
     pub(crate) fn problem(&self) -> Result<(Model, Observation), Box<dyn Error>> {
         let observation = Observation::new(self.depth.clone(), self.mask.clone(), self.camera)?;
         Ok((Model::new(self.mesh.clone()), observation))
     }
 
-    /// Refines the detected pose by a stage and prints what came of it; an error if it is not nearer the truth.
+    /// Refines the detected pose with a stage and prints the result.
+    ///
+    /// Fails if the result is not nearer to the truth.
     #[allow(clippy::print_stdout)]
     pub(crate) fn refine(&self, stage: impl Stage + Send + 'static) -> Result<(), Box<dyn Error>> {
         let (model, observation) = self.problem()?;

@@ -47,10 +47,10 @@ pub type Search = HypothesisSearch<Local, Explore, SampledMve, MeanVsd>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
-/// θ_max of nearest neighbours, degrees.
+/// θ_max of nearest neighbors, degrees.
 const THETA_DEGREES: f32 = 90.0;
 
-/// The paper's rules, but that a loss that rises with new pairs is no divergence.
+/// Returns the paper's rules, except that a loss that rises with new pairs is not a divergence.
 fn stop(iterations: usize) -> PaperStop {
     (
         Divergence::count_aware(),
@@ -59,7 +59,7 @@ fn stop(iterations: usize) -> PaperStop {
     )
 }
 
-/// A projective stage of about so many points.
+/// Creates a projective stage of about `points` points.
 fn projective<M>(metric: M, points: usize, iterations: usize) -> GatedIcp<M> {
     Icp {
         selection: VisibleSurface {
@@ -72,7 +72,8 @@ fn projective<M>(metric: M, points: usize, iterations: usize) -> GatedIcp<M> {
     }
 }
 
-/// The near stage: the projective cascade with the symmetric metric in the place of point-to-plane.
+/// Creates the near stage: the projective cascade with the symmetric metric instead of
+/// point-to-plane.
 fn near(points: usize) -> Near {
     Cascade((
         projective(PointToPoint, points, 50),
@@ -80,8 +81,10 @@ fn near(points: usize) -> Near {
     ))
 }
 
-/// A stage that pairs so many observed points with points of the model, hidden ones too: passing those over costs time and,
-/// from afar, where they hide is not known.
+/// Creates a stage that pairs observed points with points of the model.
+///
+/// Hidden points of the model are included: to exclude them costs time, and far from the truth it
+/// is not known which they are.
 fn observed<M>(
     (points, samples): (usize, usize),
     metric: M,
@@ -102,7 +105,7 @@ fn observed<M>(
     }
 }
 
-/// Where point-to-point from afar has done its part.
+/// Returns the convergence at which point-to-point far from the truth has done its part.
 fn coarse() -> Convergence {
     Convergence {
         relative_change: 1e-2,
@@ -112,8 +115,11 @@ fn coarse() -> Convergence {
 
 /// `hybrid-visible`: [`super::hybrid`] with the better reading of the paper's O.
 ///
-/// O is the visible surface for nearest neighbours too, whose pairs are at most 90° apart; the second projective stage
-/// minimises the symmetric metric, projective pairs are at most a quarter of the diameter apart, and rule 3 is count-aware.
+/// - O is the visible surface for nearest neighbors too, and the normals of their pairs differ by
+///   at most 90°.
+/// - The second projective stage minimizes the symmetric metric.
+/// - Projective pairs are at most a quarter of the diameter apart.
+/// - Divergence rule 3 is count-aware.
 #[must_use]
 pub fn hybrid_visible() -> HybridVisible {
     Repeat {
@@ -137,9 +143,11 @@ pub fn hybrid_visible() -> HybridVisible {
 
 /// `local`: local refinement that never returns a pose with a higher MVE than the initial one.
 ///
-/// Up to six steps by [`SwitchUntilStall`] until the MVE stalls or is at most 0.1, the best pose by it kept: the projective cascade where
-/// the estimate agrees with the image, else observed points matched to the model, point-to-point and then the symmetric metric. A
-/// polish of twice as many points follows, which is accepted only if the MVE improves.
+/// [`SwitchUntilStall`] runs up to six steps, until the MVE stalls or is at most 0.1, and keeps the
+/// pose with the lowest MVE. A step is the projective cascade if the estimate agrees with the
+/// image. Otherwise it pairs observed points with the model, first with point-to-point and then
+/// with the symmetric metric. A last stage with twice as many points is accepted only if the MVE
+/// improves.
 #[must_use]
 pub fn local() -> Local {
     let far = (300, 5000);
@@ -163,7 +171,7 @@ pub fn local() -> Local {
     ))
 }
 
-/// What hypotheses are refined by: two steps of fewer points.
+/// Creates the stage that refines hypotheses: two steps with fewer points.
 fn explore() -> Explore {
     SwitchUntilStall {
         score: MeanVsd::default(),
@@ -176,8 +184,10 @@ fn explore() -> Explore {
     }
 }
 
-/// [`local`], and a search where its MVE stays above a threshold. The search judges by an MVE that is lenient with masks that
-/// miss a part of the object ([`MeanVsd::lenient`]). To change the options, such as to set a bound:
+/// [`local`], followed by a search if its MVE stays above a threshold.
+///
+/// The search scores poses with an MVE for masks that miss a part of the object
+/// ([`MeanVsd::lenient`]). To change the options, for example to set a bound:
 ///
 /// ```
 /// use hybrid_icp::icp::{Bound, SearchOptions};
@@ -198,17 +208,19 @@ pub fn search_with(options: SearchOptions) -> Search {
     )
 }
 
-/// `search`: [`local`], and where its MVE stays above 0.15 a search over 256 rotations, of which 12 are refined.
+/// `search`: [`local`], followed by a search if its MVE stays above 0.15.
 ///
-/// Not local refinement: it can end anywhere, also at a pose that is equivalent by symmetry.
+/// The search ranks 256 rotations and refines 12 of them. The result can be far from the initial
+/// pose, also at a pose that is equivalent by symmetry.
 #[must_use]
 pub fn search() -> Search {
     search_with(SearchOptions::default())
 }
 
-/// `auto`: [`local`], and where its MVE stays above 0.2 a search over 128 rotations, of which 6 are refined.
+/// `auto`: [`local`], followed by a search if its MVE stays above 0.2.
 ///
-/// A hypothesis must beat the local pose by 0.05. Where that happens it is no local refinement any more.
+/// The search ranks 128 rotations and refines 6 of them. A hypothesis replaces the local pose if
+/// its score is better by 0.05; the result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
