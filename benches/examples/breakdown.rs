@@ -1,31 +1,40 @@
-//! Where the time of every preset goes: `cargo run --release -p hicp-benches --example breakdown [REPEATS]`.
+//! Prints how the time of a refinement is divided among its steps, as a Markdown table.
 //!
-//! The presets are put together anew from timed components. Times are exclusive (a render asked for by a selection counts as
-//! render alone) and medians over the repeats, summed over the three objects of the benches; the table is Markdown.
-#![allow(clippy::print_stdout, clippy::unwrap_used)]
+//! `cargo run --release -p hicp-benches --example breakdown [REPEATS [PIPELINE [OVERRIDE]...]]`
+//!
+//! - Without a pipeline, the table has a row per preset.
+//! - `breakdown 200 hybrid` runs one preset only, for a profiler.
+//! - Overrides add a row for the changed pipeline. The two pipelines run in alternation:
+//!   `breakdown 15 nn-point-to-point association.part.index=kd-tree` compares the two indexes.
+//!
+//! Every run starts from a depth image and ends with a scored pose, and finds no render of an
+//! earlier run. Times are exclusive: a render that a selection requests counts as render alone. They
+//! are medians over the repeats, summed over the three objects of the benches.
+#![allow(clippy::print_stdout)]
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use hicp_benches::{Case, OBJECTS, case, forget_renders};
-use hybrid_icp::Preset;
-use hybrid_icp::association::{
-    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
-};
-use hybrid_icp::core::Iteration;
+use hybrid_icp::association::{DataAssociation, PointSelection};
 use hybrid_icp::core::{
-    Context, Correspondences, Isometry3, Observation, PinholeCamera, PixelRegion, Problem,
-    RenderedView, Renderer, Surfel, TriMesh,
+    Context, Correspondences, Isometry3, Iteration, Observation, PinholeCamera, PixelRegion,
+    Problem, RenderedView, Renderer, Surfel, TriMesh,
 };
-use hybrid_icp::icp::{Cascade, Icp, Repeat, Session, Stage, Workspace};
-use hybrid_icp::metric::Minimize;
-use hybrid_icp::metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
-use hybrid_icp::presets::paper_stop;
+use hybrid_icp::icp::{RegimeEvent, Session, Stage, Workspace};
+use hybrid_icp::metric::{Minimize, NormalEquations, Step};
+use hybrid_icp::pipeline::{
+    BoxedAssociation, BoxedMetric, BoxedScore, BoxedSelection, BoxedSwitcher, Catalog,
+    PipelineFile, PipelineLimits,
+};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, Score};
-use hybrid_icp::switch::{PAPER_ALPHA, Switch, Threshold};
+use hybrid_icp::switch::Switcher;
+use hybrid_icp::{BoxedStage, Preset};
 
-/// What time is spent on.
+type Failure = Box<dyn std::error::Error>;
+
+/// The steps that time is spent on.
 const STEPS: [&str; 7] = [
     "observe",
     "render",
@@ -43,7 +52,7 @@ const METRIC: usize = 4;
 const SCORE: usize = 5;
 const REST: usize = 6;
 
-/// The time of each step, and the steps that are under way, the innermost last.
+/// The time of each step, and the running steps, the innermost last.
 struct Clock {
     spent: [Duration; 7],
     running: Vec<usize>,
@@ -58,7 +67,7 @@ thread_local! {
     });
 }
 
-/// Runs something as a step.
+/// Runs `work` as a step.
 fn timed<T>(step: usize, work: impl FnOnce() -> T) -> T {
     let switch = |next: Option<usize>| {
         CLOCK.with_borrow_mut(|clock| {
@@ -81,7 +90,7 @@ fn timed<T>(step: usize, work: impl FnOnce() -> T) -> T {
     result
 }
 
-#[derive(Default)]
+/// A component whose calls count as a step.
 struct Timed<T>(T);
 
 impl<T: PointSelection> PointSelection for Timed<T> {
@@ -159,104 +168,144 @@ impl<T: Renderer> Renderer for Timed<T> {
     }
 }
 
-fn projective(metric: impl ErrorMetric + 'static) -> Box<dyn Stage> {
-    Box::new(Icp {
-        selection: Timed(VisibleSurface::default()),
-        association: Timed(Projective),
-        filter: (),
-        metric: Timed(metric),
-        stop: paper_stop(),
-    })
-}
-
-fn nearest(metric: impl ErrorMetric + 'static) -> Box<dyn Stage> {
-    Box::new(Icp {
-        selection: Timed(AllSamples),
-        association: Timed(NearestNeighbor::default()),
-        filter: (),
-        metric: Timed(metric),
-        stop: paper_stop(),
-    })
-}
-
-fn timed_preset(preset: Preset) -> Box<dyn Stage> {
-    let (point, plane) = (PointToPoint, PointToPlane);
-    let cascade = |first, second| Box::new(Cascade((first, second)));
-    match preset {
-        Preset::Hybrid => Box::new(Repeat {
-            times: 2,
-            stage: Switch {
-                switcher: Threshold {
-                    score: Timed(MeanVsd::default()),
-                    alpha: PAPER_ALPHA,
-                },
-                aligned: Cascade((projective(point), projective(plane))),
-                misaligned: nearest(point),
-            },
-        }),
-        Preset::ProjectivePointToPoint => projective(point),
-        Preset::ProjectivePointToPlane => projective(plane),
-        Preset::ProjectiveCascadePointPlane => cascade(projective(point), projective(plane)),
-        Preset::ProjectiveCascadePlanePoint => cascade(projective(plane), projective(point)),
-        Preset::NnPointToPoint => nearest(point),
-        Preset::NnPointToPlane => nearest(plane),
-        Preset::NnCascadePointPlane => cascade(nearest(point), nearest(plane)),
-        Preset::NnCascadePlanePoint => cascade(nearest(plane), nearest(point)),
-        // Their rendering and scoring of the end are told apart; what else they do is in the rest.
-        other => other.build(),
+impl<T: Switcher> Switcher for Timed<T> {
+    fn regime(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> RegimeEvent {
+        timed(SCORE, || self.0.regime(context, pose))
     }
 }
 
-/// From the depth image to a scored pose: what `Refiner` does.
-fn run(case: &Case, stage: &mut dyn Stage, workspace: &mut Workspace) -> [Duration; 7] {
-    let seen = &case.scene.observation;
-    let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
-    forget_renders(
-        workspace,
-        &Problem::new(&case.scene.model, seen),
-        &case.init,
-    );
-    CLOCK.with_borrow_mut(|clock| clock.spent = [Duration::ZERO; 7]);
-    timed(REST, || {
-        let made = timed(OBSERVE, || Observation::new(depth, mask, *seen.camera()));
-        let observation = made.unwrap();
-        let problem = Problem::new(&case.scene.model, &observation);
-        let mut score = Timed(MeanVsd::default());
-        score.score(&mut workspace.context(&problem), &case.init);
-        let mut observer = ();
-        let mut session = Session::new(workspace, &mut observer);
-        let outcome = stage.run(&problem, &case.init, &mut session);
-        score.score(
-            &mut workspace.context(&problem),
-            &outcome.camera_from_object,
-        );
+/// The parts that ship, and for each kind that is a step the part `timed`, which times another one.
+fn catalog() -> Catalog {
+    let mut catalog = Catalog::built_in().clone();
+    let what = "the part that is timed";
+    catalog.add_selection(TIMED, move |p| {
+        Ok(Timed(p.part::<BoxedSelection>("part", None, what)?))
     });
-    CLOCK.with_borrow(|clock| clock.spent)
+    catalog.add_association(TIMED, move |p| {
+        Ok(Timed(p.part::<BoxedAssociation>("part", None, what)?))
+    });
+    catalog.add_metric(TIMED, move |p| {
+        Ok(Timed(p.part::<BoxedMetric>("part", None, what)?))
+    });
+    catalog.add_score(TIMED, move |p| {
+        Ok(Timed(p.part::<BoxedScore>("part", None, what)?))
+    });
+    catalog.add_switcher(TIMED, move |p| {
+        Ok(Timed(p.part::<BoxedSwitcher>("part", None, what)?))
+    });
+    catalog
 }
 
-fn main() {
-    let repeats = std::env::args()
-        .nth(1)
-        .map_or(101, |count| count.parse().unwrap());
-    let cases = OBJECTS.map(case);
-    println!("| preset | {} | all, ms |", STEPS.join(" | "));
-    println!("|---|{}", "---|".repeat(STEPS.len() + 1));
-    for preset in Preset::ALL {
-        let mut stage = timed_preset(preset);
-        let mut workspace = Workspace::new(Timed(Rasterizer::default()));
-        let mut totals = [0.0; 7];
-        for case in &cases {
-            let runs: Vec<_> = (0..repeats)
-                .map(|_| run(case, &mut stage, &mut workspace))
-                .collect();
-            for (step, total) in totals.iter_mut().enumerate() {
-                let mut spent: Vec<Duration> = runs.iter().map(|run| run[step]).collect();
-                spent.sort();
-                *total += spent[spent.len() / 2].as_secs_f64() * 1e3;
+const TIMED: &str = "timed";
+
+/// Wraps the parts of a preset that are steps. Each is on a line of its own in the preset's file.
+fn timed_parts(toml: &str) -> String {
+    let steps = [
+        "selection",
+        "association",
+        "metric",
+        "score",
+        "ranking",
+        "switcher",
+    ];
+    let wrap = |line: &str| match line.split_once(" = ") {
+        Some((key, part)) if steps.contains(&key) => {
+            format!("{key} = {{ type = \"{TIMED}\", part = {part} }}\n")
+        }
+        _ => format!("{line}\n"),
+    };
+    toml.lines().map(wrap).collect()
+}
+
+/// A pipeline with the times of its runs on the current object, and the sums over the objects
+/// before, milliseconds.
+struct Row {
+    name: String,
+    stage: BoxedStage,
+    workspace: Workspace,
+    runs: Vec<[Duration; 7]>,
+    totals: [f64; 7],
+}
+
+impl Row {
+    fn new(preset: Preset, overrides: &[String]) -> Result<Self, Failure> {
+        let mut file = PipelineFile::parse(&timed_parts(preset.toml()), preset.name())?;
+        for assignment in overrides {
+            file.set(assignment)?;
+        }
+        Ok(Self {
+            name: [&[preset.name().to_owned()], overrides].concat().join(" "),
+            stage: file.build_from(&catalog(), &PipelineLimits::DEFAULT)?,
+            workspace: Workspace::new(Timed(Rasterizer::default())),
+            runs: Vec::new(),
+            totals: [0.0; 7],
+        })
+    }
+
+    /// Refines from the depth image to a scored pose, as `Refiner` does.
+    fn run(&mut self, case: &Case) -> Result<(), Failure> {
+        let (model, seen) = (&case.scene.model, &case.scene.observation);
+        let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
+        let workspace = &mut self.workspace;
+        forget_renders(workspace, &Problem::new(model, seen), &case.init);
+        CLOCK.with_borrow_mut(|clock| clock.spent = [Duration::ZERO; 7]);
+        timed(REST, || {
+            let observation = timed(OBSERVE, || Observation::new(depth, mask, *seen.camera()))?;
+            let problem = Problem::new(model, &observation);
+            let mut score = Timed(MeanVsd::default());
+            score.score(&mut workspace.context(&problem), &case.init);
+            let mut observer = ();
+            let mut session = Session::new(workspace, &mut observer);
+            let outcome = self.stage.run(&problem, &case.init, &mut session);
+            let pose = outcome.camera_from_object;
+            score.score(&mut workspace.context(&problem), &pose);
+            Ok::<_, Failure>(())
+        })?;
+        self.runs.push(CLOCK.with_borrow(|clock| clock.spent));
+        Ok(())
+    }
+
+    /// Adds the medians of the runs to the totals and forgets the runs.
+    fn end_object(&mut self) {
+        for (step, total) in self.totals.iter_mut().enumerate() {
+            let mut spent: Vec<Duration> = self.runs.iter().map(|run| run[step]).collect();
+            spent.sort();
+            *total += spent[spent.len() / 2].as_secs_f64() * 1e3;
+        }
+        self.runs.clear();
+    }
+}
+
+fn main() -> Result<(), Failure> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let repeats: usize = arguments.first().map_or(Ok(101), |count| count.parse())?;
+    let mut rows = Vec::new();
+    match arguments.get(1) {
+        None => {
+            for preset in Preset::ALL {
+                rows.push(Row::new(preset, &[])?);
             }
         }
+        Some(name) => {
+            let overrides = &arguments[2..];
+            rows.push(Row::new(name.parse()?, &[])?);
+            if !overrides.is_empty() {
+                rows.push(Row::new(name.parse()?, overrides)?);
+            }
+        }
+    }
+    for case in OBJECTS.map(case) {
+        for _ in 0..repeats {
+            rows.iter_mut().try_for_each(|row| row.run(&case))?;
+        }
+        rows.iter_mut().for_each(Row::end_object);
+    }
+    println!("| pipeline | {} | all, ms |", STEPS.join(" | "));
+    println!("|---|{}", "---|".repeat(STEPS.len() + 1));
+    for Row { name, totals, .. } in &rows {
         let all: f64 = totals.iter().sum();
         let shares = totals.map(|total| format!("{:.0} %", 100.0 * total / all));
-        println!("| {preset} | {} | {all:.2} |", shares.join(" | "));
+        println!("| {name} | {} | {all:.2} |", shares.join(" | "));
     }
+    Ok(())
 }

@@ -47,9 +47,9 @@ MAX_ITERATIONS = 100
 class Ours:
     """Our program, answering one command at a time."""
 
-    def __init__(self, program, folder):
+    def __init__(self, program, folder, noise):
         self.process = subprocess.Popen(
-            [program, "serve", str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [program, folder, str(noise)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def ask(self, command):
@@ -264,9 +264,9 @@ def measure(ours, folder, count, rounds):
     results = {row: [] for row in [*THEIRS, *OURS]}
     covariances = []
     for number in range(count):
+        ours.ask(f"load {number}")
         instance = Instance(folder / str(number))
         covariances.append(instance.covariance_seconds)
-        ours.ask(f"load {number}")
         if o3d:
             instance.prepare_rays(ours.ask("run render-fine")["box"])
         samples = {row: [] for row in results}
@@ -376,10 +376,8 @@ def main():
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # Our program inherits it.
     program = programs / "examples" / "peers"
     folder = work / "instances"
-    subprocess.run(
-        [program, "generate", folder, str(arguments.instances), str(arguments.noise)], check=True
-    )
-    results, covariances = measure(Ours(program, folder), folder, arguments.instances, arguments.rounds)
+    ours = Ours(program, folder, arguments.noise)
+    results, covariances = measure(ours, folder, arguments.instances, arguments.rounds)
     text += [
         table(results),
         f"Not counted: normals and covariances of small_gicp's two clouds, {covariances * 1e3:.1f} ms (its GICP needs "

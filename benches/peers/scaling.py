@@ -1,7 +1,8 @@
-"""How `hybrid-icp bop refine` scales: threads, memory, hypotheses per frame. On synthetic frames of `benches/examples/bop_frame.rs`."""
+"""Measures how `hybrid-icp bop refine` scales with threads and hypotheses per frame, and its memory, on generated scenes."""
 
 import csv
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -12,15 +13,18 @@ OUTPUT = "refined_synthetic-test.csv"
 
 
 def generate(programs, folder, frames, objects, hypotheses):
-    subprocess.run(
-        [programs / "examples" / "bop_frame", folder, str(frames), str(objects), str(hypotheses)], check=True
-    )
+    shutil.rmtree(folder, ignore_errors=True)
+    command = [
+        programs / "hybrid-icp", "bop", "generate", "--out", folder, "--scenes", "1", "--images", str(frames),
+        "--instances", str(objects), "--starts", str(hypotheses),
+    ]  # fmt: skip
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return folder
 
 
 def start(programs, folder, threads):
     command = [
-        programs / "hybrid-icp", "bop", "refine", "--dataset", folder, "--results", folder / "starts_synthetic-test.csv",
+        programs / "hybrid-icp", "bop", "refine", "--dataset", folder, "--results", folder / "initial_synthetic-test.csv",
         "--output", folder / OUTPUT, "--threads", str(threads), "--pipeline", "hybrid",
     ]  # fmt: skip
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -1,17 +1,17 @@
 //! The instances of the comparison with other libraries: an object of about 14,400 visible pixels in a 640×480 image.
 
-use std::collections::{HashMap, HashSet};
-
 use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
     object_pose, perturb, rng,
 };
 use hicp_tests::{Scene, camera, render};
 use hybrid_icp::association::{PointSelection, Stride, VisibleSurface};
+use hybrid_icp::core::internal::index;
 use hybrid_icp::core::{
-    Isometry3, Model, ModelConfig, Observation, Point3, Problem, Surfel, Translation3, TriMesh,
+    Isometry3, Model, ModelConfig, Observation, Problem, Surfel, Translation3, TriMesh,
 };
 use hybrid_icp::icp::Workspace;
+use hybrid_icp::nalgebra::center;
 use hybrid_icp::raster::Rasterizer;
 
 /// The objects: those without a symmetry, so that a rotation error means something.
@@ -97,94 +97,44 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
     }
 }
 
-/// Splits the longest edges, and with each both of its triangles, until there are at least `triangles`.
-///
-/// The surface stays what it was, and closed if it was closed: neighbours split a shared edge at the same point.
+/// Splits the longest edge, and with it the triangles on its sides, until there are at least
+/// `triangles`. The surface does not change, and a closed one stays closed.
 ///
 /// # Panics
 ///
-/// Never: a valid mesh stays one.
+/// Never: a valid mesh stays valid.
 #[must_use]
 pub fn subdivided(mesh: &TriMesh, triangles: usize) -> TriMesh {
-    // Vertices in one place become one: an edge between two of a seam's vertices must be split on both its sides.
-    let mut index_of = HashMap::new();
-    let mut vertices: Vec<Point3<f32>> = Vec::new();
-    let welded: Vec<u32> = mesh
-        .vertices()
-        .iter()
-        .map(|point| {
-            // Zero is −0 as well.
-            let place = [point.x, point.y, point.z].map(|x| (x + 0.0).to_bits());
-            *index_of.entry(place).or_insert_with(|| {
-                vertices.push(*point);
-                vertices.len() as u32 - 1
-            })
-        })
-        .collect();
-    let mut faces: Vec<[u32; 3]> = mesh
-        .triangles()
-        .iter()
-        .map(|corners| corners.map(|corner| welded[corner as usize]))
-        .collect();
+    let (mut vertices, mut faces) = (mesh.vertices().to_vec(), mesh.triangles().to_vec());
     while faces.len() < triangles {
-        let mut edges: Vec<(f32, u32, u32)> = faces
-            .iter()
-            .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
-            .filter(|(a, b)| a < b)
-            .map(|(a, b)| {
-                let length = (vertices[a as usize] - vertices[b as usize]).norm();
-                (length, a, b)
-            })
-            .collect();
-        edges.sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2).cmp(&(y.1, y.2))));
-        // Edges whose faces are not touched by another split of this round.
-        let wanted = (triangles - faces.len()).div_ceil(2);
-        let mut middle_of = HashMap::new();
-        let mut touched = HashSet::<usize>::new();
-        let mut faces_of = HashMap::<(u32, u32), Vec<usize>>::new();
-        for (index, f) in faces.iter().enumerate() {
-            for (a, b) in [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])] {
-                faces_of
-                    .entry((a.min(b), a.max(b)))
-                    .or_default()
-                    .push(index);
+        let edges = faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let ends = |edge: [u32; 2]| edge.map(|corner| vertices[corner as usize]);
+        let longest = edges.max_by(|x, y| {
+            let [x, y] = [ends(*x), ends(*y)].map(|[a, b]| (a - b).norm_squared());
+            x.total_cmp(&y)
+        });
+        let edge = longest.expect("a mesh has triangles");
+        let [a, b] = ends(edge);
+        let middle = index(vertices.len());
+        vertices.push(center(&a, &b));
+        for face in 0..faces.len() {
+            let corners = faces[face];
+            if edge.iter().all(|end| corners.contains(end)) {
+                let [first, second] =
+                    edge.map(|end| corners.map(|c| if c == end { middle } else { c }));
+                faces[face] = first;
+                faces.push(second);
             }
         }
-        for (_, a, b) in edges {
-            let around = &faces_of[&(a, b)];
-            if middle_of.len() >= wanted || around.iter().any(|f| touched.contains(f)) {
-                continue;
-            }
-            touched.extend(around);
-            let middle = vertices.len() as u32;
-            vertices.push(center_of(&vertices[a as usize], &vertices[b as usize]));
-            middle_of.insert((a, b), middle);
-        }
-        faces = faces
-            .iter()
-            .flat_map(|f| {
-                let split = (0..3).find_map(|i| {
-                    let (a, b) = (f[i], f[(i + 1) % 3]);
-                    let middle = middle_of.get(&(a.min(b), a.max(b)))?;
-                    let c = f[(i + 2) % 3];
-                    Some(vec![[a, *middle, c], [*middle, b, c]])
-                });
-                split.unwrap_or_else(|| vec![*f])
-            })
-            .collect();
     }
-    TriMesh::new(vertices, faces).expect("a valid mesh stays one")
-}
-
-fn center_of(a: &Point3<f32>, b: &Point3<f32>) -> Point3<f32> {
-    Point3::from((a.coords + b.coords) * 0.5)
+    TriMesh::new(vertices, faces).expect("a valid mesh stays valid")
 }
 
 /// The model of an instance with a mesh of about 10,000 triangles, for the comparison of renderers.
 ///
 /// # Panics
 ///
-/// Never: a valid mesh stays one.
+/// Never: a valid mesh stays valid.
 #[must_use]
 pub fn with_10_000_triangles(model: &Model) -> Model {
     let config = ModelConfig {
