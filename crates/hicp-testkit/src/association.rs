@@ -2,10 +2,10 @@
 
 use hybrid_icp::association::DataAssociation;
 use hybrid_icp::core::{
-    Correspondences, Isometry3, Observation, Pair, Point3, Problem, RigidTransform, Surfel,
+    Correspondences, Observation, Pair, Point3, Problem, RigidTransform, Surfel,
 };
 
-use crate::law::{BOXED, NAMED, PURE, Subject, bits};
+use crate::law::{Subject, Trial};
 use crate::scenes::{cases, sides, workspace};
 
 /// What [`check_association`] may take for granted of an association beyond the trait's contract.
@@ -45,50 +45,26 @@ pub fn check_association<T: DataAssociation + 'static>(
     laws: AssociationLaws,
 ) {
     let subject = Subject::new::<T>(Some(make().name()));
-    let mut used = make();
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn DataAssociation>);
     for case in cases() {
         for (what, source) in sources(&case.problem) {
             let input = format!("{what} of {}", case.label);
-            let input = input.as_str();
-            let associate = |association: &mut dyn DataAssociation| {
-                subject.calm(input, || {
-                    run(association, &case.problem, &source, &case.pose)
-                })
+            let trial = subject.on(&input);
+            let associate = |association: &mut (dyn DataAssociation + 'static)| {
+                let (mut workspace, mut pairs) = (workspace(), Correspondences::new());
+                pairs.begin(&case.pose, source.len());
+                let mut context = workspace.context(&case.problem);
+                association.associate(&mut context, &source, &case.pose, &mut pairs);
+                pairs
             };
-            let expected = associate(&mut make());
-            let observation = sides(&case.problem).1;
-            contract(&subject, input, laws, &source, observation, &expected);
-            subject.holds(
-                "the pose noted in the pairs stays",
-                input,
-                bits(expected.camera_from_object()) == bits(&case.pose),
-                || bits(expected.camera_from_object()),
-            );
-            subject.same(PURE, input, &expected, &associate(&mut used));
-            subject.same(PURE, input, &expected, &associate(&mut used));
-            let mut boxed: Box<dyn DataAssociation> = Box::new(make());
-            let through_box = subject.calm(input, || {
-                run(&mut boxed, &case.problem, &source, &case.pose)
-            });
-            subject.same(BOXED, input, &expected, &through_box);
-            subject.same(BOXED, input, &make().name(), &boxed.name());
+            let pairs = trial.calm(|| associate(&mut make()));
+            contract(&trial, laws, &source, sides(&case.problem).1, &pairs);
+            let law = "the pose noted in the pairs stays";
+            trial.same(law, &case.pose, pairs.camera_from_object());
+            trial.pure::<dyn DataAssociation, _>(&pairs, [&mut used, &mut boxed], associate);
         }
     }
-    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
-    subject.same(NAMED, "any", &make().name(), &used.name());
-}
-
-fn run<A: DataAssociation + ?Sized>(
-    association: &mut A,
-    problem: &Problem<'_>,
-    source: &[Surfel],
-    pose: &Isometry3<f64>,
-) -> Correspondences {
-    let mut workspace = workspace();
-    let mut pairs = Correspondences::new();
-    pairs.begin(pose, source.len());
-    association.associate(&mut workspace.context(problem), source, pose, &mut pairs);
-    pairs
+    subject.named([make().name(), used.name(), boxed.name()]);
 }
 
 fn sources(problem: &Problem<'_>) -> [(&'static str, Vec<Surfel>); 4] {
@@ -107,8 +83,7 @@ fn sources(problem: &Problem<'_>) -> [(&'static str, Vec<Surfel>); 4] {
 }
 
 fn contract(
-    subject: &Subject,
-    input: &str,
+    trial: &Trial<'_>,
     laws: AssociationLaws,
     source: &[Surfel],
     observation: &Observation,
@@ -116,40 +91,30 @@ fn contract(
 ) {
     let mover = RigidTransform::new(pairs.camera_from_object());
     for pair in pairs.as_slice() {
-        let found = || format!("{pair:?}");
-        subject.holds("pairs are finite", input, finite(pair), found);
-        subject.holds(
-            "weights are finite and not negative",
-            input,
-            pair.weight.is_finite() && pair.weight >= 0.0,
-            found,
-        );
+        let found = format_args!("{pair:?}");
+        trial.holds("pairs are finite", finite(pair), found);
+        let law = "weights are finite and not negative";
+        trial.holds(law, pair.weight.is_finite() && pair.weight >= 0.0, found);
         if laws.sources_are_the_selected {
             let Some(selected) = source.get(pair.source_index as usize) else {
-                subject.broken("source indices are in range", input, found());
+                trial.broken("source indices are in range", found);
             };
             let moved = mover.surfel(selected);
             let off = (moved.point - pair.source.point).norm();
             let turned = (moved.normal.into_inner() - pair.source.normal.into_inner()).norm();
-            subject.holds(
+            trial.holds(
                 "sources are the selected points, moved by the pose",
-                input,
                 off <= 1e-5 * (1.0 + moved.point.coords.norm()) && turned < 1e-4,
-                || format!("{pair:?}, expected the source {moved:?}"),
+                format_args!("{pair:?}, expected the source {moved:?}"),
             );
         }
         let Some(observed) = observation.surfel(pair.target_index) else {
-            subject.broken(
-                "target indices are those of observed surfels",
-                input,
-                found(),
-            );
+            trial.broken("target indices are those of observed surfels", found);
         };
-        subject.holds(
+        trial.holds(
             "targets are the observed surfels of their indices",
-            input,
             !laws.targets_are_the_observed || pair.target == *observed,
-            || format!("{pair:?}, expected the target {observed:?}"),
+            format_args!("{pair:?}, expected the target {observed:?}"),
         );
     }
 }

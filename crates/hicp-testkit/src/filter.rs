@@ -4,7 +4,7 @@ use hybrid_icp::association::OutlierFilter;
 use hybrid_icp::core::{Correspondences, Isometry3, Iteration, Pair};
 
 use crate::association::finite;
-use crate::law::{BOXED, PURE, Subject, bits};
+use crate::law::{Subject, Trial, bits};
 use crate::pairs::{PairSet, good_pairs, hard_pairs};
 
 /// What [`check_filter`] may take for granted of a filter beyond the trait's contract.
@@ -33,42 +33,33 @@ pub struct FilterLaws {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: FilterLaws) {
     let subject = Subject::new::<T>(None);
-    let mut used = make();
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn OutlierFilter>);
     for set in good_pairs().into_iter().chain(hard_pairs()) {
         for iteration in ITERATIONS {
             let input = format!("{}, iteration {iteration}", set.label);
-            let input = input.as_str();
-            let filtered = |filter: &mut dyn OutlierFilter, pairs: &Correspondences| {
-                subject.calm(input, || run(filter, &set, iteration, pairs))
+            let trial = subject.on(&input);
+            let filtered = |filter: &mut (dyn OutlierFilter + 'static)| {
+                run(filter, &set, iteration, &set.pairs)
             };
-            let expected = filtered(&mut make(), &set.pairs);
-            contract(&subject, input, laws, &set.pairs, &expected);
+            let expected = trial.calm(|| filtered(&mut make()));
+            contract(&trial, laws, &set.pairs, &expected);
+            trial.pure::<dyn OutlierFilter, _>(&expected, [&mut used, &mut boxed], filtered);
             for before in histories(iteration) {
                 let mut filter = make();
-                for earlier in &before {
-                    subject.calm(input, || run(&mut filter, &set, *earlier, &set.pairs));
-                }
                 let input = format!("{input}, after the iterations {before:?}");
-                let found = filtered(&mut filter, &set.pairs);
-                subject.same(SCHEDULED, &input, &expected, &found);
+                let trial = subject.on(&input);
+                for earlier in &before {
+                    trial.calm(|| run(&mut filter, &set, *earlier, &set.pairs));
+                }
+                let law = "pure given the iteration: which iterations came before decides nothing";
+                trial.same(law, &expected, &trial.calm(|| filtered(&mut filter)));
             }
-            subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
-            subject.same(PURE, input, &expected, &filtered(&mut used, &set.pairs));
-            let mut boxed: Box<dyn OutlierFilter> = Box::new(make());
-            subject.same(BOXED, input, &expected, &filtered(&mut boxed, &set.pairs));
-            subject.same(
-                "a chain of one filter is that filter",
-                input,
-                &expected,
-                &filtered(&mut (make(),), &set.pairs),
-            );
+            let law = "a chain of one filter is that filter";
+            trial.same(law, &expected, &trial.calm(|| filtered(&mut (make(),))));
             if laws.idempotent {
-                subject.same(
-                    "idempotent, as declared: filtering twice is filtering once",
-                    input,
-                    &expected,
-                    &filtered(&mut make(), &expected),
-                );
+                let law = "idempotent, as declared: filtering twice is filtering once";
+                let twice = trial.calm(|| run(&mut make(), &set, iteration, &expected));
+                trial.same(law, &expected, &twice);
             }
         }
     }
@@ -76,9 +67,6 @@ pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: Filt
 
 /// The iterations in which filters are tried.
 const ITERATIONS: [usize; 4] = [0, 1, 4, 49];
-
-/// Schedules, in messages.
-const SCHEDULED: &str = "pure given the iteration: which iterations came before decides nothing";
 
 /// Iterations that may have come before one: the regular ones, none of them, later ones of a run before, and the same, as
 /// after a rejected pose.
@@ -105,15 +93,13 @@ fn run(
 }
 
 fn contract(
-    subject: &Subject,
-    input: &str,
+    trial: &Trial<'_>,
     laws: FilterLaws,
     before: &Correspondences,
     after: &Correspondences,
 ) {
-    subject.same(
+    trial.same(
         "the pose and the candidates noted in the pairs stay",
-        input,
         &(before.camera_from_object(), before.n_candidates()),
         &(after.camera_from_object(), after.n_candidates()),
     );
@@ -127,27 +113,18 @@ fn contract(
     for pair in after.as_slice() {
         let wanted = identity(pair);
         let Some(origin) = rest.find(|candidate| identity(candidate) == wanted) else {
-            subject.broken(
+            trial.broken(
                 "only removes or re-weights pairs, and keeps their order",
-                input,
-                format!("{pair:?}, which is not among the pairs that were left to come"),
+                format_args!("{pair:?}, which is not among the pairs that were left to come"),
             );
         };
         if laws.keeps_weights {
-            subject.same(
-                "weights stay, as declared",
-                input,
-                &origin.weight,
-                &pair.weight,
-            );
+            trial.same("weights stay, as declared", &origin.weight, &pair.weight);
         }
         if finite(pair) && origin.weight.is_finite() {
-            subject.holds(
-                "weights stay finite and not negative",
-                input,
-                pair.weight.is_finite() && pair.weight >= 0.0,
-                || format!("{pair:?}"),
-            );
+            let law = "weights stay finite and not negative";
+            let valid = pair.weight.is_finite() && pair.weight >= 0.0;
+            trial.holds(law, valid, format_args!("{pair:?}"));
         }
     }
 }

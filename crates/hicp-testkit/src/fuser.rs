@@ -1,9 +1,9 @@
 //! The laws of fusers.
 
-use hybrid_icp::core::{Isometry3, Matrix6, Vector6, se3};
+use hybrid_icp::core::{Isometry3, Matrix6, Vector3, Vector6, se3};
 use hybrid_icp::fusion::{CameraMotion, Fuser, PoseEstimate, Update};
 
-use crate::law::{BOXED, NAMED, PURE, Subject};
+use crate::law::{BOXED, PURE, Subject, Trial};
 
 /// What [`check_fuser`] may take for granted of a fuser beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,48 +54,60 @@ struct Course {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_fuser<T: Fuser + 'static>(make: impl Fn() -> T, laws: FuserLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
-    let name = make().name();
-    let named = !name.is_empty() && Box::new(make()).name() == name;
-    subject.holds(NAMED, "a fresh fuser", named, || format!("{name:?}"));
     let courses = courses();
     for course in &courses {
-        let input = course.name;
-        let expected = subject.calm(input, || drive(&subject, &mut make(), course));
-        subject.same(
-            PURE,
-            input,
-            &expected,
-            &drive(&subject, &mut make(), course),
-        );
+        let trial = subject.on(course.name);
+        let expected = trial.calm(|| drive(&trial, &mut make(), course));
+        trial.same(PURE, &expected, &drive(&trial, &mut make(), course));
         for before in &courses {
             let mut used = make();
-            drive(&subject, &mut used, before);
+            drive(&trial, &mut used, before);
             used.reset();
-            let input = format!("{input}, reset after: {}", before.name);
-            let gone = used.estimate().is_none();
-            let law = "reset forgets: nothing is believed after it";
-            subject.holds(law, &input, gone, || format!("{:?}", used.estimate()));
-            subject.same(PURE, &input, &expected, &drive(&subject, &mut used, course));
+            let input = format!("{}, reset after: {}", course.name, before.name);
+            let trial = subject.on(&input);
+            let law = "reset forgets: there is no estimate after it";
+            trial.holds(
+                law,
+                used.estimate().is_none(),
+                format_args!("{:?}", used.estimate()),
+            );
+            trial.same(PURE, &expected, &drive(&trial, &mut used, course));
         }
         let mut boxed: Box<dyn Fuser> = Box::new(make());
-        subject.same(
-            BOXED,
-            input,
-            &expected,
-            &drive(&subject, &mut boxed, course),
-        );
+        trial.same(BOXED, &expected, &drive(&trial, &mut boxed, course));
+        subject.named([make().name(), make().name(), boxed.name()]);
+        let estimates = &course.estimates;
         if laws.first_as_it_is {
-            first(&subject, input, &mut make(), &course.estimates[0]);
+            let law = "the first estimate is taken as it is";
+            let fuser = updated(make(), &estimates[..1]);
+            trial.same(law, &Some(estimates[0]), &fuser.estimate());
         }
-        identical(&subject, input, &mut make(), &course.estimates[0]);
-        moves(&subject, input, &mut make(), course);
+        let repeated = updated(make(), &vec![estimates[0]; 4]);
+        let law = "estimates that are all one are the result";
+        near(&trial, law, estimates[0].camera_from_object(), &repeated);
+        moves(&trial, &mut updated(make(), &estimates[..1]));
         if course.tame && laws.equivariant {
-            equivariant(&subject, input, &make, course);
+            equivariant(&trial, &make, estimates);
         }
         if course.tame && laws.permutation {
-            permutation(&subject, input, &make, course);
+            let law = "permutation: the order of the estimates does not matter";
+            let back: Vec<_> = estimates.iter().rev().copied().collect();
+            agree(
+                &trial,
+                law,
+                &updated(make(), estimates),
+                &updated(make(), &back),
+            );
         }
     }
+}
+
+/// Returns the fuser after updates.
+fn updated<F: Fuser>(mut fuser: F, estimates: &[PoseEstimate]) -> F {
+    for estimate in estimates {
+        fuser.update(estimate);
+    }
+    fuser
 }
 
 /// The camera's motions between estimates.
@@ -105,175 +117,94 @@ fn motion(step: usize) -> CameraMotion {
     CameraMotion::new(se3::exp(&twist)).expect("small")
 }
 
-/// Updates and moves through a course, with the laws that hold at every step; returns all that could be seen.
-fn drive<F: Fuser + ?Sized>(
-    subject: &Subject,
-    fuser: &mut F,
+/// Updates and moves through a course, with the laws that hold at every step. Returns everything
+/// that can be observed.
+fn drive(
+    trial: &Trial<'_>,
+    fuser: &mut dyn Fuser,
     course: &Course,
-) -> Vec<(Update, Option<PoseEstimate>, Option<PoseEstimate>)> {
-    let input = course.name;
-    let law = "nothing is believed before the first update";
-    subject.holds(law, input, fuser.estimate().is_none(), || {
-        format!("{:?}", fuser.estimate())
-    });
-    fuser.propagate(&motion(0));
-    subject.holds(law, input, fuser.estimate().is_none(), || {
-        format!("{:?}", fuser.estimate())
-    });
+) -> Vec<(Update, PoseEstimate, PoseEstimate)> {
+    for _ in 0..2 {
+        let law = "there is no estimate before the first update";
+        let found = fuser.estimate();
+        trial.holds(law, found.is_none(), format_args!("{found:?}"));
+        fuser.propagate(&motion(0));
+    }
     let mut seen = Vec::new();
     for (step, estimate) in course.estimates.iter().enumerate() {
         let before = fuser.estimate();
         let update = fuser.update(estimate);
         let updated = fuser.estimate();
         if !update.is_taken() {
-            let law = "a rejected update changes nothing that is believed";
-            subject.same(law, input, &before, &updated);
+            let law = "a rejected update changes nothing";
+            trial.same(law, &before, &updated);
         }
-        subject.same("asking changes nothing", input, &updated, &fuser.estimate());
-        healthy(subject, input, updated.as_ref());
+        let law = "reading the estimate changes nothing";
+        trial.same(law, &updated, &fuser.estimate());
+        let updated = healthy(trial, fuser);
         fuser.propagate(&motion(step));
-        let propagated = fuser.estimate();
-        healthy(subject, input, propagated.as_ref());
-        seen.push((update, updated, propagated));
+        seen.push((update, updated, healthy(trial, fuser)));
     }
     seen
 }
 
-fn healthy(subject: &Subject, input: &str, estimate: Option<&PoseEstimate>) {
-    let Some(estimate) = estimate else {
-        subject.broken(
-            "something is believed after an update",
-            input,
-            "no estimate",
-        )
+/// Returns the estimate, which must be a valid one.
+fn healthy(trial: &Trial<'_>, fuser: &(impl Fuser + ?Sized)) -> PoseEstimate {
+    let Some(estimate) = fuser.estimate() else {
+        trial.broken("there is an estimate after an update", "no estimate")
     };
     let remade = PoseEstimate::new(*estimate.camera_from_object(), *estimate.covariance());
-    subject.holds(
-        "what is believed is finite, and its covariance symmetric and positive semidefinite",
-        input,
+    trial.holds(
+        "the estimate is finite, and its covariance symmetric and positive semidefinite",
         remade.is_ok(),
-        || format!("{estimate:?}: {remade:?}"),
+        format_args!("{estimate:?}: {remade:?}"),
     );
+    estimate
 }
 
-fn first<F: Fuser>(subject: &Subject, input: &str, fuser: &mut F, estimate: &PoseEstimate) {
-    fuser.update(estimate);
-    subject.same(
-        "the first estimate is taken as it is",
-        input,
-        &Some(*estimate),
-        &fuser.estimate(),
-    );
+fn near(trial: &Trial<'_>, law: &str, expected: &Isometry3<f64>, fuser: &impl Fuser) {
+    let apart = distance(healthy(trial, fuser).camera_from_object(), expected);
+    trial.holds(law, apart < 1e-9, format_args!("{apart} away"));
 }
 
-fn identical<F: Fuser>(subject: &Subject, input: &str, fuser: &mut F, estimate: &PoseEstimate) {
-    for _ in 0..4 {
-        fuser.update(estimate);
-    }
-    let found = fuser.estimate();
-    let apart = found.map_or(f64::NAN, |found| {
-        distance(found.camera_from_object(), estimate.camera_from_object())
-    });
-    subject.holds(
-        "estimates that are all one are believed",
-        input,
-        apart < 1e-9,
-        || format!("{apart} away: {found:?}"),
-    );
-}
-
-fn moves<F: Fuser>(subject: &Subject, input: &str, fuser: &mut F, course: &Course) {
-    fuser.update(&course.estimates[0]);
-    let before = believed(subject, input, fuser);
+fn moves(trial: &Trial<'_>, fuser: &mut impl Fuser) {
+    let before = *healthy(trial, fuser).camera_from_object();
     fuser.propagate(&CameraMotion::none());
-    let still = believed(subject, input, fuser);
+    let law = "a camera that does not move changes nothing";
+    near(trial, law, &before, fuser);
     fuser.propagate(&motion(3));
-    let moved = believed(subject, input, fuser);
-    for (law, expected, found) in [
-        (
-            "a camera that stands still moves nothing",
-            *before.camera_from_object(),
-            still,
-        ),
-        (
-            "propagate moves the pose by the motion",
-            motion(3).apply(before.camera_from_object()),
-            moved,
-        ),
-    ] {
-        let apart = distance(found.camera_from_object(), &expected);
-        subject.holds(law, input, apart < 1e-9, || format!("{apart} away"));
-    }
+    let law = "propagate moves the pose by the motion";
+    near(trial, law, &motion(3).apply(&before), fuser);
 }
 
-fn equivariant<F: Fuser>(subject: &Subject, input: &str, make: &impl Fn() -> F, course: &Course) {
+fn equivariant<F: Fuser>(trial: &Trial<'_>, make: &impl Fn() -> F, estimates: &[PoseEstimate]) {
     let motion = motion(5);
-    let there: Vec<PoseEstimate> = course
-        .estimates
-        .iter()
-        .map(|estimate| seen_after(&motion, estimate))
-        .collect();
-    let half = course.estimates.len() / 2;
-    let (mut on_the_way, mut all_there) = (make(), make());
-    for estimate in &course.estimates[..half] {
-        on_the_way.update(estimate);
-    }
+    let there = estimates.iter().map(|e| seen_after(&motion, e));
+    let there: Vec<PoseEstimate> = there.collect();
+    let half = estimates.len() / 2;
+    let mut on_the_way = updated(make(), &estimates[..half]);
     on_the_way.propagate(&motion);
-    for estimate in &there[half..] {
-        on_the_way.update(estimate);
-    }
-    for estimate in &there {
-        all_there.update(estimate);
-    }
     agree(
-        subject,
+        trial,
         "equivariant: moving the camera is having seen everything from there",
-        input,
-        &believed(subject, input, &all_there),
-        &believed(subject, input, &on_the_way),
+        &updated(make(), &there),
+        &updated(on_the_way, &there[half..]),
     );
 }
 
-fn permutation<F: Fuser>(subject: &Subject, input: &str, make: &impl Fn() -> F, course: &Course) {
-    let (mut forth, mut back) = (make(), make());
-    for estimate in &course.estimates {
-        forth.update(estimate);
-    }
-    for estimate in course.estimates.iter().rev() {
-        back.update(estimate);
-    }
-    agree(
-        subject,
-        "permutation: the order of the estimates does not matter",
-        input,
-        &believed(subject, input, &forth),
-        &believed(subject, input, &back),
-    );
-}
-
-fn agree(subject: &Subject, law: &str, input: &str, expected: &PoseEstimate, found: &PoseEstimate) {
+/// Checks that two fusers have the same estimate up to rounding.
+fn agree(trial: &Trial<'_>, law: &str, expected: &impl Fuser, found: &impl Fuser) {
+    let (expected, found) = (healthy(trial, expected), healthy(trial, found));
     let apart = distance(expected.camera_from_object(), found.camera_from_object());
-    subject.holds(law, input, apart < 1e-8, || {
-        format!("poses {apart} apart: {found:?}\n    not {expected:?}")
-    });
+    let poses = format_args!("poses {apart} apart: {found:?}\n    not {expected:?}");
+    trial.holds(law, apart < 1e-8, poses);
     let difference = (expected.covariance() - found.covariance()).amax();
     let size = expected.covariance().amax();
-    subject.holds(law, input, difference <= 1e-6 * size, || {
-        format!("covariances {difference} apart, of {size}")
-    });
+    let covariances = format_args!("covariances {difference} apart, of {size}");
+    trial.holds(law, difference <= 1e-6 * size, covariances);
 }
 
-fn believed<F: Fuser + ?Sized>(subject: &Subject, input: &str, fuser: &F) -> PoseEstimate {
-    fuser.estimate().unwrap_or_else(|| {
-        subject.broken(
-            "something is believed after an update",
-            input,
-            "no estimate",
-        )
-    })
-}
-
-/// An estimate as it would have been made after a motion.
+/// Returns the estimate that would have been made after a motion.
 fn seen_after(motion: &CameraMotion, estimate: &PoseEstimate) -> PoseEstimate {
     let adjoint = se3::adjoint(motion.next_camera_from_camera());
     let covariance = adjoint * estimate.covariance() * adjoint.transpose();
@@ -291,17 +222,15 @@ fn with_mve(pose: Isometry3<f64>, covariance: Matrix6<f64>, mve: f64) -> PoseEst
         .expect("valid")
 }
 
-fn courses() -> Vec<Course> {
+#[allow(clippy::cast_precision_loss)] // Axes.
+fn courses() -> [Course; 9] {
     let center = se3::exp(&Vector6::new(0.05, -0.03, 0.6, 0.4, -0.9, 0.3));
     // Six scattered estimates, of sizes that differ by far more than a factor.
     let scattered = |size: f64, covariance: &dyn Fn(u32) -> Matrix6<f64>| {
         (0..6)
             .map(|k: u32| {
                 let phase = f64::from(k);
-                let twist = Vector6::from_fn(|axis, _| {
-                    let axis = u32::try_from(axis).unwrap_or(0);
-                    (1.7 * phase + 2.3 * f64::from(axis)).sin()
-                });
+                let twist = Vector6::from_fn(|axis, _| (1.7 * phase + 2.3 * axis as f64).sin());
                 let pose = se3::exp(&(twist * size)) * center;
                 with_mve(pose, covariance(k), 0.05 + 0.03 * f64::from((5 * k) % 6))
             })
@@ -314,75 +243,52 @@ fn courses() -> Vec<Course> {
         }
     };
     let mut wild = scattered(0.01, &sized(1e-4));
-    wild[3] = with_mve(
-        Isometry3::translation(5.0, -3.0, 9.0) * center,
-        *wild[3].covariance(),
-        0.9,
-    );
-    let turns = scattered(0.0, &sized(1e-2))
-        .into_iter()
-        .zip(0..)
-        .map(|(estimate, k): (PoseEstimate, u32)| {
-            let turn = se3::exp(&Vector6::new(
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                std::f64::consts::PI * f64::from(k % 2),
-            ));
-            with_mve(turn * center, *estimate.covariance(), 0.1)
-        })
-        .collect();
-    let course = |name, estimates, tame| Course {
-        name,
-        estimates,
-        tame,
+    let outlier = Isometry3::translation(5.0, -3.0, 9.0) * center;
+    wild[3] = with_mve(outlier, *wild[3].covariance(), 0.9);
+    let mut turns = scattered(0.0, &sized(1e-2));
+    for estimate in turns.iter_mut().skip(1).step_by(2) {
+        let half_turn = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
+        *estimate = with_mve(half_turn * center, *estimate.covariance(), 0.1);
+    }
+    let certain = |_| Matrix6::zeros();
+    let ignorant = |_| Matrix6::identity() * 1e30;
+    let either = |k: u32| Matrix6::identity() * [0.0, 1e30][k as usize % 2];
+    let directions = |k: u32| {
+        let variance = |i: usize| if i % 2 == k as usize % 2 { 0.0 } else { 1e12 };
+        Matrix6::from_diagonal(&Vector6::from_fn(|i, _| variance(i)))
     };
-    vec![
-        course(
-            "estimates close together",
-            scattered(0.002, &sized(1e-5)),
-            true,
-        ),
-        course(
-            "estimates some way apart",
-            scattered(0.02, &sized(1e-3)),
-            true,
-        ),
-        course("estimates far apart", scattered(0.4, &sized(0.1)), false),
-        course("estimates half a turn apart", turns, false),
-        course("one wild outlier", wild, false),
-        course(
+    let near = scattered(0.002, &sized(1e-5));
+    let apart = scattered(0.02, &sized(1e-3));
+    [
+        ("estimates close together", near, true),
+        ("estimates some way apart", apart, true),
+        ("estimates far apart", scattered(0.4, &sized(0.1)), false),
+        ("estimates half a turn apart", turns, false),
+        ("one wild outlier", wild, false),
+        (
             "estimates without variance",
-            scattered(0.01, &|_| Matrix6::zeros()),
+            scattered(0.01, &certain),
             false,
         ),
-        course(
-            "estimates that know nothing",
-            scattered(0.01, &|_| Matrix6::identity() * 1e30),
+        (
+            "estimates without information",
+            scattered(0.01, &ignorant),
             false,
         ),
-        course(
-            "estimates that know either everything or nothing",
-            scattered(0.01, &|k| {
-                Matrix6::identity() * if k % 2 == 0 { 0.0 } else { 1e30 }
-            }),
+        (
+            "estimates with all information or none",
+            scattered(0.01, &either),
             false,
         ),
-        course(
-            "estimates that know only some directions",
-            scattered(0.01, &|k| {
-                let known = |i: usize| {
-                    if i.is_multiple_of(2) == k.is_multiple_of(2) {
-                        0.0
-                    } else {
-                        1e12
-                    }
-                };
-                Matrix6::from_diagonal(&Vector6::from_fn(|i, _| known(i)))
-            }),
+        (
+            "estimates of some directions only",
+            scattered(0.01, &directions),
             false,
         ),
     ]
+    .map(|(name, estimates, tame)| Course {
+        name,
+        estimates,
+        tame,
+    })
 }

@@ -1,4 +1,4 @@
-//! How a broken law is reported.
+//! Reports broken laws.
 
 use std::fmt::{Debug, Display};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +9,7 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
-    /// Names a component by its type, and by its name in traces where it has one.
+    /// Names a component by its type, and by its name in traces if it has one.
     pub(crate) fn new<T>(name: Option<&str>) -> Self {
         let full = std::any::type_name::<T>();
         Self {
@@ -20,37 +20,55 @@ impl Subject {
         }
     }
 
+    /// Tries the component on an input.
+    pub(crate) fn on<'a>(&'a self, input: &'a str) -> Trial<'a> {
+        let component = &self.component;
+        Trial { component, input }
+    }
+
+    /// Checks the names of a fresh, a used and a boxed instance.
+    pub(crate) fn named(&self, [fresh, used, boxed]: [&str; 3]) {
+        let trial = self.on("any");
+        let law = "a name in traces that is not empty and always the same";
+        trial.holds(law, !fresh.is_empty(), "an empty name");
+        trial.same(law, &fresh, &used);
+        trial.same(BOXED, &fresh, &boxed);
+    }
+}
+
+/// A component and an input that it is tried on.
+#[derive(Clone, Copy)]
+pub(crate) struct Trial<'a> {
+    component: &'a str,
+    input: &'a str,
+}
+
+impl Trial<'_> {
     /// Reports a broken law.
-    pub(crate) fn broken(&self, law: &str, input: &str, found: impl Display) -> ! {
+    pub(crate) fn broken(&self, law: &str, found: impl Display) -> ! {
         panic!(
-            "{} breaks the law \"{law}\"\n  input: {input}\n  found: {found}",
-            self.component
+            "{} breaks the law \"{law}\"\n  input: {}\n  found: {found}",
+            self.component, self.input
         )
     }
 
     /// Reports a broken law unless a condition holds.
-    pub(crate) fn holds(
-        &self,
-        law: &str,
-        input: &str,
-        condition: bool,
-        found: impl FnOnce() -> String,
-    ) {
+    pub(crate) fn holds(&self, law: &str, condition: bool, found: impl Display) {
         if !condition {
-            self.broken(law, input, found());
+            self.broken(law, found);
         }
     }
 
-    /// Two results are the same to the bit.
-    pub(crate) fn same<T: Debug>(&self, law: &str, input: &str, expected: &T, found: &T) {
+    /// Checks that two results have the same bits.
+    pub(crate) fn same<T: Debug>(&self, law: &str, expected: &T, found: &T) {
         let (expected, found) = (bits(expected), bits(found));
         if expected != found {
-            self.broken(law, input, first_difference(&expected, &found));
+            self.broken(law, first_difference(&expected, &found));
         }
     }
 
     /// Runs a component; a panic is a broken law.
-    pub(crate) fn calm<R>(&self, input: &str, run: impl FnOnce() -> R) -> R {
+    pub(crate) fn calm<R>(&self, run: impl FnOnce() -> R) -> R {
         catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
             let message = payload
                 .downcast_ref::<&str>()
@@ -58,19 +76,41 @@ impl Subject {
                 .or_else(|| payload.downcast_ref::<String>().cloned());
             self.broken(
                 "never panics on data",
-                input,
                 message.as_deref().unwrap_or("a panic without a message"),
             )
         })
     }
+
+    /// Checks how many renders a component added to the one of its pose.
+    pub(crate) fn shares_the_render(&self, renders: u64, allowed: u64) {
+        self.holds(
+            "shares the render: takes the view of a pose from the context",
+            renders <= allowed,
+            format_args!("{renders} more renders of a pose already rendered"),
+        );
+    }
+
+    /// Checks that a used instance (twice) and a boxed one give the bits of a fresh one.
+    pub(crate) fn pure<C: ?Sized, R: Debug>(
+        &self,
+        of_fresh: &R,
+        [used, boxed]: [&mut C; 2],
+        run: impl Fn(&mut C) -> R,
+    ) {
+        for _ in 0..2 {
+            self.same(PURE, of_fresh, &self.calm(|| run(used)));
+        }
+        self.same(BOXED, of_fresh, &self.calm(|| run(boxed)));
+    }
 }
 
-/// A text that differs when the bits do: numbers are printed with all the digits that tell them apart, −0 from 0, and NaN as itself.
+/// Returns a text that differs when the bits differ: numbers are printed with all the digits that
+/// distinguish them, −0 differs from 0, and NaN is equal to itself.
 pub(crate) fn bits(value: &impl Debug) -> String {
     format!("{value:?}")
 }
 
-/// Where two texts part, with some of what surrounds it.
+/// Returns the place where two texts begin to differ, with some of its surroundings.
 fn first_difference(expected: &str, found: &str) -> String {
     let same = expected
         .chars()
@@ -86,11 +126,7 @@ fn first_difference(expected: &str, found: &str) -> String {
     format!("…{}…\n    not …{}…", excerpt(found), excerpt(expected))
 }
 
-/// Purity, in messages.
+/// The law of purity.
 pub(crate) const PURE: &str = "pure: equal inputs give equal bits, whatever ran before";
-/// Boxes, in messages.
+/// The law of boxed components.
 pub(crate) const BOXED: &str = "boxed = static: the same bits behind a box";
-/// Names, in messages.
-pub(crate) const NAMED: &str = "a name in traces that is not empty and always the same";
-/// Renders, in messages.
-pub(crate) const SHARED_RENDER: &str = "shares the render: asks the context for the view of a pose";

@@ -5,7 +5,7 @@ use hybrid_icp::core::{
 };
 use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, Step};
 
-use crate::law::{BOXED, NAMED, PURE, Subject};
+use crate::law::{Subject, Trial};
 use crate::pairs::{good_pairs, hard_pairs};
 
 /// Which laws [`check_metric`] holds a metric to; all of them by default.
@@ -54,7 +54,7 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
     if laws.rows {
         let subject = Subject::new::<T>(Some(make().name()));
         for set in good_pairs() {
-            rows(&subject, &set.label, &make(), &set.pairs);
+            rows(&subject.on(&set.label), &make(), &set.pairs);
         }
     }
     check_minimize(make, laws);
@@ -75,44 +75,29 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_minimize<T: Minimize + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
     let subject = Subject::new::<T>(Some(make().label()));
-    let mut used = make();
-    for (set, good) in (good_pairs().into_iter().map(|set| (set, true)))
-        .chain(hard_pairs().into_iter().map(|set| (set, false)))
-    {
-        let (input, pairs) = (set.label.as_str(), &set.pairs);
-        let first = Iteration::default();
-        let answers =
-            |metric: &mut dyn Minimize| subject.calm(input, || Answers::of(metric, &first, pairs));
-        let expected = answers(&mut make());
-        expected.are_finite(&subject, input);
-        subject.same(PURE, input, &expected, &answers(&mut used));
-        subject.same(PURE, input, &expected, &answers(&mut used));
-        let mut boxed: Box<dyn Minimize> = Box::new(make());
-        let through_box = subject.calm(input, || Answers::of(&mut boxed, &first, pairs));
-        subject.same(BOXED, input, &expected, &through_box);
-        subject.same(BOXED, input, &make().label(), &boxed.label());
-        if let (Some(step), Some(loss)) = (&expected.step, expected.mean_loss) {
-            subject.holds(
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Minimize>);
+    let good = good_pairs().into_iter().map(|set| (set, true));
+    for (set, good) in good.chain(hard_pairs().into_iter().map(|set| (set, false))) {
+        let trial = subject.on(&set.label);
+        let answer = |metric: &mut (dyn Minimize + 'static)| {
+            Answers::of(metric, &Iteration::default(), &set.pairs)
+        };
+        let answers = trial.calm(|| answer(&mut make()));
+        answers.are_finite(&trial);
+        trial.pure::<dyn Minimize, _>(&answers, [&mut used, &mut boxed], answer);
+        if let (Some(step), Some(loss)) = (&answers.step, answers.mean_loss) {
+            trial.holds(
                 "minimize reports the mean loss",
-                input,
                 close(step.mean_loss, loss, 1e-6),
-                || format!("{} from minimize, {loss} from mean_loss", step.mean_loss),
+                format_args!("{} from minimize, {loss} from mean_loss", step.mean_loss),
             );
         }
         if good {
-            if expected.step.is_none() {
-                subject.broken("well-determined pairs give a step", input, "None");
-            }
-            let check = Check {
-                subject: &subject,
-                input,
-                pairs,
-            };
-            check.laws(&make, laws);
+            let pairs = &set.pairs;
+            Check { trial, pairs }.laws(&make, laws);
         }
     }
-    subject.holds(NAMED, "any", !used.label().is_empty(), String::new);
-    subject.same(NAMED, "any", &make().label(), &used.label());
+    subject.named([make().label(), used.label(), boxed.label()]);
 }
 
 /// Checks that a metric that wraps another changes nothing: every method gives the same bits on all inputs of the kit.
@@ -131,14 +116,12 @@ pub fn check_metric_forwards<A: Minimize, B: Minimize>(
     let init = Isometry3::translation(0.01, 0.02, 0.5);
     let later = Iteration::new(1, &init, Problem::default());
     for set in good_pairs().into_iter().chain(hard_pairs()) {
-        let input = set.label.as_str();
+        let trial = subject.on(&set.label);
         for iteration in [Iteration::default(), later] {
             let expected = Answers::of(&mut inner(), &iteration, &set.pairs);
-            let found = subject.calm(input, || {
-                Answers::of(&mut wrapper(), &iteration, &set.pairs)
-            });
+            let found = trial.calm(|| Answers::of(&mut wrapper(), &iteration, &set.pairs));
             let law = "forwards every method to what it wraps";
-            subject.same(law, input, &expected, &found);
+            trial.same(law, &expected, &found);
         }
     }
 }
@@ -154,11 +137,7 @@ struct Answers {
 }
 
 impl Answers {
-    fn of<M: Minimize + ?Sized>(
-        metric: &mut M,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-    ) -> Self {
+    fn of(metric: &mut dyn Minimize, iteration: &Iteration<'_>, pairs: &Correspondences) -> Self {
         let mut squared_errors = vec![0.0; pairs.len()];
         metric.add_squared_errors(iteration, pairs, 1.0, &mut squared_errors);
         Self {
@@ -169,45 +148,28 @@ impl Answers {
         }
     }
 
-    fn are_finite(&self, subject: &Subject, input: &str) {
-        let loss = |value: f64| value.is_finite() && value >= 0.0;
+    fn are_finite(&self, trial: &Trial<'_>) {
         if let Some(step) = &self.step {
-            subject.holds(
-                "minimize gives nothing or a finite increment",
-                input,
-                se3::is_finite(&step.increment),
-                || format!("{step:?}"),
-            );
-            subject.holds(
-                "the loss is finite and not negative",
-                input,
-                loss(step.mean_loss),
-                || format!("{step:?}"),
-            );
+            let law = "minimize gives nothing or a finite increment";
+            let finite = se3::is_finite(&step.increment);
+            trial.holds(law, finite, format_args!("{step:?}"));
         }
-        if let Some(mean) = self.mean_loss {
-            subject.holds(
-                "the loss is finite and not negative",
-                input,
-                loss(mean),
-                || format!("a mean loss of {mean}"),
-            );
-        }
-        if let Some(system) = &self.system {
-            subject.holds(
-                "the loss is finite and not negative",
-                input,
-                loss(system.loss()),
-                || format!("a system of loss {}", system.loss()),
-            );
+        let losses = [
+            ("minimize", self.step.as_ref().map(|step| step.mean_loss)),
+            ("mean_loss", self.mean_loss),
+            ("system", self.system.as_ref().map(NormalEquations::loss)),
+        ];
+        for (method, loss) in losses {
+            let valid = loss.is_none_or(|loss| loss.is_finite() && loss >= 0.0);
+            let law = "the loss is finite and not negative";
+            trial.holds(law, valid, format_args!("{loss:?} from {method}"));
         }
     }
 }
 
 /// One set of pairs that determine a step.
 struct Check<'a> {
-    subject: &'a Subject,
-    input: &'a str,
+    trial: Trial<'a>,
     pairs: &'a Correspondences,
 }
 
@@ -263,29 +225,27 @@ impl Check<'_> {
     }
 
     fn step(&self, metric: &mut dyn Minimize, pairs: &Correspondences) -> Step {
-        let step = self
-            .subject
-            .calm(self.input, || metric.minimize(&Iteration::default(), pairs));
-        step.unwrap_or_else(|| {
-            let law = "well-determined pairs give a step";
-            self.subject.broken(law, self.input, "None")
-        })
+        let minimize = || metric.minimize(&Iteration::default(), pairs);
+        let step = self.trial.calm(minimize);
+        let law = "well-determined pairs give a step";
+        step.unwrap_or_else(|| self.trial.broken(law, "None"))
     }
 
     fn with(&self, pairs: impl Iterator<Item = Pair>) -> Correspondences {
+        self.at(self.pairs.camera_from_object(), pairs)
+    }
+
+    fn at(&self, pose: &Isometry3<f64>, pairs: impl Iterator<Item = Pair>) -> Correspondences {
         let mut set = Correspondences::new();
-        set.begin(self.pairs.camera_from_object(), self.pairs.n_candidates());
+        set.begin(pose, self.pairs.n_candidates());
         set.extend(pairs);
         set
     }
 
-    /// The sources, and the targets too if asked, moved in the camera frame.
+    /// Returns the pairs with the sources, and optionally the targets, moved in the camera frame.
     fn moved(&self, motion: &Isometry3<f64>, targets: bool) -> Correspondences {
         let mover = RigidTransform::new(motion);
-        let mut set = Correspondences::new();
-        let pose = motion * self.pairs.camera_from_object();
-        set.begin(&pose, self.pairs.n_candidates());
-        set.extend(self.pairs.as_slice().iter().map(|pair| Pair {
+        let pairs = self.pairs.as_slice().iter().map(|pair| Pair {
             source: mover.surfel(&pair.source),
             target: if targets {
                 mover.surfel(&pair.target)
@@ -293,8 +253,8 @@ impl Check<'_> {
                 pair.target
             },
             ..*pair
-        }));
-        set
+        });
+        self.at(&(motion * self.pairs.camera_from_object()), pairs)
     }
 
     fn scaled(&self, factor: f32) -> Correspondences {
@@ -304,26 +264,24 @@ impl Check<'_> {
         };
         let mut pose = *self.pairs.camera_from_object();
         pose.translation.vector *= f64::from(factor);
-        let mut set = Correspondences::new();
-        set.begin(&pose, self.pairs.n_candidates());
-        set.extend(self.pairs.as_slice().iter().map(|pair| Pair {
+        let pairs = self.pairs.as_slice().iter().map(|pair| Pair {
             source: surfel(&pair.source),
             target: surfel(&pair.target),
             ..*pair
-        }));
-        set
+        });
+        self.at(&pose, pairs)
     }
 
-    /// Two steps agree in loss and motion; lengths are compared relative to the size of what was moved.
+    /// Checks that two steps agree in loss and motion. Lengths are compared relative to the size of
+    /// the motion.
     fn equal(&self, law: &str, expected: &Step, found: &Step, tolerance: f64) {
         let (angle, distance) = se3::pose_distance(&expected.increment, &found.increment);
         let scale = expected.increment.translation.vector.norm() + expected.mean_loss.sqrt();
         let agree = close(expected.mean_loss, found.mean_loss, tolerance)
             && angle <= tolerance
             && distance <= tolerance * (scale + f64::MIN_POSITIVE);
-        self.subject.holds(law, self.input, agree, || {
-            format!("{found:?}\n    not {expected:?}")
-        });
+        let found = format_args!("{found:?}\n    not {expected:?}");
+        self.trial.holds(law, agree, found);
     }
 
     fn downhill(&self, metric: &mut dyn Minimize, step: &Step) {
@@ -331,26 +289,25 @@ impl Check<'_> {
         let after = metric.mean_loss(&Iteration::default(), &self.moved(&tenth, false));
         let lower = after.is_some_and(|after| after <= step.mean_loss * (1.0 + 1e-4) + 1e-13);
         let law = "downhill: a tenth of the increment does not raise the mean loss";
-        self.subject.holds(law, self.input, lower, || {
-            format!("{after:?} after {}", step.mean_loss)
-        });
+        let found = format_args!("{after:?} after {}", step.mean_loss);
+        self.trial.holds(law, lower, found);
     }
 }
 
-fn rows(subject: &Subject, input: &str, metric: &dyn ErrorMetric, pairs: &Correspondences) {
+fn rows(trial: &Trial<'_>, metric: &dyn ErrorMetric, pairs: &Correspondences) {
     for pair in pairs.as_slice().iter().take(100) {
         let error = metric.squared_error(pair);
-        for (weight, factor) in [(1.0, 1.0), (2.0, 2.0)] {
+        for weight in [1.0, 2.0] {
             let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
             metric.linearize(&Pair { weight, ..*pair }, &mut rows);
-            let law = "squared_error is the sum of the squared rows, and rows carry the weight";
-            let agree = close(rows.loss(), factor * error, 1e-6);
-            subject.holds(law, input, agree, || {
-                format!(
-                    "rows of {} at a weight of {weight}, a squared error of {error}, for {pair:?}",
-                    rows.loss()
-                )
-            });
+            let rows = rows.loss();
+            trial.holds(
+                "squared_error is the sum of the squared rows, and rows carry the weight",
+                close(rows, f64::from(weight) * error, 1e-6),
+                format_args!(
+                    "rows of {rows} at a weight of {weight}, a squared error of {error}, for {pair:?}"
+                ),
+            );
         }
     }
 }

@@ -67,65 +67,39 @@ pub(crate) fn hard_pairs() -> Vec<PairSet> {
             pairs: set,
         }
     };
-    let changed = |change: fn(usize, &mut Pair)| {
+    let every = |change: fn(&mut Pair)| {
         let mut pairs = all.to_vec();
-        for (i, pair) in pairs.iter_mut().enumerate() {
-            change(i, pair);
-        }
+        pairs.iter_mut().for_each(change);
         pairs
     };
+    let fifth = |change: fn(&mut Pair)| {
+        let mut pairs = all.to_vec();
+        change(&mut pairs[5]);
+        pairs
+    };
+    let mut on_a_line = all.to_vec();
+    for (pair, millimeters) in on_a_line.iter_mut().zip((0..100_u8).cycle()) {
+        pair.source.point = Point3::new(0.0, 0.0, 0.4 + f32::from(millimeters) * 1e-3);
+    }
     vec![
         with("no pairs", Vec::new()),
         with("one pair", all[..1].to_vec()),
         with("two pairs", all[..2].to_vec()),
         with("five pairs", all[..5].to_vec()),
         with("one pair, many times", vec![all[0]; 40]),
-        with(
-            "pairs without any distance",
-            changed(|_, p| p.target = p.source),
-        ),
-        with("weights of zero", changed(|_, p| p.weight = 0.0)),
-        with(
-            "sources on a line",
-            changed(|i, p| {
-                p.source.point = Point3::new(
-                    0.0,
-                    0.0,
-                    0.4 + f32::from(u8::try_from(i % 100).unwrap_or(0)) * 1e-3,
-                );
-            }),
-        ),
+        with("pairs without any distance", every(|p| p.target = p.source)),
+        with("weights of zero", every(|p| p.weight = 0.0)),
+        with("sources on a line", on_a_line),
         with(
             "sources in one point",
-            changed(|_, p| p.source.point = Point3::new(0.0, 0.0, 0.4)),
+            every(|p| p.source.point = Point3::new(0.0, 0.0, 0.4)),
         ),
-        with(
-            "one target of NaN",
-            changed(|i, p| {
-                if i == 5 {
-                    p.target.point.x = f32::NAN;
-                }
-            }),
-        ),
-        with(
-            "one source of NaN",
-            changed(|i, p| {
-                if i == 5 {
-                    p.source.point.y = f32::NAN;
-                }
-            }),
-        ),
+        with("one target of NaN", fifth(|p| p.target.point.x = f32::NAN)),
+        with("one source of NaN", fifth(|p| p.source.point.y = f32::NAN)),
         with(
             "all targets infinite",
-            changed(|_, p| p.target.point.z = f32::INFINITY),
+            every(|p| p.target.point.z = f32::INFINITY),
         ),
-        with(
-            "one weight of NaN",
-            changed(|i, p| {
-                if i == 5 {
-                    p.weight = f32::NAN;
-                }
-            }),
-        ),
+        with("one weight of NaN", fifth(|p| p.weight = f32::NAN)),
     ]
 }

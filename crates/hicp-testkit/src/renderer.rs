@@ -3,7 +3,7 @@
 use hybrid_icp::core::{NO_TRIANGLE, PixelRegion, RenderedView, Renderer};
 use hybrid_icp::raster::Rasterizer;
 
-use crate::law::{BOXED, PURE, Subject};
+use crate::law::{PURE, Subject, Trial};
 use crate::scenes::{Case, cases, sides};
 
 /// What [`check_renderer`] may take for granted of a renderer beyond the trait's contract.
@@ -38,9 +38,10 @@ impl Default for RendererLaws {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: RendererLaws) {
     let subject = Subject::new::<T>(None);
-    let (mut used, mut used_view) = (make(), RenderedView::default());
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Renderer>);
+    let mut used_view = RenderedView::default();
     for case in cases() {
-        let input = case.label.as_str();
+        let trial = subject.on(&case.label);
         let camera = sides(&case.problem).1.camera();
         let part = PixelRegion {
             u_min: 70,
@@ -50,67 +51,52 @@ pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: Rendere
         };
         let mut whole = None;
         for region in [camera.region(), part] {
-            let mut expected = RenderedView::default();
-            subject.calm(input, || draw(&mut make(), &case, &region, &mut expected));
-            contract(&subject, input, &case, &region, &expected);
-            for _ in 0..2 {
-                subject.calm(input, || draw(&mut used, &case, &region, &mut used_view));
-                subject.same(PURE, input, &expected, &used_view);
-            }
-            let mut boxed: Box<dyn Renderer> = Box::new(make());
-            let mut view = RenderedView::default();
-            subject.calm(input, || draw(&mut boxed, &case, &region, &mut view));
-            subject.same(BOXED, input, &expected, &view);
-            let whole = whole.get_or_insert_with(|| expected.clone());
+            let fresh_view = |renderer: &mut (dyn Renderer + 'static)| {
+                let mut view = RenderedView::default();
+                draw(renderer, &case, &region, &mut view);
+                view
+            };
+            let view = trial.calm(|| fresh_view(&mut make()));
+            contract(&trial, &case, &region, &view);
+            trial.pure::<dyn Renderer, _>(&view, [&mut used, &mut boxed], fresh_view);
+            trial.calm(|| draw(&mut used, &case, &region, &mut used_view));
+            trial.same(PURE, &view, &used_view);
+            let whole = whole.get_or_insert_with(|| view.clone());
             let law = "a part of the image shows what the whole shows there";
             for (u, v) in pixels(&region) {
-                let (own, there) = (expected.depth_at(u, v), whole.depth_at(u, v));
-                subject.holds(law, input, own.to_bits() == there.to_bits(), || {
-                    format!("{own} in the part and {there} in the whole at ({u}, {v})")
-                });
+                let (own, there) = (view.depth_at(u, v), whole.depth_at(u, v));
+                let found = format_args!("{own} in the part, {there} in the whole at ({u}, {v})");
+                trial.holds(law, own.to_bits() == there.to_bits(), found);
             }
         }
         if let (Some(share), Some(whole)) = (laws.differing_pixels, &whole) {
-            agrees(&subject, input, &case, whole, share);
+            agrees(&trial, &case, whole, share);
         }
     }
 }
 
-fn draw<R: Renderer + ?Sized>(
-    renderer: &mut R,
-    case: &Case,
-    region: &PixelRegion,
-    view: &mut RenderedView,
-) {
+fn draw(renderer: &mut dyn Renderer, case: &Case, region: &PixelRegion, view: &mut RenderedView) {
     let (model, observation) = sides(&case.problem);
     renderer.render(model.mesh(), observation.camera(), &case.pose, region, view);
 }
 
-fn contract(
-    subject: &Subject,
-    input: &str,
-    case: &Case,
-    region: &PixelRegion,
-    view: &RenderedView,
-) {
+fn contract(trial: &Trial<'_>, case: &Case, region: &PixelRegion, view: &RenderedView) {
+    let shown = format_args!("{:?} for {region:?}", view.region());
     let inside = view.region().is_empty() || view.region().intersection(region) == view.region();
-    subject.holds("the view lies within the region", input, inside, || {
-        format!("{:?} for {region:?}", view.region())
-    });
+    trial.holds("the view lies within the region", inside, shown);
     let triangles = sides(&case.problem).0.mesh().triangles().len();
     for (depth, triangle) in view.depth().iter().zip(view.triangles()) {
-        let found = || format!("a depth of {depth} and the triangle {triangle}");
+        let found = format_args!("a depth of {depth} and the triangle {triangle}");
         let law = "depths are finite and not negative";
-        subject.holds(law, input, depth.is_finite() && *depth >= 0.0, found);
+        trial.holds(law, depth.is_finite() && *depth >= 0.0, found);
         let shows = *triangle != NO_TRIANGLE;
         let law = "a pixel has a depth exactly if it has a triangle of the mesh";
         let in_range = !shows || (*triangle as usize) < triangles;
-        subject.holds(law, input, (*depth > 0.0) == shows && in_range, found);
+        trial.holds(law, (*depth > 0.0) == shows && in_range, found);
     }
     if behind(case) {
         let law = "behind the camera there is nothing";
-        let nothing = view.depth().iter().all(|z| *z == 0.0);
-        subject.holds(law, input, nothing, || format!("{:?}", view.region()));
+        trial.holds(law, view.depth().iter().all(|z| *z == 0.0), shown);
     }
 }
 
@@ -125,7 +111,7 @@ fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> {
 }
 
 #[allow(clippy::cast_precision_loss)] // Counts of pixels.
-fn agrees(subject: &Subject, input: &str, case: &Case, view: &RenderedView, share: f64) {
+fn agrees(trial: &Trial<'_>, case: &Case, view: &RenderedView, share: f64) {
     let region = sides(&case.problem).1.camera().region();
     let mut reference = RenderedView::default();
     draw(&mut Rasterizer::default(), case, &region, &mut reference);
@@ -137,7 +123,6 @@ fn agrees(subject: &Subject, input: &str, case: &Case, view: &RenderedView, shar
     }
     let law = "agrees with the rasterizer, as declared";
     let agrees = differing as f64 <= share * shown as f64;
-    subject.holds(law, input, agrees, || {
-        format!("{differing} of {shown} pixels differ")
-    });
+    let found = format_args!("{differing} of {shown} pixels differ");
+    trial.holds(law, agrees, found);
 }

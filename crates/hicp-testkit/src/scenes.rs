@@ -4,8 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hybrid_icp::core::{
-    Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Translation3, UnitQuaternion,
-    Vector3,
+    Context, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Translation3,
+    UnitQuaternion, Vector3,
 };
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::raster::{Rasterizer, render_depth_image};
@@ -81,6 +81,20 @@ pub fn scenes() -> &'static [Scene] {
 /// Returns a workspace with the rasterizer.
 pub(crate) fn workspace() -> Workspace {
     Workspace::new(Rasterizer::default())
+}
+
+/// Calls `run` where the view of a pose is in the cache. Returns its result and the number of
+/// renders that it added.
+pub(crate) fn at_rendered_pose<R>(
+    problem: &Problem<'_>,
+    pose: &Isometry3<f64>,
+    run: impl FnOnce(&mut Context<'_>) -> R,
+) -> (R, u64) {
+    let mut workspace = workspace();
+    workspace.context(problem).view(pose);
+    let before = workspace.renders();
+    let result = run(&mut workspace.context(problem));
+    (result, workspace.renders() - before)
 }
 
 /// A problem and a pose, with words for messages.

@@ -1,12 +1,10 @@
 //! The laws of scores and switchers.
 
-use hybrid_icp::core::{Isometry3, Problem};
-use hybrid_icp::icp::RegimeEvent;
 use hybrid_icp::score::Score;
 use hybrid_icp::switch::Switcher;
 
-use crate::law::{BOXED, NAMED, PURE, SHARED_RENDER, Subject};
-use crate::scenes::{cases, scenes, workspace};
+use crate::law::Subject;
+use crate::scenes::{at_rendered_pose, cases, scenes};
 
 /// What [`check_score`] may take for granted of a score beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,59 +42,40 @@ impl Default for ScoreLaws {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_score<T: Score + 'static>(make: impl Fn() -> T, laws: ScoreLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
-    let mut used = make();
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Score>);
     for case in cases() {
-        let input = case.label.as_str();
-        let score = |score: &mut dyn Score| {
-            subject.calm(input, || run_score(score, &case.problem, &case.pose))
+        let trial = subject.on(&case.label);
+        let score = |score: &mut (dyn Score + 'static)| {
+            at_rendered_pose(&case.problem, &case.pose, |context| {
+                score.score(context, &case.pose)
+            })
         };
-        let expected = score(&mut make());
-        let (value, renders) = expected;
-        subject.holds("a score is never NaN", input, !value.is_nan(), || {
-            value.to_string()
-        });
-        subject.holds(
+        let of_fresh = trial.calm(|| score(&mut make()));
+        let (value, renders) = of_fresh;
+        trial.holds("a score is never NaN", !value.is_nan(), value);
+        trial.holds(
             "a score is within its range",
-            input,
             value >= 0.0 && value <= laws.worst,
-            || format!("{value}, expected 0 to {}", laws.worst),
+            format_args!("{value}, expected 0 to {}", laws.worst),
         );
-        subject.holds(SHARED_RENDER, input, renders <= laws.extra_renders, || {
-            format!("{renders} more renders of a pose already rendered")
-        });
-        subject.same(PURE, input, &expected, &score(&mut used));
-        subject.same(PURE, input, &expected, &score(&mut used));
-        let mut boxed: Box<dyn Score> = Box::new(make());
-        let through_box = subject.calm(input, || run_score(&mut boxed, &case.problem, &case.pose));
-        subject.same(BOXED, input, &expected, &through_box);
-        subject.same(BOXED, input, &make().name(), &boxed.name());
+        trial.shares_the_render(renders, laws.extra_renders);
+        trial.pure::<dyn Score, _>(&of_fresh, [&mut used, &mut boxed], score);
     }
-    if laws.ranks_poses {
-        for scene in scenes() {
-            let (truth, _) = run_score(&mut make(), &scene.problem(), &scene.truth);
-            let (far, _) = run_score(&mut make(), &scene.problem(), &scene.far);
-            subject.holds(
-                "ranks poses, as declared: the truth scores better than a pose far off",
-                scene.name,
-                truth < far,
-                || format!("{truth} at the truth, {far} far off"),
-            );
-        }
+    for scene in scenes().iter().filter(|_| laws.ranks_poses) {
+        let score = |pose| {
+            at_rendered_pose(&scene.problem(), pose, |context| {
+                make().score(context, pose)
+            })
+            .0
+        };
+        let (truth, far) = (score(&scene.truth), score(&scene.far));
+        subject.on(scene.name).holds(
+            "ranks poses, as declared: the truth scores better than a pose far off",
+            truth < far,
+            format_args!("{truth} at the truth, {far} far off"),
+        );
     }
-    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
-    subject.same(NAMED, "any", &make().name(), &used.name());
-}
-
-fn run_score<S: Score + ?Sized>(
-    score: &mut S,
-    problem: &Problem<'_>,
-    pose: &Isometry3<f64>,
-) -> (f64, u64) {
-    let mut workspace = workspace();
-    workspace.context(problem).view(pose);
-    let before = workspace.renders();
-    let value = score.score(&mut workspace.context(problem), pose);
-    (value, workspace.renders() - before)
+    subject.named([make().name(), used.name(), boxed.name()]);
 }
 
 /// What [`check_switcher`] may take for granted of a switcher.
@@ -131,50 +110,23 @@ impl Default for SwitcherLaws {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_switcher<T: Switcher + 'static>(make: impl Fn() -> T, laws: SwitcherLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
-    let mut used = make();
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Switcher>);
     for case in cases() {
-        let input = case.label.as_str();
-        let judge = |switcher: &mut dyn Switcher| {
-            subject.calm(input, || run_switcher(switcher, &case.problem, &case.pose))
+        let trial = subject.on(&case.label);
+        let judge = |switcher: &mut (dyn Switcher + 'static)| {
+            at_rendered_pose(&case.problem, &case.pose, |context| {
+                switcher.regime(context, &case.pose)
+            })
         };
-        let expected = judge(&mut make());
-        let (event, renders) = expected;
-        subject.holds(
-            "the regime is one of those declared",
-            input,
-            event.regime.0 < laws.regimes,
-            || format!("{event:?}"),
-        );
-        subject.holds(
-            "a score is never NaN",
-            input,
-            !event.score.is_some_and(f64::is_nan),
-            || format!("{event:?}"),
-        );
-        subject.holds(SHARED_RENDER, input, renders <= laws.extra_renders, || {
-            format!("{renders} more renders of a pose already rendered")
-        });
-        subject.same(PURE, input, &expected, &judge(&mut used));
-        subject.same(PURE, input, &expected, &judge(&mut used));
-        let mut boxed: Box<dyn Switcher> = Box::new(make());
-        let through_box = subject.calm(input, || {
-            run_switcher(&mut boxed, &case.problem, &case.pose)
-        });
-        subject.same(BOXED, input, &expected, &through_box);
-        subject.same(BOXED, input, &make().name(), &boxed.name());
+        let of_fresh = trial.calm(|| judge(&mut make()));
+        let (event, renders) = of_fresh;
+        let found = format_args!("{event:?}");
+        let declared = event.regime.0 < laws.regimes;
+        trial.holds("the regime is one of those declared", declared, found);
+        let is_number = !event.score.is_some_and(f64::is_nan);
+        trial.holds("a score is never NaN", is_number, found);
+        trial.shares_the_render(renders, laws.extra_renders);
+        trial.pure::<dyn Switcher, _>(&of_fresh, [&mut used, &mut boxed], judge);
     }
-    subject.holds(NAMED, "any", !used.name().is_empty(), String::new);
-    subject.same(NAMED, "any", &make().name(), &used.name());
-}
-
-fn run_switcher<S: Switcher + ?Sized>(
-    switcher: &mut S,
-    problem: &Problem<'_>,
-    pose: &Isometry3<f64>,
-) -> (RegimeEvent, u64) {
-    let mut workspace = workspace();
-    workspace.context(problem).view(pose);
-    let before = workspace.renders();
-    let event = switcher.regime(&mut workspace.context(problem), pose);
-    (event, workspace.renders() - before)
+    subject.named([make().name(), used.name(), boxed.name()]);
 }

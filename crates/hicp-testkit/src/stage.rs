@@ -2,11 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use hybrid_icp::core::{Isometry3, Problem, se3};
+use hybrid_icp::core::{Isometry3, se3};
 use hybrid_icp::icp::{IterationEvent, Observer, Outcome, Session, Stage, Verdict, Workspace};
 
-use crate::law::{BOXED, PURE, Subject, bits};
-use crate::scenes::{cases, sides, workspace};
+use crate::law::{PURE, Subject, Trial, bits};
+use crate::scenes::{Case, cases, sides, workspace};
 
 /// What [`check_stage`] may take for granted of a stage beyond the trait's contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,42 +41,43 @@ impl Default for StageLaws {
 /// Panics with the law, the input and what was found when a law is broken.
 pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
     let subject = Subject::new::<T>(None);
-    let (mut used, mut used_workspace) = (make(), workspace());
+    let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Stage>);
+    let mut used_workspace = workspace();
     for case in cases() {
-        let input = case.label.as_str();
-        let (expected, told) = subject.calm(input, || {
-            run(&mut make(), &mut workspace(), &case.problem, &case.pose)
-        });
-        contract(&subject, input, laws, &case.pose, &expected, &told);
+        let trial = subject.on(&case.label);
+        let init = &case.pose;
+        let fresh = |stage: &mut (dyn Stage + 'static)| {
+            let mut told = Told::default();
+            let outcome = run(stage, &mut workspace(), &case, &mut told);
+            (outcome, told.0)
+        };
+        let of_fresh = trial.calm(|| fresh(&mut make()));
+        let (outcome, told) = &of_fresh;
+        contract(&trial, laws, init, outcome, told);
+        trial.pure::<dyn Stage, _>(&of_fresh, [&mut used, &mut boxed], fresh);
+        let mut told_again = Told::default();
+        let again = trial.calm(|| run(&mut used, &mut used_workspace, &case, &mut told_again));
+        trial.same(PURE, outcome, &again);
         if sides(&case.problem).1.n_surfels() == 0 {
-            subject.same(
-                "where nothing was observed the initial pose is returned bit for bit",
-                input,
-                &case.pose,
-                &expected.camera_from_object,
-            );
+            let law = "if nothing is observed, the initial pose is returned bit for bit";
+            trial.same(law, init, &outcome.camera_from_object);
         }
-        for _ in 0..2 {
-            let (again, _) = subject.calm(input, || {
-                run(&mut used, &mut used_workspace, &case.problem, &case.pose)
-            });
-            subject.same(PURE, input, &expected, &again);
-        }
-        let mut boxed: Box<dyn Stage> = Box::new(make());
-        let (through_box, _) = subject.calm(input, || {
-            run(&mut boxed, &mut workspace(), &case.problem, &case.pose)
-        });
-        subject.same(BOXED, input, &expected, &through_box);
-        let stopped = subject.calm(input, || {
-            let (mut workspace, mut observer) = (workspace(), Stopper);
-            let mut session = Session::new(&mut workspace, &mut observer);
-            make().run(&case.problem, &case.pose, &mut session)
-        });
-        finite(&subject, input, &case.pose, &stopped);
+        let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut Stopper));
+        finite(&trial, init, &stopped);
     }
 }
 
-/// The poses that an observer is told.
+fn run(
+    stage: &mut dyn Stage,
+    workspace: &mut Workspace,
+    case: &Case,
+    observer: &mut dyn Observer,
+) -> Outcome {
+    let mut session = Session::new(workspace, observer);
+    stage.run(&case.problem, &case.pose, &mut session)
+}
+
+/// The poses that are reported to an observer.
 #[derive(Default)]
 struct Told(Vec<Isometry3<f64>>);
 
@@ -96,79 +97,50 @@ impl Observer for Stopper {
     }
 }
 
-fn run<S: Stage + ?Sized>(
-    stage: &mut S,
-    workspace: &mut Workspace,
-    problem: &Problem<'_>,
-    init: &Isometry3<f64>,
-) -> (Outcome, Vec<Isometry3<f64>>) {
-    let mut told = Told::default();
-    let outcome = stage.run(problem, init, &mut Session::new(workspace, &mut told));
-    (outcome, told.0)
-}
-
-fn finite(subject: &Subject, input: &str, init: &Isometry3<f64>, outcome: &Outcome) {
+fn finite(trial: &Trial<'_>, init: &Isometry3<f64>, outcome: &Outcome) {
     let pose = &outcome.camera_from_object;
     if se3::is_finite(init) {
-        subject.holds(
-            "the pose is finite when the initial one is",
-            input,
-            se3::is_finite(pose),
-            || format!("{outcome:?}"),
-        );
+        let law = "the pose is finite if the initial one is";
+        trial.holds(law, se3::is_finite(pose), format_args!("{outcome:?}"));
     } else {
-        subject.same(
-            "an initial pose that is not finite is returned bit for bit",
-            input,
-            init,
-            pose,
-        );
+        let law = "an initial pose that is not finite is returned bit for bit";
+        trial.same(law, init, pose);
     }
 }
 
 fn contract(
-    subject: &Subject,
-    input: &str,
+    trial: &Trial<'_>,
     laws: StageLaws,
     init: &Isometry3<f64>,
     outcome: &Outcome,
     told: &[Isometry3<f64>],
 ) {
-    finite(subject, input, init, outcome);
+    finite(trial, init, outcome);
+    let found = format_args!("{outcome:?}");
     let pose = bits(&outcome.camera_from_object);
     let kept = pose == bits(init);
     if matches!(outcome.verdict, Verdict::KeptInitial(_)) {
         let law = "a kept pose is the initial one bit for bit";
-        subject.holds(law, input, kept, || format!("{outcome:?}"));
+        trial.holds(law, kept, found);
     }
     if laws.tells_the_observer {
-        subject.holds(
-            "accept after evaluation: the pose was told to the observer, or is the initial one",
-            input,
+        trial.holds(
+            "accept after evaluation: the pose was reported to the observer, or is the initial one",
             kept || told.iter().any(|evaluated| bits(evaluated) == pose),
-            || format!("{outcome:?}, none of {} poses told", told.len()),
+            format_args!("{outcome:?}, none of {} poses reported", told.len()),
         );
-        subject.holds(
-            "no more iterations are told than counted",
-            input,
+        trial.holds(
+            "no more iterations are reported than counted",
             told.len() <= outcome.iterations,
-            || format!("{} told, {} counted", told.len(), outcome.iterations),
+            format_args!("{} reported, {} counted", told.len(), outcome.iterations),
         );
     }
     if let Some(evaluation) = outcome.evaluation {
-        subject.holds(
-            "an evaluation has pairs and a finite loss",
-            input,
-            evaluation.n_pairs > 0
-                && evaluation.mean_loss.is_finite()
-                && evaluation.mean_loss >= 0.0,
-            || format!("{evaluation:?}"),
-        );
-        subject.holds(
-            "the number of pairs is that of the evaluation",
-            input,
-            outcome.n_pairs() == evaluation.n_pairs,
-            || format!("{outcome:?}"),
-        );
+        let loss = evaluation.mean_loss;
+        let valid = evaluation.n_pairs > 0 && loss.is_finite() && loss >= 0.0;
+        trial.holds("an evaluation has pairs and a finite loss", valid, found);
+        let agrees = outcome.n_pairs() == evaluation.n_pairs;
+        let law = "the number of pairs is that of the evaluation";
+        trial.holds(law, agrees, found);
     }
 }
