@@ -156,33 +156,26 @@ impl CaseMaker {
     ///
     /// [`SimError::Parameter`] when a length, an angle or a count of the configuration is out of its range.
     pub fn new(config: CaseConfig) -> Result<Self, SimError> {
-        let length = |what, value| check_range(what, value, 0.0..=100.0, "metres from 0 to 100");
-        length("largest distance", config.max_distance_meters)?;
-        length("offset of the optical axis", config.axis_offset_meters)?;
+        let length = |what, value| check_range(what, value, 0.0..=100.0);
+        length("largest distance in meters", config.max_distance_meters)?;
+        length("axis offset in meters", config.axis_offset_meters)?;
         match config.init {
             InitialPose::Fixed {
                 translation_meters,
                 rotation_degrees,
             } => {
-                length("initial translation error", translation_meters)?;
-                check_range(
-                    "initial rotation error",
-                    rotation_degrees,
-                    0.0..=180.0,
-                    "degrees from 0 to 180",
-                )?;
+                length("translation error in meters", translation_meters)?;
+                check_range("rotation error in degrees", rotation_degrees, 0.0..=180.0)?;
             }
             InitialPose::Binned(bins) => {
-                length(
-                    "largest initial translation error",
-                    bins.max_translation_meters,
-                )?;
+                let largest = bins.max_translation_meters;
+                length("largest translation error in meters", largest)?;
                 for (what, count) in [
                     ("number of VSD bins", bins.count as f64),
                     ("tries per object pose", f64::from(bins.tries_per_pose)),
                     ("number of object poses tried", f64::from(bins.max_poses)),
                 ] {
-                    check_range(what, count, 1.0..=1e9, "at least 1")?;
+                    check_range(what, count, 1.0..=1e9)?;
                 }
             }
         }

@@ -78,13 +78,8 @@ impl Clutter {
         models: &[Model],
         count: usize,
     ) -> Result<Self, SimError> {
-        check_range(
-            "number of models",
-            models.len() as f64,
-            1.0..=1e6,
-            "at least 1",
-        )?;
-        check_range("number of objects", count as f64, 1.0..=100.0, "1 to 100")?;
+        check_range("number of models", models.len() as f64, 1.0..=1e6)?;
+        check_range("number of objects", count as f64, 1.0..=100.0)?;
         let mut objects = Vec::with_capacity(count);
         let mut discs: Vec<(f64, f64, f64)> = Vec::with_capacity(count);
         for _ in 0..count {

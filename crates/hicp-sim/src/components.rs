@@ -1,5 +1,6 @@
 //! Connected parts of a mesh.
 
+use hicp_core::internal::index;
 use hicp_core::{MeshError, Point3, TriMesh};
 
 /// A connected part of a mesh.
@@ -25,22 +26,21 @@ pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
     let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
     for corners in mesh.triangles() {
         let part = part_of[corners[0] as usize] as usize;
-        let index = *number[part].get_or_insert_with(|| {
+        let number = *number[part].get_or_insert_with(|| {
             triangles.push(Vec::new());
             triangles.len() - 1
         });
-        triangles[index].push(*corners);
+        triangles[number].push(*corners);
     }
     let mut new_index: Vec<Option<u32>> = vec![None; mesh.vertices().len()];
     let mut components = Vec::with_capacity(triangles.len());
     for mut triangles in triangles {
         let mut vertices: Vec<Point3<f32>> = Vec::new();
-        for index in triangles.iter_mut().flatten() {
-            let old = *index as usize;
-            *index = *new_index[old].get_or_insert_with(|| {
+        for corner in triangles.iter_mut().flatten() {
+            let old = *corner as usize;
+            *corner = *new_index[old].get_or_insert_with(|| {
                 vertices.push(mesh.vertices()[old]);
-                // No more than the mesh has.
-                u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
+                index(vertices.len() - 1)
             });
         }
         let mesh = TriMesh::new(vertices, triangles)?;
@@ -62,13 +62,10 @@ pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
 pub fn join<'a>(meshes: impl IntoIterator<Item = &'a TriMesh>) -> Result<TriMesh, MeshError> {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for mesh in meshes {
-        let offset = u32::try_from(vertices.len()).unwrap_or(u32::MAX);
+        let offset = index(vertices.len());
         vertices.extend_from_slice(mesh.vertices());
-        triangles.extend(
-            mesh.triangles()
-                .iter()
-                .map(|corners| corners.map(|i| i.saturating_add(offset))),
-        );
+        let corners = mesh.triangles().iter();
+        triangles.extend(corners.map(|corners| corners.map(|i| i + offset)));
     }
     TriMesh::new(vertices, triangles)
 }

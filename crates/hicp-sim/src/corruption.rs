@@ -36,19 +36,9 @@ impl Corruption {
     ///
     /// [`SimError::Parameter`] when a parameter is out of its range.
     pub fn apply(&self, case: &Case) -> Result<(DepthImage, Mask), SimError> {
-        check_range(
-            "occluded share",
-            self.occluded_share,
-            0.0..=1.0,
-            "a number from 0 to 1",
-        )?;
+        check_range("occluded share", self.occluded_share, 0.0..=1.0)?;
         let wall = self.wall_behind_meters.unwrap_or(0.0);
-        check_range(
-            "distance of the wall in metres",
-            wall,
-            0.0..=100.0,
-            "a number from 0 to 100",
-        )?;
+        check_range("distance of the wall in meters", wall, 0.0..=100.0)?;
         let of = |step: &str| stream(case.seed, &[&case.object, step], case.index);
 
         let (mut depth, mut mask) = (case.depth.clone(), case.mask.clone());

@@ -1,5 +1,7 @@
 //! What can go wrong in a simulation.
 
+use std::ops::RangeInclusive;
+
 use hicp_core::{ImageError, MeshError};
 use thiserror::Error;
 
@@ -10,12 +12,12 @@ pub enum SimError {
     /// A parameter is out of its range.
     #[error("{what} is {value}, expected {expected}")]
     Parameter {
-        /// Which one.
+        /// The parameter.
         what: &'static str,
         /// The value given.
         value: f64,
         /// What was expected.
-        expected: &'static str,
+        expected: String,
     },
     /// The object is as large as the largest distance to the camera, so that no distance is left to draw.
     #[error(
@@ -89,20 +91,18 @@ pub enum SimError {
     Mesh(#[from] MeshError),
 }
 
-/// Refuses what is not a finite number in a closed range.
+/// Returns an error unless a value lies in a closed range.
 pub(crate) fn check_range(
     what: &'static str,
     value: f64,
-    range: std::ops::RangeInclusive<f64>,
-    expected: &'static str,
+    range: RangeInclusive<f64>,
 ) -> Result<(), SimError> {
-    if range.contains(&value) && value.is_finite() {
-        Ok(())
-    } else {
-        Err(SimError::Parameter {
-            what,
-            value,
-            expected,
-        })
+    if range.contains(&value) {
+        return Ok(());
     }
+    Err(SimError::Parameter {
+        what,
+        value,
+        expected: format!("a number from {} to {}", range.start(), range.end()),
+    })
 }

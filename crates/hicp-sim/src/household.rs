@@ -116,31 +116,36 @@ impl Household {
         Self::Camera,
     ];
 
-    /// Name in tables and files: lower case, one word.
+    /// The name, and the function that builds the solid.
+    fn shape(self) -> (&'static str, fn() -> Solid) {
+        match self {
+            Self::Mug => ("mug", vessels::mug),
+            Self::Bottle => ("bottle", vessels::bottle),
+            Self::Bowl => ("bowl", vessels::bowl),
+            Self::Carton => ("carton", boxes::carton),
+            Self::Bracket => ("bracket", tools::bracket),
+            Self::Hammer => ("hammer", tools::hammer),
+            Self::Plate => ("plate", vessels::plate),
+            Self::Iron => ("iron", tools::iron),
+            Self::Car => ("car", boxes::car),
+            Self::Pan => ("pan", vessels::pan),
+            Self::Can => ("can", vessels::can),
+            Self::Laptop => ("laptop", boxes::laptop),
+            Self::Teapot => ("teapot", vessels::teapot),
+            Self::Knife => ("knife", tools::knife),
+            Self::Book => ("book", boxes::book),
+            Self::Pot => ("pot", vessels::pot),
+            Self::Tape => ("tape", tools::tape),
+            Self::Headphones => ("headphones", boxes::headphones),
+            Self::Camera => ("camera", boxes::camera),
+            Self::Ladle => ("ladle", vessels::ladle),
+        }
+    }
+
+    /// Returns the name in tables and files: lower case, one word.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Mug => "mug",
-            Self::Bottle => "bottle",
-            Self::Bowl => "bowl",
-            Self::Carton => "carton",
-            Self::Bracket => "bracket",
-            Self::Hammer => "hammer",
-            Self::Plate => "plate",
-            Self::Iron => "iron",
-            Self::Car => "car",
-            Self::Pan => "pan",
-            Self::Can => "can",
-            Self::Laptop => "laptop",
-            Self::Teapot => "teapot",
-            Self::Knife => "knife",
-            Self::Book => "book",
-            Self::Pot => "pot",
-            Self::Tape => "tape",
-            Self::Headphones => "headphones",
-            Self::Camera => "camera",
-            Self::Ladle => "ladle",
-        }
+        self.shape().0
     }
 
     /// Makes the object's model in its nominal proportions, with its symmetries.
@@ -170,28 +175,7 @@ impl Household {
     /// Returns the object's solid in its nominal proportions, meters, z up.
     #[must_use]
     pub fn solid(self) -> Solid {
-        match self {
-            Self::Mug => vessels::mug(),
-            Self::Bottle => vessels::bottle(),
-            Self::Bowl => vessels::bowl(),
-            Self::Carton => boxes::carton(),
-            Self::Bracket => tools::bracket(),
-            Self::Hammer => tools::hammer(),
-            Self::Plate => vessels::plate(),
-            Self::Iron => tools::iron(),
-            Self::Car => boxes::car(),
-            Self::Pan => vessels::pan(),
-            Self::Can => vessels::can(),
-            Self::Laptop => boxes::laptop(),
-            Self::Teapot => vessels::teapot(),
-            Self::Knife => tools::knife(),
-            Self::Book => boxes::book(),
-            Self::Pot => vessels::pot(),
-            Self::Tape => tools::tape(),
-            Self::Headphones => boxes::headphones(),
-            Self::Camera => boxes::camera(),
-            Self::Ladle => vessels::ladle(),
-        }
+        self.shape().1()
     }
 
     /// Returns the object's solid in other proportions, meters, z up.
@@ -207,41 +191,23 @@ impl Household {
         let turn = |axis: Vector3<f64>, share: f64| {
             Isometry3::rotation(axis * (std::f64::consts::TAU * share))
         };
-        let revolution = || {
-            SymmetryAxis::new(Vector3::z(), Point3::origin())
-                .into_iter()
-                .collect()
+        let half_turn = |axis| turn(axis, 0.5);
+        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+        let discrete = match self {
+            Self::Can | Self::Tape | Self::Book => vec![half_turn(x)],
+            Self::Carton => [x, y, z].map(half_turn).to_vec(),
+            Self::Pot => (1..6).map(|k| turn(z, f64::from(k) / 6.0)).collect(),
+            Self::Headphones => vec![half_turn(z)],
+            _ => Vec::new(),
         };
-        match self {
-            Self::Bottle | Self::Bowl | Self::Plate => Symmetries {
-                discrete: Vec::new(),
-                continuous: revolution(),
-            },
-            Self::Can | Self::Tape => Symmetries {
-                discrete: vec![turn(Vector3::x(), 0.5)],
-                continuous: revolution(),
-            },
-            Self::Carton => Symmetries {
-                discrete: [Vector3::x(), Vector3::y(), Vector3::z()]
-                    .map(|axis| turn(axis, 0.5))
-                    .to_vec(),
-                continuous: Vec::new(),
-            },
-            Self::Pot => Symmetries {
-                discrete: (1..6)
-                    .map(|k| turn(Vector3::z(), f64::from(k) / 6.0))
-                    .collect(),
-                continuous: Vec::new(),
-            },
-            Self::Book => Symmetries {
-                discrete: vec![turn(Vector3::x(), 0.5)],
-                continuous: Vec::new(),
-            },
-            Self::Headphones => Symmetries {
-                discrete: vec![turn(Vector3::z(), 0.5)],
-                continuous: Vec::new(),
-            },
-            _ => Symmetries::default(),
+        let revolves = matches!(
+            self,
+            Self::Bottle | Self::Bowl | Self::Plate | Self::Can | Self::Tape
+        );
+        let axis = SymmetryAxis::new(z, Point3::origin());
+        Symmetries {
+            discrete,
+            continuous: axis.into_iter().filter(|_| revolves).collect(),
         }
     }
 }

@@ -26,22 +26,12 @@ impl MaskDefects {
     ///
     /// [`SimError::Parameter`] when the share is not in [0, 1] or a radius is above 256 pixels.
     pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, mask: &Mask) -> Result<Mask, SimError> {
-        check_range(
-            "missing share of the mask",
-            self.missing_share,
-            0.0..=1.0,
-            "a number from 0 to 1",
-        )?;
+        check_range("missing share of the mask", self.missing_share, 0.0..=1.0)?;
         for (what, radius) in [
             ("erosion in pixels", self.erosion_pixels),
             ("dilation in pixels", self.dilation_pixels),
         ] {
-            check_range(
-                what,
-                f64::from(radius),
-                0.0..=f64::from(MAX_RADIUS),
-                "at most 256",
-            )?;
+            check_range(what, f64::from(radius), 0.0..=f64::from(MAX_RADIUS))?;
         }
         let mut mask = mask.clone();
         // Drawn in any case, so that shares of one stream cut in one direction.
@@ -133,10 +123,10 @@ fn grow(mask: &Mask, radius: u32, value: bool) -> Result<Mask, SimError> {
         x
     };
     let is = |u: i64, v: i64| {
-        let (u, v) = (
-            u32::try_from(u).unwrap_or(u32::MAX),
-            u32::try_from(v).unwrap_or(u32::MAX),
-        );
+        // A negative coordinate is outside the image.
+        let (Ok(u), Ok(v)) = (u32::try_from(u), u32::try_from(v)) else {
+            return false;
+        };
         mask.get(u, v) == Some(value)
     };
     for v in 0..height {

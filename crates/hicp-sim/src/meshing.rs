@@ -7,6 +7,7 @@
 
 use std::collections::HashMap;
 
+use hicp_core::internal::index;
 use hicp_core::{Point3, TriMesh, Vector3};
 
 use crate::error::SimError;
@@ -137,8 +138,7 @@ impl Surface<'_> {
 
     fn push(&mut self, point: Point3<f32>) -> u32 {
         self.vertices.push(point);
-        // Meshes have far fewer than 2³² vertices; `TriMesh::new` refuses more than its limit.
-        u32::try_from(self.vertices.len() - 1).unwrap_or(u32::MAX)
+        index(self.vertices.len() - 1)
     }
 }
 

@@ -1,9 +1,21 @@
 //! Profiles and polygons that solids are turned and extruded from: points in the plane, metres.
 
-/// A point of a spherical bowl's profile, from the foot at its axis (0) up to the rim (14).
-pub(crate) fn bowl_point(i: usize, radius: f64) -> (f64, f64) {
-    let t = 1.35 * f64::from(to_u32(i)) / 14.0;
-    (radius * t.sin(), 0.04 - radius * t.cos())
+/// Returns the points of a curve at 0, 1, …, `last`.
+pub(crate) fn curve<P>(last: u32, point: impl Fn(f64) -> P) -> Vec<P> {
+    (0..=last).map(f64::from).map(point).collect()
+}
+
+/// Returns the profile of a spherical bowl: from the foot at its axis up to the rim, and back inside.
+pub(crate) fn bowl_profile(outer_radius: f64, inner_radius: f64) -> Vec<(f64, f64)> {
+    let side = |radius: f64| {
+        curve(14, |i| {
+            let t = 1.35 * i / 14.0;
+            (radius * t.sin(), 0.04 - radius * t.cos())
+        })
+    };
+    let (mut profile, inside) = (side(outer_radius), side(inner_radius));
+    profile.extend(inside.into_iter().rev());
+    profile
 }
 
 /// Inserts points so that no segment of an open profile is longer than `longest`; the closing segment runs along the axis.
@@ -34,9 +46,4 @@ pub(crate) fn subdivide(polygon: &[(f64, f64)], longest: f64) -> Vec<(f64, f64)>
         }
     }
     points
-}
-
-/// Loop counters of the shapes above.
-pub(crate) fn to_u32(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or(u32::MAX)
 }

@@ -31,12 +31,7 @@ impl ReconstructionNoise {
     ///
     /// [`SimError::Parameter`] when the level is not 1 to 4.
     pub fn level(level: u32) -> Result<Self, SimError> {
-        check_range(
-            "reconstruction level",
-            f64::from(level),
-            1.0..=4.0,
-            "1, 2, 3 or 4",
-        )?;
+        check_range("reconstruction level", f64::from(level), 1.0..=4.0)?;
         let steps = f64::from(level - 1);
         Ok(Self {
             intrinsics_pixels: 0.5 * steps,
@@ -92,18 +87,9 @@ impl Reconstruction {
     ///
     /// [`SimError`] when a parameter is out of its range, the object is too large for the distances, or noise has left nothing.
     pub fn reconstruct(&self, model: &Model, object: &str, seed: u64) -> Result<Model, SimError> {
-        check_range(
-            "images of a reconstruction",
-            f64::from(self.images),
-            1.0..=1e6,
-            "at least 1",
-        )?;
-        check_range(
-            "depth noise",
-            self.noise.depth_percent,
-            0.0..=50.0,
-            "percent from 0 to 50",
-        )?;
+        let noise = &self.noise;
+        check_range("number of images", f64::from(self.images), 1.0..=1e6)?;
+        check_range("depth noise in percent", noise.depth_percent, 0.0..=50.0)?;
         let (nearest, farthest) = (model.diameter(), self.max_distance_meters);
         if nearest >= farthest {
             return Err(SimError::TooLarge {
@@ -112,7 +98,6 @@ impl Reconstruction {
                 max_distance: farthest,
             });
         }
-        let noise = &self.noise;
         let sigma = noise.depth_percent / 100.0 * f64::midpoint(nearest, farthest);
         let truncation_meters = 3.0 * self.voxel_meters + 2.5 * sigma;
         let margin = Vector3::repeat(truncation_meters + 2.0 * self.voxel_meters);
@@ -175,7 +160,7 @@ fn shifted(camera: &PinholeCamera, pixels: f64) -> Result<PinholeCamera, SimErro
     let wrong = |_| SimError::Parameter {
         what: "error of the camera parameters in pixels",
         value: pixels,
-        expected: "a finite number that leaves the focal lengths positive",
+        expected: "a finite number that leaves the focal lengths positive".to_owned(),
     };
     PinholeCamera::new(
         camera.fx() + pixels,

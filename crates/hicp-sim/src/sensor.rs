@@ -44,12 +44,7 @@ impl DepthSensor {
         camera: &PinholeCamera,
     ) -> Result<DepthImage, SimError> {
         let step = self.quantization_meters.unwrap_or(0.0);
-        check_range(
-            "quantization in metres",
-            step,
-            0.0..=1.0,
-            "a number from 0 to 1",
-        )?;
+        check_range("quantization in meters", step, 0.0..=1.0)?;
         let lost = self.dropout.lost(perfect, camera)?;
         let mut measured = self.noise.apply(rng, perfect);
         if step > 0.0 {
@@ -85,19 +80,10 @@ impl Dropout {
             }));
         }
         if let Some(degrees) = self.max_incidence_degrees {
-            check_range(
-                "largest incidence angle in degrees",
-                degrees,
-                0.0..=90.0,
-                "a number from 0 to 90",
-            )?;
+            check_range("largest incidence angle in degrees", degrees, 0.0..=90.0)?;
         }
-        check_range(
-            "edge width in pixels",
-            f64::from(self.edge_pixels),
-            0.0..=64.0,
-            "at most 64",
-        )?;
+        let width_of_edges = f64::from(self.edge_pixels);
+        check_range("edge width in pixels", width_of_edges, 0.0..=64.0)?;
         let min_cosine = self
             .max_incidence_degrees
             .map(|degrees| degrees.to_radians().cos());
@@ -261,7 +247,7 @@ mod tests {
             .unwrap_err();
         assert_eq!(
             error.to_string(),
-            "quantization in metres is -1, expected a number from 0 to 1"
+            "quantization in meters is -1, expected a number from 0 to 1"
         );
         let small = PinholeCamera::new(10.0, 10.0, 3.0, 3.0, 8, 8).unwrap();
         assert!(

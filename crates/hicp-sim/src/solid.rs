@@ -4,6 +4,7 @@
 
 use std::collections::HashMap;
 
+use hicp_core::internal::index;
 use hicp_core::{Isometry3, MeshError, Point3, TriMesh, Vector3};
 
 /// A collection of closed parts.
@@ -23,7 +24,7 @@ impl Solid {
     /// Adds every part of another solid, moved by `pose`.
     #[must_use]
     pub fn with(mut self, other: &Self, pose: &Isometry3<f64>) -> Self {
-        let offset = to_index(self.vertices.len());
+        let offset = index(self.vertices.len());
         self.vertices
             .extend(other.vertices.iter().map(|p| pose * p));
         self.triangles
@@ -66,7 +67,7 @@ impl Solid {
                 let key = [p.x, p.y, p.z].map(f32::to_bits);
                 *first_at.entry(key).or_insert_with(|| {
                     vertices.push(p);
-                    to_index(vertices.len() - 1)
+                    index(vertices.len() - 1)
                 })
             })
             .collect();
@@ -197,15 +198,10 @@ impl Solid {
         if a == b || b == c || c == a {
             return;
         }
-        let first = to_index(self.vertices.len());
+        let first = index(self.vertices.len());
         self.vertices.extend(corners);
         self.triangles.push([first, first + 1, first + 2]);
     }
-}
-
-/// Indices of generated meshes are far below 2³².
-fn to_index(count: usize) -> u32 {
-    u32::try_from(count).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

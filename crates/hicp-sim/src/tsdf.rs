@@ -63,18 +63,15 @@ impl TsdfVolume {
     /// [`SimError`] when a length is not positive and finite, the corners are in the wrong order, or there would be more
     /// than [`MAX_VOXELS`] voxels.
     pub fn new(config: TsdfConfig) -> Result<Self, SimError> {
-        for (what, value) in [
-            ("voxel size", config.voxel_meters),
-            ("truncation", config.truncation_meters),
-        ] {
-            check_range(what, value, 1e-6..=1e3, "metres from 1e-6 to 1000")?;
-        }
         let extent = config.max - config.min;
-        for (what, value) in ["volume along x", "volume along y", "volume along z"]
-            .into_iter()
-            .zip(extent.iter())
-        {
-            check_range(what, *value, 1e-6..=1e6, "metres from 1e-6 to 1e6")?;
+        for (what, value, largest) in [
+            ("voxel size in meters", config.voxel_meters, 1e3),
+            ("truncation in meters", config.truncation_meters, 1e3),
+            ("volume along x in meters", extent.x, 1e6),
+            ("volume along y in meters", extent.y, 1e6),
+            ("volume along z in meters", extent.z, 1e6),
+        ] {
+            check_range(what, value, 1e-6..=largest)?;
         }
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // Positive and at most 10¹².

@@ -2,7 +2,7 @@
 
 use hicp_core::{Isometry3, Point3, Vector3};
 
-use crate::profile::{refine, subdivide, to_u32};
+use crate::profile::{curve, refine, subdivide};
 use crate::solid::Solid;
 
 /// A flat carton.
@@ -107,12 +107,10 @@ pub(crate) fn headphones() -> Solid {
     let right = Solid::lathe(&refine(&cup, 0.008), 36)
         .moved(&(Isometry3::translation(0.078, 0.0, 0.0) * inward));
     let half_turn = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
-    let band: Vec<_> = (0..=24)
-        .map(|i| {
-            let t = std::f64::consts::PI * f64::from(to_u32(i)) / 24.0;
-            Point3::new(0.084 * t.cos(), 0.0, 0.012 + 0.092 * t.sin())
-        })
-        .collect();
+    let band = curve(24, |i| {
+        let t = std::f64::consts::PI * i / 24.0;
+        Point3::new(0.084 * t.cos(), 0.0, 0.012 + 0.092 * t.sin())
+    });
     right
         .clone()
         .with(&right, &half_turn)

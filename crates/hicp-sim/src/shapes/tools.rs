@@ -2,7 +2,7 @@
 
 use hicp_core::{Isometry3, Point3, Vector3};
 
-use crate::profile::{refine, subdivide, to_u32};
+use crate::profile::{curve, refine, subdivide};
 use crate::solid::Solid;
 
 /// An angle bracket of two thin plates.
@@ -59,13 +59,11 @@ pub(crate) fn iron() -> Solid {
     ];
     let upper = sole.map(|(x, y)| (0.8 * x - 0.012, 0.7 * y));
     let raised = |z: f64| Isometry3::translation(0.0, 0.0, z);
-    let grip: Vec<_> = (0..=12)
-        .map(|i| {
-            let t = f64::from(to_u32(i)) / 12.0;
-            let x = 0.06 - 0.15 * t;
-            Point3::new(x, 0.0, 0.055 + 0.05 * (std::f64::consts::PI * t).sin())
-        })
-        .collect();
+    let grip = curve(12, |i| {
+        let t = i / 12.0;
+        let x = 0.06 - 0.15 * t;
+        Point3::new(x, 0.0, 0.055 + 0.05 * (std::f64::consts::PI * t).sin())
+    });
     Solid::prism(&subdivide(&sole, 0.006), (0.0, 0.0), 0.03, 5)
         .with(
             &Solid::prism(&subdivide(&upper, 0.006), (0.0, 0.0), 0.04, 6),

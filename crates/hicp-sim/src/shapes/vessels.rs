@@ -1,17 +1,18 @@
 //! Vessels: thin walls, handles and bodies of revolution.
 
+use std::f64::consts::PI;
+
 use hicp_core::{Isometry3, Point3};
 
-use crate::profile::{bowl_point, refine, to_u32};
+use crate::profile::{bowl_profile, curve, refine};
 use crate::solid::Solid;
 
 /// A cup with a thin wall and a handle.
 pub(crate) fn mug() -> Solid {
-    let arc = |i: usize| {
-        let t = std::f64::consts::PI * (f64::from(to_u32(i)) / 16.0 - 0.5);
+    let handle = curve(16, |i| {
+        let t = PI * (i / 16.0 - 0.5);
         Point3::new(0.038 + 0.030 * t.cos(), 0.0, 0.032 * t.sin())
-    };
-    let handle: Vec<_> = (0..=16).map(arc).collect();
+    });
     let wall = [
         (0.0, -0.048),
         (0.038, -0.048),
@@ -45,10 +46,7 @@ pub(crate) fn bottle() -> Solid {
 
 /// A thin-walled bowl.
 pub(crate) fn bowl() -> Solid {
-    let outside = (0..=14).map(|i| bowl_point(i, 0.085));
-    let inside = (0..=14).rev().map(|i| bowl_point(i, 0.081));
-    let profile: Vec<_> = outside.chain(inside).collect();
-    Solid::lathe(&profile, 56)
+    Solid::lathe(&bowl_profile(0.085, 0.081), 56)
 }
 
 /// A dinner plate.
@@ -76,12 +74,10 @@ pub(crate) fn pan() -> Solid {
         (0.0825, -0.0165),
         (0.0, -0.0165),
     ];
-    let handle: Vec<_> = (0..=14)
-        .map(|i| {
-            let t = f64::from(to_u32(i)) / 14.0;
-            Point3::new(0.09 + 0.105 * t, 0.0, 0.012 + 0.018 * t)
-        })
-        .collect();
+    let handle = curve(14, |i| {
+        let t = i / 14.0;
+        Point3::new(0.09 + 0.105 * t, 0.0, 0.012 + 0.018 * t)
+    });
     Solid::lathe(&refine(&profile, 0.01), 56)
         .with(&Solid::sweep(&handle, 0.009, 12), &Isometry3::identity())
 }
@@ -122,28 +118,21 @@ pub(crate) fn pot() -> Solid {
 
 /// A teapot: a round body, a spout and a handle.
 pub(crate) fn teapot() -> Solid {
-    let body = (1..=14).map(|i| {
-        // From the flat bottom to the lid, along an ellipse.
-        let t = std::f64::consts::PI * (0.18 + 0.75 * f64::from(to_u32(i)) / 14.0);
+    // From the flat bottom to the lid, along an ellipse.
+    let mut profile = curve(14, |i| {
+        let t = PI * (0.18 + 0.75 * i / 14.0);
         (0.056 * t.sin(), -0.046 * t.cos())
     });
-    let knob = [(0.007, 0.05), (0.011, 0.056), (0.008, 0.063), (0.0, 0.064)];
-    let profile: Vec<_> = std::iter::once((0.0, -0.0354))
-        .chain(body)
-        .chain(knob)
-        .collect();
-    let spout: Vec<_> = (0..=12)
-        .map(|i| {
-            let t = f64::from(to_u32(i)) / 12.0;
-            Point3::new(0.045 + 0.06 * t, 0.0, -0.012 + 0.055 * t * t)
-        })
-        .collect();
-    let handle: Vec<_> = (0..=16)
-        .map(|i| {
-            let t = std::f64::consts::PI * (f64::from(to_u32(i)) / 16.0 - 0.5);
-            Point3::new(-0.046 - 0.038 * t.cos(), 0.0, -0.028 * t.sin())
-        })
-        .collect();
+    profile[0] = (0.0, -0.0354); // On the axis.
+    profile.extend([(0.007, 0.05), (0.011, 0.056), (0.008, 0.063), (0.0, 0.064)]);
+    let spout = curve(12, |i| {
+        let t = i / 12.0;
+        Point3::new(0.045 + 0.06 * t, 0.0, -0.012 + 0.055 * t * t)
+    });
+    let handle = curve(16, |i| {
+        let t = PI * (i / 16.0 - 0.5);
+        Point3::new(-0.046 - 0.038 * t.cos(), 0.0, -0.028 * t.sin())
+    });
     Solid::lathe(&refine(&profile, 0.008), 48)
         .with(&Solid::sweep(&spout, 0.009, 14), &Isometry3::identity())
         .with(&Solid::sweep(&handle, 0.006, 12), &Isometry3::identity())
@@ -151,16 +140,12 @@ pub(crate) fn teapot() -> Solid {
 
 /// A ladle: a small thin-walled bowl with a long handle.
 pub(crate) fn ladle() -> Solid {
-    let outside = (0..=14).map(|i| bowl_point(i, 0.042));
-    let inside = (0..=14).rev().map(|i| bowl_point(i, 0.0395));
-    let profile: Vec<_> = outside.chain(inside).collect();
-    let handle: Vec<_> = (0..=20)
-        .map(|i| {
-            let t = f64::from(to_u32(i)) / 20.0;
-            // A bend at the end to hang it by.
-            let hook = 0.03 * (t - 0.8).max(0.0) / 0.2;
-            Point3::new(0.039 + 0.02 * t + hook, 0.0, 0.025 + 0.18 * t)
-        })
-        .collect();
-    Solid::lathe(&profile, 40).with(&Solid::sweep(&handle, 0.0045, 12), &Isometry3::identity())
+    let handle = curve(20, |i| {
+        let t = i / 20.0;
+        // A bend at the end to hang it by.
+        let hook = 0.03 * (t - 0.8).max(0.0) / 0.2;
+        Point3::new(0.039 + 0.02 * t + hook, 0.0, 0.025 + 0.18 * t)
+    });
+    Solid::lathe(&bowl_profile(0.042, 0.0395), 40)
+        .with(&Solid::sweep(&handle, 0.0045, 12), &Isometry3::identity())
 }

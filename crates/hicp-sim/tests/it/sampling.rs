@@ -261,7 +261,7 @@ fn what_cannot_be_done_is_said() {
     let error = CaseMaker::new(config).unwrap_err().to_string();
     assert_eq!(
         error,
-        "largest distance is NaN, expected metres from 0 to 100"
+        "largest distance in meters is NaN, expected a number from 0 to 100"
     );
 }
 

@@ -158,16 +158,22 @@ fn volumes_that_cannot_be_are_refused() {
     })
     .unwrap_err()
     .to_string();
-    assert_eq!(told, "voxel size is 0, expected metres from 1e-6 to 1000");
+    assert_eq!(
+        told,
+        "voxel size in meters is 0, expected a number from 0.000001 to 1000"
+    );
     let told = TsdfVolume::new(TsdfConfig {
         max: Point3::new(1.0, -1.0, 1.0),
         ..config
     })
     .unwrap_err()
     .to_string();
-    assert!(told.starts_with("volume along y is -1"), "{told}");
+    assert!(told.starts_with("volume along y in meters is -1"), "{told}");
     let told = ReconstructionNoise::level(5).unwrap_err().to_string();
-    assert_eq!(told, "reconstruction level is 5, expected 1, 2, 3 or 4");
+    assert_eq!(
+        told,
+        "reconstruction level is 5, expected a number from 1 to 4"
+    );
 }
 
 /// Mean distance from samples of one model to the nearest of the dense samples of another, metres.
