@@ -13,11 +13,7 @@
 //! ```
 //!
 //! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has
-//! the types, and a test holds the two together.
-//!
-//! Modules in reading order, by file: `errors`, `array` (numbers in and out), `camera`, `model`,
-//! `depth` and `observation`, `pipeline` (with `batch` and `observer`), `result` and `events`,
-//! `score`, `step`, `fusion`, `sequential`, `image`, `bop`.
+//! the types, and a test compares the two.
 
 mod array;
 mod batch;
