@@ -6,11 +6,10 @@ use std::time::Duration;
 #[cfg(unix)]
 pub(crate) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    // Neither is ever negative.
-    Duration::new(
-        u64::try_from(time.tv_sec).unwrap_or(0),
-        u32::try_from(time.tv_nsec).unwrap_or(0),
-    )
+    let (Ok(seconds), Ok(nanoseconds)) = (time.tv_sec.try_into(), time.tv_nsec.try_into()) else {
+        unreachable!("the processor time of a thread is never negative");
+    };
+    Duration::new(seconds, nanoseconds)
 }
 
 /// Returns the time since the first call: there is no portable clock of a thread except on Unix.

@@ -2,6 +2,7 @@
 
 use std::sync::Once;
 
+use hybrid_icp::core::internal::index;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, RelativeSize, register_font};
@@ -39,7 +40,7 @@ impl Figure {
 
     fn size(&self) -> (u32, u32) {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let count = |n: usize| u32::try_from(n.clamp(1, 50)).unwrap_or(1);
+        let count = |n: usize| index(n.clamp(1, 50));
         (PANEL.0 * count(columns), PANEL.1 * count(self.rows.len()))
     }
 

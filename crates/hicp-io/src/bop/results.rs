@@ -161,7 +161,8 @@ fn row_of(cells: &[&str; 7]) -> Result<ResultRow, (usize, Option<RotationError>)
 /// Returns the line of a record, from 1. The position of the reader is in front of the blank lines before the record.
 fn line_of(text: &[u8], position: Option<&csv::Position>) -> usize {
     let start = position.map_or(0, |position| position.byte());
-    let (before, rest) = text.split_at(usize::try_from(start).unwrap_or(0));
+    let start = usize::try_from(start).unwrap_or_else(|_| unreachable!("the text is in memory"));
+    let (before, rest) = text.split_at(start);
     let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
     let end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
     let bytes = before.iter().chain(blank);
