@@ -45,7 +45,6 @@ struct Journey<'a> {
 /// A method on its way.
 struct Traveler {
     estimator: SequentialEstimator,
-    method: usize,
     n_estimates: usize,
 }
 
@@ -143,11 +142,10 @@ impl<'a> TrajectoryRunner<'a> {
     fn travel(&mut self, journey: &Journey<'_>, watch: Watch<'_>) -> Result<Vec<Measured>, Failed> {
         let variant = &self.underlying[journey.underlying];
         let mut travelers = Vec::new();
-        for (method, rule) in self.rules.iter().enumerate() {
+        for rule in &self.rules {
             let (stage, init) = (variant.build(None)?, &journey.trajectory.init);
             travelers.push(Traveler {
                 estimator: rule.estimator(stage, &variant.name, journey.believed, init)?,
-                method,
                 n_estimates: 0,
             });
         }
@@ -192,9 +190,6 @@ impl<'a> TrajectoryRunner<'a> {
                 watch(&TrajectoryStep {
                     object: &self.subjects[journey.object],
                     trajectory: journey.index,
-                    underlying: &self.underlying[journey.underlying].name,
-                    method: &config.methods[one.method],
-                    image,
                     camera_from_object: truth,
                     believed: journey.believed,
                     step: &step,

@@ -14,12 +14,6 @@ pub struct TrajectoryStep<'a> {
     pub object: &'a Subject,
     /// Index of the trajectory among those of its object.
     pub trajectory: u64,
-    /// Name of the underlying pipeline.
-    pub underlying: &'a str,
-    /// Name of the method.
-    pub method: &'a str,
-    /// Index of the image.
-    pub image: u64,
     /// The true pose in the frame of this image; one of them, if the object has symmetries.
     pub camera_from_object: Isometry3<f64>,
     /// The registered model: a reconstruction.

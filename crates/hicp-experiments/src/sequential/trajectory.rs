@@ -18,8 +18,6 @@ pub(crate) struct Trajectory {
     pub(crate) init: Isometry3<f64>,
     /// Mean VSD of `init` against the truth in the first camera frame, with the original model.
     pub(crate) vsd_initial: f64,
-    /// Its bin, from 0.
-    pub(crate) bin: usize,
 }
 
 impl Trajectory {
@@ -63,7 +61,6 @@ impl Trajectory {
                         direction,
                         init,
                         vsd_initial,
-                        bin,
                     });
                 }
             }

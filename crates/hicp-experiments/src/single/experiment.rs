@@ -124,6 +124,17 @@ impl Experiment {
         nth.map_or_else(|| Condition::perfect(true), |(_, condition)| condition)
     }
 
+    /// Returns the thresholds α of the first `levels`; one `None` if they do not change α.
+    pub(super) fn alphas(self, levels: usize) -> Vec<Option<f64>> {
+        let levels = self.conditions(0).into_iter().take(levels);
+        let alphas: Vec<Option<f64>> = levels.filter_map(|level| level.1.alpha).map(Some).collect();
+        if alphas.is_empty() {
+            vec![None]
+        } else {
+            alphas
+        }
+    }
+
     /// Returns the levels with their conditions.
     fn conditions(self, case: u64) -> Vec<(String, Condition)> {
         let (binned, off) = (Condition::perfect(true), Condition::perfect(false));

@@ -8,7 +8,6 @@ use hybrid_icp::BoxedStage;
 use hybrid_icp::icp::{Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
 
-use super::condition::Condition;
 use super::config::Config;
 use crate::clock::thread_time;
 use crate::error::ExperimentError;
@@ -23,8 +22,8 @@ pub(super) struct Runner<'a> {
     config: &'a Config,
     subjects: &'a [Subject],
     models: &'a Models,
-    binned: CaseMaker,
-    fixed: CaseMaker,
+    /// Of initial poses that are 6.2 mm and 9.5° off, and of binned ones.
+    makers: [CaseMaker; 2],
     /// By level, then by variant; one level for all unless levels change the pipelines.
     stages: Vec<Vec<BoxedStage>>,
     /// By variant.
@@ -34,6 +33,7 @@ pub(super) struct Runner<'a> {
 
 /// A case as a condition presents it.
 struct Presented<'a> {
+    subject: &'a Subject,
     case: &'a Case,
     depth: Arc<DepthImage>,
     mask: Mask,
@@ -47,22 +47,16 @@ impl<'a> Runner<'a> {
         subjects: &'a [Subject],
         models: &'a Models,
     ) -> Result<Self, ExperimentError> {
-        let alphas =
-            (0..config.levels.len()).map(|level| config.experiment.condition(level, 0).alpha);
-        let pipelines = alphas
-            .enumerate()
-            .filter(|(level, alpha)| *level == 0 || alpha.is_some());
+        let maker = |binned| Ok::<_, ExperimentError>(CaseMaker::new(config.cases(binned)?)?);
         let build = |alpha| config.variants.iter().map(|v| v.build(alpha)).collect();
+        let alphas = config.experiment.alphas(config.levels.len()).into_iter();
         let workspace = |_| Workspace::new(Rasterizer::default());
         Ok(Self {
             config,
             subjects,
             models,
-            binned: CaseMaker::new(config.cases(true)?)?,
-            fixed: CaseMaker::new(config.cases(false)?)?,
-            stages: pipelines
-                .map(|(_, alpha)| build(alpha))
-                .collect::<Result<_, _>>()?,
+            makers: [maker(false)?, maker(true)?],
+            stages: alphas.map(build).collect::<Result<_, _>>()?,
             workspaces: config.variants.iter().map(workspace).collect(),
             forgotten: 0,
         })
@@ -72,55 +66,34 @@ impl<'a> Runner<'a> {
     ///
     /// All variants get the same image and the same initial pose.
     pub(super) fn outcomes(&mut self, object: usize, index: u64) -> Vec<Outcome> {
-        let config = self.config;
-        let mut outcomes = Vec::new();
+        let (config, subject) = (self.config, &self.subjects[object]);
         let mut cases: [Option<Result<Case, String>>; 2] = [None, None];
+        let mut outcomes = Vec::new();
         for level in 0..config.levels.len() {
             let condition = config.experiment.condition(level, index);
-            let case = cases[usize::from(condition.binned)]
-                .get_or_insert_with(|| self.case(object, index, condition.binned));
-            let case = case.as_ref().map_err(Clone::clone);
-            let presented = case.and_then(|case| self.present(object, case, &condition));
+            let start = usize::from(condition.binned);
+            let case = cases[start].get_or_insert_with(|| {
+                let maker = &mut self.makers[start];
+                let case = maker.case(&subject.model, &subject.name, config.seed, index);
+                case.map_err(|e| e.to_string())
+            });
+            let presented = case.as_ref().map_err(Clone::clone).and_then(|case| {
+                let seen = condition.corruption.apply(case);
+                let (depth, mask) = seen.map_err(|e| e.to_string())?;
+                Ok(Presented {
+                    subject,
+                    case,
+                    depth: Arc::new(depth),
+                    mask,
+                    model: self.model(object, condition.model_level)?,
+                })
+            });
             for variant in 0..config.variants.len() {
-                let measured = match &presented {
-                    Ok(presented) => self.measure(object, level, variant, presented),
-                    Err(error) => Err(error.clone()),
-                };
-                outcomes.push(measured);
+                let presented = presented.as_ref().map_err(Clone::clone);
+                outcomes.push(presented.and_then(|it| self.measure(level, variant, it)));
             }
         }
         outcomes
-    }
-
-    fn case(&mut self, object: usize, index: u64, binned: bool) -> Result<Case, String> {
-        let maker = match binned {
-            true => &mut self.binned,
-            false => &mut self.fixed,
-        };
-        let (subject, seed) = (&self.subjects[object], self.config.seed);
-        let case = maker.case(&subject.model, &subject.name, seed, index);
-        case.map_err(|e| e.to_string())
-    }
-
-    fn present<'c>(
-        &self,
-        object: usize,
-        case: &'c Case,
-        condition: &Condition,
-    ) -> Result<Presented<'c>, String>
-    where
-        'a: 'c,
-    {
-        let (depth, mask) = condition
-            .corruption
-            .apply(case)
-            .map_err(|e| e.to_string())?;
-        Ok(Presented {
-            case,
-            depth: Arc::new(depth),
-            mask,
-            model: self.model(object, condition.model_level)?,
-        })
     }
 
     /// Returns the model of an object at a level: 0 is the original.
@@ -139,13 +112,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    fn measure(
-        &mut self,
-        object: usize,
-        level: usize,
-        variant: usize,
-        presented: &Presented<'_>,
-    ) -> Outcome {
+    fn measure(&mut self, level: usize, variant: usize, presented: &Presented<'_>) -> Outcome {
         let level = level.min(self.stages.len() - 1);
         let stage = &mut self.stages[level][variant];
         let workspace = &mut self.workspaces[variant];
@@ -165,11 +132,11 @@ impl<'a> Runner<'a> {
             let behind = Isometry3::translation(0.0, 0.0, -10.0 - f64::from(self.forgotten));
             workspace.context(&problem).view(&behind);
         }
-        let (subject, pose) = (&self.subjects[object], outcome.camera_from_object);
+        let (subject, pose) = (presented.subject, outcome.camera_from_object);
         let truth = &case.camera_from_object;
         Ok(Measured {
             vsd_initial: case.vsd_initial,
-            vsd_final: self.fixed.vsd(&subject.model, truth, &pose),
+            vsd_final: self.makers[0].vsd(&subject.model, truth, &pose),
             add_final_mm: subject.add_or_adi_mm(&pose, truth),
             steps: outcome.iterations,
             termination: outcome.termination.name().to_owned(),
