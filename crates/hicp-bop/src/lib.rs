@@ -18,7 +18,7 @@
 //!     masks: MaskSource::Visible,
 //! };
 //! // One refiner per thread; images may be refined in any order.
-//! let mut refiner = Refiner::preset(Preset::Hybrid);
+//! let mut refiner = Refiner::preset(Preset::Auto);
 //! for (frame, indices) in frames_of(&rows) {
 //!     let result = shared.frame(&mut refiner, frame, &rows, &indices);
 //!     result.enter(&mut rows, Rescore::Mve, true);

@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--scale", type=float, default=0.001)
     options = parser.parse_args()
 
-    pipeline = Pipeline.preset("hybrid")
+    pipeline = Pipeline.preset("auto")
     if options.model:
         model, observation, rough = read(options)
     else:

@@ -24,7 +24,7 @@ def detect(depth: npt.NDArray[np.float32]) -> tuple[npt.NDArray[np.bool_], Array
 def refine(model: Model, camera: Camera, depth: npt.NDArray[np.float32]) -> Array:
     """What a robot calls per detection: a pose to trust, or an exception."""
     mask, rough = detect(depth)
-    result = Pipeline.preset("hybrid").refine(model, Observation(depth, mask, camera), rough)
+    result = Pipeline.preset("auto").refine(model, Observation(depth, mask, camera), rough)
     if result.mve > 0.4:
         raise RuntimeError(f"not to be trusted: {result}")
     return result.T_co

@@ -9,7 +9,7 @@
 //!
 //! model = Model.from_file("mug.ply", unit="mm")
 //! observation = Observation(depth_m, mask, Camera.from_K(K, (640, 480)))
-//! result = Pipeline.preset("hybrid").refine(model, observation, T_co)
+//! result = Pipeline().refine(model, observation, T_co)
 //! ```
 //!
 //! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has

@@ -22,14 +22,22 @@ const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], metr
 /// A refinement pipeline: Hybrid ICP, one of the classical variants that it was compared with, or
 /// your own from a TOML file.
 ///
-/// Made by `Pipeline.preset` or `Pipeline.from_toml`. It keeps scratch memory from call to call and
-/// may be shared by threads.
+/// `Pipeline()` is the default, "auto". `Pipeline.from_toml` reads a custom one. A pipeline keeps
+/// scratch memory from call to call, and threads may share it.
+///
+/// Parameters
+/// ----------
+/// name : str, optional
+///     One of `Pipeline.presets()`: "auto" refines and, if the score stays bad, searches; "local"
+///     never searches; "hybrid" is the method of the paper.
+/// overrides : sequence of str, optional
+///     Fields to set, such as "threshold=0.3" of "auto" or "times=3" of "hybrid".
 ///
 /// Examples
 /// --------
 /// >>> from hybrid_icp import Pipeline
-/// >>> Pipeline.preset("hybrid")
-/// Pipeline('hybrid')
+/// >>> Pipeline()
+/// Pipeline('auto')
 /// >>> Pipeline.preset("hybrid", overrides=["times=1"]).name
 /// 'hybrid times=1'
 #[pyclass(frozen, module = "hybrid_icp", name = "Pipeline")]
@@ -50,7 +58,13 @@ type Pickled = (Py<PyAny>, (String, String, Vec<String>));
 #[pymethods]
 #[allow(non_snake_case)]
 impl PyPipeline {
-    /// Makes a pipeline by name.
+    #[new]
+    #[pyo3(signature = (name = "auto", *, overrides = Vec::new()))]
+    fn new(name: &str, overrides: Vec<String>) -> PyResult<Self> {
+        Self::preset(name, overrides)
+    }
+
+    /// Makes a pipeline by name: the same as `Pipeline(name)`.
     ///
     /// Parameters
     /// ----------
@@ -188,7 +202,7 @@ impl PyPipeline {
     /// >>> depth = render_depth(model, camera, true)
     /// >>> observation = Observation(depth, depth > 0, camera)
     /// >>> rough = np.eye(4); rough[2, 3] = 0.54
-    /// >>> result = Pipeline.preset("hybrid").refine(model, observation, rough)
+    /// >>> result = Pipeline().refine(model, observation, rough)
     /// >>> bool(abs(result.T_co[2, 3] - 0.5) < 1e-4)
     /// True
     #[pyo3(signature = (model, observation, T_co, observer = None))]

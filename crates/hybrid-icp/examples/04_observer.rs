@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let given = scene::Scene::new()?;
     let (model, observation) = given.problem()?;
     let mut table = Table { truth: given.truth };
-    let mut refiner = Refiner::preset(Preset::Hybrid);
+    let mut refiner = Refiner::preset(Preset::Auto);
     let observed = refiner.refine_observed(&model, &observation, &given.detected, &mut table);
     // Looking changes nothing.
     let unobserved = refiner.refine(&model, &observation, &given.detected);

@@ -1,8 +1,8 @@
 """Refine 6D object poses in depth images.
 
-A detector gives a segmentation mask and a rough pose; `Pipeline.refine` makes it a better one and says how well it explains the
-image. `Pipeline.preset("hybrid")` is Hybrid ICP (Dreczkowski & Johns), which looks at the image to decide how to register; ``"auto"``,
-the default of the program and of `hybrid_icp.ray`, also searches for the object where refinement fails.
+A detector gives a segmentation mask and a rough pose. `Pipeline().refine` returns a better pose and its score. `Pipeline()` runs
+the default ``"auto"``, which also searches for the object if refinement fails. `Pipeline("hybrid")` is the method of the paper
+(Dreczkowski & Johns), which selects the registration from the image.
 
 Conventions: metres and radians; poses are 4x4 float64 matrices ``T_co`` that take object coordinates to the camera's; cameras look
 along +z with x right and y down; images are indexed [v, u] with pixel centres at integers; depth is along the optical axis, 0 where
@@ -22,7 +22,7 @@ A plate half a metre in front of the camera, and a detector that is four centime
 >>> observation = Observation(depth, depth > 0, camera)
 >>> rough = np.eye(4)
 >>> rough[2, 3] = 0.54
->>> result = Pipeline.preset("hybrid").refine(model, observation, rough)
+>>> result = Pipeline().refine(model, observation, rough)
 >>> result.outcome, bool(result.mve < result.mve_initial)
 ('refined', True)
 """

@@ -163,6 +163,7 @@ class Observation:
 
 @final
 class Pipeline:
+    def __new__(cls, name: str = "auto", *, overrides: Sequence[str] = ...) -> Pipeline: ...
     @staticmethod
     def preset(name: str, *, overrides: Sequence[str] = ...) -> Pipeline: ...
     @staticmethod

@@ -3,7 +3,7 @@
 Each image is a piece of work that depends on nothing else, and equal input gives equal bytes:
 
     images = read_images("cosypose_ycbv-test.csv")
-    refiner = DatasetRefiner("bop/ycbv", "test", Pipeline.preset("hybrid"), object_ids(images))
+    refiner = DatasetRefiner("bop/ycbv", "test", Pipeline(), object_ids(images))
     lines = {}
     for scene_id, im_id, indices, rows in images:  # On whatever machine.
         refined, statuses, faults = refiner.refine(rows)
