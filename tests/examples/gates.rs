@@ -1,10 +1,10 @@
-//! How many right and wrong poses a threshold on the MVE accepts, as a Markdown table.
+//! Counts the right and wrong poses that a threshold on the MVE accepts, as a Markdown table.
 //!
 //! `cargo run --release -p hicp-tests --example gates [SCENES]`
 //!
-//! Scenes of six objects on a table, with the depth noise of an Intel D435. Each visible object is refined
-//! by `auto`: its own model from near and from any rotation, its model in other proportions, and the model
-//! of another object. A pose with a warning is not accepted.
+//! Scenes of six objects on a table, with the depth noise of an Intel D435. Each visible object is
+//! refined by `auto`: its own model from near and from any rotation, its model in other
+//! proportions, and the model of another object. A pose with a warning is not accepted.
 
 use hicp_sim::{
     AxialPolynomial, Clutter, DepthNoise, DepthSensor, Household, Proportions, perturb, rng,

@@ -1,4 +1,5 @@
-//! Refines 200 starts that are 6.2 mm and 9.5° off, on ten synthetic objects, with every preset on the same images.
+//! Refines 200 starts that are 6.2 mm and 9.5° off, on ten synthetic objects, with every preset on
+//! the same images.
 //!
 //! `cargo run --release -p hicp-tests --example synthetic_starts [DEPTH_NOISE_PERCENT]`
 
@@ -39,7 +40,8 @@ fn main() {
                 MEAN_ROTATION_ERROR_DEGREES.to_radians(),
             );
             for (_, refiner, column) in &mut refiners {
-                // A fresh observation, so that normals and search trees are part of everyone's time.
+                // A fresh observation, so that normals and search trees are part of everyone's
+                // time.
                 let start = Instant::now();
                 let observation = scene.observe_anew();
                 let refined = refiner.refine(&scene.model, &observation, &init);

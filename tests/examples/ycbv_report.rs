@@ -1,6 +1,6 @@
-//! Refines the estimates of four detectors on five real YCB-Video frames with every pipeline: median ADI and MVE before and
-//! after, how the ground truth stays put, and times as ratios to nn-point-to-point: medians, and means, which show a search that
-//! runs for few rows.
+//! Refines the estimates of four detectors on five real YCB-Video frames with every pipeline:
+//! median ADI and MVE before and after, how the ground truth stays put, and times as ratios to
+//! nn-point-to-point: medians, and means, which show a search that runs for few rows.
 //!
 //! `cargo run --release -p hicp-tests --example ycbv_report`
 
@@ -69,7 +69,8 @@ fn main() {
             let (mut errors, mut scores) = (Vec::new(), Vec::new());
             for (index, init) in starts {
                 let instance = &instances[*index];
-                // A fresh observation each time, so that its normals and trees are part of the time.
+                // A fresh observation each time, so that its normals and trees are part of the
+                // time.
                 let mut refiner = Refiner::preset(preset);
                 let start = Instant::now();
                 let observation = instance.observe();

@@ -1,4 +1,5 @@
-//! What the cross-crate tests and the benches share: scenes, starts, data, an allocator that counts.
+//! What the cross-crate tests and the benches share: scenes, starts, data, an allocator that
+//! counts.
 
 pub mod allocations;
 pub mod fuzz;
@@ -54,10 +55,11 @@ impl Scene {
         .expect("sizes agree")
     }
 
-    /// The same view with an upright bar over a `share` of the width of the mask's middle, flat, and nearer than the nearest
-    /// point of the object by `meters`.
+    /// The same view with an upright bar over a `share` of the width of the mask's middle, flat,
+    /// and nearer than the nearest point of the object by `meters`.
     ///
-    /// `masked` says whether the segmentation takes the bar for the object, as detectors do with hands and grippers.
+    /// `masked` says whether the segmentation takes the bar for the object, as detectors do with
+    /// hands and grippers.
     pub fn behind_a_bar(&self, share: f64, meters: f32, masked: bool) -> Observation {
         let (width, height) = (
             self.observation.camera().width(),
@@ -89,7 +91,8 @@ impl Scene {
     }
 }
 
-/// Returns the median; the mean of the two middle values of an even number. Sorts the values; NaN without any.
+/// Returns the median; the mean of the two middle values of an even number. Sorts the values; NaN
+/// without any.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
@@ -152,7 +155,8 @@ pub fn scene(object: Household, noise_percent: f64, rng: &mut SimRng) -> Scene {
     }
 }
 
-/// Returns the rotation (radians) and translation (metres) error, up to the declared symmetries: about a continuous one only the direction of the axis counts.
+/// Returns the rotation (radians) and translation (metres) error, up to the declared symmetries:
+/// about a continuous one only the direction of the axis counts.
 pub fn symmetric_pose_distance(
     pose: &Isometry3<f64>,
     truth: &Isometry3<f64>,

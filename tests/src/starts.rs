@@ -1,4 +1,5 @@
-//! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a table row of how a pipeline does on them.
+//! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a table row of how a pipeline
+//! does on them.
 
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hybrid_icp::core::{Isometry3, Problem};
@@ -48,7 +49,8 @@ pub struct Row {
     pub degrees_p90: f64,
     /// Median translation error, millimetres.
     pub millimeters: f64,
-    /// Median of [`hybrid_icp::icp::Outcome::iterations`]: every evaluation, the first and the rejected included.
+    /// Median of [`hybrid_icp::icp::Outcome::iterations`]: every evaluation, the first and the
+    /// rejected included.
     pub iterations: f64,
     /// Share of the starts whose pose was kept.
     pub kept: f64,
@@ -92,8 +94,9 @@ pub fn measure_stage(stage: &mut dyn Stage, starts: &[Start]) -> Row {
     }
 }
 
-/// A stage of the visible surface with a given association and metric (TOML), that ends when the next increment moves the
-/// object by less than 0.1 mm and 0.01°, or after 50 evaluations. No filter, no divergence rule.
+/// A stage of the visible surface with a given association and metric (TOML), that ends when the
+/// next increment moves the object by less than 0.1 mm and 0.01°, or after 50 evaluations. No
+/// filter, no divergence rule.
 pub fn plain_icp(association: &str, metric: &str) -> String {
     format!(
         "type = \"icp\"\nselection = \"visible-surface\"\nassociation = {association}\nmetric = {metric}\n\

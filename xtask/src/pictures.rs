@@ -17,7 +17,8 @@ pub(crate) fn draw() -> Result<()> {
 const ESTIMATES: &str = "sundermeyer_ycbv-test.csv";
 const IMAGES: [(&str, &str); 3] = [("48", "1"), ("50", "1"), ("53", "1")];
 
-/// Draws the gallery of real frames into `target/pictures`. `BOP_PATH` names the folder of the datasets.
+/// Draws the gallery of real frames into `target/pictures`. `BOP_PATH` names the folder of the
+/// datasets.
 pub(crate) fn draw_data() -> Result<()> {
     let root =
         std::env::var("BOP_PATH").context("BOP_PATH: expected the folder that holds ycbv")?;

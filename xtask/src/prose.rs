@@ -1,5 +1,5 @@
-//! The style of comments and Markdown: sentences and lines that are hard to read, and links to files that
-//! do not exist.
+//! The style of comments and Markdown: sentences and lines that are hard to read, and links to
+//! files that do not exist.
 
 use std::path::Path;
 
@@ -29,10 +29,25 @@ const EXCEPT: [&str; 4] = [
     "docs/study/",
     "CHANGELOG.md",
 ];
-/// Where a finding is an error. Findings elsewhere are printed.
-const CLEAN: [&str; 4] = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/"];
+/// Folders and files in which a finding is an error. Findings elsewhere are counted.
+const CLEAN: [&str; 14] = [
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "README.md",
+    "SECURITY.md",
+    "crates/hicp-association/",
+    "crates/hicp-core/",
+    "crates/hicp-fusion/",
+    "crates/hicp-icp/",
+    "crates/hicp-metric/",
+    "crates/hicp-raster/",
+    "crates/hicp-score/",
+    "crates/hicp-switch/",
+    "docs/",
+    "xtask/",
+];
 
-/// Prints the number of findings per folder, or all of them, and returns those in [`CLEAN`] folders.
+/// Prints the number of findings, or all of them, and returns those in [`CLEAN`] folders.
 pub(crate) fn check(print: bool) -> Result<Vec<String>> {
     let mut findings = Vec::new();
     for path in files(Path::new("."), &["rs", "md"]) {

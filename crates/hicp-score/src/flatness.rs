@@ -25,8 +25,8 @@ const FLAT: f64 = 0.03;
 /// The flatness of the measured and the rendered surface where both are visible.
 ///
 /// A wall, a table or a box in the place of the object may still have a good MVE. Its finest
-/// tolerance is 5 % of the diameter, so a face or a side of the object fits against it. A plane then
-/// explains the depth better than the pose does.
+/// tolerance is 5 % of the diameter, so a face or a side of the object fits against it. A plane
+/// then explains the depth better than the pose does.
 ///
 /// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer.
 /// The pixels are those of the mask with depth where the model is rendered, on a grid of at most

@@ -14,8 +14,8 @@
 //! ```
 //!
 //! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is
-//! enough. Depend on one of those alone if you write a component and want few dependencies. `hicp-io`
-//! reads files (meshes, PNGs, BOP datasets).
+//! enough. Depend on one of those alone if you write a component and want few dependencies.
+//! `hicp-io` reads files (meshes, PNGs, BOP datasets).
 //!
 //! # Compose your own
 //!
@@ -41,8 +41,8 @@
 //!
 //! # Parts by role
 //!
-//! Every role is a trait. The last column names the example to copy for a custom part, in the folder
-//! `examples` of this crate.
+//! Every role is a trait. The last column names the example to copy for a custom part, in the
+//! folder `examples` of this crate.
 //!
 //! | role | trait | what ships | example |
 //! |---|---|---|---|
@@ -60,12 +60,14 @@
 //! | observes a run | [`Observer`](icp::Observer) | [`Trace`] | `04_observer` |
 //!
 //! With the feature `pipeline`, which is on by default, the module `pipeline` reads the same
-//! compositions from TOML files. `hicp-testkit` checks custom parts against the laws of their trait.
+//! compositions from TOML files. `hicp-testkit` checks custom parts against the laws of their
+//! trait.
 //!
 //! # Conventions
 //!
-//! Meters and radians. `camera_from_object` takes object coordinates to those of the camera. Cameras
-//! look along +z with x right and y down. Pixel centers are at integers. [`nalgebra`] is re-exported.
+//! Meters and radians. `camera_from_object` takes object coordinates to those of the camera.
+//! Cameras look along +z with x right and y down. Pixel centers are at integers. [`nalgebra`] is
+//! re-exported.
 
 mod calibration;
 mod checks;

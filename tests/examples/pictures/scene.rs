@@ -32,8 +32,8 @@ pub(crate) struct Scene {
 pub(crate) type Crop = (u32, u32, u32, u32);
 
 impl Scene {
-    /// Puts objects on a table, each at (x, y) in meters and rotated around the vertical by degrees.
-    /// The camera looks at the origin from `distance` meters, 35° above the table.
+    /// Puts objects on a table, each at (x, y) in meters and rotated around the vertical by
+    /// degrees. The camera looks at the origin from `distance` meters, 35° above the table.
     pub(crate) fn on_a_table(
         distance: f64,
         objects: &[(Household, f64, f64, f64)],

@@ -40,7 +40,8 @@ pub trait Stage {
     }
 }
 
-/// A stage behind a box, as a name or a file selects it: the same code and the same bits as the literal.
+/// A stage behind a box, as a name or a file selects it: the same code and the same bits as the
+/// literal.
 pub type BoxedStage = Box<dyn Stage + Send>;
 
 macro_rules! forward {
