@@ -19,7 +19,7 @@ pub struct Pair {
     /// is an index into the model's elements.
     pub source_index: u32,
     /// The index of the target element: row-major in the observation's region, see
-    /// [`crate::Observation::surfel`].
+    /// [`Observation::surfel`](crate::Observation::surfel).
     pub target_index: u32,
 }
 

@@ -2,7 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The identity of an immutable [`crate::Model`] or [`crate::Observation`] within this process.
+/// The identity of an immutable [`Model`](crate::Model) or [`Observation`](crate::Observation)
+/// within this process.
 ///
 /// Two values with the same id hold the same data. The number itself has no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

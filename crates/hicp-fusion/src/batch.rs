@@ -23,7 +23,7 @@ pub(crate) enum Weights {
 /// `average` weighs the estimates equally; `weighted-average` uses their own covariances. In both
 /// methods, the covariance of the result follows from those of the estimates. The covariance of a
 /// camera motion is added to every held estimate. Its errors are the same in all of them, which
-/// [`crate::RecursiveFuser`] accounts for and this fuser does not.
+/// [`RecursiveFuser`](crate::RecursiveFuser) accounts for and this fuser does not.
 ///
 /// Cost of an update: about 1 µs per held estimate, see [`Fusion`]. Memory: about 700 bytes per
 /// estimate, up to the window.

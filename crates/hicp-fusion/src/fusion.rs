@@ -56,7 +56,8 @@ impl Fusion {
 
     /// Adds an estimate.
     ///
-    /// Directions without variance get the standard deviation [`crate::MIN_STANDARD_DEVIATION`].
+    /// Directions without variance get the standard deviation
+    /// [`MIN_STANDARD_DEVIATION`](crate::MIN_STANDARD_DEVIATION).
     pub fn push(&mut self, estimate: &PoseEstimate) {
         self.push_weighted(&estimate.camera_from_object, &estimate.covariance);
     }

@@ -39,8 +39,8 @@ impl Default for Gate {
 /// A fuser behind a [`Gate`]: estimates that fail are not fused.
 ///
 /// Until an estimate passes, the one with the lowest MVE, and the first of equals, is held alone
-/// and provisionally. Use it inside [`crate::SymmetryAware`] and not around it, because a symmetric
-/// pose is not an outlier.
+/// and provisionally. Use it inside [`SymmetryAware`](crate::SymmetryAware) and not around it,
+/// because a symmetric pose is not an outlier.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Matrix6};

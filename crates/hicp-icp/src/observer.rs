@@ -16,7 +16,7 @@ use crate::outcome::{Evaluation, Outcome};
 )]
 pub trait Observer {
     /// Receives an evaluated pose. `Break` ends the stage there, with
-    /// [`crate::Termination::Stopped`].
+    /// [`Termination::Stopped`](crate::Termination::Stopped).
     ///
     /// If a stop rule rejects the pose, its judgment takes precedence. Composed stages continue
     /// with the next part and call the observer again.

@@ -9,8 +9,9 @@ use crate::vsd::{ScoreError, visibility_masks, vsd};
 ///
 /// `test` is the measured depth. `estimate` and `truth` are renders of the object at both poses
 /// with the camera of the test image. `diameter` and `delta`, the visibility tolerance, are in
-/// meters. `delta` is [`crate::VISIBILITY_TOLERANCE_METERS`] for all datasets except ITODD, where
-/// it is 0.005. If neither render shows a visible pixel, the result is 1 for every τ.
+/// meters. `delta` is [`VISIBILITY_TOLERANCE_METERS`](crate::VISIBILITY_TOLERANCE_METERS) for all
+/// datasets except ITODD, where it is 0.005. If neither render shows a visible pixel, the result is
+/// 1 for every τ.
 ///
 /// Cost: O(pixels of the smallest rectangle around both renders), since neither pose can be visible
 /// elsewhere.

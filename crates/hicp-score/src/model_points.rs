@@ -61,7 +61,7 @@ impl ModelPoints {
         add(estimate, truth, &self.points)
     }
 
-    /// Returns [`crate::adi`], in meters. Cost: O(n log n), without building the tree.
+    /// Returns [`adi`](crate::adi), in meters. Cost: O(n log n), without building the tree.
     #[must_use]
     pub fn adi(&self, estimate: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
         self.nearest.adi(estimate, truth, &self.points)

@@ -31,7 +31,7 @@ pub fn add(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f
 /// of their spacing. [`mssd`] over the symmetries does not have such a floor.
 ///
 /// Cost: O(n log n) for the search tree over the points and for the search.
-/// [`crate::ModelPoints::adi`] builds the tree once.
+/// [`ModelPoints::adi`](crate::ModelPoints::adi) builds the tree once.
 #[must_use]
 pub fn adi(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, points: &[Point3<f32>]) -> f64 {
     NearestPoints::new(points).adi(estimate, truth, points)

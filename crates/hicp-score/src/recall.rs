@@ -15,7 +15,7 @@ const AD_THRESHOLD: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseErrors {
-    /// e_VSD(τ); see [`crate::bop_vsd`].
+    /// e_VSD(τ); see [`bop_vsd`](crate::bop_vsd).
     pub vsd: [f64; N_TOLERANCES],
     /// MSSD, meters.
     pub mssd_m: f64,

@@ -11,10 +11,10 @@ use crate::tolerances::{AgreementCounts, mean};
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
 /// It splats points of the model's surface into a coarse depth buffer and compares the buffer with
-/// the observation, as [`crate::MeanVsd`] compares a render. It costs about 10 µs for every mesh.
-/// It does not replace the MVE for accepting or reporting a pose: pixels without a sample count as
-/// not rendered, and thin parts may be missed. Samples of a closed mesh that face away from the
-/// camera are skipped.
+/// the observation, as [`MeanVsd`](crate::MeanVsd) compares a render. It costs about 10 µs for
+/// every mesh. It does not replace the MVE for accepting or reporting a pose: pixels without a
+/// sample count as not rendered, and thin parts may be missed. Samples of a closed mesh that face
+/// away from the camera are skipped.
 ///
 /// Cost: O(samples) per pose. The samples are computed once per model and shared, and so is the
 /// coarse observation.
@@ -46,7 +46,7 @@ impl SampledMve {
     }
 
     /// Creates the default score for masks that miss a part of the object, like
-    /// [`crate::MeanVsd::lenient`].
+    /// [`MeanVsd::lenient`](crate::MeanVsd::lenient).
     #[must_use]
     pub fn lenient() -> Self {
         Self {

@@ -17,7 +17,7 @@ use hicp_score::Score;
 /// Cost: a score, and at most `max_steps` × (a stage and a score).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SwitchUntilStall<C, A, M> {
-    /// The score, lower is better: the MVE, as in [`crate::Threshold`].
+    /// The score, lower is better: the MVE, as in [`Threshold`](crate::Threshold).
     pub score: C,
     /// The smallest score of a misaligned estimate.
     pub alpha: f64,

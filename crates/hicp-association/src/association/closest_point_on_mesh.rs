@@ -13,8 +13,8 @@ use crate::stride::Stride;
 /// Pairs every observed point with the exact closest point on the model's triangles.
 ///
 /// It implements the search of Besl & McKay 1992, §III, from the observation to the model; see
-/// [`crate::ObservationToModel`]. It avoids the error of a sampled surface, half the spacing of the
-/// samples, and the noise that this adds to the direction.
+/// [`ObservationToModel`](crate::ObservationToModel). It avoids the error of a sampled surface,
+/// half the spacing of the samples, and the noise that this adds to the direction.
 ///
 /// Each observed point is moved into the object frame. Branch and bound over a tree of boxes finds
 /// the closest point. The tree is built once per model and shared by all threads. The source of the

@@ -20,9 +20,10 @@ use crate::stride::Stride;
 /// ([`hicp_core::sample_surface`]). It does not move with the estimate, so it is built once per
 /// model and shared by all threads, images and hypotheses.
 ///
-/// [`crate::ClosestPointOnMesh`] is exact. It costs about three times as much if every element is
-/// allowed, and half as much if many hidden samples must be skipped, as for thin walls. For a mug
-/// and 1,800 observed points, this association takes 0.8 and 5.6 ms, and the exact one 2.7 ms.
+/// [`ClosestPointOnMesh`](crate::ClosestPointOnMesh) is exact. It costs about three times as much
+/// if every element is allowed, and half as much if many hidden samples must be skipped, as for
+/// thin walls. For a mug and 1,800 observed points, this association takes 0.8 and 5.6 ms, and the
+/// exact one 2.7 ms.
 ///
 /// The source of a pair is still the model's point, moved by the current estimate, and its target
 /// the observed point. `source` is ignored. `source_index` is the index of the sample. All observed

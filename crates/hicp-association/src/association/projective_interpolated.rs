@@ -15,8 +15,8 @@ use crate::association::pixel_projection::PixelProjection;
 ///
 /// It does not interpolate across depth edges. All four pixels need a surfel whose depth is within
 /// `max_step` of that of the pixel that contains the projection. Otherwise, or if the four normals
-/// cancel, that pixel gives the target as in [`crate::Projective`]. In both cases `target_index` is
-/// that pixel.
+/// cancel, that pixel gives the target as in [`Projective`](crate::Projective). In both cases
+/// `target_index` is that pixel.
 ///
 /// Cost: O(1) per point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,8 @@ use crate::search::nearest::distance_squared;
 /// Pairs a model point with the closest observed point in a window around its projected pixel.
 ///
 /// Sources: Benjemaa & Schmitt 1997; Dorai et al. 1998. It is a compromise between
-/// [`crate::Projective`], which it equals at radius 0, and a nearest-neighbor search. A window of
-/// ±r pixels bridges misalignments and holes of r pixels, and does not need a tree.
+/// [`Projective`](crate::Projective), which it equals at radius 0, and a nearest-neighbor search. A
+/// window of ±r pixels bridges misalignments and holes of r pixels, and does not need a tree.
 ///
 /// Distances are in three dimensions. Of equally close points, the first in row-major order is
 /// used. The window is clipped at the border of the observed region. A point that projects outside

@@ -33,7 +33,7 @@ impl Nearest {
     }
 }
 
-/// An index over points for [`crate::NearestNeighbor`].
+/// An index over points for [`NearestNeighbor`](crate::NearestNeighbor).
 pub(crate) trait PointIndex: Send + Sync + 'static {
     /// Builds the index. The points must be finite.
     fn new(points: &[Point3<f32>]) -> Self;

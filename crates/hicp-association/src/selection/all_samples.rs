@@ -7,8 +7,9 @@ use crate::selection::point_selection::PointSelection;
 /// Selects all of the model's area-uniform surface samples, visible or not.
 ///
 /// It is the literal reading of O in §III-A. Nearest-neighbor association drags points of the
-/// hidden side onto the visible surface. If the model can be rendered, [`crate::VisibleSurface`] is
-/// therefore the better choice. Cost: a copy of the samples.
+/// hidden side onto the visible surface. If the model can be rendered,
+/// [`VisibleSurface`](crate::VisibleSurface) is therefore the better choice. Cost: a copy of the
+/// samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AllSamples;
 

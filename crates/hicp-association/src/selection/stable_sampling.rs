@@ -20,7 +20,7 @@ use crate::selection::point_selection::PointSelection;
 ///
 /// The order of the inner selection does not change. Of equal contributions, the first is drawn. If
 /// there are at most `count` points, all are kept. It works best on visible points
-/// ([`crate::VisibleSurface`] inside), because the hidden side constrains nothing.
+/// ([`VisibleSurface`](crate::VisibleSurface) inside), because the hidden side constrains nothing.
 ///
 /// Cost: the inner selection, and O(6 n log n).
 #[derive(Clone, Debug, PartialEq)]

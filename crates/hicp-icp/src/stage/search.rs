@@ -78,8 +78,8 @@ impl Default for SearchOptions {
 /// a better ranked one is not refined.
 ///
 /// **Contract**: the score of the returned pose is never above that of the local stage's pose. A
-/// local stage in a [`crate::Guard`] is never worse than the initial pose. With a bound, a pose
-/// outside of it is never returned; the initial pose replaces a local pose that is outside.
+/// local stage in a [`Guard`](crate::Guard) is never worse than the initial pose. With a bound, a
+/// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
 /// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
 /// score, `refined` × the exploring stage, and the local stage once more.

@@ -8,8 +8,8 @@ use crate::session::Session;
 
 /// Refines a pose.
 ///
-/// [`crate::Icp`], [`crate::Cascade`], [`crate::Repeat`] and `Switch` are stages, and so is any
-/// composition of them: Hybrid ICP is a struct literal.
+/// [`Icp`](crate::Icp), [`Cascade`](crate::Cascade), [`Repeat`](crate::Repeat) and `Switch` are
+/// stages, and so is any composition of them: Hybrid ICP is a struct literal.
 ///
 /// # Contract
 ///

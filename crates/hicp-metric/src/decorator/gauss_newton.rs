@@ -12,7 +12,7 @@ use crate::metric::minimize::Minimize;
 /// linearized point-to-plane step leaves 4° of 15°. It always solves the metric's
 /// [`Minimize::system`], whatever its `minimize` does. The increment is the product of the inner
 /// ones. The mean loss is that *before* the increment. The loss may rise, see
-/// [`crate::LevenbergMarquardt`].
+/// [`LevenbergMarquardt`](crate::LevenbergMarquardt).
 ///
 /// If the first linearization gives no step, neither does this. A later one without a step ends the
 /// iterations.

@@ -14,7 +14,8 @@ const FACTOR: f64 = 10.0;
 const MAX_DAMPING: f64 = 1e12;
 const MIN_DAMPING: f64 = 1e-12;
 
-/// Iterates over one set of pairs like [`crate::GaussNewton`], with only steps that lower the loss.
+/// Iterates over one set of pairs like [`GaussNewton`](crate::GaussNewton), with only steps that
+/// lower the loss.
 ///
 /// The normal equations are damped by λ diag(JᵀWJ) (Levenberg 1944; Marquardt 1963) in scaled
 /// unknowns, so λ has no unit. Each diagonal entry counts as at least 10⁻⁶ of the mean. A step is

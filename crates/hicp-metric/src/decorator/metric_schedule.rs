@@ -8,8 +8,8 @@ use crate::metric::minimize::Minimize;
 /// Selects one metric per iteration: the k-th in the k-th iteration of a stage, then the last.
 ///
 /// A kernel with a decreasing scale starts almost convex and ends selective (graduated
-/// non-convexity: Blake & Zisserman 1987). An example is [`crate::Robust`] with
-/// [`crate::Scale::Meters`] of 20 mm, 10 mm and 5 mm.
+/// non-convexity: Blake & Zisserman 1987). An example is [`Robust`](crate::Robust) with
+/// [`Scale::Meters`](crate::Scale::Meters) of 20 mm, 10 mm and 5 mm.
 ///
 /// During the schedule, stop rules that compare losses receive those of different metrics. Make
 /// them lenient, or use rules on the motion. Without metrics, there is no step.

@@ -14,8 +14,9 @@ const PARALLEL: f64 = 1e-4;
 /// tangent plane: C = I − (1 − ε) n nᵀ, with eigenvalues 1, 1, ε. The original estimates normals
 /// from 20 neighbors; here they are those of the surfels. If both normals agree, the error is ½
 /// |tangential offset|² + (normal offset)²/(2ε). At ε = 1, it is half of that of
-/// [`crate::PointToPoint`]. For ε → 0 and equal normals, it approaches that of point-to-plane over
-/// 2ε. The loss is therefore in m², but 1/(2ε) times as large as that of other metrics.
+/// [`PointToPoint`](crate::PointToPoint). For ε → 0 and equal normals, it approaches that of
+/// point-to-plane over 2ε. The loss is therefore in m², but 1/(2ε) times as large as that of other
+/// metrics.
 ///
 /// The rows are whitened: they are the three eigenvectors of C_c + R C_o Rᵀ, known in closed form,
 /// weighted by the inverse eigenvalues. The matrix is constant during a step, as in the original.

@@ -9,8 +9,9 @@ use crate::system::row_blocks::{Row, system_of_rows};
 /// E = (mᵀ (T o − c))², where the normal m of the model rotates with it, by Gauss–Newton.
 ///
 /// The model's normals do not have the noise of the depth sensor. Otherwise the metric is like
-/// [`crate::PointToPlane`]. By symmetry, its row is that of the observed point: J = [mᵀ, (c × m)ᵀ].
-/// There is no step from fewer than six pairs. Cost: one pass and a 6×6 Cholesky decomposition.
+/// [`PointToPlane`](crate::PointToPlane). By symmetry, its row is that of the observed point: J =
+/// [mᵀ, (c × m)ᵀ]. There is no step from fewer than six pairs. Cost: one pass and a 6×6 Cholesky
+/// decomposition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PlaneToPoint;
 

@@ -9,8 +9,8 @@ use crate::system::normal_equations::NormalEquations;
 ///
 /// Source: Rusinkiewicz, "A Symmetric Objective Function for ICP", TOG 2019, without the ½. Each
 /// side takes half of the motion. The error vanishes if both points lie on a common surface of
-/// second order. The metric therefore converges from farther away than [`crate::PointToPlane`] and
-/// slides less on curved surfaces.
+/// second order. The metric therefore converges from farther away than
+/// [`PointToPlane`](crate::PointToPlane) and slides less on curved surfaces.
 ///
 /// One step is *exact* for exact correspondences. With p̃ = p − p̄, q̃ = q − q̄ and the Gibbs
 /// vector a = axis · tan θ of the half rotation, this problem is linear without approximation:
@@ -19,7 +19,8 @@ use crate::system::normal_equations::NormalEquations;
 /// min Σ w [ (p̃ − q̃)·n + ((p̃ + q̃) × n)·a + n·t' ]²,   T = Trans(q̄) Rot(θ) Trans(t' cos θ) Rot(θ) Trans(−p̄)
 /// ```
 ///
-/// Directions that no normal constrains do not move, as with [`crate::Degeneracy::Damp`].
+/// Directions that no normal constrains do not move, as with
+/// [`Degeneracy::Damp`](crate::Degeneracy::Damp).
 ///
 /// Both normals must have the same orientation. Pairs with n_o · n_c ≤ 0 are on different sides and
 /// are skipped: they have no row, no part in the mean loss, and a squared error of zero. There is

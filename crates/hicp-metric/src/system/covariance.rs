@@ -55,9 +55,10 @@ impl NormalEquations {
     /// - 11 to 26 if the points stay those visible 1 mm and 1° away, because pixels near the
     ///   silhouette then have wrong pairs.
     ///
-    /// At 0.5 %, noisy normals raise point-to-plane of a thin object to 13. [`crate::Generalized`]
-    /// gives 22 to 34 even with the right pairs; use [`crate::sandwich_covariance`] for it. `cargo
-    /// run --release -p hicp-tests --example nees_report 300` reproduces these figures.
+    /// At 0.5 %, noisy normals raise point-to-plane of a thin object to 13.
+    /// [`Generalized`](crate::Generalized) gives 22 to 34 even with the right pairs; use
+    /// [`sandwich_covariance`](crate::sandwich_covariance) for it. `cargo run --release -p
+    /// hicp-tests --example nees_report 300` reproduces these figures.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         let n_free = self.n_free();
@@ -91,11 +92,11 @@ impl NormalEquations {
 /// and independent, as for [`NormalEquations::covariance`], but weights need not be inverse
 /// variances, and the rows of a pair may depend on each other.
 ///
-/// It suits [`crate::Generalized`], whose tangential rows have less noise than its normal ones, so
-/// that the plain covariance is four to five times too small. For projective Generalized ICP, the
-/// mean of ξᵀΣ⁻¹ξ (6 if right) is 5.6 to 6.2 instead of 22 to 29 at 0.2 % of noise, and 5.6 to 5.9
-/// at 0.5 %. Nearest neighbors fit the noise and give 20 at 0.5 % (`cargo run --release -p
-/// hicp-tests --example nees_report 300`).
+/// It suits [`Generalized`](crate::Generalized), whose tangential rows have less noise than its
+/// normal ones, so that the plain covariance is four to five times too small. For projective
+/// Generalized ICP, the mean of ξᵀΣ⁻¹ξ (6 if right) is 5.6 to 6.2 instead of 22 to 29 at 0.2 % of
+/// noise, and 5.6 to 5.9 at 0.5 %. Nearest neighbors fit the noise and give 20 at 0.5 % (`cargo run
+/// --release -p hicp-tests --example nees_report 300`).
 ///
 /// Returns `None` if the pairs do not determine all six directions. Cost: two linearizations.
 pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(

@@ -3,9 +3,9 @@
 /// The treatment of directions of the increment that the pairs do not determine.
 ///
 /// These are the directions whose eigenvalue of the scaled JᵀWJ is at most a threshold times the
-/// largest (see [`crate::Observability`]). A plane and a sphere leave three of six undetermined,
-/// and a cylinder leaves two. The plain solution of such a system slides along them, driven by
-/// noise and rounding.
+/// largest (see [`Observability`](crate::Observability)). A plane and a sphere leave three of six
+/// undetermined, and a cylinder leaves two. The plain solution of such a system slides along them,
+/// driven by noise and rounding.
 ///
 /// With `Freeze` and `Refuse`, nothing slides. With `Damp`, nothing slides along directions that
 /// are exactly undetermined, such as those of a plane. In noise-free depth images of a cylinder and

@@ -68,7 +68,8 @@ impl NormalEquations {
         moved
     }
 
-    /// Returns Σ w over the pairs, if [`crate::ErrorMetric::linearize_all`] summed the system.
+    /// Returns Σ w over the pairs, if
+    /// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all) summed the system.
     pub(crate) fn weight(&self) -> Option<f64> {
         self.weight
     }

@@ -10,8 +10,9 @@ use crate::system::row_sums::RowSums;
 
 /// Returns the system of the residuals p − c of all pairs.
 ///
-/// Up to rounding it equals the provided [`crate::ErrorMetric::linearize_all`], in a sixth of the
-/// time. The three rows of a pair at p are [eₖ, p × eₖ], so JᵀJ only needs Σ w, Σ w p and Σ w p pᵀ.
+/// Up to rounding it equals the provided
+/// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all), in a sixth of the time. The
+/// three rows of a pair at p are [eₖ, p × eₖ], so JᵀJ only needs Σ w, Σ w p and Σ w p pᵀ.
 pub(crate) fn system_of_points(pairs: &[Pair]) -> Option<NormalEquations> {
     let system = vectorized(SumPoints { pairs })?;
     // Sources were checked with the centroid. This check covers targets.

@@ -30,8 +30,9 @@ impl Row {
 
 /// Returns the system of a metric with one row per pair.
 ///
-/// Up to rounding it equals the provided [`crate::ErrorMetric::linearize_all`], in half the time,
-/// because rows lie across the lanes of vectors instead of along them.
+/// Up to rounding it equals the provided
+/// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all), in half the time, because
+/// rows lie across the lanes of vectors instead of along them.
 pub(crate) fn system_of_rows(
     pairs: &[Pair],
     row: impl Fn(&Pair) -> Row,
