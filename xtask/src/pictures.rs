@@ -15,7 +15,7 @@ pub(crate) fn draw() -> Result<()> {
 
 /// The estimates whose poses the gallery of real frames shows, and images of YCB-Video.
 const ESTIMATES: &str = "sundermeyer_ycbv-test.csv";
-const IMAGES: [(&str, &str); 3] = [("48", "1"), ("50", "1"), ("53", "1")];
+const IMAGES: [(u32, u32); 5] = [(50, 1), (51, 1), (52, 34), (53, 33), (54, 1)];
 
 /// Draws the gallery of real frames into `target/pictures`. `BOP_PATH` names the folder of the
 /// datasets.
@@ -27,24 +27,20 @@ pub(crate) fn draw_data() -> Result<()> {
     let folder = target().join("pictures");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let after = folder.join("refined_ycbv-test.csv");
-    let bop = |words: &str| {
+    let bop = |name: &str| {
         let mut command = cargo("run --quiet --bin hybrid-icp -- bop");
-        command
-            .args(words.split(' '))
-            .arg("--dataset")
-            .arg(&dataset);
+        command.arg(name).arg("--dataset").arg(&dataset);
         command
     };
-    execute(
-        bop("refine --results")
-            .arg(&before)
-            .arg("--output")
-            .arg(&after),
-    )?;
+    let mut refine = bop("refine");
+    refine.arg("--results").arg(&before);
+    execute(refine.arg("--output").arg(&after))?;
     for (scene, image) in IMAGES {
         let picture = folder.join(format!("ycbv-{scene}-{image}.png"));
-        let mut show = bop(&format!("show --scene {scene} --image {image} --results"));
-        show.arg(&after).arg("--against").arg(&before);
+        let mut show = bop("show");
+        show.args(["--scene", &scene.to_string(), "--image", &image.to_string()]);
+        show.arg("--results").arg(&after);
+        show.arg("--against").arg(&before);
         execute(show.arg("--out").arg(&picture))?;
         println!("{}", picture.display());
     }
