@@ -161,7 +161,7 @@ impl FromIterator<Pair> for Correspondences {
 
 /// A rigid motion in `f32`, for moving many surfels.
 ///
-/// Its use is the same as that of a pose `b_from_a`: it maps coordinates in frame `a` to frame `b`.
+/// Like a pose `b_from_a`, it maps coordinates in frame `a` to frame `b`.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidTransform {
     rotation: Matrix3<f32>,

@@ -171,7 +171,7 @@ impl PoseEstimate {
         &self.covariance
     }
 
-    /// The mean VSD estimate, if known.
+    /// The mean VSD estimate e_MVE, from 0 (best) to 1, if known.
     #[must_use]
     pub fn mve(&self) -> Option<f64> {
         self.mve

@@ -96,7 +96,7 @@ impl Fusion {
         self.terms.is_empty()
     }
 
-    /// Returns V at a pose, `camera_from_object`.
+    /// Returns V, which has no unit, at a pose `camera_from_object`.
     #[must_use]
     pub fn cost(&self, camera_from_object: &Isometry3<f64>) -> f64 {
         let half_square = |term: &Term| {

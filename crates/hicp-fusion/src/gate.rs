@@ -66,7 +66,7 @@ pub struct Gated<F> {
 }
 
 impl<F: Fuser> Gated<F> {
-    /// Puts a fuser behind a gate.
+    /// Adds a gate to a fuser.
     ///
     /// # Errors
     ///

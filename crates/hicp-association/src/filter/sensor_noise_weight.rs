@@ -35,7 +35,8 @@ pub struct SensorNoise {
     pub linear: f32,
     /// c₂, meters per square meter.
     pub quadratic: f32,
-    /// t. With 0, the tilt has no influence.
+    /// Coefficient t of the tilt term, for z in meters and θ in radians; 0 for no influence of the
+    /// tilt.
     pub tilt: f32,
 }
 

@@ -131,7 +131,7 @@ impl PointTree {
 
 /// Returns the squared distances of the points of a leaf.
 ///
-/// They are rounded as in [`super::nearest::distance_squared`].
+/// They are rounded as in [`distance_squared`](super::nearest::distance_squared).
 #[inline(always)]
 fn distances(leaf: &[[f32; LEAF_SIZE]; 3], query: &Point3<f32>) -> [f32; LEAF_SIZE] {
     let mut distances = [0.0; LEAF_SIZE];

@@ -327,8 +327,7 @@ proptest! {
     }
 }
 
-/// The definition for a triangle: the foot on the plane if it is inside, otherwise the nearest
-/// point of the three edges.
+/// Returns the distance by definition: to the foot on the plane if it is inside, else to an edge.
 fn distance_to_triangle(point: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
     let to_edge = |p: &Point3<f64>, q: &Point3<f64>| {
         let along = q - p;

@@ -308,7 +308,7 @@ impl DisjointSets {
 #[non_exhaustive]
 pub enum MeshError {
     /// There are no triangles.
-    #[error("mesh has {vertices} vertices but no triangle")]
+    #[error("mesh has {vertices} vertices but no triangle, expected at least one triangle")]
     NoTriangles {
         /// Number of vertices.
         vertices: usize,
@@ -350,7 +350,7 @@ pub enum MeshError {
         limit: f32,
     },
     /// Every triangle has zero area.
-    #[error("all {triangles} triangles have zero area")]
+    #[error("all {triangles} triangles have zero area, expected at least one with an area")]
     NoArea {
         /// Number of triangles.
         triangles: usize,

@@ -1,4 +1,4 @@
-//! The pinhole camera, and the distances of its pixels.
+//! Tests of the pinhole camera, and of the distances of its pixels.
 
 use hicp_core::{
     CameraError, DepthImage, ImageError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH,

@@ -15,9 +15,9 @@ const MEMORY: usize = 5;
 /// Sources: Anderson 1965; for ICP, Pavlov et al. 2018 and Zhang, Yao & Deng 2021. The stage is one
 /// step of a fixed-point iteration T ↦ G(T): an ICP stage that ends after one increment, such as
 /// one with `IterationLimit(2)`. The last five residuals f = G(u) − u are twists ln(T T₀⁻¹)
-/// relative to the initial pose. The next start is their combination with the smallest residual. If
-/// the stage's mean loss is not lower after an extrapolation, the plain iterate replaces it and the
-/// memory is cleared, so the loss never rises.
+/// relative to the initial pose. The next start is the combination of iterates with the smallest
+/// residual. If the stage's mean loss is not lower after an extrapolation, the plain iterate
+/// replaces it and the memory is cleared, so the loss never rises.
 ///
 /// It helps if the steps are small and the points stay the same. Point-to-point over nearest
 /// neighbors of all samples took 118 steps instead of 132 to the same loss over six starts

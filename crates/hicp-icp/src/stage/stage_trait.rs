@@ -40,8 +40,9 @@ pub trait Stage {
     }
 }
 
-/// A stage behind a box, as a name or a file selects it: the same code and the same bits as the
-/// literal.
+/// A boxed stage, for stages that a name or a file selects.
+///
+/// It runs the same code as the struct literal and gives the same bits.
 pub type BoxedStage = Box<dyn Stage + Send>;
 
 macro_rules! forward {

@@ -45,7 +45,7 @@ impl Default for Scale {
 ///
 /// The mean loss is that of E over the *original* weights, and not the mean of w r², which is only
 /// part of a majorizer. At a given σ, E falls with every exact step. It rises if pairs drift into
-/// the tail, although their weights vanish there, and it changes in the direction of σ. Stop rules
+/// the tail, although their weights vanish there, and it grows and shrinks with σ. Stop rules
 /// on the mean loss therefore keep their meaning. For [`Kernel::L2`] and for small residuals, it
 /// equals the inner loss.
 ///

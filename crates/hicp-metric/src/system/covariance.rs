@@ -57,7 +57,7 @@ impl NormalEquations {
     ///
     /// At 0.5 %, noisy normals raise point-to-plane of a thin object to 13.
     /// [`Generalized`](crate::Generalized) gives 22 to 34 even with the right pairs; use
-    /// [`sandwich_covariance`](crate::sandwich_covariance) for it. `cargo run --release -p
+    /// [`sandwich_covariance`] for it. `cargo run --release -p
     /// hicp-tests --example nees_report 300` reproduces these figures.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {

@@ -70,8 +70,8 @@ fn invisible_scenes_give_an_empty_view() {
     let cases = [
         ("behind", at(0.0, 0.0, -1.0), image),
         ("before the near plane", at(0.0, 0.0, 0.0099), image),
-        ("beside", at(5.0, 0.0, 1.0), image),
-        ("far beside", at(1.0e6, 0.0, 1.0), image),
+        ("next to it", at(5.0, 0.0, 1.0), image),
+        ("far next to it", at(1.0e6, 0.0, 1.0), image),
         ("not in the region", at(0.1, 0.0, 1.0), aside),
         ("no region", at(0.0, 0.0, 1.0), nothing),
         ("region out of the image", at(0.0, 0.0, 1.0), outside),
