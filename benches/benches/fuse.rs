@@ -1,6 +1,6 @@
-//! Fusing estimates, and a step of the sequential estimator against the ICP inside it.
+//! Fusion of estimates, and a step of the sequential estimator compared with the ICP inside it.
 //!
-//! `cargo bench -p hicp-benches --bench fuse`
+//! Run `cargo bench -p hicp-benches --bench fuse`.
 
 use std::hint::black_box;
 
@@ -16,7 +16,7 @@ use hybrid_icp::icp::{Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{Preset, SequentialEstimator};
 
-/// Estimates as a pipeline makes them: 4 mm and 4° apart, of unequal uncertainty about the object.
+/// Returns estimates 4 mm and 4° apart, with the unequal covariances of a pipeline's output.
 fn estimates(count: usize) -> (Vec<PoseEstimate>, UnitCovariance) {
     let case = case(Household::Mug);
     let mut rng = rng(7);
@@ -34,7 +34,7 @@ fn estimates(count: usize) -> (Vec<PoseEstimate>, UnitCovariance) {
     (estimates, unit)
 }
 
-/// Inverting all covariances and solving: what a batch fuser does in an update.
+/// Measures the inversion of all covariances and the solution: an update of a batch fuser.
 fn fuse(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("fuse");
     for count in [2, 10, 100] {
@@ -53,7 +53,7 @@ fn fuse(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The tenth image: nine estimates are held; the camera moves, and a tenth comes.
+/// Measures the update with the tenth image: nine estimates exist, and the camera has moved.
 fn update(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("fuse-update");
     let (estimates, unit) = estimates(10);
@@ -62,7 +62,7 @@ fn update(criterion: &mut Criterion) {
     for method in FusionMethod::ALL {
         let mut ninth = method.build(FuserConfig {
             unit,
-            // Ten stay ten, however often the bench runs.
+            // The window keeps ten estimates however often the bench runs.
             window: Some(10),
             ..FuserConfig::default()
         });
@@ -84,7 +84,7 @@ fn update(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// ICP alone from a start, and a whole step of the estimator from the same start.
+/// Compares ICP alone with a whole step of the estimator from the same start.
 fn step(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sequential");
     for preset in [Preset::ProjectiveCascadePointPlane, Preset::Hybrid] {
@@ -104,7 +104,8 @@ fn step(criterion: &mut Criterion) {
         });
         let method = FusionMethod::Average;
         for (id, made) in [
-            // Without the MVE, which `average` does not need: the fuser and the bookkeeping alone.
+            // Without the MVE, which `average` does not need: measures the fuser and the
+            // bookkeeping.
             (
                 "step",
                 SequentialEstimator::paper(preset.build(), method, &case.init),

@@ -1,6 +1,9 @@
-//! One iteration of projective point-to-plane over every visible pixel: by hand in AVX2, and through the traits.
+//! One iteration of projective point-to-plane over every visible pixel.
 //!
-//! `cargo bench -p hicp-benches --bench fused`; the throughput is that of source points, so its inverse is the time per pixel and iteration.
+//! Compares the loop written by hand in AVX2 with the traits.
+//!
+//! Run `cargo bench -p hicp-benches --bench fused`. The throughput counts source points, so its
+//! inverse is the time per pixel and iteration.
 
 use std::hint::black_box;
 

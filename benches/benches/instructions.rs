@@ -1,11 +1,12 @@
-//! Instruction counts of every step, measured by valgrind. They vary by less than a percent between
-//! runs, while times vary by tens of percent.
+//! Instruction counts of every step, measured by valgrind.
 //!
-//! Run `cargo xtask instructions`, or `cargo bench -p hicp-benches --features instructions --bench
-//! instructions` with valgrind and a `gungraun-runner` of the library's version on the path. The
-//! instructions of a setup are not counted. A processor without AVX2 runs other code with other
-//! counts.
-#![allow(missing_docs, unused_qualifications)] // The macros' code.
+//! Counts vary by less than a percent between runs, while times vary by tens of percent.
+//!
+//! Run `cargo xtask instructions`. Alternatively, install valgrind and a `gungraun-runner` of the
+//! library's version, and run
+//! `cargo bench -p hicp-benches --features instructions --bench instructions`. The instructions of
+//! a setup are not counted. A processor without AVX2 runs other code with other counts.
+#![allow(missing_docs, unused_qualifications)] // Caused by the macros.
 
 use std::hint::black_box;
 
@@ -29,8 +30,10 @@ use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, Score};
 use hybrid_icp::{Preset, Refinement, Refiner};
 
-/// Fails a bench that executes 3 % more than `instructions`: the count when the limit was set, with
-/// the compiler that `xtask/src/instructions.rs` names. A commit that changes it gives the reason.
+/// Returns a configuration that fails a bench that executes 3 % more than `instructions`.
+///
+/// That is the count when the limit was set, with the compiler that `xtask/src/instructions.rs`
+/// names. A commit that changes a limit gives the reason.
 fn limit(instructions: u64) -> LibraryBenchmarkConfig {
     let mut callgrind = Callgrind::default();
     callgrind.hard_limits([(EventKind::Ir, instructions * 103 / 100)]);
@@ -39,8 +42,7 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
     config
 }
 
-/// A case whose render at the initial pose is in the cache, with the points selected and paired
-/// there.
+/// A case with a cached render at the initial pose, and the points selected and paired there.
 struct Ready {
     case: Case,
     workspace: Workspace,
@@ -170,7 +172,7 @@ fn score(mut ready: Ready) -> (Ready, f64) {
 fn warm() -> (Case, Refiner) {
     let case = case(Household::Mug);
     let mut refiner = Refiner::preset(Preset::Hybrid);
-    // Elsewhere, so that its renders are not those of the measured run.
+    // The first run starts at another pose, so that the measured run finds none of its renders.
     let elsewhere = Isometry3::translation(0.001, 0.0, 0.0) * case.init;
     refiner.refine(&case.scene.model, &case.scene.observation, &elsewhere);
     (case, refiner)

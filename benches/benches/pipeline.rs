@@ -1,6 +1,6 @@
-//! Whole pipelines: every preset by its name, from an observation to a pose and from a depth image to a pose.
+//! Whole pipelines: every preset, from an observation to a pose and from a depth image to a pose.
 //!
-//! `cargo bench -p hicp-benches --bench pipeline`
+//! Run `cargo bench -p hicp-benches --bench pipeline`.
 
 use std::cell::RefCell;
 
@@ -9,7 +9,9 @@ use hicp_benches::{OBJECTS, case, forget_renders};
 use hybrid_icp::core::{Observation, Problem};
 use hybrid_icp::{Preset, Refiner};
 
-/// A warm refinement: the observation, its search tree, the scratch memory, and the renders that fit the cache are there.
+/// Measures warm refinements.
+///
+/// The observation, its search tree, the scratch memory and the cached renders already exist.
 fn pipeline(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("pipeline");
     for object in OBJECTS {
@@ -26,7 +28,10 @@ fn pipeline(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// From the depth image: observation, search tree, every render, refinement and both scores.
+/// Measures refinements from the depth image.
+///
+/// The time includes the observation, the search tree, every render, the refinement and both
+/// scores.
 fn cold(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("pipeline-cold");
     for object in OBJECTS {

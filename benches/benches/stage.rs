@@ -1,6 +1,7 @@
-//! Single ICP stages: each association with each metric as the presets and the peers pair them, warm.
+//! Single warm ICP stages, with the associations and metrics of the presets and the other
+//! libraries.
 //!
-//! `cargo bench -p hicp-benches --bench stage`
+//! Run `cargo bench -p hicp-benches --bench stage`.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use hicp_benches::{OBJECTS, case, stages};

@@ -1,6 +1,8 @@
-//! The steps of the data flow, one group each: `render`, `observe`, `select`, `associate`, `metric`, `score`.
+//! Steps of the data flow, one group each.
 //!
-//! `cargo bench -p hicp-benches --bench steps`
+//! The groups are `render`, `observe`, `select`, `associate`, `metric` and `score`.
+//!
+//! Run `cargo bench -p hicp-benches --bench steps`.
 
 use std::hint::black_box;
 
@@ -72,7 +74,7 @@ fn select(criterion: &mut Criterion) {
         let mut selections: [Box<dyn PointSelection>; 2] =
             [Box::new(AllSamples), Box::new(VisibleSurface::default())];
         for selection in &mut selections {
-            // The render is in the cache: this measures the selection alone.
+            // The render is in the cache, so this measures the selection alone.
             let (mut source, mut workspace) = selected(&case, selection);
             group.bench_function(BenchmarkId::new(selection.name(), case.name), |bencher| {
                 bencher.iter(|| {
@@ -135,7 +137,7 @@ fn score(criterion: &mut Criterion) {
     for case in cases() {
         let problem = Problem::new(&case.scene.model, &case.scene.observation);
         let mut workspace = Workspace::new(Rasterizer::default());
-        // The first call renders; the rest measures the score alone.
+        // The first call renders. The other calls measure the score alone.
         group.bench_function(BenchmarkId::new("mve", case.name), |bencher| {
             bencher.iter(|| {
                 let mut context = workspace.context(&problem);

@@ -7,9 +7,9 @@
 //! - Overrides add a row for the changed pipeline. The two pipelines run in alternation:
 //!   `breakdown 15 nn-point-to-point association.part.index=kd-tree` compares the two indexes.
 //!
-//! Every run starts from a depth image and ends with a scored pose, and finds no render of an
-//! earlier run. Times are exclusive: a render that a selection requests counts as render alone. They
-//! are medians over the repeats, summed over the three objects of the benches.
+//! Every run starts from a depth image, ends with a scored pose, and finds no render of an earlier
+//! run. Times are exclusive: a render that a selection requests counts as a render only. They are
+//! medians over the repeats, summed over the three objects of the benches.
 #![allow(clippy::print_stdout)]
 
 use std::cell::RefCell;
@@ -34,7 +34,7 @@ use hybrid_icp::{BoxedStage, Preset};
 
 type Failure = Box<dyn std::error::Error>;
 
-/// The steps that time is spent on.
+/// Steps whose time is measured.
 const STEPS: [&str; 7] = [
     "observe",
     "render",
@@ -52,7 +52,7 @@ const METRIC: usize = 4;
 const SCORE: usize = 5;
 const REST: usize = 6;
 
-/// The time of each step, and the running steps, the innermost last.
+/// The time of each step, and the stack of running steps.
 struct Clock {
     spent: [Duration; 7],
     running: Vec<usize>,
@@ -67,7 +67,7 @@ thread_local! {
     });
 }
 
-/// Runs `work` as a step.
+/// Runs `work` and adds its time to a step.
 fn timed<T>(step: usize, work: impl FnOnce() -> T) -> T {
     let switch = |next: Option<usize>| {
         CLOCK.with_borrow_mut(|clock| {
@@ -90,7 +90,7 @@ fn timed<T>(step: usize, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// A component whose calls count as a step.
+/// A component whose calls are timed as a step.
 struct Timed<T>(T);
 
 impl<T: PointSelection> PointSelection for Timed<T> {
@@ -174,7 +174,9 @@ impl<T: Switcher> Switcher for Timed<T> {
     }
 }
 
-/// The parts that ship, and for each kind that is a step the part `timed`, which times another one.
+/// Returns the shipped parts, with a part `timed` for each kind that is a step.
+///
+/// A `timed` part measures the part inside it.
 fn catalog() -> Catalog {
     let mut catalog = Catalog::built_in().clone();
     let what = "the part that is timed";
@@ -198,7 +200,7 @@ fn catalog() -> Catalog {
 
 const TIMED: &str = "timed";
 
-/// Wraps the parts of a preset that are steps. Each is on a line of its own in the preset's file.
+/// Wraps the timed parts of a preset. In the preset's file, each part is on a line of its own.
 fn timed_parts(toml: &str) -> String {
     let steps = [
         "selection",
@@ -217,8 +219,9 @@ fn timed_parts(toml: &str) -> String {
     toml.lines().map(wrap).collect()
 }
 
-/// A pipeline with the times of its runs on the current object, and the sums over the objects
-/// before, milliseconds.
+/// A pipeline with the times of its runs.
+///
+/// Holds the runs on the current object, and the sums over earlier objects in milliseconds.
 struct Row {
     name: String,
     stage: BoxedStage,
@@ -242,7 +245,7 @@ impl Row {
         })
     }
 
-    /// Refines from the depth image to a scored pose, as `Refiner` does.
+    /// Refines from the depth image to a scored pose, like `Refiner`.
     fn run(&mut self, case: &Case) -> Result<(), Failure> {
         let (model, seen) = (&case.scene.model, &case.scene.observation);
         let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
@@ -265,7 +268,7 @@ impl Row {
         Ok(())
     }
 
-    /// Adds the medians of the runs to the totals and forgets the runs.
+    /// Adds the medians of the runs to the totals and clears the runs.
     fn end_object(&mut self) {
         for (step, total) in self.totals.iter_mut().enumerate() {
             let mut spent: Vec<Duration> = self.runs.iter().map(|run| run[step]).collect();

@@ -1,14 +1,20 @@
-//! What every preset does on a fixed set of scenes, in counts that no clock changes, and no x86-64 processor: `cargo xtask counts`.
+//! Counts the work of every preset on a fixed set of scenes: `cargo xtask counts`.
 //!
-//! Scenes: three objects, without noise and with 0.5 % of it, from a start that is nearly right, one that is far off, and one that is
-//! the wrong way round, so that what can search does.
-//! A line per preset. Columns:
+//! The counts are the same on every run and on every x86-64 processor.
 //!
-//! - `regimes`: switches that took the aligned branch / the other;
-//! - `stages`, `iterations` (evaluations of a pose, the rejected included), `selected` points, `pairs` that the metrics saw;
-//! - `queries`: points that asked for their nearest neighbour, and the `nodes` of trees that were looked at for them;
-//! - `renders` made, `pixels` of their views, those `filled` in the end and those `tested` against triangles, `triangles` given to the renderer;
-//! - `cold`, `warm`: heap allocations of the first run (model and observation new, scratch memory empty) and of the next.
+//! The scenes show three objects, without noise and with 0.5 % noise. The starts are nearly right,
+//! far off, and rotated by 180°, so that the presets that can search do so. There is a line per
+//! preset, with these columns:
+//!
+//! - `regimes`: switches that selected the aligned branch / another branch.
+//! - `stages`, `iterations`: ICP stages, and evaluations of a pose, including rejected poses.
+//! - `selected`, `pairs`: selected points, and pairs passed to the metrics.
+//! - `queries`, `nodes`: nearest-neighbor queries, and tree nodes visited for them.
+//! - `renders`, `pixels`, `triangles`: renders, pixels of their views, and triangles passed to the
+//!   renderer.
+//! - `filled`, `tested`: pixels that show the object, and pixels tested against triangles.
+//! - `cold`, `warm`: heap allocations of the first run (new model and observation, empty scratch
+//!   memory) and of the next run.
 
 use std::fmt::Write as _;
 
@@ -25,7 +31,7 @@ static COUNTING: Counting = Counting;
 
 const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
 const NOISE_PERCENT: [f64; 2] = [0.0, 0.5];
-/// Name, translation (metres) and rotation (degrees) error.
+/// Name, translation error (meters) and rotation error (degrees).
 const STARTS: [(&str, f64, f64); 3] = [
     ("aligned", 0.003, 3.0),
     ("misaligned", 0.04, 30.0),
@@ -57,7 +63,7 @@ fn line(
     (start, meters, degrees): (&str, f64, f64),
     preset: Preset,
 ) -> Vec<String> {
-    // All of it anew for every line: what a cold run builds must not be there already.
+    // Creates everything again for every line, because a cold run must not find existing results.
     let mut rng = rng(7);
     let scene = hicp_tests::scene(object, percent, &mut rng);
     let model = object.model().expect("the objects that ship are valid");
@@ -105,7 +111,7 @@ fn line(
     line
 }
 
-/// The columns padded to one width each: words to the left, numbers to the right.
+/// Pads each column to one width: words to the left, numbers to the right.
 fn aligned(table: &[Vec<String>]) -> String {
     let mut widths = vec![0; table[0].len()];
     for line in table {

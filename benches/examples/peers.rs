@@ -1,11 +1,11 @@
-//! Our side of the comparison with other libraries, which `cargo xtask peers` runs.
+//! The side of this project in the comparison with other libraries, run by `cargo xtask peers`.
 //!
-//! `peers FOLDER NOISE` reads commands from standard input and answers each with a line of JSON:
+//! `peers FOLDER NOISE` reads commands from standard input and prints a line of JSON for each:
 //!
 //! - `load NUMBER` creates an instance and writes it to a folder of that name: raw little-endian
 //!   arrays and a `meta.json`.
-//! - `run ROW` does one thing once. The answer has the nanoseconds, and where they apply the items,
-//!   the iterations and the pose found.
+//! - `run ROW` runs a row once. The reply has the time in nanoseconds and, where they apply, the
+//!   items, the iterations and the pose.
 
 use std::io::{BufRead as _, Write as _};
 use std::path::Path;
@@ -55,7 +55,7 @@ fn main() -> Result<(), Failure> {
                 json!({ "loaded": number })
             }
             Some(("run", row)) => {
-                let loaded = loaded.as_ref().ok_or("nothing is loaded")?;
+                let loaded = loaded.as_ref().ok_or("no instance is loaded: send `load NUMBER` first")?;
                 bench.run(row, loaded)?
             }
             _ => return Err(format!("unknown command {line:?}").into()),
@@ -77,7 +77,7 @@ fn write(folder: &Path, loaded: &Loaded) -> Result<(), Failure> {
     let mask = observation.mask().pixels().iter().map(|m| u8::from(*m));
     std::fs::write(folder.join("mask.u8"), mask.collect::<Vec<_>>())?;
     write_surfels(folder, "source", &instance.source)?;
-    // The others register against every masked pixel that has a surfel.
+    // The other libraries register against every masked pixel that has a surfel.
     let target: Vec<Surfel> = observation.surfels(1).map(|(_, s)| *s).collect();
     write_surfels(folder, "target", &target)?;
     let meta = json!({
@@ -128,7 +128,7 @@ fn write_floats(
     Ok(std::fs::write(folder.join(format!("{name}.f32")), bytes)?)
 }
 
-/// Registers the points that it is given.
+/// Selects the points that it holds.
 #[derive(Clone)]
 struct Given(Vec<Surfel>);
 
@@ -138,7 +138,7 @@ impl PointSelection for Given {
     }
 }
 
-/// An instance, and what is made of it beforehand.
+/// An instance and the data prepared from it.
 struct Loaded {
     instance: Instance,
     /// The model with a mesh of 10,000 triangles.
@@ -185,7 +185,7 @@ fn widened(observation: &Observation) -> Result<(DepthImage, Mask, PinholeCamera
     Ok((depth, Mask::new(1920, 1080, mask)?, camera))
 }
 
-/// Scratch memory that stays warm from run to run, as that of the other libraries does.
+/// Scratch memory that stays warm between runs, as in the other libraries.
 struct Bench {
     workspace: Workspace,
     rasterizer: Rasterizer,
@@ -193,7 +193,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Does what a row names, once.
+    /// Runs a row once.
     fn run(&mut self, row: &str, loaded: &Loaded) -> Result<Value, Failure> {
         let Instance { scene, source, .. } = &loaded.instance;
         let (every_pixel, observation) = (&loaded.every_pixel, &scene.observation);
@@ -255,7 +255,7 @@ impl Bench {
         json!({ "ns": nanoseconds(start), "items": union, "score": mve })
     }
 
-    /// Runs a stage from given points, on an observation whose search tree is yet to be built.
+    /// Runs a stage from given points, on an observation without a search tree.
     fn icp(
         &mut self,
         loaded: &Loaded,
@@ -278,11 +278,11 @@ impl Bench {
         Ok(self.refine(loaded, &observation, &mut stage, source.len(), start))
     }
 
-    /// Refines everything from the depth image to the pose: normals, renders, scores and trees.
+    /// Refines from the depth image to the pose, including normals, renders, scores and trees.
     fn depth_to_pose(&mut self, preset: Preset, loaded: &Loaded) -> Result<Value, Failure> {
         let mut stage = preset.build();
         let seen = &loaded.instance.scene.observation;
-        // A render of an earlier run must not be found in the cache.
+        // The cache must not contain a render of an earlier run.
         let problem = Problem::new(&loaded.instance.scene.model, seen);
         forget_renders(&mut self.workspace, &problem, &loaded.instance.init);
         let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
@@ -291,7 +291,7 @@ impl Bench {
         Ok(self.refine(loaded, &observation, &mut stage, 0, start))
     }
 
-    /// Answers with the pose and the time since `start`.
+    /// Returns the pose and the time since `start`.
     fn refine(
         &mut self,
         loaded: &Loaded,
@@ -315,7 +315,7 @@ impl Bench {
     }
 }
 
-/// Items are the pixels of the mask's box.
+/// Observes a depth image. Items are the pixels of the mask's box.
 fn observe(depth: &DepthImage, mask: &Mask, camera: &PinholeCamera) -> Result<Value, Failure> {
     let (depth, mask) = (depth.clone(), mask.clone());
     let start = Instant::now();
@@ -335,7 +335,7 @@ fn fused(loaded: &Loaded) -> Result<Value, Failure> {
         let center = pose * loaded.instance.scene.model.center();
         let increment = fused
             .step(&pose, &center)
-            .ok_or("the pairs determine no step")?;
+            .ok_or("the pairs do not determine a step")?;
         iterations += 1;
         let moved = (increment * center - center).norm();
         let small = moved < STOP.0.translation_meters

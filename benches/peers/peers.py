@@ -1,13 +1,15 @@
-"""Other libraries and this one on the same arrays, in alternation, on one core: `cargo xtask peers`.
+"""Compares this library with others on the same arrays, on one core: `cargo xtask peers`.
 
-Our program (`benches/examples/peers.rs`) makes the instances, each an object of about 14,400 visible pixels in a 640x480 image
-and a start 6.2 mm and 9.5 degrees off, and writes them as raw arrays. Every round then does every row once, ours
-and theirs in turn; the first round warms up and is not counted. A row's time on an instance is the median over the
-rounds; the table has the median over the instances and the quartiles.
+Our program (`benches/examples/peers.rs`) creates the instances and writes them as raw arrays. Each
+is an object of about 14,400 visible pixels in a 640x480 image, with a start 6.2 mm and 9.5 degrees
+off. Every round runs every row once and alternates between our rows and theirs. The first round
+warms up and is not counted. A row's time on an instance is the median over the rounds. The table
+shows the median over the instances and the quartiles.
 
-What is timed: the call alone, with its arrays in the library's own form. Search trees and what else depends on the image
-are timed with the registration (column "with tree") for ours and for theirs; normals and covariances of the point-based
-libraries are not counted, and stated below the table.
+Only the call is timed, with its arrays in the library's own form. Search trees, like everything
+else that depends on the image, are timed with the registration (column "with tree"), for our rows
+and for theirs. The normals and covariances of the point-based libraries are not counted; the text
+below the table states their time.
 """
 
 import os
@@ -31,28 +33,28 @@ import small_gicp
 
 try:
     import open3d as o3d
-except ImportError as error:  # Its wheel wants libusb-1.0, libGL and libgomp of the system.
-    print(f"peers: rows of Open3D are left out: {error}", file=sys.stderr)
+except ImportError as error:  # Its wheel requires the system's libusb-1.0, libGL and libgomp.
+    print(f"peers: skipped the rows of Open3D: {error}", file=sys.stderr)
     o3d = None
 
 import scaling
 import vsd
 
-GATE = 0.03  # metres, that of our rows
-TRANSLATION_EPS = 1e-4  # metres
+GATE = 0.03  # meters, as in our rows
+TRANSLATION_EPS = 1e-4  # meters
 ROTATION_EPS = math.radians(0.01)
 MAX_ITERATIONS = 100
 
 
 class Ours:
-    """Our program, answering one command at a time."""
+    """Our program, which replies to one command at a time."""
 
     def __init__(self, program, folder, noise):
         self.process = subprocess.Popen(
             [program, folder, str(noise)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
-    def ask(self, command):
+    def send(self, command):
         self.process.stdin.write(command + "\n")
         self.process.stdin.flush()
         line = self.process.stdout.readline()
@@ -62,7 +64,7 @@ class Ours:
 
 
 class Instance:
-    """The arrays of an instance, and what the libraries make of them beforehand."""
+    """The arrays of an instance, and the data that the libraries prepare from them."""
 
     def __init__(self, folder):
         def floats(name, columns):
@@ -79,7 +81,7 @@ class Instance:
         self.vertices = floats("fine_vertices", 3)
         self.triangles = np.fromfile(folder / "fine_triangles.u32", dtype="<u4").reshape(-1, 3)
 
-        # small_gicp: clouds, with covariances and normals of 20 neighbours.
+        # small_gicp: clouds, with covariances and normals of 20 neighbors.
         def cloud(surfels):
             points = small_gicp.PointCloud(surfels[:, :3].astype(np.float64))
             start = time.perf_counter()
@@ -100,12 +102,15 @@ class Instance:
             self.o3_source, self.o3_target = o3d_cloud(self.source), o3d_cloud(self.target)
 
     def prepare_rays(self, box):
-        """The rays of the pixels of a box through the mesh at the initial pose, which is put into the rays."""
+        """Creates the rays of a box of pixels through the mesh.
+
+        The rays, not the mesh, are moved by the initial pose.
+        """
         fx, fy, cx, cy = self.meta["camera"]
         u, v = np.meshgrid(np.arange(box[0], box[2]), np.arange(box[1], box[3]))
         directions = np.stack([(u - cx) / fx, (v - cy) / fy, np.ones(u.shape)], axis=-1)
         rotation, translation = self.init[:3, :3], self.init[:3, 3]
-        # A direction of unit depth: the distance along the ray in units of its length is the depth.
+        # Directions have unit depth, so that the distance in units of their length is the depth.
         directions = directions @ rotation
         origins = np.broadcast_to(-rotation.T @ translation, directions.shape)
         self.rays = o3d.core.Tensor(np.concatenate([origins, directions], axis=-1).astype(np.float32))
@@ -114,10 +119,10 @@ class Instance:
         self.scene.cast_rays(self.rays, nthreads=1)
 
     def error(self, pose):
-        """Rotation (degrees) and translation (millimetres, of the object's centre) error."""
+        """Returns the rotation error (degrees) and the translation error of the center (mm)."""
         pose = np.asarray(pose, dtype=np.float64).reshape(4, 4)
         turn = pose[:3, :3].T @ self.truth[:3, :3]
-        # The sine is exact where the cosine is flat.
+        # The sine is precise at small angles, unlike the cosine.
         sine = np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
         angle = math.degrees(math.atan2(sine, (np.trace(turn) - 1) / 2))
         return angle, float(np.linalg.norm((pose @ self.center - self.truth @ self.center)[:3])) * 1e3
@@ -147,7 +152,7 @@ def small_gicp_row(kind):
             )
 
         ns, result = timed(align)
-        # It counts from 0.
+        # small_gicp counts from 0.
         return {"ns": ns, "iterations": result.iterations + 1, "pose": result.T_target_source}
 
     return run
@@ -182,7 +187,10 @@ def open3d_raycast(instance):
 
 
 def numpy_vsd(instance):
-    """VSD between the image and a render, in the place of the estimate: any two depth images cost the same."""
+    """Computes VSD between the image and a shifted copy of it.
+
+    The copy replaces the render of an estimate: any two depth images cost the same.
+    """
     estimate = np.where(instance.mask, instance.depth + np.float32(0.004), np.float32(0.0))
     ns, errors = timed(
         lambda: vsd.vsd(instance.depth, instance.depth, estimate, instance.meta["camera"], instance.meta["diameter"])
@@ -200,7 +208,7 @@ THEIRS = {
     "numpy VSD": numpy_vsd,
 }
 
-# Ours, as the program names them.
+# Rows of our program, by its names.
 OURS = [
     "observe",
     "observe-1080",
@@ -223,10 +231,10 @@ WHAT = {
     "observe": "vertex map and normals in the mask's box; items: pixels of the box",
     "observe-1080": "the same pixels in a 1920×1080 image",
     "render": "depth of the object's mesh; items: pixels shown",
-    "render-fine": "depth of its mesh at 10,000 triangles",
+    "render-fine": "depth of the mesh with 10,000 triangles",
     "render-fine-1080": "the same pixels in a 1920×1080 image",
-    "mve": "MVE at ten tolerances beyond its render; items: pixels of the union",
-    "fused": "reference: AVX2 by hand, every pixel; items: points",
+    "mve": "MVE at ten tolerances without its render; items: pixels of the union",
+    "fused": "reference: hand-written AVX2, every pixel; items: points",
     "projective-every-pixel": "the same through the traits",
     "projective": "projective point-to-plane, 2,000 points",
     "nn-point-to-point": "2,000 points against 4,000 pixels, with tree",
@@ -244,7 +252,7 @@ WHAT = {
     "numpy VSD": "bop_toolkit's definition, ten tolerances, renders not counted",
 }
 
-# Name, numerator, denominator, per what, what is wanted of it.
+# Name, numerator, denominator, unit of the ratio, target.
 RATIOS = [
     ("1 traits : hand-fused, per pixel and iteration", "projective-every-pixel", "fused", "iteration", "≤ 3, aim 1.5"),
     ("2 small_gicp ICP : nn-point-to-point", "small_gicp ICP", "nn-point-to-point", None, ""),
@@ -260,22 +268,26 @@ RATIOS = [
 
 
 def measure(ours, folder, count, rounds):
-    """Returns, by row, a list over the instances of {ns, items, iterations, error}, and seconds of covariances."""
+    """Measures every row on every instance.
+
+    Returns, by row, a list over the instances of {ns, items, iterations, error}, and the median
+    time of the covariances in seconds.
+    """
     results = {row: [] for row in [*THEIRS, *OURS]}
     covariances = []
     for number in range(count):
-        ours.ask(f"load {number}")
+        ours.send(f"load {number}")
         instance = Instance(folder / str(number))
         covariances.append(instance.covariance_seconds)
         if o3d:
-            instance.prepare_rays(ours.ask("run render-fine")["box"])
+            instance.prepare_rays(ours.send("run render-fine")["box"])
         samples = {row: [] for row in results}
         theirs = list(THEIRS.items())
         for _ in range(rounds + 1):
             for index, row in enumerate(OURS):
                 if index < len(theirs):
                     samples[theirs[index][0]].append(theirs[index][1](instance))
-                samples[row].append(ours.ask(f"run {row}"))
+                samples[row].append(ours.send(f"run {row}"))
         for row, answers in samples.items():
             if answers[-1] is None:
                 continue
@@ -306,7 +318,7 @@ def table(results):
     ]
     for row, cases in results.items():
         if not cases:
-            lines.append(f"| {row} | {WHAT[row]} | not here | | | |")
+            lines.append(f"| {row} | {WHAT[row]} | not measured | | | |")
             continue
         low, middle, high = quartiles([case["ns"] / 1e6 for case in cases])
         per_item = iterations = error = ""
@@ -327,7 +339,7 @@ def table(results):
 
 
 def ratios(results):
-    lines = ["| ratio | median (quartiles) over the instances | wanted |", "|---|---|---|"]
+    lines = ["| ratio | median (quartiles) over the instances | target |", "|---|---|---|"]
     for name, above, below, per, wanted in RATIOS:
         values = []
         for a, b in zip(results[above], results[below]):
@@ -339,7 +351,7 @@ def ratios(results):
             low, middle, high = quartiles(values)
             lines.append(f"| {name} | {middle:.2f} ({low:.2f}–{high:.2f}) | {wanted} |")
         else:
-            lines.append(f"| {name} | not here | {wanted} |")
+            lines.append(f"| {name} | not measured | {wanted} |")
     return "\n".join(lines)
 
 
@@ -359,7 +371,7 @@ def main():
     parser.add_argument("--instances", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--noise", type=float, default=0.0, help="depth noise, percent of the depth")
-    parser.add_argument("--no-scaling", action="store_true", help="leave out what `bop refine` is measured on")
+    parser.add_argument("--no-scaling", action="store_true", help="skip the measurements of `bop refine`")
     arguments = parser.parse_args()
     vsd.check()
     work = arguments.target / "peers"
@@ -371,7 +383,7 @@ def main():
         f"Open3D {o3d.__version__ if o3d else 'missing'}, small_gicp {version('small_gicp')}."
     ]
     if not arguments.no_scaling:
-        scaled = scaling.report(programs, work / "scaling")  # Before this process is tied to one core.
+        scaled = scaling.report(programs, work / "scaling")  # Before this process is limited to one core.
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # Our program inherits it.
     program = programs / "examples" / "peers"
@@ -381,7 +393,7 @@ def main():
     text += [
         table(results),
         f"Not counted: normals and covariances of small_gicp's two clouds, {covariances * 1e3:.1f} ms (its GICP needs "
-        "them; ours takes the surfels' normals, which `observe` makes).",
+        "them; ours uses the surfels' normals, which `observe` computes).",
         ratios(results),
     ]
     if not arguments.no_scaling:

@@ -1,4 +1,7 @@
-"""Measures how `hybrid-icp bop refine` scales with threads and hypotheses per frame, and its memory, on generated scenes."""
+"""Measures the time and memory of `hybrid-icp bop refine` on generated scenes.
+
+The time is compared between numbers of threads and numbers of hypotheses per frame.
+"""
 
 import csv
 import os
@@ -36,7 +39,7 @@ def finish(process):
 
 
 def refine(programs, folder, threads):
-    """Returns seconds, and seconds in the pipeline over all images, as the result file states them."""
+    """Returns the total seconds, and the seconds in the pipeline by the result file."""
     begin = time.perf_counter()
     finish(start(programs, folder, threads))
     seconds = time.perf_counter() - begin
@@ -48,8 +51,9 @@ def refine(programs, folder, threads):
 def peak_memory(programs, folder, threads):
     """Returns the peak resident memory as words.
 
-    Read from the running process: what the system reports once it has ended counts this process's own memory at the fork.
-    The peak only grows, so the last reading misses no more than what the last moments add.
+    The peak is read from the running process. After its end, the system's report would include the
+    memory of this process at the fork. The peak only grows, so the last value misses only the growth
+    of the last moments.
     """
     process = start(programs, folder, threads)
     peak = None
@@ -60,16 +64,16 @@ def peak_memory(programs, folder, threads):
         except OSError:
             break  # Not Linux.
         found = [line.split()[1] for line in text.splitlines() if line.startswith("VmHWM:")]
-        # Before its program is loaded, the process is a copy of this one.
+        # Until its program is loaded, the process is a copy of this one.
         if found and "Name:\thybrid-icp" in text:
             peak = int(found[0])
         time.sleep(0.001)
     finish(process)
-    return "not known on this system" if peak is None else f"{peak / 1024:.0f} MB"
+    return "unknown on this system" if peak is None else f"{peak / 1024:.0f} MB"
 
 
 def report(programs, folder):
-    lines = ["| `bop refine` | measured | wanted |", "|---|---|---|"]
+    lines = ["| `bop refine` | measured | target |", "|---|---|---|"]
 
     many = generate(programs, folder / "frames", 8, 10, 10)
     ratios, ones = [], []

@@ -1,9 +1,9 @@
-"""Visible Surface Discrepancy by its definition in BOP'19, over whole images, as evaluation scripts compute it."""
+"""Visible Surface Discrepancy (BOP'19) over whole images, as evaluation scripts compute it."""
 
 import numpy as np
 
 TOLERANCES = [0.05 * k for k in range(1, 11)]
-DELTA = 0.015  # metres
+DELTA = 0.015  # meters
 
 
 def distances(depth, camera):
@@ -13,13 +13,19 @@ def distances(depth, camera):
 
 
 def visible(test, model):
-    """Where a model is seen: not behind what was measured by more than delta, or nothing was measured."""
+    """Returns the pixels at which a model is visible.
+
+    The model is at most delta behind the measured surface, or the pixel has no measurement.
+    """
     near = model.astype(np.float32) - test.astype(np.float32) <= DELTA
     return (model > 0) & (near | (test == 0))
 
 
 def vsd(depth_test, depth_truth, depth_estimate, camera, diameter):
-    """Returns e(tau) for ten tolerances, given as shares of the diameter. Depths in metres, 0 where there is nothing."""
+    """Returns e(tau) for ten tolerances, given as shares of the diameter.
+
+    Depths are in meters, and 0 at pixels without a surface.
+    """
     test, truth, estimate = (distances(depth, camera) for depth in (depth_test, depth_truth, depth_estimate))
     seen_truth = visible(test, truth)
     seen_estimate = visible(test, estimate) | (seen_truth & (estimate > 0))
@@ -33,7 +39,7 @@ def vsd(depth_test, depth_truth, depth_estimate, camera, diameter):
 
 
 def check():
-    """Holds the code above against a case computed by bop_toolkit."""
+    """Checks the code above against a case computed by bop_toolkit."""
 
     def image(*rows):
         return np.array([[float(x) for x in row.split()] for row in rows], dtype=np.float32) / 1000

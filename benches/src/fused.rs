@@ -1,22 +1,27 @@
-//! A projective point-to-plane step fused by hand into one AVX2 loop: what the hardware allows, to measure the traits against.
+//! A projective point-to-plane step, fused by hand into one AVX2 loop.
 //!
-//! It does what `Projective` and `PointToPlane` do together, for the points of one selection and one observation, eight at a
-//! time, with `f32` sums that are carried over to `f64` every few hundred points. No trait, no weight, no filter, no
-//! list of pairs: nothing but the arithmetic and the one load per observed pixel that cannot be avoided.
+//! It shows the speed that the hardware allows; the traits are measured against it.
+//!
+//! It does the work of `Projective` and `PointToPlane` for the points of one selection and one
+//! observation, eight at a time. Sums are `f32` and are added to `f64` totals every few hundred
+//! points. There are no traits, weights, filters or lists of pairs: only the arithmetic and one
+//! load per observed pixel, neither of which can be avoided.
 
 use hybrid_icp::core::{Isometry3, Matrix6, Observation, Point3, Surfel, Vector3, Vector6, se3};
 
-/// Unknowns and the residual: the columns of a row.
+/// Columns of a row: six unknowns and the residual.
 const COLUMNS: usize = 7;
-/// Entries of the upper triangle of [`COLUMNS`]²: JᵀJ, Jᵀr and rᵀr.
+/// Number of entries of the upper triangle of [`COLUMNS`]²: JᵀJ, Jᵀr and rᵀr.
 const SUMS: usize = COLUMNS * (COLUMNS + 1) / 2;
 
-/// The points and the observed surfels of a registration, laid out for the loop.
+/// The points and observed surfels of a registration, in the memory layout of the loop.
 #[derive(Debug)]
 pub struct Fused {
-    /// x, y, z of the source points, object frame, padded with NaN to whole vectors of eight.
+    /// x, y and z of the source points in the object frame, padded with NaN to whole vectors of
+    /// eight.
     source: [Vec<f32>; 3],
-    /// Point, normal and two zeros per pixel of the observation's region; all zeros where there is no surfel.
+    /// Point, normal and two zeros per pixel of the observation's region. All zeros without a
+    /// surfel.
     targets: Vec<Target>,
     width: usize,
     height: usize,
@@ -38,7 +43,9 @@ struct Motion {
 }
 
 impl Fused {
-    /// Lays out a selection and an observation; `None` on a processor without AVX2 and FMA.
+    /// Arranges a selection and an observation for the loop.
+    ///
+    /// Returns `None` on a processor without AVX2 and FMA.
     #[must_use]
     pub fn new(observation: &Observation, source: &[Surfel]) -> Option<Self> {
         if !available() || observation.region().is_empty() {
@@ -71,9 +78,10 @@ impl Fused {
         })
     }
 
-    /// Returns the Gauss–Newton increment at a pose, rotations summed about `pivot` (camera frame; anywhere near the object).
+    /// Returns the Gauss–Newton increment at a pose, or `None` if the pairs do not determine it.
     ///
-    /// `None` when the pairs do not determine it.
+    /// Rotations are summed around `pivot`, a point in the camera frame anywhere near the object.
+    ///
     #[must_use]
     pub fn step(
         &self,
@@ -111,13 +119,13 @@ impl Fused {
         se3::is_finite(&increment).then_some(increment)
     }
 
-    /// Number of source points, the padding included.
+    /// Returns the number of source points, including the padding.
     #[must_use]
     pub fn len(&self) -> usize {
         self.source[0].len()
     }
 
-    /// Returns whether there is no source point.
+    /// Returns `true` if there is no source point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.source[0].is_empty()
@@ -151,13 +159,13 @@ mod avx2 {
 
     use super::{COLUMNS, Fused, Motion, SUMS, Target};
 
-    /// Vectors per block: its rows stay in the first-level cache between being made and being summed.
+    /// Vectors per block. Its rows stay in the first-level cache until they are summed.
     const BLOCK: usize = 64;
 
     type Rows = [[__m256; BLOCK]; COLUMNS];
 
     pub(super) fn sums(fused: &Fused, motion: &Motion) -> [f64; SUMS] {
-        // SAFETY: a `Fused` is only made where AVX2 and FMA are available.
+        // SAFETY: a `Fused` is only created if AVX2 and FMA are available.
         unsafe { vectorized(fused, motion) }
     }
 
@@ -184,7 +192,9 @@ mod avx2 {
         total
     }
 
-    /// Moves, projects, pairs and linearises; a point without a pair leaves a row of zeros. Returns the number of vectors.
+    /// Moves, projects, pairs and linearizes the points of a block.
+    ///
+    /// A point without a pair leaves a row of zeros. Returns the number of vectors.
     #[target_feature(enable = "avx2,fma")]
     fn fill(fused: &Fused, motion: &Motion, source: [&[f32]; 3], rows: &mut Rows) -> usize {
         let r = motion.rotation.map(|x| _mm256_set1_ps(x));
@@ -224,7 +234,7 @@ mod avx2 {
                 _mm256_mullo_epi32(_mm256_cvttps_epi32(v), width),
                 _mm256_cvttps_epi32(u),
             );
-            // Pixel 0 for those without one; the mask takes its row out.
+            // Points outside the image use pixel 0; the mask clears their rows.
             let pixel = _mm256_and_si256(pixel, _mm256_castps_si256(valid));
             let [tx, ty, tz, nx, ny, nz] = gather(&fused.targets, pixel);
             let valid = _mm256_and_ps(valid, _mm256_cmp_ps::<_CMP_GT_OQ>(tz, zero));
@@ -256,7 +266,7 @@ mod avx2 {
         vectors
     }
 
-    /// Adds column `I` times columns `I`… to the totals.
+    /// Adds the products of column `I` with columns `I` and higher to the totals.
     #[target_feature(enable = "avx2,fma")]
     fn accumulate<const I: usize>(rows: &Rows, vectors: usize, total: &mut [f64]) {
         let mut sums = [_mm256_setzero_ps(); COLUMNS];
@@ -287,20 +297,22 @@ mod avx2 {
     #[target_feature(enable = "avx2,fma")]
     fn load(values: &[f32]) -> __m256 {
         assert_eq!(values.len(), 8);
-        // SAFETY: eight values, and the load needs no alignment.
+        // SAFETY: there are eight values, and the load needs no alignment.
         unsafe { _mm256_loadu_ps(values.as_ptr()) }
     }
 
-    /// Loads eight targets, one cache line each, and turns them into columns: x, y, z, then the normal's.
+    /// Loads eight targets, one cache line each, and transposes them into columns.
+    ///
+    /// The columns are x, y, z of the point and then of the normal.
     #[target_feature(enable = "avx2,fma")]
     fn gather(targets: &[Target], pixels: __m256i) -> [__m256; 6] {
         let mut indices = [0_u32; 8];
-        // SAFETY: eight 32-bit integers are what the store writes, and it needs no alignment.
+        // SAFETY: the store writes eight 32-bit integers and needs no alignment.
         unsafe { _mm256_storeu_si256(indices.as_mut_ptr().cast(), pixels) };
         let line = |i: usize| load(&targets[indices[i] as usize].0);
         let (a, b, c, d) = (line(0), line(1), line(2), line(3));
         let (e, f, g, h) = (line(4), line(5), line(6), line(7));
-        // Four lanes at a time: 2×2 transposes, then 4×4, then the halves.
+        // Transposes four lanes at a time: 2×2 blocks, then 4×4 blocks, then the halves.
         let quarter = |a, b, c, d| {
             let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
             let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
@@ -336,9 +348,9 @@ mod tests {
     use hybrid_icp::metric::{ErrorMetric, PointToPlane};
     use hybrid_icp::raster::Rasterizer;
 
-    /// The hand-written loop and the traits take the same step, to 10⁻⁴ of what it moves.
+    /// The steps of the loop and of the traits differ by at most 10⁻⁴ of the motion.
     #[test]
-    fn the_traits_take_the_same_step() {
+    fn the_traits_compute_the_same_step() {
         if !available() {
             eprintln!("skipped: no AVX2 with FMA");
             return;

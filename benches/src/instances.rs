@@ -1,4 +1,6 @@
-//! The instances of the comparison with other libraries: an object of about 14,400 visible pixels in a 640×480 image.
+//! Instances for the comparison with other libraries.
+//!
+//! Each is an object of about 14,400 visible pixels in a 640×480 image.
 
 use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
@@ -14,7 +16,7 @@ use hybrid_icp::icp::Workspace;
 use hybrid_icp::nalgebra::center;
 use hybrid_icp::raster::Rasterizer;
 
-/// The objects: those without a symmetry, so that a rotation error means something.
+/// The objects. None has a symmetry, so that a rotation error is meaningful.
 pub const OBJECTS: [Household; 5] = [
     Household::Mug,
     Household::Hammer,
@@ -23,26 +25,26 @@ pub const OBJECTS: [Household; 5] = [
     Household::Car,
 ];
 
-/// Visible pixels aimed at.
+/// Target number of visible pixels.
 pub const VISIBLE_PIXELS: f64 = 14_400.0;
 
-/// Points that the point-based libraries are given.
+/// Number of points that the point-based libraries receive.
 pub const POINTS: usize = 2000;
 
-/// An instance.
+/// An object in an image with an initial pose.
 #[derive(Debug)]
 pub struct Instance {
     /// Name of the object.
     pub object: &'static str,
-    /// Model, image and true pose.
+    /// The model, the image and the true pose.
     pub scene: Scene,
     /// The initial pose, 6.2 mm and 9.5° off.
     pub init: Isometry3<f64>,
-    /// About [`POINTS`] points that are visible at the initial pose, object frame.
+    /// About [`POINTS`] points in the object frame that are visible at the initial pose.
     pub source: Vec<Surfel>,
 }
 
-/// Makes an instance from its number.
+/// Creates an instance from its number.
 ///
 /// # Panics
 ///
@@ -54,7 +56,7 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
     let model = object.model().expect("the objects that ship are valid");
     let camera = camera();
     let mut truth = object_pose(&mut rng, &model.center(), 0.5..0.5001, 0.01);
-    // Pixels go with the inverse square of the distance, nearly.
+    // The number of pixels is nearly proportional to the inverse square of the distance.
     for _ in 0..4 {
         let (_, mask) = render(&model, &camera, &truth);
         let pixels = mask.pixels().iter().filter(|m| **m).count() as f64;
@@ -97,8 +99,9 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
     }
 }
 
-/// Splits the longest edge, and with it the triangles on its sides, until there are at least
-/// `triangles`. The surface does not change, and a closed one stays closed.
+/// Splits the longest edge, and the triangles on its sides, until there are at least `triangles`.
+///
+/// The surface does not change, and a closed surface stays closed.
 ///
 /// # Panics
 ///
@@ -130,7 +133,7 @@ pub fn subdivided(mesh: &TriMesh, triangles: usize) -> TriMesh {
     TriMesh::new(vertices, faces).expect("a valid mesh stays valid")
 }
 
-/// The model of an instance with a mesh of about 10,000 triangles, for the comparison of renderers.
+/// Returns a model with a mesh of about 10,000 triangles, for the comparison of renderers.
 ///
 /// # Panics
 ///
@@ -150,7 +153,7 @@ mod tests {
     use hybrid_icp::core::Facing;
 
     #[test]
-    fn instances_are_of_the_size_that_is_stated() {
+    fn instances_have_the_stated_size() {
         for number in 0..OBJECTS.len() {
             let instance = instance(number, 0.0);
             let pixels = instance.scene.observation.n_measured() as f64;
@@ -168,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_subdivided_mesh_is_closed_and_of_the_same_area() {
+    fn a_subdivided_mesh_stays_closed_and_keeps_its_area() {
         for object in OBJECTS {
             let mesh = object.solid().to_mesh().unwrap();
             let fine = subdivided(&mesh, 10_000);

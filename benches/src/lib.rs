@@ -1,4 +1,4 @@
-//! The scenes that the benches measure: fixed seeds, so that every run measures the same work.
+//! Scenes that the benches measure. The seeds are fixed, so that every run measures the same work.
 
 pub mod fused;
 pub mod instances;
@@ -12,7 +12,7 @@ use hicp_tests::Scene;
 use hybrid_icp::core::{Isometry3, Problem};
 use hybrid_icp::icp::Workspace;
 
-/// A scene and a start at the paper's mean initialisation error.
+/// A scene and a start at the paper's mean initialization error.
 #[derive(Debug)]
 pub struct Case {
     /// Name of the object.
@@ -23,7 +23,7 @@ pub struct Case {
     pub init: Isometry3<f64>,
 }
 
-/// Makes the case of an object, with 0.5 % depth noise.
+/// Creates the case of an object, with 0.5 % depth noise.
 #[must_use]
 pub fn case(object: Household) -> Case {
     let mut rng = rng(42);
@@ -41,10 +41,12 @@ pub fn case(object: Household) -> Case {
     }
 }
 
-/// The objects that the benches measure: a body with a handle, a thin one, and a flat box.
+/// Objects that the benches measure: a body with a handle, a thin one, and a flat box.
 pub const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
 
-/// Fills a workspace's render cache with poses that no run asks for, so that none finds what the run before it rendered.
+/// Fills a workspace's render cache with poses that no run requests.
+///
+/// The next run then finds no render of an earlier run.
 pub fn forget_renders(workspace: &mut Workspace, problem: &Problem<'_>, init: &Isometry3<f64>) {
     for step in 1..=8 {
         let elsewhere = Isometry3::translation(0.001 * f64::from(step), 0.0, 0.0) * init;

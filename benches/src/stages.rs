@@ -1,4 +1,4 @@
-//! The single stages that benches and the comparison with other libraries run.
+//! Single stages that benches and the comparison with other libraries run.
 
 use hybrid_icp::BoxedStage;
 use hybrid_icp::association::{
@@ -7,10 +7,12 @@ use hybrid_icp::association::{
 use hybrid_icp::icp::{Icp, IterationLimit, SmallMotion};
 use hybrid_icp::metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 
-/// The gate of all stages, metres: pairs further apart are left out. Wider than any start is off, as the other libraries are told.
+/// Maximum distance of a pair in all stages, meters.
+///
+/// It is larger than the error of any start. The other libraries use the same value.
 pub const GATE_METERS: f32 = 0.03;
 
-/// When a stage ends: the next increment is below 0.1 mm and 0.01°, or after 100 evaluations.
+/// Stop rule: the next increment is below 0.1 mm and 0.01°, or there were 100 evaluations.
 pub const STOP: (SmallMotion, IterationLimit) = (
     SmallMotion {
         translation_meters: 1e-4,
@@ -19,7 +21,8 @@ pub const STOP: (SmallMotion, IterationLimit) = (
     IterationLimit(100),
 );
 
-/// A stage from visible points, at most [`GATE_METERS`] from theirs, to its natural end.
+/// Creates a stage of visible points with pairs of at most [`GATE_METERS`], which runs until
+/// [`STOP`].
 pub fn visible<A, M>(stride: Stride, association: A, metric: M) -> BoxedStage
 where
     A: DataAssociation + Send + 'static,
@@ -34,7 +37,9 @@ where
     })
 }
 
-/// Every stage with its name. `every-pixel` takes each visible pixel, the others about 2,000 of them.
+/// Returns every stage with its name.
+///
+/// `every-pixel` uses each visible pixel. The others use about 2,000 of them.
 #[must_use]
 pub fn all() -> Vec<(&'static str, BoxedStage)> {
     let some = Stride::AboutPoints(2000);

@@ -1,4 +1,4 @@
-//! Counts what a run does, from outside: through an [`Observer`] and a [`Renderer`] around the rasterizer.
+//! Counts the work of a run with an [`Observer`] and a [`Renderer`] around the rasterizer.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -8,16 +8,16 @@ use hybrid_icp::core::{Isometry3, PinholeCamera, PixelRegion, RenderedView, Rend
 use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent, Termination};
 use hybrid_icp::raster::Rasterizer;
 
-/// What the renders of a run did.
+/// The work of the renders of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RenderWork {
-    /// Renders made, hits of the cache not counted.
+    /// Number of renders, without cache hits.
     pub renders: u64,
-    /// Pixels of the views: what has to be cleared.
+    /// Number of pixels of the views, all of which are cleared.
     pub pixels: u64,
-    /// Pixels of them that show the object.
+    /// Number of pixels that show the object.
     pub filled: u64,
-    /// Triangles that the renderer was given.
+    /// Number of triangles passed to the renderer.
     pub triangles: u64,
 }
 
@@ -29,7 +29,7 @@ pub struct CountingRenderer {
 }
 
 impl CountingRenderer {
-    /// What was rendered since the last call.
+    /// Returns the work since the last call.
     #[must_use]
     pub fn take(&self) -> RenderWork {
         let [renders, pixels, filled, triangles] =
@@ -62,23 +62,25 @@ impl Renderer for CountingRenderer {
     }
 }
 
-/// What the stages of a run did.
+/// The work of the stages of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StageWork {
-    /// Switches that took the aligned branch.
+    /// Number of switches that selected the aligned branch.
     pub aligned: u64,
-    /// Switches that took another.
+    /// Number of switches that selected another branch.
     pub misaligned: u64,
-    /// ICP stages run.
+    /// Number of ICP stages.
     pub stages: u64,
-    /// Evaluations of a pose, the rejected included.
+    /// Number of evaluations of a pose, including rejected poses.
     pub iterations: u64,
-    /// Points selected, over all stages.
+    /// Number of selected points, over all stages.
     pub selected: u64,
-    /// Pairs that the metrics saw, over all evaluations.
+    /// Number of pairs passed to the metrics, over all evaluations.
     pub pairs: u64,
-    /// Points that asked for their nearest neighbour: the source points of every association through a tree, the one that is
-    /// made anew after a rolled-back iteration included.
+    /// Number of nearest-neighbor queries.
+    ///
+    /// These are the source points of every association that uses a tree. The association after a
+    /// rolled-back iteration counts again.
     pub queries: u64,
     last_pose: Option<Isometry3<f64>>,
 }
@@ -104,7 +106,8 @@ impl Observer for StageWork {
         self.iterations += outcome.iterations as u64;
         self.selected += event.n_source as u64;
         if event.association.starts_with("nearest") {
-            // A stage that returns an accepted pose other than the one it evaluated last has associated there once more.
+            // If a stage returns a pose other than the one it evaluated last, it has associated
+            // there again.
             let again = outcome.evaluation.is_some()
                 && (self.last_pose != Some(outcome.camera_from_object)
                     || matches!(
@@ -128,14 +131,14 @@ mod tests {
     use hybrid_icp::metric::PointToPlane;
     use hybrid_icp::presets::paper_stop;
 
-    /// Counts the points that ask.
+    /// Counts the points that are associated.
     #[derive(Default)]
-    struct Asked {
+    struct CountedPoints {
         inner: NearestNeighbor,
         points: u64,
     }
 
-    impl DataAssociation for Asked {
+    impl DataAssociation for CountedPoints {
         fn associate(
             &mut self,
             context: &mut Context<'_>,
@@ -153,9 +156,9 @@ mod tests {
         }
     }
 
-    /// What the observer makes of a stage's end is what the association was asked, with and without a rollback.
+    /// The observer's count equals the association's own count, with and without a rollback.
     #[test]
-    fn queries_are_those_that_an_association_counts_itself() {
+    fn the_observer_counts_as_many_queries_as_the_association() {
         let (mut rolled_back, mut others) = (0, 0);
         for object in OBJECTS {
             let case = case(object);
@@ -165,7 +168,7 @@ mod tests {
                 let init = perturb(&mut rng, &case.scene.truth, 0.01, 0.2);
                 let mut stage = Icp {
                     selection: VisibleSurface::default(),
-                    association: Asked::default(),
+                    association: CountedPoints::default(),
                     filter: (),
                     metric: PointToPlane,
                     stop: paper_stop(),

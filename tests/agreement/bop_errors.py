@@ -1,15 +1,20 @@
-"""Compares the errors and recalls of `hybrid-icp bop eval` with an implementation of its own, written from the definitions.
+"""Compares the errors and recalls of `hybrid-icp bop eval` with a separate implementation.
 
     python bop_errors.py --dataset DIR --results FILE.csv --errors ERRORS.csv --report REPORT.json
 
-where ERRORS.csv and REPORT.json are what `bop eval --errors ERRORS.csv --json REPORT.json` wrote for FILE.csv. Nothing is
-shared with the program: meshes, PNGs, JSON and the result file are read here, the poses as they stand in the file; depth is
-rendered by casting the ray of every pixel centre at the plane of every triangle around it; ADI is a search over all pairs
-of vertices. Needs numpy only.
+`bop eval --errors ERRORS.csv --json REPORT.json` writes ERRORS.csv and REPORT.json for FILE.csv.
 
-Fails when MSSD, MSPD, ADD or ADI differ by more than 1e-3 of their value, when the share of pixels that VSD counts
-differently exceeds --vsd-tolerance for any estimate and tolerance, or when a recall differs although all errors lie on the
-same side of every threshold.
+This script follows the definitions and shares no code with the program. It reads meshes, PNGs, JSON
+and the result file itself, and uses the poses as the file states them. It renders depth by
+intersecting the ray of every pixel center with the plane of every triangle around it, and computes
+ADI over all pairs of vertices. It needs numpy only.
+
+The script fails in three cases:
+
+- MSSD, MSPD, ADD or ADI differ by more than 1e-3 of their value.
+- The share of pixels that VSD counts differently exceeds --vsd-tolerance for any estimate and
+  tolerance.
+- A recall differs although all errors lie on the same side of every threshold.
 """
 
 import argparse
@@ -25,12 +30,12 @@ import numpy as np
 
 TOLERANCES = [k * 0.05 for k in range(1, 11)]
 RELATIVE = 1e-3
-# Errors below this many millimetres or pixels are zero up to the rounding of nine printed digits.
+# Differences below this many millimeters or pixels come from rounding to nine printed digits.
 ABSOLUTE = 1e-6
 
 
 def read_ply(path):
-    """Vertices (n, 3) and triangles (m, 3) of an ASCII or binary little-endian PLY file."""
+    """Returns the vertices (n, 3) and triangles (m, 3) of an ASCII or little-endian PLY file."""
     data = path.read_bytes()
     head, body = data.split(b"end_header\n", 1) if b"end_header\n" in data else data.split(b"end_header\r\n", 1)
     kind, elements = None, []
@@ -73,7 +78,7 @@ def read_ply(path):
 
 
 def read_png16(path):
-    """Pixels of a 16-bit grey PNG without interlacing."""
+    """Returns the pixels of a 16-bit gray PNG without interlacing."""
     data = path.read_bytes()
     place, packed = 8, b""
     while place < len(data):
@@ -81,7 +86,7 @@ def read_png16(path):
         tag, chunk = data[place + 4:place + 8], data[place + 8:place + 8 + length]
         if tag == b"IHDR":
             width, height, bits, color, _, _, interlace = struct.unpack(">IIBBBBB", chunk)
-            assert (bits, color, interlace) == (16, 0, 0), f"{path}: not 16-bit grey"
+            assert (bits, color, interlace) == (16, 0, 0), f"{path}: not a 16-bit gray PNG without interlacing"
         elif tag == b"IDAT":
             packed += chunk
         place += 12 + length
@@ -109,7 +114,7 @@ def read_png16(path):
 
 
 def render(vertices, triangles, pose, k, shape):
-    """Depth image: the nearest triangle along the ray through every pixel centre, 0 without one."""
+    """Returns a depth image: the nearest triangle at every pixel center, 0 without one."""
     rotation, translation = pose
     points = vertices @ rotation.T + translation
     depth = np.full(shape, np.inf)
@@ -126,7 +131,7 @@ def render(vertices, triangles, pose, k, shape):
         normal = np.cross(b - a, c - a)
         uu, vv = np.meshgrid(np.arange(u0, u1 + 1), np.arange(v0, v1 + 1))
         rays = np.stack([(uu - k[0, 2]) / k[0, 0], (vv - k[1, 2]) / k[1, 1], np.ones(uu.shape)], axis=-1)
-        # The ray passes inside when the volumes it spans with the three edges have one sign.
+        # The ray is inside if the volumes that it spans with the three edges have the same sign.
         sides = [rays @ np.cross(p, q) for p, q in ((a, b), (b, c), (c, a))]
         inside = np.all([s >= 0 for s in sides], axis=0) | np.all([s <= 0 for s in sides], axis=0)
         slope = rays @ normal
@@ -145,7 +150,7 @@ def distances(depth, k):
 
 
 def vsd(test, estimate, truth, poses, k, diameter, delta):
-    """Errors for every tolerance, and the number of pixels they are shares of."""
+    """Returns the error for every tolerance, and the number of pixels in the union."""
     (_, t_e), (_, t_g) = poses
     between = np.linalg.norm(t_e[:2] / t_e[2] - t_g[:2] / t_g[2])
     if between >= diameter / 2 * (1 / t_e[2] + 1 / t_g[2]):
@@ -166,7 +171,10 @@ def vsd(test, estimate, truth, poses, k, diameter, delta):
 
 
 def symmetries(info):
-    """BOP's motions: every step of every continuous symmetry after every discrete one, the identity among them."""
+    """Returns BOP's symmetry motions, including the identity.
+
+    These are all steps of every continuous symmetry after every discrete one.
+    """
     discrete = [(np.eye(3), np.zeros(3))]
     for numbers in info.get("symmetries_discrete", []):
         m = np.array(numbers, dtype=float).reshape(4, 4)
@@ -189,7 +197,7 @@ def project(points, k):
 
 
 def point_errors(vertices, motions, estimate, truth, k):
-    """MSSD, MSPD, ADD, ADI: millimetres and pixels."""
+    """Returns MSSD, MSPD, ADD and ADI in millimeters and pixels."""
     (r_e, t_e), (r_g, t_g) = estimate, truth
     estimated, true = vertices @ r_e.T + t_e, vertices @ r_g.T + t_g
     surface, image = [], []
@@ -203,7 +211,10 @@ def point_errors(vertices, motions, estimate, truth, k):
 
 
 def matched(errors, threshold):
-    """Number of instances found: estimates by descending score, each takes the free instance with the least error."""
+    """Returns the number of instances found.
+
+    Each estimate, by descending score, takes the free instance with the smallest error.
+    """
     free = set(range(errors.shape[1]))
     for row in errors:
         least = min(free, key=lambda i: row[i], default=None)
@@ -312,7 +323,7 @@ def main():
     if report["targets"] != wanted:
         failures.append(f"the program counts {report['targets']} instances, expected {wanted}")
     for name, value in recalls.items():
-        # A pixel may move one VSD across one of its hundred thresholds; nothing else may differ.
+        # A pixel may move one VSD across one of its 100 thresholds. Nothing else may differ.
         slack = {"ar_vsd": 0.01 / wanted, "ar": 0.01 / wanted / 3}.get(name, 0.0) + 1e-12
         if abs(report[name] - value) > slack:
             failures.append(f"{name} is {report[name]}, expected {value}")
