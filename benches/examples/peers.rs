@@ -55,7 +55,9 @@ fn main() -> Result<(), Failure> {
                 json!({ "loaded": number })
             }
             Some(("run", row)) => {
-                let loaded = loaded.as_ref().ok_or("no instance is loaded: send `load NUMBER` first")?;
+                let loaded = loaded
+                    .as_ref()
+                    .ok_or("no instance is loaded: send `load NUMBER` first")?;
                 bench.run(row, loaded)?
             }
             _ => return Err(format!("unknown command {line:?}").into()),

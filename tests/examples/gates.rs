@@ -1,10 +1,11 @@
 //! Counts the right and wrong poses that a threshold on the MVE accepts, as a Markdown table.
 //!
-//! `cargo run --release -p hicp-tests --example gates [SCENES]`
+//! Run `cargo run --release -p hicp-tests --example gates [SCENES]`.
 //!
-//! Scenes of six objects on a table, with the depth noise of an Intel D435. Each visible object is
-//! refined by `auto`: its own model from near and from any rotation, its model in other
-//! proportions, and the model of another object. A pose with a warning is not accepted.
+//! The scenes show six objects on a table, with the depth noise of an Intel D435. The preset `auto`
+//! refines each visible object in four ways: with its own model from a near start and from any
+//! rotation, with its model in other proportions, and with the model of another object. A pose with
+//! a warning is not accepted.
 
 use hicp_sim::{
     AxialPolynomial, Clutter, DepthNoise, DepthSensor, Household, Proportions, perturb, rng,
@@ -14,14 +15,14 @@ use hybrid_icp::core::{Isometry3, Model, Observation, Translation3};
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner};
 
-/// A refined pose: its MVE, whether there is a warning, and whether it is right.
+/// A refined pose: its MVE, whether it has a warning, and whether it is right.
 struct Judged {
     mve: f64,
     warned: bool,
     right: bool,
 }
 
-/// Objects with fewer visible pixels are left out.
+/// Fewest visible pixels of an object that is refined.
 const LEAST_PIXELS: usize = 1500;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

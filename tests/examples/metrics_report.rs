@@ -1,11 +1,14 @@
-//! How accurate each metric is, and in how many iterations, on the 200 starts of `synthetic_starts` (6.2 mm, 9.5°), as a
-//! Markdown table.
+//! Prints the accuracy and the iterations of each metric on 200 starts, as a Markdown table.
 //!
-//! `cargo run --release -p hicp-tests --example metrics_report [DEPTH_NOISE_PERCENT [STARTS_PER_OBJECT]]`
+//! The starts are those of `synthetic_starts` (6.2 mm, 9.5°).
 //!
-//! Every row is one ICP stage on the visible surface, about 2,000 points, without filters and divergence rules, that ends when
-//! the next increment moves the object by less than 0.1 mm and 0.01° (50 evaluations at most). Iterations are evaluations,
-//! the first one at the initial pose included. Errors are up to the declared symmetries.
+//! Run `cargo run --release -p hicp-tests --example metrics_report [NOISE_PERCENT [STARTS]]`. The
+//! noise is a share of the depth, and the starts are per object.
+//!
+//! Every row is one ICP stage on about 2,000 points of the visible surface, without filters or
+//! divergence rules. A stage ends if the next increment moves the object by less than 0.1 mm and
+//! 0.01°, or after 50 evaluations. Iterations are evaluations, including the first one at the
+//! initial pose. Errors are up to the declared symmetries.
 
 use hicp_tests::starts::{NEAREST_OF_ALL, measure, plain_icp, starts};
 

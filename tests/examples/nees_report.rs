@@ -1,10 +1,12 @@
-//! Whether covariances tell the truth: the mean normalised estimation error squared (NEES) over Monte-Carlo runs, as a
-//! Markdown table.
+//! Prints how consistent covariances are, as a Markdown table.
 //!
-//! `cargo run --release -p hicp-tests --example nees_report [RUNS]`
+//! The measure is the mean normalized estimation error squared (NEES) over Monte-Carlo runs.
 //!
-//! The mean of ξᵀΣ⁻¹ξ is 6 for a covariance that is right, more for an optimistic one. Rows: how the pairs came about, the
-//! association and the metric. Images of 160×120, every pixel; ICP starts 1 mm and 1° off.
+//! Run `cargo run --release -p hicp-tests --example nees_report [RUNS]`.
+//!
+//! The mean of ξᵀΣ⁻¹ξ is 6 for a correct covariance and larger for an optimistic one. Rows name the
+//! origin of the pairs, the association and the metric. Images have 160×120 pixels, all of which
+//! are used. ICP starts 1 mm and 1° off.
 
 use hicp_sim::Household;
 use hicp_tests::nees::{Nees, Pairs, measure};
@@ -20,7 +22,7 @@ fn main() {
     };
     let nearest = || NearestNeighbor::new(Stride::Pixels(1), SearchIndex::default());
     println!(
-        "| pairs | object | noise | NEES of `covariance` | NEES of `sandwich_covariance` | 99 % band | RMS error of the centre |"
+        "| pairs | object | noise | NEES of `covariance` | NEES of `sandwich_covariance` | 99 % band | RMS error of the center |"
     );
     println!("|---|---|---|---|---|---|---|");
     for object in [Household::Hammer, Household::Iron, Household::Car] {
@@ -48,9 +50,9 @@ fn main() {
                 ),
                 ("fixed", Pairs::FixedAtTruth, exact),
                 ("ICP", Pairs::Icp, off),
-                ("ICP, selected anew", Pairs::Reselected, off),
+                ("ICP, selected again", Pairs::Reselected, off),
                 (
-                    "ICP, selected anew, without boundary targets",
+                    "ICP, selected again, without boundary targets",
                     Pairs::ReselectedInside,
                     off,
                 ),

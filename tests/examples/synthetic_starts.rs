@@ -1,7 +1,8 @@
-//! Refines 200 starts that are 6.2 mm and 9.5° off, on ten synthetic objects, with every preset on
-//! the same images.
+//! Refines 200 starts on ten synthetic objects with every preset, on the same images.
 //!
-//! `cargo run --release -p hicp-tests --example synthetic_starts [DEPTH_NOISE_PERCENT]`
+//! The starts are 6.2 mm and 9.5° off.
+//!
+//! Run `cargo run --release -p hicp-tests --example synthetic_starts [DEPTH_NOISE_PERCENT]`.
 
 use std::time::Instant;
 
@@ -13,7 +14,7 @@ use hybrid_icp::{Preset, Refiner};
 
 const STARTS_PER_OBJECT: usize = 20;
 
-/// What is gathered of one preset.
+/// The measurements of one preset.
 #[derive(Default)]
 struct Column {
     angles: Vec<f64>,
@@ -40,10 +41,10 @@ fn main() {
                 MEAN_ROTATION_ERROR_DEGREES.to_radians(),
             );
             for (_, refiner, column) in &mut refiners {
-                // A fresh observation, so that normals and search trees are part of everyone's
-                // time.
+                // A new observation for each preset, so that every time includes normals and search
+                // trees.
                 let start = Instant::now();
-                let observation = scene.observe_anew();
+                let observation = scene.observe_again();
                 let refined = refiner.refine(&scene.model, &observation, &init);
                 column
                     .milliseconds
@@ -71,7 +72,7 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|");
     let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
-    let yardstick = refiners
+    let baseline = refiners
         .iter_mut()
         .find(|(preset, ..)| *preset == Preset::NnPointToPoint)
         .map_or((f64::NAN, f64::NAN), |(_, _, column)| {
@@ -87,12 +88,12 @@ fn main() {
             column.vsd.iter().sum::<f64>() / count,
             100.0 * failed / count,
             100.0 * column.worse as f64 / count,
-            median(&mut column.milliseconds) / yardstick.0,
-            mean(&column.milliseconds) / yardstick.1,
+            median(&mut column.milliseconds) / baseline.0,
+            mean(&column.milliseconds) / baseline.1,
         );
     }
     println!(
-        "\nThe yardstick of the times, nn-point-to-point, took {:.2} ms in the median, from depth image to pose.",
-        yardstick.0
+        "\nTimes are relative to nn-point-to-point: median {:.2} ms from depth image to pose.",
+        baseline.0
     );
 }

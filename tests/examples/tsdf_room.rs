@@ -1,8 +1,9 @@
-//! Integrates recorded depth frames into one volume and prints what comes out of it.
+//! Integrates recorded depth frames into one volume and prints the size of the surface.
 //!
-//! `cargo run --release -p hicp-tests --example tsdf_room FOLDER [VOXEL_METERS] [OUT.ply]`
+//! Run `cargo run --release -p hicp-tests --example tsdf_room FOLDER [VOXEL_METERS] [OUT.ply]`.
 //!
-//! FOLDER is a BOP scene without objects: `depth/` and a `scene_camera.json` with world-to-camera poses, in millimetres.
+//! FOLDER is a BOP scene without objects: `depth/` and a `scene_camera.json` with world-to-camera
+//! poses, in millimeters.
 
 use std::path::PathBuf;
 
@@ -12,7 +13,11 @@ use hicp_tests::room::{bounds, frames};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let folder = PathBuf::from(arguments.next().ok_or("a folder of frames is needed")?);
+    let folder = PathBuf::from(
+        arguments
+            .next()
+            .ok_or("no folder of frames: usage: tsdf_room FOLDER [VOXEL_METERS] [OUT.ply]")?,
+    );
     let voxel_meters: f64 = arguments.next().map_or(Ok(0.015), |text| text.parse())?;
     let frames = frames(&folder)?;
     let (min, max) = bounds(&frames);

@@ -1,8 +1,10 @@
-//! Refines the estimates of four detectors on five real YCB-Video frames with every pipeline:
-//! median ADI and MVE before and after, how the ground truth stays put, and times as ratios to
-//! nn-point-to-point: medians, and means, which show a search that runs for few rows.
+//! Refines the estimates of four detectors on five real YCB-Video frames with every preset.
 //!
-//! `cargo run --release -p hicp-tests --example ycbv_report`
+//! The table shows the median ADI and MVE before and after, and the error of refinements that start
+//! at the ground truth. Times are relative to nn-point-to-point. It shows the ratios of medians and
+//! of means, because a search that runs for few rows changes the mean only.
+//!
+//! Run `cargo run --release -p hicp-tests --example ycbv_report`.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -60,7 +62,7 @@ fn main() {
     let (mut baseline, mut mean_baseline, mut refine_baseline) = (0.0, 0.0, 0.0);
     let mut lines = BTreeMap::new();
     let mut order = Preset::ALL.to_vec();
-    // The yardstick of the time ratios goes first.
+    // The baseline of the time ratios runs first.
     order.sort_by_key(|p| *p != Preset::NnPointToPoint);
     for preset in order {
         let mut cells = Vec::new();
@@ -69,8 +71,7 @@ fn main() {
             let (mut errors, mut scores) = (Vec::new(), Vec::new());
             for (index, init) in starts {
                 let instance = &instances[*index];
-                // A fresh observation each time, so that its normals and trees are part of the
-                // time.
+                // A new observation each time, so that the time includes normals and trees.
                 let mut refiner = Refiner::preset(preset);
                 let start = Instant::now();
                 let observation = instance.observe();

@@ -1,5 +1,4 @@
-//! What the cross-crate tests and the benches share: scenes, starts, data, an allocator that
-//! counts.
+//! Scenes, starts, data and a counting allocator, shared by the cross-crate tests and the benches.
 
 pub mod allocations;
 pub mod fuzz;
@@ -18,7 +17,7 @@ use hybrid_icp::core::{
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::raster::Rasterizer;
 
-/// The ten objects that the starts, and the figures quoted from them, are about.
+/// The ten objects of the starts and of the figures quoted from them.
 pub const OBJECTS: [Household; 10] = [
     Household::Mug,
     Household::Bottle,
@@ -32,7 +31,7 @@ pub const OBJECTS: [Household; 10] = [
     Household::Pan,
 ];
 
-/// A model seen in a depth image, and where it truly is.
+/// A model in a depth image, with its true pose.
 #[derive(Debug)]
 pub struct Scene {
     /// The object.
@@ -44,8 +43,8 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Makes the observation anew, without its search trees.
-    pub fn observe_anew(&self) -> Observation {
+    /// Creates the observation again, without its search trees.
+    pub fn observe_again(&self) -> Observation {
         let observation = &self.observation;
         Observation::new(
             Arc::clone(observation.shared_depth()),
@@ -55,11 +54,12 @@ impl Scene {
         .expect("sizes agree")
     }
 
-    /// The same view with an upright bar over a `share` of the width of the mask's middle, flat,
-    /// and nearer than the nearest point of the object by `meters`.
+    /// Returns the same view with an upright, flat bar in front of the object.
     ///
-    /// `masked` says whether the segmentation takes the bar for the object, as detectors do with
-    /// hands and grippers.
+    /// The bar covers a `share` of the mask's width around its middle, and is `meters` nearer than
+    /// the nearest point of the object.
+    ///
+    /// If `masked`, the mask includes the bar, as detectors do with hands and grippers.
     pub fn behind_a_bar(&self, share: f64, meters: f32, masked: bool) -> Observation {
         let (width, height) = (
             self.observation.camera().width(),
@@ -91,8 +91,9 @@ impl Scene {
     }
 }
 
-/// Returns the median; the mean of the two middle values of an even number. Sorts the values; NaN
-/// without any.
+/// Sorts the values and returns the median, or NaN without values.
+///
+/// The median of an even number of values is the mean of the two middle ones.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
@@ -103,12 +104,12 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// The camera of the synthetic scenes: 640×480, 60° wide.
+/// Returns the camera of the synthetic scenes: 640×480 pixels, 60° wide.
 pub fn camera() -> PinholeCamera {
     PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480).expect("a valid camera")
 }
 
-/// Renders a model at a pose into a depth image of the whole camera, with the mask of its pixels.
+/// Renders a model into a depth image of the whole camera, with the mask of its pixels.
 pub fn render(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> (DepthImage, Mask) {
     let nothing = DepthImage::from_meters(
         camera.width(),
@@ -137,7 +138,7 @@ pub fn render(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> (
     )
 }
 
-/// Makes a scene: the object at a random pose, 0.3 to 0.6 m away, with relative depth noise.
+/// Creates a scene: the object at a random pose, 0.3 to 0.6 m away, with relative depth noise.
 pub fn scene(object: Household, noise_percent: f64, rng: &mut SimRng) -> Scene {
     let model = object.model().expect("the objects that ship are valid");
     let camera = camera();
@@ -155,8 +156,9 @@ pub fn scene(object: Household, noise_percent: f64, rng: &mut SimRng) -> Scene {
     }
 }
 
-/// Returns the rotation (radians) and translation (metres) error, up to the declared symmetries:
-/// about a continuous one only the direction of the axis counts.
+/// Returns the rotation (radians) and translation (meters) error, up to the declared symmetries.
+///
+/// Around a continuous symmetry axis, only the direction of the axis counts.
 pub fn symmetric_pose_distance(
     pose: &Isometry3<f64>,
     truth: &Isometry3<f64>,

@@ -1,4 +1,4 @@
-//! Monte-Carlo consistency of covariances: the normalised estimation error squared (NEES).
+//! Monte-Carlo consistency of covariances: the normalized estimation error squared (NEES).
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hybrid_icp::association::{BoundaryTargets, DataAssociation, OutlierFilter, PointSelection};
@@ -13,25 +13,25 @@ use hybrid_icp::raster::Rasterizer;
 
 use crate::render;
 
-/// What a set of runs showed.
+/// The results of a set of runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Nees {
-    /// Runs with a covariance.
+    /// Number of runs with a covariance.
     pub runs: usize,
-    /// Mean of ξᵀΣ⁻¹ξ; 6 for a consistent covariance.
+    /// Mean of ξᵀΣ⁻¹ξ. It is 6 for a consistent covariance.
     pub mean: f64,
-    /// The part of it that is the mean error, not its spread: x̄ᵀ x̄ of the whitened errors x.
+    /// Part of `mean` that comes from the mean error: x̄ᵀ x̄ of the whitened errors x.
     pub bias: f64,
-    /// Mean of ξᵀΣ⁻¹ξ with the sandwich covariance, whose residuals may differ in variance.
+    /// Mean of ξᵀΣ⁻¹ξ with the sandwich covariance, which allows residuals of different variance.
     pub sandwich: f64,
     /// Mean number of pairs.
     pub pairs: f64,
-    /// Root mean square translation error of the object's centre, millimetres.
+    /// Root mean square translation error of the object's center, millimeters.
     pub millimeters: f64,
 }
 
 impl Nees {
-    /// The band in which the mean of χ²₆ lies over so many runs, 99 times of 100 (normal approximation).
+    /// Returns the 99 % band of the mean of χ²₆ over the runs (normal approximation).
     #[must_use]
     pub fn band(&self) -> (f64, f64) {
         let half = 2.5758 * (12.0 / self.runs as f64).sqrt();
@@ -39,27 +39,34 @@ impl Nees {
     }
 }
 
-/// How the pairs of a run come about.
+/// Origin of the pairs of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pairs {
-    /// Registered by ICP from an initial error, the points those visible there; associated anew at the returned pose.
+    /// Pairs of ICP from an initial error.
+    ///
+    /// The points are those visible at the initial pose. They are associated again at the returned
+    /// pose.
     Icp,
-    /// As that, but the points selected anew, at the pose so far, for each of five stages, and at the returned pose.
+    /// Like `Icp`, but in five stages, each with points selected at its initial pose.
+    ///
+    /// The points are also selected again at the returned pose.
     Reselected,
-    /// As that, without pairs at the mask's and depth edges.
+    /// Like `Reselected`, without pairs at the edges of the mask and the depth.
     ReselectedInside,
-    /// Made once, at the true pose; one metric minimised over them.
+    /// Pairs of the true pose, over which one metric is minimized.
     FixedAtTruth,
-    /// As those, with the exact normals of the model on the observed side, and weights inverse to the variance of a residual.
+    /// Like `FixedAtTruth`, with the model's exact normals as those of the observation.
+    ///
+    /// The weights are inverse to the variance of a residual.
     FixedExactNormals,
 }
 
-/// A quarter of the resolution of the other scenes.
+/// Returns a camera with a quarter of the resolution of the other scenes.
 pub fn small_camera() -> PinholeCamera {
     PinholeCamera::new(143.1, 143.4, 80.1, 59.8, 160, 120).expect("a valid camera")
 }
 
-/// Registers an object so many times under new noise and compares the errors with the covariances.
+/// Registers an object `runs` times under new noise and compares the errors with the covariances.
 ///
 /// # Panics
 ///
@@ -130,7 +137,8 @@ where
             association.associate(&mut context, &source, &truth, &mut pairs);
             if made == Pairs::FixedExactNormals {
                 for pair in pairs.as_mut_slice() {
-                    // The noise moves a point along its ray by a share of its depth: n·p times that share in the residual.
+                    // The noise moves a point along its ray by a share of its depth. In the
+                    // residual, that is the same share of n·p.
                     let normal = pair.source.normal;
                     let scale = normal.dot(&pair.source.point.coords);
                     pair.target.normal = normal;

@@ -1,14 +1,14 @@
-//! Recorded depth frames of a room, where the machine has them.
+//! Recorded depth frames of a room, if the machine has them.
 
 use std::path::{Path, PathBuf};
 
 use hicp_io::bop::Scene;
 use hybrid_icp::core::{DepthImage, Isometry3, PinholeCamera, Point3};
 
-/// Depths beyond this are left out, metres: structured light measures badly there.
+/// Largest depth that is used, meters. Structured light is inaccurate beyond it.
 pub const MAX_DEPTH_METERS: f32 = 5.0;
 
-/// A depth image and where it was taken.
+/// A depth image and the camera pose of it.
 #[derive(Debug)]
 pub struct Frame {
     /// The depth image.
@@ -19,7 +19,9 @@ pub struct Frame {
     pub camera_from_world: Isometry3<f64>,
 }
 
-/// Returns the folder of frames: `traj/tsdf_fusion_50` in `HICP_DATA`, or in the shared data beside the project.
+/// Returns the folder of frames, if it exists.
+///
+/// It is `traj/tsdf_fusion_50` in `HICP_DATA`, or in the shared data next to the project.
 pub fn root() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folders = [
@@ -32,11 +34,13 @@ pub fn root() -> Option<PathBuf> {
         .find(|folder| folder.is_dir())
 }
 
-/// Reads the frames of a folder in the layout of a BOP scene: `depth/` and `scene_camera.json` with world-to-camera poses.
+/// Reads the frames of a folder in the layout of a BOP scene.
+///
+/// The folder has `depth/` and a `scene_camera.json` with world-to-camera poses.
 ///
 /// # Errors
 ///
-/// When a file cannot be read, or a frame has no pose.
+/// If a file cannot be read, or a frame has no pose.
 pub fn frames(folder: &Path) -> Result<Vec<Frame>, Box<dyn std::error::Error>> {
     let scene = Scene::open(folder)?;
     let mut frames = Vec::new();
@@ -62,7 +66,7 @@ pub fn frames(folder: &Path) -> Result<Vec<Frame>, Box<dyn std::error::Error>> {
     Ok(frames)
 }
 
-/// Returns the corners of the box that holds everything measured, metres, world frame.
+/// Returns the corners of the bounding box of all measured points, meters, world frame.
 pub fn bounds(frames: &[Frame]) -> (Point3<f64>, Point3<f64>) {
     let infinite = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let mut corners = (infinite, -infinite);

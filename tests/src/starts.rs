@@ -1,5 +1,4 @@
-//! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a table row of how a pipeline
-//! does on them.
+//! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a pipeline's results on them.
 
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hybrid_icp::core::{Isometry3, Problem};
@@ -9,7 +8,7 @@ use hybrid_icp::raster::Rasterizer;
 
 use crate::{OBJECTS, Scene, median, scene, symmetric_pose_distance};
 
-/// A scene and the pose to start from.
+/// A scene and an initial pose.
 #[derive(Debug)]
 pub struct Start {
     /// The scene.
@@ -18,7 +17,7 @@ pub struct Start {
     pub init: Isometry3<f64>,
 }
 
-/// Makes the starts of the `synthetic_starts` example: so many per object, of all ten.
+/// Creates the starts of the `synthetic_starts` example: `per_object` for each of the ten objects.
 pub fn starts(per_object: usize, noise_percent: f64) -> Vec<Start> {
     let objects = (0..).zip(OBJECTS);
     objects
@@ -40,19 +39,19 @@ pub fn starts(per_object: usize, noise_percent: f64) -> Vec<Start> {
         .collect()
 }
 
-/// How a pipeline did on a set of starts.
+/// The results of a pipeline on a set of starts.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// Median rotation error, degrees, up to the symmetries.
     pub degrees: f64,
-    /// Ninetieth percentile of the same.
+    /// Ninetieth percentile of the rotation error, degrees.
     pub degrees_p90: f64,
-    /// Median translation error, millimetres.
+    /// Median translation error, millimeters.
     pub millimeters: f64,
-    /// Median of [`hybrid_icp::icp::Outcome::iterations`]: every evaluation, the first and the
-    /// rejected included.
+    /// Median of [`hybrid_icp::icp::Outcome::iterations`], including the first and rejected
+    /// evaluations.
     pub iterations: f64,
-    /// Share of the starts whose pose was kept.
+    /// Share of the starts whose initial pose was kept.
     pub kept: f64,
 }
 
@@ -60,7 +59,7 @@ pub struct Row {
 ///
 /// # Panics
 ///
-/// When the text is not a pipeline.
+/// If the text is not a pipeline.
 pub fn measure(pipeline: &str, starts: &[Start]) -> Row {
     let file = PipelineFile::parse(pipeline, "row").unwrap_or_else(|e| panic!("{e}"));
     let mut stage = file.build().unwrap_or_else(|e| panic!("{e}\n{pipeline}"));
@@ -94,9 +93,10 @@ pub fn measure_stage(stage: &mut dyn Stage, starts: &[Start]) -> Row {
     }
 }
 
-/// A stage of the visible surface with a given association and metric (TOML), that ends when the
-/// next increment moves the object by less than 0.1 mm and 0.01°, or after 50 evaluations. No
-/// filter, no divergence rule.
+/// Returns a stage of the visible surface with a given association and metric (TOML).
+///
+/// The stage ends if the next increment moves the object by less than 0.1 mm and 0.01°, or after 50
+/// evaluations. It has no filter and no divergence rule.
 pub fn plain_icp(association: &str, metric: &str) -> String {
     format!(
         "type = \"icp\"\nselection = \"visible-surface\"\nassociation = {association}\nmetric = {metric}\n\
@@ -104,5 +104,5 @@ pub fn plain_icp(association: &str, metric: &str) -> String {
     )
 }
 
-/// Nearest neighbours among all masked pixels (TOML).
+/// Nearest neighbors among all masked pixels (TOML).
 pub const NEAREST_OF_ALL: &str = "{ type = \"nearest-neighbor\", pixels = 1 }";

@@ -1,4 +1,4 @@
-//! Real YCB-Video frames, where the machine has them.
+//! Real YCB-Video frames, if the machine has them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,8 +8,10 @@ use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
 
-/// Returns the dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has
-/// result files as the excerpt has that the tests are of.
+/// Returns the dataset's folder, if it exists and contains result files.
+///
+/// It is `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data next to the project. The
+/// tests need the excerpt with its folder `results`.
 pub fn root() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/bop");
     let folders = [
@@ -39,7 +41,7 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// Makes the observation anew.
+    /// Creates a new observation.
     pub fn observe(&self) -> Observation {
         let depth = Arc::clone(&self.depth);
         Observation::new(depth, self.mask.clone(), self.camera).expect("sizes agree")

@@ -1,6 +1,8 @@
-//! Arbitrary bytes as a source of choices.
+//! Choices made from arbitrary bytes.
 
-/// Takes choices from the front; once the bytes are used up, every choice is the first one.
+/// A source of choices, made from the bytes in order.
+///
+/// After the last byte, every choice is the first one.
 pub(super) struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -23,7 +25,7 @@ impl<'a> Bytes<'a> {
         })
     }
 
-    /// A number from 0 to `n` - 1, for `n` up to 256.
+    /// Returns a number from 0 to `n` - 1, for `n` up to 256.
     pub(super) fn below(&mut self, n: usize) -> usize {
         usize::from(self.byte()) % n.max(1)
     }
@@ -32,19 +34,19 @@ impl<'a> Bytes<'a> {
         choices[self.below(choices.len())]
     }
 
-    /// True once in `n` bytes that are spread evenly; false when the bytes are used up.
+    /// Returns `true` for one in `n` evenly distributed bytes, and `false` after the last byte.
     pub(super) fn one_in(&mut self, n: usize) -> bool {
         self.below(n) == n - 1
     }
 
-    /// From -1 to 1.
+    /// Returns a number from -1 to 1.
     pub(super) fn signed(&mut self) -> f64 {
         f64::from(i16::from_le_bytes(self.array())) / 32768.0
     }
 
-    /// Any bits, or one of the values at which arithmetic turns.
+    /// Returns a number with arbitrary bits, or one of the special values of arithmetic.
     pub(super) fn any_number(&mut self) -> f64 {
-        const TURNS: [f64; 16] = [
+        const SPECIAL: [f64; 16] = [
             0.0,
             -0.0,
             1.0,
@@ -65,7 +67,7 @@ impl<'a> Bytes<'a> {
         if self.one_in(2) {
             f64::from_le_bytes(self.array())
         } else {
-            self.pick(&TURNS)
+            self.pick(&SPECIAL)
         }
     }
 }

@@ -1,4 +1,6 @@
-//! Readers take paths: bytes in a temporary file, one per thread and name, overwritten from run to run.
+//! Temporary files with arbitrary bytes, because readers take paths.
+//!
+//! There is one file per thread and name, which every run overwrites.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -27,7 +29,8 @@ pub(super) fn with_bytes(name: &'static str, data: &[u8]) -> PathBuf {
             .files
             .entry(name)
             .or_insert_with(|| File::create(&path).expect("a temporary file"));
-        // Kept open and not truncated first: some file systems flush a file that is.
+        // The file stays open and is not truncated first, because some file systems flush truncated
+        // files.
         file.rewind().expect("a seekable file");
         file.write_all(data).expect("room for a temporary file");
         file.set_len(data.len() as u64).expect("a resizable file");
@@ -35,7 +38,7 @@ pub(super) fn with_bytes(name: &'static str, data: &[u8]) -> PathBuf {
     })
 }
 
-/// A path in the thread's temporary folder for what a target writes.
-pub(super) fn beside(path: &std::path::Path, name: &str) -> PathBuf {
+/// Returns a path in the thread's temporary folder for the output of a target.
+pub(super) fn next_to(path: &std::path::Path, name: &str) -> PathBuf {
     path.with_file_name(name)
 }

@@ -1,6 +1,7 @@
-//! What the fuzzers of `fuzz/` run, and what `tests/fuzz_regressions.rs` runs on their findings.
+//! Bodies of the fuzz targets, for the fuzzers of `fuzz/` and for the test that replays their
+//! findings.
 //!
-//! A target takes any bytes and panics where something does not hold that must hold of all of them.
+//! A target accepts any bytes. It panics if a property that must hold for all inputs does not hold.
 
 mod bytes;
 mod file;
@@ -11,7 +12,7 @@ mod refine;
 /// A body of a fuzz target.
 pub type Target = fn(&[u8]);
 
-/// Every target by name: one per reader, and whole refinements.
+/// Every target by name: one per reader, and one for whole refinements.
 pub const TARGETS: [(&str, Target); 11] = [
     ("bop_json", readers::bop_json),
     ("camera_json", readers::camera_json),
@@ -30,11 +31,11 @@ pub const TARGETS: [(&str, Target); 11] = [
 ///
 /// # Panics
 ///
-/// When there is no target of that name, or when what must hold does not.
+/// If no target has that name, or if a property of the target does not hold.
 pub fn run(name: &str, data: &[u8]) {
     let (_, target) = TARGETS
         .iter()
         .find(|(known, _)| *known == name)
-        .unwrap_or_else(|| panic!("no fuzz target is called {name}"));
+        .unwrap_or_else(|| panic!("no fuzz target is named {name}"));
     target(data);
 }

@@ -1,13 +1,15 @@
-//! Arbitrary bytes into the text of a pipeline file, through the catalogue of parts.
+//! Pipeline files made from arbitrary bytes and the catalog of parts.
 
 use hybrid_icp::pipeline::{Accepts, Catalog, Parameter, Part, PartKind};
 
 use super::bytes::Bytes;
 
-/// Depth below which parts hold no parts of their own kind: TOML files may not be nested without end.
+/// Depth below which parts contain no parts of their own kind. TOML files have a nesting limit.
 const DEEPEST: usize = 3;
 
-/// A pipeline file whose parts exist and whose values are mostly within their ranges; small counts, so that it ends soon.
+/// Returns a pipeline file of existing parts, with most values in their ranges.
+///
+/// Counts are small, so that a run ends soon.
 pub(super) fn pipeline(bytes: &mut Bytes<'_>) -> String {
     let part = choose(bytes, PartKind::Stage, 0);
     fields(bytes, part, 0).join("\n")
@@ -20,7 +22,7 @@ fn choose(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> &'static Part 
             _ => false,
         })
     };
-    // A clock decides about the time limit, and a target must do the same every time.
+    // A target must be deterministic, and the time limit depends on a clock.
     let choices: Vec<&Part> = Catalog::built_in()
         .parts()
         .filter(|part| part.kind == kind && part.name != "time-limit")
@@ -32,7 +34,7 @@ fn choose(bytes: &mut Bytes<'_>, kind: PartKind, depth: usize) -> &'static Part 
 fn fields(bytes: &mut Bytes<'_>, part: &Part, depth: usize) -> Vec<String> {
     let mut fields = vec![format!("type = \"{}\"", part.name)];
     for parameter in &part.parameters {
-        // Defaults of counts are for good results, not for speed.
+        // Counts are always set, because their defaults favor accuracy over speed.
         let is_count = matches!(parameter.accepts, Accepts::Count { .. });
         if must_be_given(parameter) || is_count || bytes.one_in(2) {
             let value = value(bytes, &parameter.accepts, depth);
@@ -79,7 +81,7 @@ fn list(bytes: &mut Bytes<'_>, mut item: impl FnMut(&mut Bytes<'_>) -> String) -
     format!("[{}]", items.join(", "))
 }
 
-/// A small count, and now and then one that is refused or must be bounded by what there is.
+/// Returns a small count, and occasionally one that must be refused or bounded.
 fn count(bytes: &mut Bytes<'_>, min: u32) -> u32 {
     match bytes.byte() {
         255 => u32::MAX,
@@ -89,7 +91,7 @@ fn count(bytes: &mut Bytes<'_>, min: u32) -> u32 {
     }
 }
 
-/// The ends of the range, a value near where things usually are, or one within it.
+/// Returns an end of the range, a common value, or a value in the range.
 fn number(bytes: &mut Bytes<'_>, min: f64, max: f64) -> String {
     let usual = [min, max, 0.1, 0.01, 1e-3, 1.0, 10.0, 90.0, 1e-9, 1e9];
     let value = if bytes.one_in(4) {
@@ -98,7 +100,7 @@ fn number(bytes: &mut Bytes<'_>, min: f64, max: f64) -> String {
     } else {
         bytes.pick(&usual)
     };
-    // With a decimal point or an exponent in every case: TOML has whole numbers and others.
+    // Always has a decimal point or an exponent, because TOML distinguishes integers from floats.
     match value {
         v if v.is_infinite() => if v > 0.0 { "inf" } else { "-inf" }.to_owned(),
         v => format!("{v:e}"),

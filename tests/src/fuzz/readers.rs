@@ -1,4 +1,6 @@
-//! A target per reader: whatever the bytes, a value that keeps its promises or an error that names the file.
+//! Fuzz targets of the readers.
+//!
+//! Whatever the bytes, a reader returns a valid value, or an error that names the file.
 
 use std::path::Path;
 
@@ -12,9 +14,11 @@ use hicp_io::{
 use hybrid_icp::core::{TriMesh, se3};
 use hybrid_icp::pipeline::PipelineFile;
 
-use super::file::{beside, with_bytes};
+use super::file::{next_to, with_bytes};
 
-/// Returns the value; an error must name the file, on one line, without the file's own bytes drowning it.
+/// Returns the value, or checks the error.
+///
+/// An error must name the file and be short, even if it quotes the file.
 fn checked<T>(path: &Path, result: Result<T, IoError>) -> Option<T> {
     match result {
         Ok(value) => Some(value),
@@ -33,8 +37,8 @@ fn mesh(name: &'static str, data: &[u8]) {
     let Some(mesh) = checked(&path, read_mesh(&path, LengthUnit::Meters)) else {
         return;
     };
-    hold_to_a_mesh(&mesh);
-    let copy = beside(&path, "copy.ply");
+    check_mesh(&mesh);
+    let copy = next_to(&path, "copy.ply");
     write_ply(&copy, &mesh, LengthUnit::Meters).expect("a mesh that can be written");
     let back = read_mesh(&copy, LengthUnit::Meters).expect("a mesh that was written");
     assert_eq!(mesh.vertices(), back.vertices());
@@ -45,7 +49,7 @@ fn mesh(name: &'static str, data: &[u8]) {
     );
 }
 
-fn hold_to_a_mesh(mesh: &TriMesh) {
+fn check_mesh(mesh: &TriMesh) {
     let n = mesh.vertices().len();
     assert!(
         mesh.vertices()
@@ -66,21 +70,21 @@ pub(super) fn stl(data: &[u8]) {
     mesh("a.stl", data);
 }
 
-/// As a mesh, and as a point cloud.
+/// Reads the bytes as a mesh and as a point cloud.
 pub(super) fn ply(data: &[u8]) {
     mesh("a.ply", data);
     let path = with_bytes("cloud.ply", data);
     let _ = checked(&path, read_point_cloud_ply(&path, LengthUnit::Meters));
 }
 
-/// As depth, as a mask and as colour.
+/// Reads the bytes as a depth image, a mask and a color image.
 pub(super) fn png(data: &[u8]) {
     let path = with_bytes("a.png", data);
     if let Some(depth) = checked(&path, read_depth_png(&path, 0.1)) {
         assert!(depth.pixels().iter().all(|z| z.is_finite() && *z >= 0.0));
     }
     if let Some(mask) = checked(&path, read_mask_png(&path)) {
-        let copy = beside(&path, "copy.png");
+        let copy = next_to(&path, "copy.png");
         write_mask_png(&copy, &mask).expect("a mask that can be written");
         assert_eq!(read_mask_png(&copy).expect("a mask that was written"), mask);
     }
@@ -89,7 +93,7 @@ pub(super) fn png(data: &[u8]) {
     }
 }
 
-/// The first byte says which of BOP's files the others are.
+/// Reads the bytes as one of BOP's JSON files, selected by the first byte.
 pub(super) fn bop_json(data: &[u8]) {
     let (kind, json) = data.split_first().unwrap_or((&b'c', &[]));
     match kind % 6 {
@@ -119,7 +123,7 @@ pub(super) fn bop_json(data: &[u8]) {
                     .segmentation
                     .iter()
                     .filter(|code| is_small(code))
-                    .for_each(hold_to_a_code);
+                    .for_each(check_code);
             }
         }
     }
@@ -129,7 +133,7 @@ fn scene(camera: &[u8], truth: &[u8], info: &[u8]) {
     let path = with_bytes("scene_camera.json", camera);
     with_bytes("scene_gt.json", truth);
     with_bytes("scene_gt_info.json", info);
-    let scene = match Scene::open(beside(&path, "")) {
+    let scene = match Scene::open(next_to(&path, "")) {
         Ok(scene) => scene,
         Err(error) => {
             let message = error.to_string();
@@ -163,13 +167,13 @@ pub(super) fn results_csv(data: &[u8]) {
     for row in &rows {
         assert!(se3::is_finite(&row.camera_from_object()), "{row:?}");
     }
-    let copy = beside(&path, "copy.csv");
+    let copy = next_to(&path, "copy.csv");
     write_results(&copy, &rows).expect("rows that can be written");
     let back = read_results(&copy).expect("rows that were written");
     assert_eq!(back, rows);
 }
 
-/// Two bytes of size, then COCO's text; also as plain counts.
+/// Reads two bytes of size, then COCO's text, and the same bytes as plain counts.
 pub(super) fn rle(data: &[u8]) {
     let [width, height, rest @ ..] = data else {
         return;
@@ -178,7 +182,7 @@ pub(super) fn rle(data: &[u8]) {
     if let Ok(text) = std::str::from_utf8(rest)
         && let Ok(code) = Rle::from_compressed(width, height, text)
     {
-        hold_to_a_code(&code);
+        check_code(&code);
         let back = Rle::from_compressed(width, height, &code.to_compressed());
         assert_eq!(back.as_ref(), Ok(&code));
     }
@@ -186,7 +190,7 @@ pub(super) fn rle(data: &[u8]) {
         .chunks_exact(4)
         .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]));
     if let Ok(code) = Rle::from_counts(width, height, counts.collect()) {
-        hold_to_a_code(&code);
+        check_code(&code);
     }
 }
 
@@ -194,7 +198,7 @@ fn is_small(code: &Rle) -> bool {
     u64::from(code.width()) * u64::from(code.height()) < 1 << 16
 }
 
-fn hold_to_a_code(code: &Rle) {
+fn check_code(code: &Rle) {
     let mask = code.to_mask();
     assert_eq!((mask.width(), mask.height()), (code.width(), code.height()));
     let set: u64 = code
@@ -208,7 +212,7 @@ fn hold_to_a_code(code: &Rle) {
     assert_eq!(Rle::of_mask(&mask).to_mask(), mask);
 }
 
-/// Text that is read and built, not run.
+/// Reads text and builds the pipeline without running it.
 pub(super) fn pipeline_toml(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;
@@ -233,7 +237,7 @@ pub(super) fn pose_json(data: &[u8]) {
     };
     let pose = file.camera_from_object;
     assert!(se3::is_finite(&pose), "{pose:?}");
-    let copy = beside(&path, "copy.json");
+    let copy = next_to(&path, "copy.json");
     write_pose_json(&copy, &pose).expect("a pose that can be written");
     let back = read_pose_json(&copy)
         .expect("a pose that was written")

@@ -1,4 +1,6 @@
-//! Arbitrary bytes into a small mesh, camera, depth image, mask, pose and pipeline, and a whole refinement of them.
+//! Whole refinements of scenes made from arbitrary bytes.
+//!
+//! The bytes define a small mesh, camera, depth image, mask, pose and pipeline.
 
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, Point3,
@@ -12,7 +14,10 @@ use super::bytes::Bytes;
 use super::parts;
 use crate::render;
 
-/// Nothing panics, the pose is finite or the initial one bit for bit, scores are from 0 to 1, and a second run gives the same bits.
+/// Refines a scene twice and checks the outcome.
+///
+/// Nothing may panic. The pose is finite, or has the bits of the initial pose. Scores are from 0 to
+/// 1, and both runs return the same bits.
 pub(super) fn refine(data: &[u8]) {
     let mut bytes = Bytes::new(data);
     let Some(mut refiner) = refiner(&mut bytes) else {
@@ -22,19 +27,22 @@ pub(super) fn refine(data: &[u8]) {
         return;
     };
     let first = refiner.refine(&model, &observation, &init);
-    hold_to_an_outcome(&first, &init);
+    check_outcome(&first, &init);
     let again = refiner.refine(&model, &observation, &init);
     assert_eq!(bits(&first), bits(&again), "{first:?} {again:?}");
 }
 
-fn hold_to_an_outcome(refined: &Refinement, init: &Isometry3<f64>) {
+fn check_outcome(refined: &Refinement, init: &Isometry3<f64>) {
     let pose = refined.outcome.camera_from_object;
     let kept = pose_bits(&pose) == pose_bits(init);
     assert!(kept || se3::is_finite(&pose), "{refined:?}");
     assert!((0.0..=1.0).contains(&refined.mve), "{refined:?}");
     assert!((0.0..=1.0).contains(&refined.mve_initial), "{refined:?}");
     if let Verdict::KeptInitial(_) = refined.outcome.verdict {
-        assert!(kept, "kept means bit for bit: {refined:?} from {init:?}");
+        assert!(
+            kept,
+            "a kept pose must have the same bits: {refined:?} from {init:?}"
+        );
     }
 }
 
@@ -51,7 +59,7 @@ fn bits(refined: &Refinement) -> ([u64; 7], u64, u64) {
     )
 }
 
-/// As much work as a fuzzer has time for.
+/// Limits on the work, so that a fuzzer can run many inputs.
 const LIMITS: PipelineLimits = PipelineLimits {
     max_iterations: 2000,
     max_hypotheses: 500,
@@ -136,7 +144,7 @@ fn symmetries(bytes: &mut Bytes<'_>) -> Symmetries {
     symmetries
 }
 
-/// A pose near another, or one with numbers of any kind.
+/// Returns a pose near another, or one with an arbitrary number.
 fn pose(bytes: &mut Bytes<'_>, near: &Isometry3<f64>, meters: f64, radians: f64) -> Isometry3<f64> {
     let mut translation = Vector3::from([0; 3].map(|_| bytes.signed() * meters));
     let rotation = Vector3::from([0; 3].map(|_| bytes.signed() * radians));
@@ -159,7 +167,7 @@ fn depth(
 ) -> Option<DepthImage> {
     let n = (camera.width() * camera.height()) as usize;
     let meters = match bytes.below(4) {
-        // What the camera sees, with noise on every third pixel.
+        // The rendered depth, with or without noise on every third pixel.
         0 | 1 => {
             let (seen, _) = render(model, camera, truth);
             let noise = bytes.one_in(2);

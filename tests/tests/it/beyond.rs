@@ -50,7 +50,7 @@ proptest! {
         let observation = match seed % 4 {
             0 => scene.behind_a_bar(0.3, 0.05, false),
             1 => scene.behind_a_bar(0.3, 0.05, true),
-            _ => scene.observe_anew(),
+            _ => scene.observe_again(),
         };
         let refine = |preset: Preset| {
             Refiner::preset(preset).refine(&scene.model, &observation, &init)
