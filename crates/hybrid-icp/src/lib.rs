@@ -19,8 +19,8 @@
 //!
 //! # Compose your own
 //!
-//! [`Preset`] lists the pipelines that ship. All of them are made of public parts. This is Hybrid ICP
-//! (Dreczkowski & Johns), which selects the registration from the image:
+//! [`Preset`] lists the pipelines that ship. All of them are made of public parts. This is Hybrid
+//! ICP (Dreczkowski & Johns), which selects the registration from the image:
 //!
 //! ```
 //! use hybrid_icp::prelude::*;
