@@ -1,4 +1,4 @@
-//! A warm run makes no heap allocation, whatever the preset.
+//! Checks that a warm run makes no heap allocation, whatever the preset.
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,8 @@ use hybrid_icp::{Preset, Refiner, SequentialEstimator};
 fn a_warm_run_allocates_nothing() {
     let mut rng = rng(3);
     let scene = scene(Household::Mug, 1.0, &mut rng);
-    // One start that is nearly right and one that is far off, so that `hybrid` takes both of its branches; and one upside down,
-    // so that there is something to search for.
+    // The first start is nearly right and the second far off, so that `hybrid` runs both of its
+    // branches. The third is upside down, so that a search finds something better.
     let starts = [
         perturb(&mut rng, &scene.truth, 0.004, 0.08),
         perturb(&mut rng, &scene.truth, 0.08, 0.6),
@@ -45,7 +45,7 @@ fn a_warm_run_allocates_nothing() {
     counter_works();
 }
 
-/// An ICP stage with one part of the catalogue in the place of its kind, or `None` for parts that are no component of a stage.
+/// Returns an ICP stage with a part, or `None` if the part is not a component of a stage.
 fn stage_with(part: &Part) -> Option<String> {
     let own = match part.name {
         "schedule" => "{ type = \"schedule\", filters = [\"max-distance\", \"trimmed\"] }".to_owned(),
@@ -86,7 +86,7 @@ fn stage_with(part: &Part) -> Option<String> {
 }
 
 #[test]
-fn every_component_of_the_catalogue_is_silent_when_warm() {
+fn every_warm_component_of_the_catalog_allocates_nothing() {
     let mut rng = rng(5);
     let scene = scene(Household::Mug, 1.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
@@ -111,7 +111,7 @@ fn every_component_of_the_catalogue_is_silent_when_warm() {
 #[test]
 fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
     let mut rng = rng(7);
-    // A bottle: its symmetries are looked at too.
+    // A bottle has symmetries, which the estimator also uses.
     let scene = scene(Household::Bottle, 1.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
     let uncertain = CameraMotion::none()

@@ -11,7 +11,7 @@ use hybrid_icp::core::{Context, Correspondences, Isometry3, Surfel};
 use hybrid_icp::icp::{Divergence, Icp, IterationLimit};
 use hybrid_icp::metric::{PointToPlane, WeightedSum};
 
-/// Allocations of the second of two equal refinements, and how many iterations it took.
+/// Returns the allocations and iterations of the second of two equal refinements.
 fn warm_allocations(association: impl DataAssociation + Send + 'static) -> (u64, u64) {
     let mut rng = rng(3);
     let scene = scene(Household::Mug, 1.0, &mut rng);
@@ -38,13 +38,13 @@ const SOFT: SoftProjective = SoftProjective {
 };
 
 #[test]
-fn a_warm_run_with_parts_of_ones_own_allocates_nothing() {
+fn a_warm_run_with_custom_parts_allocates_nothing() {
     let (allocations, iterations) = warm_allocations(SOFT);
     assert_eq!(allocations, 0);
     assert!(iterations > 1, "{iterations}");
 }
 
-/// Makes a copy of the points in every iteration.
+/// Copies the points in every iteration.
 struct Wasteful;
 
 impl DataAssociation for Wasteful {
@@ -62,7 +62,7 @@ impl DataAssociation for Wasteful {
 }
 
 #[test]
-fn an_association_that_allocates_is_found_out() {
+fn an_association_that_allocates_is_detected() {
     let (allocations, iterations) = warm_allocations(Wasteful);
     assert!(
         allocations >= iterations,

@@ -1,5 +1,9 @@
-//! What the presets that go beyond the paper promise: `local` never raises the MVE, `search` and `auto` leave its pose only for one
-//! that they judge better, a bounded search stays in its bound, and a search finds the object, or what looks the same.
+//! Contracts of the presets that go beyond the paper.
+//!
+//! - `local` never raises the MVE.
+//! - `search` and `auto` leave the pose of `local` only for one that they score better.
+//! - A bounded search stays in its bound.
+//! - A search finds the object, or an equivalent pose.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -17,14 +21,14 @@ use hybrid_icp::score::{MeanVsd, SampledMve, Score, add, adi, mssd};
 use hybrid_icp::{Preset, Refiner, presets};
 use proptest::prelude::*;
 
-/// The MVE by which a search judges.
+/// Returns the MVE that a search uses.
 fn lenient(scene: &Scene, observation: &Observation, pose: &Isometry3<f64>) -> f64 {
     let problem = Problem::new(&scene.model, observation);
     let mut workspace = Workspace::new(Rasterizer::default());
     MeanVsd::lenient().score(&mut workspace.context(&problem), pose)
 }
 
-/// The object turned half about an axis of its frame, where it stands.
+/// Returns the true pose rotated by 180° around an axis of the object frame through the center.
 fn flipped(scene: &Scene, axis: Vector3<f64>) -> Isometry3<f64> {
     let Point3 { coords: center } = scene.model.center();
     let turn = UnitQuaternion::new(axis * PI);
@@ -34,7 +38,7 @@ fn flipped(scene: &Scene, axis: Vector3<f64>) -> Isometry3<f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// The contracts of `local`, and of what is built on it: whatever the start, the image and the noise.
+    /// Checks `local` and the presets built on it, whatever the start, the image and the noise.
     #[test]
     fn the_mve_is_never_raised(
         object in 0..Household::ALL.len(),
@@ -46,7 +50,8 @@ proptest! {
         let mut rng = rng(seed);
         let scene = scene(Household::ALL[object], noise, &mut rng);
         let init = perturb(&mut rng, &scene.truth, meters, angle);
-        // A part of the object is hidden in every other scene, and what hides it taken for the object in every fourth.
+        // A bar hides a part of the object in half of the scenes. In a quarter, the mask includes
+        // it.
         let observation = match seed % 4 {
             0 => scene.behind_a_bar(0.3, 0.05, false),
             1 => scene.behind_a_bar(0.3, 0.05, true),
@@ -70,7 +75,7 @@ proptest! {
         }
     }
 
-    /// A bound holds for the local stage of the search as well as for its hypotheses.
+    /// The bound applies to the local stage of the search and to its hypotheses.
     #[test]
     fn a_bounded_search_stays_in_its_bound(
         object in 0..Household::ALL.len(),
@@ -98,11 +103,12 @@ proptest! {
     }
 }
 
-/// What `local` cannot see, and the score can: an object that is the wrong way round. Where the image tells, that is; a mug seen
-/// from the side looks the same upside down.
+/// `local` cannot correct a flipped object, but the score reveals it.
+///
+/// A flip counts only if the image shows it: from the side, a mug looks the same upside down.
 #[test]
-fn a_search_turns_round_what_is_the_wrong_way_round() {
-    let (mut told, mut righted) = (0, 0);
+fn a_search_finds_the_pose_of_a_flipped_object() {
+    let (mut visible, mut righted) = (0, 0);
     for (seed, object) in (0..).zip([Household::Mug, Household::Car, Household::Teapot]) {
         let scene = scene(object, 0.3, &mut rng(seed));
         let refine = |preset: Preset, init: &Isometry3<f64>| {
@@ -115,7 +121,7 @@ fn a_search_turns_round_what_is_the_wrong_way_round() {
             if local <= SearchOptions::default().threshold {
                 continue;
             }
-            told += 1;
+            visible += 1;
             let found = refine(Preset::Search, &init);
             assert!(
                 found.mve < truth + 0.02,
@@ -127,14 +133,14 @@ fn a_search_turns_round_what_is_the_wrong_way_round() {
             righted += usize::from(angle.to_degrees() < 2.0 && distance < 0.003);
         }
     }
-    assert!(told >= 4, "{told} flips of 9 are a test of a search");
+    assert!(visible >= 4, "only {visible} of 9 flips are visible");
     assert!(
-        righted + 1 >= told,
-        "{righted} of {told} ended at the truth"
+        righted + 1 >= visible,
+        "{righted} of {visible} ended at the truth"
     );
 }
 
-/// Of a body of revolution no image tells the turn about its axis, and the symmetry-aware error does not ask for it.
+/// No image shows the rotation of a body of revolution around its axis, and the error ignores it.
 #[test]
 fn a_symmetric_object_is_found_up_to_its_symmetry() {
     let scene = scene(Household::Bottle, 0.3, &mut rng(4));
@@ -148,11 +154,13 @@ fn a_symmetric_object_is_found_up_to_its_symmetry() {
     }
 }
 
-/// An object that looks the same from several sides has several true poses, and a search lands on any of them. MSSD over the
-/// declared symmetries is small at each, ADD at one alone. (ADI over sampled points is no judge here: the symmetry maps samples
-/// between samples, and they are millimetres apart.) With a bound the search does not leave it, and finds no equivalent pose beyond.
+/// A symmetric object has several true poses, and a search may return any of them.
+///
+/// MSSD over the declared symmetries is small at each, and ADD at only one. ADI over sampled points
+/// does not work here: the symmetry maps samples between samples, which are millimeters apart. A
+/// bounded search stays in its bound, and returns no equivalent pose outside it.
 #[test]
-fn of_equivalent_poses_any_is_found_and_none_outside_of_a_bound() {
+fn a_search_finds_any_equivalent_pose_inside_its_bound() {
     let mut elsewhere = BTreeMap::new();
     for (object, seed) in [
         (Household::Carton, 0),
@@ -198,9 +206,9 @@ fn of_equivalent_poses_any_is_found_and_none_outside_of_a_bound() {
     );
 }
 
-/// No time at all: the local pose, and an outcome that says why there was nothing more.
+/// Without any time, the search returns the local pose and reports the deadline.
 #[test]
-fn a_search_out_of_time_returns_what_it_has() {
+fn a_search_out_of_time_returns_the_local_pose() {
     let scene = scene(Household::Mug, 0.3, &mut rng(0));
     let init = flipped(&scene, Vector3::z());
     let options = SearchOptions {
@@ -218,9 +226,10 @@ fn a_search_out_of_time_returns_what_it_has() {
     );
 }
 
-/// Rotations that lie outside of the bound cost time too, and symmetries that an object does not have cost none.
+/// Rotations outside of the bound also cost time. Symmetries that an object does not have cost
+/// none.
 #[test]
-fn a_search_that_finds_nothing_to_try_ends_in_time() {
+fn a_search_without_hypotheses_ends_in_time() {
     let scene = scene(Household::Mug, 0.3, &mut rng(0));
     let init = flipped(&scene, Vector3::z());
     assert!(scene.model.symmetries().is_empty());
@@ -258,9 +267,9 @@ fn a_search_that_finds_nothing_to_try_ends_in_time() {
     }
 }
 
-/// A threshold that is never passed makes a search what its local stage is.
+/// If the threshold is never exceeded, a search equals its local stage.
 #[test]
-fn without_need_nothing_is_searched() {
+fn a_search_below_its_threshold_is_its_local_stage() {
     let scene = scene(Household::Mug, 0.3, &mut rng(0));
     let init = flipped(&scene, Vector3::z());
     let options = SearchOptions {

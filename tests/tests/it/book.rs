@@ -1,4 +1,4 @@
-//! The TOML blocks of the README and the book are pipelines that build.
+//! Checks that the TOML blocks of the README and the book are pipelines that build.
 
 use std::path::{Path, PathBuf};
 

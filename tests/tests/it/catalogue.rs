@@ -1,9 +1,9 @@
-//! `docs/catalogue.md` is the page that the code writes.
+//! Checks that `docs/catalogue.md` is the page that the code writes.
 
 use hybrid_icp::pipeline::Catalog;
 
 #[test]
-fn the_catalogue_page_is_up_to_date() {
+fn the_catalog_page_is_up_to_date() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/catalogue.md");
     let written = Catalog::built_in().page();
     if std::env::var_os("HICP_BLESS").is_some() {

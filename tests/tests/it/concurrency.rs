@@ -1,4 +1,5 @@
-//! What may be shared between threads is, what may be sent is, and neither changes a bit.
+//! Checks that types can be shared and sent between threads, and that threads do not change
+//! results.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -13,7 +14,9 @@ use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{BoxedStage, Preset, Refinement, Refiner, SequentialEstimator};
 
-/// Compiles only if the documentation is right: models and observations are shared by reference, workspaces are one per thread.
+/// Compiles only if the documented `Send` and `Sync` hold.
+///
+/// Models and observations are shared by reference. Each thread has its own workspace.
 #[test]
 fn data_are_send_and_sync_and_workspaces_are_send() {
     fn shared<T: Send + Sync>() {}
@@ -42,7 +45,7 @@ fn data_are_send_and_sync_and_workspaces_are_send() {
     sent::<SequentialEstimator>();
 }
 
-/// An object in a small image, observed anew with every call: no search tree is there yet.
+/// An object in a small image. Every call creates an observation without a search tree.
 struct View {
     model: Model,
     camera: PinholeCamera,
@@ -70,7 +73,7 @@ impl View {
         Observation::new(self.depth.clone(), self.mask.clone(), self.camera).unwrap()
     }
 
-    /// Starts from good to bad, so that both branches of the switch run.
+    /// Returns starts from good to bad, so that both branches of the switch run.
     fn starts(&self, count: u32) -> Vec<Isometry3<f64>> {
         let mut rng = rng(9);
         (0..count)
@@ -82,7 +85,9 @@ impl View {
     }
 }
 
-/// Refines from every start on some threads that share the model and the observation; each takes the next start.
+/// Refines from every start on some threads that share the model and the observation.
+///
+/// Each thread takes the next start.
 fn refine_all(
     model: &Model,
     observation: &Observation,
@@ -127,7 +132,7 @@ fn one_two_and_eight_threads_give_the_same_bits() {
 fn a_thousand_refinements_share_one_observation() {
     let view = View::new();
     let starts = view.starts(1000);
-    // Sixteen threads meet where the search tree is not built yet.
+    // The 16 threads start before the search tree exists.
     let together = refine_all(&view.model, &view.observe(), &starts, 16);
     let alone = refine_all(&view.model, &view.observe(), &starts, 1);
     assert_eq!(together, alone);

@@ -1,21 +1,30 @@
-//! Every part with every other: selections × associations × filters × metrics of the catalogue, from a small perturbation.
+//! Every combination of the catalog's selections, associations, filters and metrics.
 //!
-//! Each combination is built from the text of a pipeline file and runs on three scenes. Whatever the parts, a run must not
-//! panic, must return a finite pose and an honest outcome, and the same bits when repeated. Which combinations also *converge*
-//! is the golden file `golden/cross.txt`: a line per selection, association and filter, a column per metric, and in it
-//! a character per scene:
+//! Every run starts from a small perturbation.
 //!
-//! - `+` the mean distance of the model's samples from where they truly are, up to the declared symmetries, fell to half or less;
-//! - `-` it did not;
-//! - `~` it ended within 10 % of the half.
+//! Each combination is built from the text of a pipeline file and runs on three scenes. Whatever
+//! the parts, a run must not panic, and must return a finite pose, a truthful outcome, and the same
+//! bits when repeated. The golden file `golden/cross.txt` records which combinations *converge*. It
+//! has a line per selection, association and filter, a column per metric, and in it a character per
+//! scene:
 //!
-//! Rounding differs between machines, so a result within 10 % of the half passes for any of the three, and a `~`
-//! of the file for anything within 20 %. Everything else must agree exactly, better results included: the file is what the parts do, to be
-//! read when they change. To accept a change: `HICP_BLESS=1 cargo test -p hicp-tests --test it cross`, and look at the difference.
+//! - `+`: the mean distance of the model's samples from their true places, up to the declared
+//!   symmetries, fell to half or less.
+//! - `-`: it did not.
+//! - `~`: it ended within 10 % of the half.
 //!
-//! Left out as without meaning: selections under the associations that start from the observation (they ignore it), filters
-//! on the observed surface (under associations that search the observation every point finds itself, so one line suffices).
-//! The filters that are seldom used run on the visible surface only.
+//! Rounding differs between machines. A result within 10 % of the half therefore agrees with any of
+//! the three, and a `~` in the file agrees with anything within 20 %. Everything else must agree
+//! exactly, including better results, so that every change of the parts is reviewed. To accept a
+//! change, run `HICP_BLESS=1 cargo test -p hicp-tests --test it cross` and check the difference.
+//!
+//! Combinations without meaning are left out:
+//!
+//! - Selections with associations that start from the observation, which ignore the selection.
+//! - Filters on the observed surface: if the association searches the observation, every point is
+//!   paired with itself, so that one line is enough.
+//!
+//! Filters that are seldom used run on the visible surface only.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -29,13 +38,13 @@ use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Catalog, PartKind};
 use hybrid_icp::raster::Rasterizer;
 
-/// Evaluations per run.
+/// Maximum number of evaluations per run.
 const ITERATIONS: usize = 12;
-/// Model samples, and about how many points selections and search trees keep.
+/// Number of model samples, and approximate number of points of selections and search trees.
 const POINTS: usize = 400;
-/// Every how many runs one is repeated with a new pipeline and a new workspace.
+/// Interval of the runs that are repeated with a new pipeline and a new workspace.
 const REPEATED: usize = 5;
-/// Filters that are crossed with every selection.
+/// Filters that are combined with every selection.
 const MAIN_FILTERS: [&str; 5] = [
     "max-distance",
     "max-normal-angle",
@@ -43,7 +52,7 @@ const MAIN_FILTERS: [&str; 5] = [
     "one-to-one",
     "normal-weight",
 ];
-/// Associations that ask for the model points closest to the observed ones, whatever was selected.
+/// Associations that search the model points closest to the observed ones and ignore the selection.
 const FROM_OBSERVATION: [&str; 2] = ["observation-to-model", "closest-point-on-mesh"];
 
 struct Case {
@@ -52,7 +61,9 @@ struct Case {
     before: f64,
 }
 
-/// A mug without noise, a hammer and a carton with 0.3 % of it; 3 mm and 3° off.
+/// Returns a mug without noise, and a hammer and a carton with 0.3 % noise.
+///
+/// The initial poses are 3 mm and 3° off.
 fn cases() -> Vec<Case> {
     let mut rng = rng(12);
     let camera = camera();
@@ -88,7 +99,7 @@ fn cases() -> Vec<Case> {
     .collect()
 }
 
-/// Mean distance of the model's samples from where they truly are, at the symmetry for which it is least.
+/// Returns the mean distance of the model's samples from their true places, for the best symmetry.
 fn point_error(scene: &Scene, pose: &Isometry3<f64>) -> f64 {
     let samples = scene.model.samples();
     let motions = scene.model.symmetries().motions();
@@ -103,7 +114,7 @@ fn point_error(scene: &Scene, pose: &Isometry3<f64>) -> f64 {
     errors.min_by(f64::total_cmp).unwrap()
 }
 
-/// The parts of a kind as they stand in a file, sized for small scenes.
+/// Returns the parts of a kind as TOML, sized for small scenes.
 fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
     Catalog::built_in()
         .parts()
@@ -125,7 +136,7 @@ fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
                     ("without-boundary", "selection") => {
                         format!("{{ type = \"visible-surface\", points = {POINTS} }}")
                     }
-                    // With the default all samples are kept, and the selection would not be tested.
+                    // The default would keep all samples and not test the selection.
                     (_, "count") if kind == PartKind::Selection => (POINTS / 2).to_string(),
                     (_, "points") => POINTS.to_string(),
                     ("observation-to-model", "samples") => "4000".to_owned(),
@@ -140,7 +151,7 @@ fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
         .collect()
 }
 
-/// The lines of the table: selection, association and filters, by name and as text.
+/// Returns the lines of the table: selection, association and filters, by name and as TOML.
 fn lines() -> Vec<([&'static str; 3], [String; 3])> {
     let mut filters = vec![("none", String::new())];
     filters.extend(parts(PartKind::Filter));
@@ -185,8 +196,8 @@ fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }
 
-/// What holds of every outcome, whatever the parts.
-fn assert_honest(outcome: &Outcome, init: &Isometry3<f64>, text: &str) {
+/// Checks the properties of every outcome, whatever the parts.
+fn assert_truthful(outcome: &Outcome, init: &Isometry3<f64>, text: &str) {
     let pose = &outcome.camera_from_object;
     assert!(se3::is_finite(pose), "{outcome:?}\n{text}");
     assert!(
@@ -199,7 +210,7 @@ fn assert_honest(outcome: &Outcome, init: &Isometry3<f64>, text: &str) {
         (1..=ITERATIONS).contains(&outcome.iterations),
         "{outcome:?}\n{text}"
     );
-    // A new pose was evaluated, and what was found there is told.
+    // A new pose was evaluated, and the outcome reports its evaluation.
     assert!(kept || outcome.evaluation.is_some(), "{outcome:?}\n{text}");
     assert_eq!(
         outcome.evaluation.is_some(),
@@ -221,7 +232,9 @@ fn assert_honest(outcome: &Outcome, init: &Isometry3<f64>, text: &str) {
     }
 }
 
-/// Whether a result agrees with a character of the golden file; `share` is the error left, of that at the start.
+/// Returns whether a result agrees with a character of the golden file.
+///
+/// `share` is the remaining error as a share of the initial one.
 fn agrees(written: char, share: f64) -> bool {
     match written {
         '+' => share <= 0.55,
@@ -239,7 +252,9 @@ fn verdict(share: f64) -> char {
     }
 }
 
-/// The error left of each run of a line of the table, as a share of that at the start: a scene after the other, for each metric.
+/// Returns the remaining error of each run of a line, as a share of the initial one.
+///
+/// The order is by metric, then by scene.
 fn shares(
     line: usize,
     [selection, association, filter]: &[String; 3],
@@ -256,18 +271,19 @@ fn shares(
         let mut stage = build(&text);
         for case in cases {
             let outcome = run(&mut stage, workspace, case);
-            assert_honest(&outcome, &case.init, &text);
+            assert_truthful(&outcome, &case.init, &text);
             let runs_before = line * metrics.len() * cases.len() + shares.len();
             if runs_before.is_multiple_of(REPEATED) {
-                // A warm stage, a new one in a new workspace: the same bits, the search trees shared.
+                // The warm stage and a new one in a new workspace must return the same bits. They
+                // share the search trees.
                 let again = run(&mut stage, workspace, case);
-                let anew = run(
+                let fresh = run(
                     &mut build(&text),
                     &mut Workspace::new(Rasterizer::default()),
                     case,
                 );
                 assert_eq!(outcome, again, "{text}");
-                assert_eq!(outcome, anew, "{text}");
+                assert_eq!(outcome, fresh, "{text}");
             }
             let after = point_error(&case.scene, &outcome.camera_from_object);
             shares.push(after / case.before);
@@ -277,12 +293,12 @@ fn shares(
 }
 
 #[test]
-fn every_combination_is_safe_honest_and_as_good_as_written_down() {
+fn every_combination_matches_the_golden_file() {
     let cases = cases();
     let metrics = parts(PartKind::Metric);
     let lines = lines();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    // Thread t of n takes every n-th line from line t on: heavy associations stand next to each other.
+    // Thread t of n runs every n-th line from line t on, because slow associations are adjacent.
     let mut found: Vec<(usize, Vec<f64>)> = std::thread::scope(|scope| {
         let shares_of_thread = |thread: usize| {
             let mut workspace = Workspace::new(Rasterizer::default());
@@ -344,7 +360,7 @@ fn every_combination_is_safe_honest_and_as_good_as_written_down() {
         let written = golden.next().unwrap_or("nothing");
         let expected: String = written
             .strip_prefix(&line(names, ""))
-            .unwrap_or_else(|| panic!("wanted a line for {names:?}, found {written}"))
+            .unwrap_or_else(|| panic!("expected a line for {names:?}, found {written}"))
             .split(' ')
             .collect();
         let same = expected.chars().count() == shares.len()
@@ -354,6 +370,6 @@ fn every_combination_is_safe_honest_and_as_good_as_written_down() {
             writeln!(differences, "was {written}\nis  {now}\n    {shares:.3?}").unwrap();
         }
     }
-    assert_eq!(golden.next(), None, "a line too many");
+    assert_eq!(golden.next(), None, "the golden file has more lines");
     assert!(differences.is_empty(), "\n{differences}");
 }

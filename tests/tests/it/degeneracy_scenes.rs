@@ -1,8 +1,11 @@
-//! Surfaces that leave motions open: which ones are reported, and that nothing slides along them.
+//! Surfaces that leave motions open.
 //!
-//! A plane, a cylinder and a sphere fill the image and the mask; their depth and normals are analytic in the rays, so the
-//! observation is exact up to `f32`, and the pose starts off by a motion that the surface determines and one that it does not.
-//! A line and five points, as pairs.
+//! The tests check the reported open directions, and that nothing moves along them.
+//!
+//! A plane, a cylinder and a sphere fill the image and the mask. Their depth and normals are
+//! analytic in the rays, so the observation is exact up to `f32`. The initial pose is off by a
+//! motion that the surface determines and one that it does not. A line and five points are tested
+//! as pairs.
 
 use std::f64::consts::PI;
 
@@ -17,16 +20,16 @@ use hybrid_icp::metric::Minimize;
 use hybrid_icp::metric::{Conditioned, Degeneracy, Observability, PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
 
-/// Distance of the surfaces' origin from the camera.
+/// Distance of the surfaces' origin from the camera, meters.
 const DISTANCE: f64 = 0.5;
-/// Radius of cylinder and sphere.
+/// Radius of the cylinder and the sphere, meters.
 const RADIUS: f64 = 0.2;
 
 fn camera() -> PinholeCamera {
     PinholeCamera::new(300.0, 300.0, 79.5, 59.5, 160, 120).unwrap()
 }
 
-/// An observation of the depth that a function gives for the slopes (x/z, y/z) of a ray.
+/// Returns an observation of the depth that a function gives for the slopes (x/z, y/z) of a ray.
 fn observe(depth: impl Fn(f64, f64) -> f64) -> Observation {
     let camera = camera();
     let mut meters = Vec::new();
@@ -41,19 +44,19 @@ fn observe(depth: impl Fn(f64, f64) -> f64) -> Observation {
     Observation::new(image, mask, camera).unwrap()
 }
 
-/// Depth of the near side of a cylinder along the camera's y axis.
+/// Returns the depth of the near side of a cylinder along the camera's y axis.
 fn cylinder_depth(x: f64, _: f64) -> f64 {
     let (a, c) = (x * x + 1.0, (DISTANCE + RADIUS).powi(2) - RADIUS * RADIUS);
     let b = DISTANCE + RADIUS;
     (b - (b * b - a * c).sqrt()) / a
 }
 
-/// Depth of the near side of a sphere.
+/// Returns the depth of the near side of a sphere.
 fn sphere_depth(x: f64, y: f64) -> f64 {
     cylinder_depth(x.hypot(y), 0.0)
 }
 
-/// The surface elements of the exact surface that the camera sees, on a grid; they are the selected points.
+/// Selects surfels of the exact surface that the camera sees, on a grid.
 #[derive(Clone)]
 struct Exact(Vec<Surfel>);
 
@@ -63,7 +66,7 @@ impl PointSelection for Exact {
     }
 }
 
-/// Points of a surface with its normals, from its depth and the centre of curvature (of the section, for a cylinder).
+/// Returns points of a surface with its normals, from its depth and its normal at a point.
 fn surface(
     depth: impl Fn(f64, f64) -> f64,
     normal: impl Fn(&Point3<f64>) -> Vector3<f64>,
@@ -84,17 +87,17 @@ fn surface(
     )
 }
 
-/// What one run over a scene showed.
+/// The results of a run on a scene.
 struct Run {
-    /// Observability at the first turn.
+    /// Observability at the first iteration.
     observability: Observability,
-    /// Largest component of an increment along a degenerate direction, relative to the length of the first increment.
+    /// Largest component of an increment along an open direction, relative to the first increment.
     slide: f64,
-    /// Root mean square distance from the observed tangent planes before and after, metres.
+    /// Root mean square distance from the observed tangent planes before and after, meters.
     rms: (f64, f64),
 }
 
-/// Runs ICP by hand, so that every increment can be looked at.
+/// Runs the ICP loop step by step and records every increment.
 fn run(
     exact: &Exact,
     observation: &Observation,
@@ -157,20 +160,20 @@ fn run(
     }
 }
 
-/// Length of a scaled twist's part in the space of others, which are orthonormal.
+/// Returns the length of a scaled twist's part in the space of orthonormal others.
 fn part_within(direction: &Vector6<f64>, space: &[Vector6<f64>]) -> f64 {
     let squares = space.iter().map(|other| direction.dot(other).powi(2));
     squares.sum::<f64>().sqrt()
 }
 
-/// The unit scaled twist of a turn about an axis through a point, or of a shift.
+/// Returns the unit scaled twist of a rotation around an axis through a point, or of a translation.
 fn unit_twist(
     observability: &Observability,
     rho: Vector3<f64>,
     turn: Vector3<f64>,
     about: Point3<f64>,
 ) -> Vector6<f64> {
-    // The pivot moves by φ × (pivot − point) under a turn about the point.
+    // A rotation around the point moves the pivot by φ × (pivot − point).
     let moved = rho + turn.cross(&(observability.pivot - about));
     let mut twist = Vector6::zeros();
     twist.fixed_rows_mut::<3>(0).copy_from(&moved);
@@ -180,10 +183,11 @@ fn unit_twist(
     twist.normalize()
 }
 
-/// Checks a scene: the degenerate directions are these, nothing moves along them, and the rest is solved.
+/// Checks that the degenerate directions are these, nothing moves along them, and the rest is
+/// solved.
 ///
-/// Damping holds only what is open exactly; on curved surfaces pixels and estimated normals lift the eigenvalues above it, and
-/// `slide_of_damping` says how far it may slide there.
+/// Damping stops only exactly open directions. On curved surfaces, pixels and estimated normals
+/// raise the eigenvalues above the damping. `slide_of_damping` limits the motion there.
 fn check(
     name: &str,
     exact: &Exact,
@@ -191,7 +195,7 @@ fn check(
     open: &[(Vector3<f64>, Vector3<f64>, Point3<f64>)],
     slide_of_damping: f64,
 ) {
-    // 3 mm toward the camera and a degree of tilt, 2 mm aside and 2° in the image plane.
+    // 3 mm toward the camera, about 1° of tilt, 2 mm sideways, and 2° in the image plane.
     let start = Isometry3::new(
         Vector3::new(0.002, 0.001, -0.003),
         Vector3::new(1.0, 0.5, 2.0) * (PI / 180.0),
@@ -229,7 +233,7 @@ fn check(
 }
 
 #[test]
-fn a_plane_leaves_two_shifts_and_a_turn() {
+fn a_plane_leaves_two_translations_and_a_rotation_open() {
     let o = Vector3::zeros();
     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
     let at = Point3::new(0.0, 0.0, DISTANCE);
@@ -244,7 +248,7 @@ fn a_plane_leaves_two_shifts_and_a_turn() {
 }
 
 #[test]
-fn a_cylinder_leaves_its_axis_to_shift_along_and_to_turn_about() {
+fn a_cylinder_leaves_translation_and_rotation_open_at_its_axis() {
     let (o, y) = (Vector3::zeros(), Vector3::y());
     let center = Point3::new(0.0, 0.0, DISTANCE + RADIUS);
     let exact = surface(cylinder_depth, |p| Vector3::new(p.x, 0.0, p.z - center.z));
@@ -258,7 +262,7 @@ fn a_cylinder_leaves_its_axis_to_shift_along_and_to_turn_about() {
 }
 
 #[test]
-fn a_sphere_leaves_every_turn_about_its_centre() {
+fn a_sphere_leaves_every_rotation_around_its_center_open() {
     let o = Vector3::zeros();
     let center = Point3::new(0.0, 0.0, DISTANCE + RADIUS);
     let exact = surface(sphere_depth, |p| p - center);
@@ -266,7 +270,7 @@ fn a_sphere_leaves_every_turn_about_its_centre() {
     check("sphere", &exact, &observe(sphere_depth), &turns, 0.5);
 }
 
-/// Pairs of points a motion apart, with a normal across them.
+/// Returns pairs of points that differ by a motion, all with the same normal.
 fn moved_pairs(points: &[Point3<f64>], motion: &Isometry3<f64>) -> Correspondences {
     let normal = UnitVector3::new_normalize(Vector3::new(0.2, -0.1, -1.0));
     let surfel = |point: Point3<f64>| Surfel {
@@ -280,7 +284,7 @@ fn moved_pairs(points: &[Point3<f64>], motion: &Isometry3<f64>) -> Correspondenc
 }
 
 #[test]
-fn a_line_of_points_leaves_the_turn_about_it() {
+fn a_line_of_points_leaves_the_rotation_around_it_open() {
     let along = Vector3::new(1.0, 2.0, 0.5).normalize();
     let middle = Point3::new(0.05, -0.02, 0.6);
     let points: Vec<_> = (-10..=10)
@@ -302,7 +306,8 @@ fn a_line_of_points_leaves_the_turn_about_it() {
         assert_eq!(found.n_degenerate(Degeneracy::THRESHOLD), 1, "{found:?}");
         let turn = unit_twist(&found, Vector3::zeros(), along, middle);
         assert!(turn.dot(&found.directions[0]).abs() > 0.999, "{found:?}");
-        // The shift between the pairs is found whole, and nothing turns about the line.
+        // The full translation between the pairs is found, and there is no rotation around the
+        // line.
         let increment = metric
             .minimize(&Iteration::default(), &pairs)
             .unwrap()
@@ -314,7 +319,7 @@ fn a_line_of_points_leaves_the_turn_about_it() {
 }
 
 #[test]
-fn five_points_determine_a_motion_by_distances_and_no_step_by_planes() {
+fn five_points_determine_a_step_by_distances_but_not_by_planes() {
     let points = [
         (0.0, 0.0, 0.5),
         (0.05, 0.01, 0.52),
@@ -330,7 +335,7 @@ fn five_points_determine_a_motion_by_distances_and_no_step_by_planes() {
     let pairs = moved_pairs(&points, &motion);
     for policy in [Degeneracy::Freeze, Degeneracy::Damp] {
         let threshold = Degeneracy::THRESHOLD;
-        // Five residuals along one normal: fewer rows than unknowns.
+        // There are five residuals along one normal: fewer rows than unknowns.
         let mut planes = Conditioned {
             metric: PointToPlane,
             policy,
@@ -354,7 +359,7 @@ fn five_points_determine_a_motion_by_distances_and_no_step_by_planes() {
             .observability()
             .unwrap();
         assert_eq!(open.n_degenerate(threshold), 0, "{open:?}");
-        // A Gauss–Newton step of 2·10⁻³ rad is off by its square.
+        // The error of a Gauss–Newton step of 2·10⁻³ rad is its square.
         let increment = distances
             .minimize(&Iteration::default(), &pairs)
             .unwrap()

@@ -1,4 +1,4 @@
-//! Pipelines are pure: the same bits from a second run, from a box, and on other threads.
+//! Checks that a pipeline returns the same bits in a second run, from a box, and on other threads.
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, scene};
@@ -52,7 +52,7 @@ fn a_second_run_gives_the_same_bits() {
 fn every_thread_gives_the_same_bits() {
     let cases = cases();
     let expected = run(&mut Refiner::preset(Preset::Hybrid), &cases);
-    // The observations, and so their search trees, are shared.
+    // The threads share the observations with their search trees.
     let results: Vec<Vec<Refinement>> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..8)
             .map(|_| scope.spawn(|| run(&mut Refiner::preset(Preset::Hybrid), &cases)))
@@ -67,7 +67,7 @@ fn every_thread_gives_the_same_bits() {
     }
 }
 
-/// Hybrid ICP with every part behind a box.
+/// Returns Hybrid ICP with every part behind a box.
 fn boxed_hybrid() -> BoxedStage {
     type Part<T> = Box<T>;
     fn icp(
@@ -113,12 +113,12 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
     let expected = run(&mut Refiner::boxed(presets::hybrid()), &cases);
     assert_eq!(run(&mut Refiner::boxed(boxed_hybrid()), &cases), expected);
     assert_eq!(run(&mut Refiner::preset(Preset::Hybrid), &cases), expected);
-    // The cases are worth something only if they differ.
+    // The cases must differ, or the comparison proves nothing.
     assert!(expected.iter().any(|r| r.mve < 0.1) && expected.iter().any(|r| r.mve_initial > 0.4));
 }
 
 #[test]
-fn the_functions_of_the_presets_are_what_their_names_build() {
+fn preset_functions_build_the_presets_of_their_names() {
     let cases = cases();
     let functions: [(Preset, Refiner); 13] = [
         (Preset::Hybrid, Refiner::boxed(presets::hybrid())),
@@ -167,15 +167,15 @@ fn the_functions_of_the_presets_are_what_their_names_build() {
     for (preset, mut refiner) in functions {
         let found = run(&mut refiner, &cases);
         assert_eq!(found, run(&mut Refiner::preset(preset), &cases), "{preset}");
-        // `auto` is `local` where that ends well.
+        // `auto` equals `local` if the local pose is good.
         let own = preset != Preset::Auto;
         assert!(
             !own || !results.contains(&found),
-            "{preset} does what another does"
+            "{preset} gives the results of another preset"
         );
         results.push(found);
     }
-    // The paper's stop rules are those of its stages.
+    // The stages of the presets have the paper's stop rules.
     let by_hand = Icp {
         selection: VisibleSurface::default(),
         association: Projective,

@@ -1,4 +1,4 @@
-//! Everything public below the façade is reachable through it.
+//! Checks that everything public in the lower crates is reachable through the facade.
 
 use std::path::Path;
 
@@ -6,9 +6,10 @@ use hybrid_icp::core::Quaternion;
 use hybrid_icp::nalgebra::Quaternion as ThroughNalgebra;
 use hybrid_icp::raster::{Culling, RasterConfig};
 
-/// A crate is re-exported as a whole, so no name of it can be missing; this test finds a crate that is not.
+/// Each crate is re-exported as a whole, so no name in it can be missing. This test finds a missing
+/// crate.
 #[test]
-fn every_library_below_is_a_module_of_the_facade() {
+fn every_lower_crate_is_a_module_of_the_facade() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/hybrid-icp");
     let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap();
     let source = std::fs::read_to_string(root.join("src/lib.rs")).unwrap();
@@ -30,9 +31,9 @@ fn every_library_below_is_a_module_of_the_facade() {
     );
 }
 
-/// A ROS pose is x, y, z, w; a renderer has a configuration: both were out of reach of the façade's names once.
+/// Quaternions (for ROS poses) and configurations of renderers were once missing from the facade.
 #[test]
-fn a_quaternion_and_the_configuration_of_the_rasterizer_are_within_reach() {
+fn the_facade_reaches_quaternions_and_the_rasterizer_configuration() {
     let (w, x, y, z) = (0.5, 0.5, -0.5, 0.5);
     let quaternion: ThroughNalgebra<f64> = Quaternion::new(w, x, y, z);
     assert_eq!(quaternion.w, w);

@@ -1,4 +1,4 @@
-//! The seeds of the fuzzers, and everything they found, through the same bodies, without a fuzzer.
+//! Runs the fuzz targets on their seeds and on everything that the fuzzers found, without a fuzzer.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Every target with its file in one of the folders of `fuzz/`.
+/// Returns every target with its files in one of the folders of `fuzz/`.
 fn files(kind: &str) -> Vec<(&'static str, PathBuf)> {
     TARGETS
         .iter()
@@ -39,17 +39,17 @@ fn replay(kind: &str) {
 }
 
 #[test]
-fn what_the_fuzzers_found_stays_mended() {
+fn findings_of_the_fuzzers_stay_fixed() {
     replay("regressions");
 }
 
 #[test]
-fn every_target_holds_on_its_seeds() {
+fn every_target_passes_on_its_seeds() {
     replay("seeds");
 }
 
 #[test]
-fn every_target_has_seeds_and_a_program_and_nothing_else_is_there() {
+fn every_target_has_seeds_and_a_program_and_nothing_else_exists() {
     let names: BTreeSet<&str> = TARGETS.iter().map(|(name, _)| *name).collect();
     let stems = |folder: &str| -> BTreeSet<String> {
         let files = entries(&fuzz_folder().join(folder));

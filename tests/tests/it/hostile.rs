@@ -1,4 +1,4 @@
-//! Scenes that a robot meets and no paper shows: each ends in a clear error or an honest outcome.
+//! Difficult scenes that robots meet. Each ends in a clear error or a truthful outcome.
 
 use hicp_sim::{Household, Solid, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
@@ -15,7 +15,7 @@ fn mug() -> Scene {
     scene(Household::Mug, 0.0, &mut rng(5))
 }
 
-/// Refines with every preset and checks what holds for any outcome.
+/// Refines with every preset and checks the properties of any outcome.
 fn refine_all(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Refinement> {
     Preset::ALL
         .into_iter()
@@ -29,7 +29,7 @@ fn refine_all(model: &Model, observation: &Observation, init: &Isometry3<f64>) -
                 "{preset}: {refined:?}"
             );
             if let Verdict::KeptInitial(_) = refined.outcome.verdict {
-                assert_eq!(pose, *init, "{preset}: kept means bit for bit");
+                assert_eq!(pose, *init, "{preset}: a kept pose must have the same bits");
             }
             refined
         })
@@ -60,7 +60,7 @@ fn an_object_behind_the_camera_is_not_seen() {
             .zip(refine_all(&scene.model, &scene.observation, &init))
     {
         assert_eq!(refined.mve_initial, 1.0, "{preset}");
-        // Projective association sees nothing from there; nearest neighbours may bring the object back.
+        // Projective association finds no pairs there. Nearest neighbors may move the object back.
         if preset.name().starts_with("projective") {
             assert_eq!(
                 refined.outcome.verdict,
@@ -71,7 +71,7 @@ fn an_object_behind_the_camera_is_not_seen() {
 }
 
 #[test]
-fn an_object_around_the_camera_is_survived() {
+fn an_object_around_the_camera_does_not_panic() {
     let scene = mug();
     let center = scene.truth.rotation * scene.model.center().coords;
     let init = Isometry3::from_parts((-center).into(), scene.truth.rotation);
@@ -82,7 +82,7 @@ fn an_object_around_the_camera_is_survived() {
 fn half_of_the_object_outside_the_image_still_registers() {
     let model = Household::Hammer.model().unwrap();
     let camera = camera();
-    // Half of the hammer is beyond the right edge: at 0.45 m the image ends 0.25 m from the axis.
+    // Half of the hammer is beyond the right edge: at 0.45 m, the image ends 0.25 m from the axis.
     let turn = hybrid_icp::core::UnitQuaternion::new(Vector3::new(0.9, 0.5, 0.4));
     let truth = Isometry3::from_parts(Vector3::new(0.25, 0.02, 0.45).into(), turn);
     let (depth, mask) = render(&model, &camera, &truth);
@@ -130,7 +130,7 @@ fn depth_of_zeros_gives_no_pairs() {
 }
 
 #[test]
-fn one_triangle_ends_honestly() {
+fn one_triangle_ends_with_a_truthful_outcome() {
     let corners = vec![
         Point3::new(0.0, 0.0, 0.0),
         Point3::new(0.1, 0.0, 0.0),
@@ -143,16 +143,17 @@ fn one_triangle_ends_honestly() {
     assert!(observation.n_surfels() > 100);
     let init = Isometry3::translation(0.0, 0.0, 0.01) * truth;
     refine_all(&model, &observation, &init);
-    // A plane fixes three of six directions; those must be right, and nothing may slide in the others. The presets' divergence
-    // rules keep the initial pose here, for pairs are lost along the triangle's edges, so this pipeline has none.
-    let undaunted = Icp {
+    // A plane determines three of six directions. Those must be right, and nothing may move along
+    // the others. This pipeline has no divergence rule, because those of the presets keep the
+    // initial pose: pairs are lost at the triangle's edges.
+    let without_divergence = Icp {
         selection: VisibleSurface::default(),
         association: Projective,
         filter: (),
         metric: PointToPlane,
         stop: (Convergence::default(), IterationLimit::default()),
     };
-    let refined = Refiner::new(undaunted).refine(&model, &observation, &init);
+    let refined = Refiner::new(without_divergence).refine(&model, &observation, &init);
     let normal = truth.rotation * Vector3::z();
     let shift = refined.outcome.camera_from_object * model.center() - truth * model.center();
     assert!(normal.dot(&shift).abs() < 1e-5, "{refined:?}");
@@ -160,7 +161,7 @@ fn one_triangle_ends_honestly() {
 }
 
 #[test]
-fn three_hundred_thousand_triangles_are_no_trouble() {
+fn three_hundred_thousand_triangles_are_refined() {
     let profile: Vec<(f64, f64)> = (0..=390)
         .map(|i| {
             let t = std::f64::consts::PI * f64::from(i) / 390.0;
@@ -197,7 +198,7 @@ fn a_focal_length_of_zero_is_refused() {
 }
 
 #[test]
-fn an_initial_pose_far_away_or_not_finite_is_kept_or_brought_back() {
+fn a_far_initial_pose_ends_truthfully_and_one_that_is_not_finite_is_kept() {
     let scene = mug();
     let far = Isometry3::translation(0.0, 0.0, 1e6) * scene.truth;
     refine_all(&scene.model, &scene.observation, &far);

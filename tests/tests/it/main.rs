@@ -1,4 +1,4 @@
-//! Integration tests of the whole workspace: one program, so that it is linked once.
+//! Integration tests of the whole workspace, in one program that is linked once.
 
 #![allow(
     clippy::cast_possible_truncation,

@@ -1,6 +1,8 @@
-//! Covariances against what Monte-Carlo runs really do: the mean of ξᵀΣ⁻¹ξ over 500 of them, that of χ²₆ if Σ is right.
+//! Compares covariances with the errors of Monte-Carlo runs.
 //!
-//! The whole table: `cargo run --release -p hicp-tests --example nees_report`.
+//! If Σ is right, the mean of ξᵀΣ⁻¹ξ over 500 runs is that of χ²₆.
+//!
+//! Run `cargo run --release -p hicp-tests --example nees_report` for the whole table.
 
 use hicp_sim::Household;
 use hicp_tests::nees::{Nees, Pairs, measure};
@@ -23,7 +25,8 @@ fn assert_in_band(name: &str, mean: f64, nees: &Nees) {
 
 #[test]
 fn the_covariance_is_right_where_its_assumptions_hold() {
-    // Right pairs, exact normals, weights inverse to the variances: nothing but the formula is left.
+    // The pairs and normals are exact, and the weights are inverse to the variances. Only the
+    // formula remains.
     for object in [Household::Hammer, Household::Iron, Household::Car] {
         let parts = (VISIBLE, Projective, PointToPlane);
         let nees = measure(
@@ -37,15 +40,15 @@ fn the_covariance_is_right_where_its_assumptions_hold() {
     }
 }
 
-/// 0.2 % of noise, from 1 mm and 1° off, the visible points selected anew for each of five stages.
+/// Noise of 0.2 % and a start 1 mm and 1° off, with points selected again in each of five stages.
 ///
-/// Selected once, at the initial pose, pixels beside the silhouette keep wrong pairs, which no covariance knows of: the same
-/// runs then show 9 to 20.
+/// If points are selected only once, at the initial pose, pixels near the silhouette keep wrong
+/// pairs, which no covariance includes. The same runs then show 9 to 20.
 const START: (f64, (f64, f64)) = (0.2, (0.001, 1.0));
 
 #[test]
-fn the_covariance_of_plane_to_point_icp_is_not_optimistic_and_pessimistic_by_a_sixth_at_most() {
-    // Tilted pixels have a smaller variance than their equal weights say: 5.59 and 5.6 where 6 would be right.
+fn the_covariance_of_plane_to_point_icp_is_never_optimistic_and_at_most_a_sixth_pessimistic() {
+    // Tilted pixels have a smaller variance than equal weights imply: 5.59 and 5.6 instead of 6.
     for object in [Household::Iron, Household::Car] {
         let parts = (VISIBLE, Projective, PlaneToPoint);
         let nees = measure(object, START, RUNS, Pairs::Reselected, parts);
@@ -65,7 +68,7 @@ fn the_sandwich_covariance_of_generalized_icp_is_right_and_the_plain_one_is_not(
         let parts = (VISIBLE, Projective, Generalized::default());
         let nees = measure(object, START, RUNS, Pairs::Reselected, parts);
         assert_in_band(object.name(), nees.sandwich, &nees);
-        // What its documentation warns of; if this ever fails, correct that.
+        // The documentation warns of this. If this fails, correct the documentation.
         assert!(nees.mean > 15.0, "{}: {nees:?}", object.name());
     }
 }

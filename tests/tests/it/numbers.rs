@@ -1,4 +1,6 @@
-//! Numbers that are none, or cannot be: refused where a type is made, or an honest outcome; never a NaN in a result.
+//! Invalid and impossible numbers.
+//!
+//! A constructor refuses them, or the outcome is truthful. A result is never NaN.
 
 use hicp_io::pose_from_bop;
 use hicp_sim::{Household, RelativeGaussian, rng};
@@ -68,7 +70,7 @@ impl Scene {
         Observation::new(depth, self.mask.clone(), camera()).unwrap()
     }
 
-    /// The depth with every pixel changed.
+    /// Returns the depth image with every pixel changed.
     fn changed(&self, change: impl Fn(f32) -> f32) -> DepthImage {
         let pixels = self.depth.pixels().iter().map(|z| change(*z)).collect();
         DepthImage::from_meters(160, 120, pixels).unwrap()
@@ -76,7 +78,7 @@ impl Scene {
 }
 
 #[track_caller]
-fn honest(refined: &Refinement, init: &Isometry3<f64>) {
+fn check_truthful(refined: &Refinement, init: &Isometry3<f64>) {
     let pose = refined.outcome.camera_from_object;
     if init
         .translation
@@ -97,7 +99,7 @@ fn honest(refined: &Refinement, init: &Isometry3<f64>) {
 }
 
 #[test]
-fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
+fn invalid_depths_count_as_missing_and_the_rest_is_refined() {
     let scene = scene();
     let init = scene.truth * Isometry3::translation(0.003, 0.0, 0.0);
     let plain = Refiner::preset(Preset::Hybrid).refine(
@@ -106,7 +108,8 @@ fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
         &init,
     );
     assert_eq!(plain.outcome.verdict, Verdict::Refined);
-    // What the sensor writes for nothing: not a number, infinite, negative, a denormal, absurdly far.
+    // Values that sensors write without a measurement: not a number, infinite, negative, denormal,
+    // or absurdly far.
     for nothing in [
         f32::NAN,
         f32::INFINITY,
@@ -140,7 +143,7 @@ fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
             "{nothing}"
         );
         for preset in Preset::ALL {
-            honest(
+            check_truthful(
                 &Refiner::preset(preset).refine(&scene.model, &observation, &init),
                 &init,
             );
@@ -155,7 +158,7 @@ fn depths_that_are_none_are_missing_and_the_rest_is_refined() {
 }
 
 #[test]
-fn depth_in_another_unit_is_doubted() {
+fn depth_in_another_unit_causes_a_warning() {
     let scene = scene();
     assert_eq!(
         warnings(
@@ -174,7 +177,7 @@ fn depth_in_another_unit_is_doubted() {
         assert!((measured / expected - 1.0).abs() < 0.2, "{measured}");
         for preset in Preset::ALL {
             let refined = Refiner::preset(preset).refine(&scene.model, &observation, &scene.truth);
-            honest(&refined, &scene.truth);
+            check_truthful(&refined, &scene.truth);
         }
     }
     let nothing = scene.observe(scene.changed(|z| z * 1000.0 * 1000.0));
@@ -185,17 +188,17 @@ fn depth_in_another_unit_is_doubted() {
 }
 
 #[test]
-fn models_in_another_unit_or_far_from_their_origin_are_doubted() {
+fn models_in_another_unit_or_far_from_their_origin_cause_a_warning() {
     let scene = scene();
     let observation = scene.observe(scene.depth.clone());
-    for (scale, doubted) in [
+    for (scale, expected) in [
         (1000.0, "diameter is 123."),
         (0.001, "diameter is 1.233e-4 m"),
     ] {
         let model = Model::new(cuboid([0.1 * scale, 0.06 * scale, 0.04 * scale]));
         let found = warnings(&model, &observation, &scene.truth);
-        assert!(found[0].to_string().contains(doubted), "{found:?}");
-        honest(
+        assert!(found[0].to_string().contains(expected), "{found:?}");
+        check_truthful(
             &Refiner::preset(Preset::Hybrid).refine(&model, &observation, &scene.truth),
             &scene.truth,
         );
@@ -215,17 +218,19 @@ fn models_in_another_unit_or_far_from_their_origin_are_doubted() {
     );
 }
 
-/// Centimetres taken for decimetres make an object of a plausible size, but not behind its mask. What is thin and seen end-on, mostly
-/// occluded, or partly outside of the image has few pixels too, and is not doubted.
+/// A model in the wrong unit can have a plausible size, but not a plausible mask.
+///
+/// Objects that are thin and seen end-on, mostly occluded, or partly outside of the image also have
+/// few pixels. They cause no warning.
 #[test]
-fn models_far_too_large_for_their_mask_are_doubted() {
+fn models_far_too_large_for_their_mask_cause_a_warning() {
     let scene = scene();
-    let told = |sides: [f32; 3], mask: &dyn Fn(usize, usize) -> bool, pose: &Isometry3<f64>| {
+    let warn = |sides: [f32; 3], mask: &dyn Fn(usize, usize) -> bool, pose: &Isometry3<f64>| {
         let pixels = (0..160 * 120).map(|i| mask(i % 160, i / 160)).collect();
         let mask = Mask::new(160, 120, pixels).unwrap();
         let depth = DepthImage::from_meters(160, 120, vec![0.4; 160 * 120]).unwrap();
         let observation = Observation::new(depth, mask, camera()).unwrap();
-        // A vertex far away that no triangle uses is no part of the object.
+        // A far vertex that no triangle uses is not part of the object.
         let mesh = cuboid(sides);
         let mut vertices = mesh.vertices().to_vec();
         vertices.push(Point3::new(90.0, 80.0, 70.0));
@@ -233,37 +238,38 @@ fn models_far_too_large_for_their_mask_are_doubted() {
         warnings(&Model::new(mesh), &observation, pose)
     };
     let seen = |u: usize, v: usize| scene.mask.pixels()[v * 160 + u];
-    let found = told([1.0, 0.6, 0.4], &seen, &scene.truth);
+    let found = warn([1.0, 0.6, 0.4], &seen, &scene.truth);
     assert!(matches!(found[..], [Warning::Sliver { .. }]), "{found:?}");
-    assert_eq!(told([0.1, 0.06, 0.04], &seen, &scene.truth), []);
+    assert_eq!(warn([0.1, 0.06, 0.04], &seen, &scene.truth), []);
     let ahead = Isometry3::translation(0.0, 0.0, 0.4);
     let square = |from: usize, to: usize| {
         move |u: usize, v: usize| (from..to).contains(&u) && (from..to).contains(&v)
     };
-    // A pen of 150 × 8 × 8 mm covers 6 × 6 pixels along its length.
-    assert_eq!(told([0.008, 0.008, 0.15], &square(57, 63), &ahead), []);
-    // Its side of 60 × 40 mm has 1,350 pixels. Of 81 left one has to ask what hides the others.
-    assert_eq!(told([0.1, 0.06, 0.04], &square(51, 60), &ahead), []);
-    let found = told([0.1, 0.06, 0.04], &square(51, 59), &ahead);
+    // A pen of 150 × 8 × 8 mm covers 6 × 6 pixels if seen along its length.
+    assert_eq!(warn([0.008, 0.008, 0.15], &square(57, 63), &ahead), []);
+    // Its side of 60 × 40 mm has 1,350 pixels. With 81 visible pixels there is no warning.
+    assert_eq!(warn([0.1, 0.06, 0.04], &square(51, 60), &ahead), []);
+    let found = warn([0.1, 0.06, 0.04], &square(51, 59), &ahead);
     assert!(
         matches!(found[..], [Warning::Sliver { pixels: 64, at_least, .. }] if (at_least - 1350.0).abs() < 1e-3),
         "{found:?}"
     );
-    assert_eq!(told([0.1, 0.06, 0.04], &square(0, 8), &ahead), []);
-    assert_eq!(told([0.6, 0.6, 0.0], &square(51, 59), &ahead), []);
+    assert_eq!(warn([0.1, 0.06, 0.04], &square(0, 8), &ahead), []);
+    assert_eq!(warn([0.6, 0.6, 0.0], &square(51, 59), &ahead), []);
 }
 
-/// A diameter that a dataset states may be that of another version of the mesh, but not of another object. Vertices that no triangle uses do
-/// not count.
+/// A stated diameter may belong to another version of the mesh, but not to another object.
+///
+/// Vertices that no triangle uses do not count.
 #[test]
-fn a_stated_diameter_that_is_not_the_meshs_is_doubted() {
+fn a_stated_diameter_that_differs_from_the_mesh_causes_a_warning() {
     let mesh = cuboid([0.1, 0.06, 0.04]);
     let own = Model::new(mesh.clone()).diameter();
     let mut vertices = mesh.vertices().to_vec();
     vertices.push(Point3::new(5.0, 0.0, 0.0));
     let stray = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
     for mesh in [mesh, stray] {
-        let told = |factor: f64| {
+        let warning_of = |factor: f64| {
             let diameter = Some(factor * own);
             let config = ModelConfig {
                 diameter,
@@ -272,21 +278,21 @@ fn a_stated_diameter_that_is_not_the_meshs_is_doubted() {
             warning_of_diameter(&Model::with_config(mesh.clone(), config))
         };
         for near in [0.951, 1.0, 1.049] {
-            assert_eq!(told(near), None);
+            assert_eq!(warning_of(near), None);
         }
         for far in [0.001, 0.949, 1.051, 1000.0] {
             let expected = Warning::StatedDiameter {
                 stated: far * own,
                 measured: own,
             };
-            assert_eq!(told(far), Some(expected));
+            assert_eq!(warning_of(far), Some(expected));
         }
     }
 }
 
-/// The scores of a refinement from which on its pose is doubted.
+/// Checks the scores above which a result causes a warning.
 #[test]
-fn results_are_doubted_by_their_scores() {
+fn results_with_bad_scores_cause_a_warning() {
     let (half, nearly) = (0.5, 0.4_f64.next_down());
     assert_eq!(warnings_of_result(half, nearly, None), []);
     assert_eq!(
@@ -299,7 +305,7 @@ fn results_are_doubted_by_their_scores() {
         matches!(found[..], [Warning::FoundElsewhere { mve_initial: 0.9, mve }] if mve == nearly),
         "{found:?}"
     );
-    // One warning about a pose that does not explain the image is enough.
+    // A pose that does not explain the image causes one warning only.
     assert_eq!(
         warnings_of_result(1.0, 0.4, None),
         [Warning::Unexplained { mve: 0.4 }]
@@ -307,7 +313,7 @@ fn results_are_doubted_by_their_scores() {
     assert_eq!(warnings_of_result(0.2, 0.2, None), []);
     let flatness = Flatness::new(0.01, 0.002, 0.0123, 0.2);
     assert_eq!(warnings_of_result(half, 0.4, Some(flatness)).len(), 1);
-    // No depth image is as flat as numbers are.
+    // No depth image is as flat as rounding allows, so the message states at least 1 mm.
     let exact = Flatness::new(0.01, 1e-16, 0.0123, 0.2);
     let found = warnings_of_result(half, nearly, Some(exact));
     assert!(found[0].to_string().contains("flat to within 0.0010 m"));
@@ -332,9 +338,11 @@ fn results_are_doubted_by_their_scores() {
     );
 }
 
-/// Objects without a flat side, found on a wall. One with a flat side may lie on the wall as it would in its own place.
+/// Objects without a flat side, found on a wall, cause a warning.
+///
+/// An object with a flat side may fit a wall as well as its true place.
 #[test]
-fn what_is_found_on_a_wall_is_doubted() {
+fn an_object_found_on_a_wall_causes_a_warning() {
     const ROUND: [Household; 3] = [Household::Mug, Household::Bottle, Household::Bowl];
     let mut refiner = Refiner::preset(Preset::Auto);
     for (index, start) in starts(2, 0.3).iter().enumerate() {
@@ -344,7 +352,7 @@ fn what_is_found_on_a_wall_is_doubted() {
         if !ROUND.contains(&OBJECTS[index / 2]) {
             continue;
         }
-        // A wall in the place of the object, nearer than its centre by a fifth of its diameter.
+        // The wall replaces the object, nearer than its center by a fifth of its diameter.
         let center = scene.truth * scene.model.center();
         let z = center.z - 0.2 * scene.model.diameter();
         let (width, height) = (observation.depth().width(), observation.depth().height());
@@ -361,7 +369,7 @@ fn what_is_found_on_a_wall_is_doubted() {
 }
 
 #[test]
-fn cameras_that_cannot_be() {
+fn impossible_cameras_are_refused() {
     for bad in [0.0, -0.0, -400.0, f64::NAN, f64::INFINITY] {
         for (fx, fy, name) in [(bad, 400.0, "fx"), (400.0, bad, "fy")] {
             let refused = PinholeCamera::new(fx, fy, 80.0, 60.0, 160, 120).unwrap_err();
@@ -374,15 +382,15 @@ fn cameras_that_cannot_be() {
 }
 
 #[test]
-fn matrices_that_are_no_rotation_are_refused() {
-    let told = |matrix: &Matrix3<f64>| {
+fn matrices_that_are_not_rotations_are_refused() {
+    let error_of = |matrix: &Matrix3<f64>| {
         let rows: [f64; 9] = matrix.transpose().as_slice().try_into().unwrap();
         pose_from_bop(&rows, &[0.0; 3]).unwrap_err().to_string()
     };
     for axis in 0..3 {
         let mut reflection = Matrix3::identity();
         reflection[(axis, axis)] = -1.0;
-        assert!(told(&reflection).contains("determinant -1"));
+        assert!(error_of(&reflection).contains("determinant -1"));
     }
     let mut skewed = Matrix3::identity();
     skewed[(0, 1)] = 0.01;
@@ -392,17 +400,17 @@ fn matrices_that_are_no_rotation_are_refused() {
         Matrix3::zeros(),
         Matrix3::identity() * 1e200,
     ] {
-        assert!(told(&bad).contains("not orthogonal"), "{bad}");
+        assert!(error_of(&bad).contains("not orthogonal"), "{bad}");
     }
     for bad in BAD {
         let mut matrix = Matrix3::identity();
         matrix[(2, 1)] = bad;
-        told(&matrix);
+        error_of(&matrix);
     }
 }
 
 #[test]
-fn poses_a_million_metres_away_or_not_finite_end_honestly() {
+fn poses_very_far_away_or_not_finite_end_truthfully() {
     let scene = scene();
     let observation = scene.observe(scene.depth.clone());
     for direction in 0..3 {
@@ -418,7 +426,7 @@ fn poses_a_million_metres_away_or_not_finite_end_honestly() {
             let mut init = scene.truth;
             init.translation.vector[direction] += length;
             for preset in Preset::ALL {
-                honest(
+                check_truthful(
                     &Refiner::preset(preset).refine(&scene.model, &observation, &init),
                     &init,
                 );

@@ -1,4 +1,4 @@
-//! Pipelines from files: the same bits as code, and messages that help.
+//! Pipelines from files: the same bits as in code, and helpful messages.
 
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -48,7 +48,7 @@ fn the_former_name_of_nearest_neighbor_builds_the_same_part() {
     assert_eq!(found, expected);
 }
 
-/// A file that uses a part, with every parameter that has no default given.
+/// Returns TOML that uses a part and sets only the parameters without a default.
 fn smallest_use(kind: PartKind, name: &str) -> String {
     let part = Catalog::built_in()
         .parts()
@@ -86,7 +86,7 @@ fn first(kind: PartKind) -> &'static str {
         .name
 }
 
-/// A pipeline in which a part stands where parts of its kind stand.
+/// Returns a pipeline with a part in the place of its kind.
 fn pipeline_with(kind: PartKind, part: &str) -> String {
     let field = |wanted, default: &str| {
         if kind == wanted {
@@ -115,7 +115,7 @@ fn pipeline_with(kind: PartKind, part: &str) -> String {
 }
 
 #[test]
-fn every_part_of_the_catalogue_builds_and_runs() {
+fn every_part_of_the_catalog_builds_and_runs() {
     let mut rng = rng(4);
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
@@ -124,7 +124,7 @@ fn every_part_of_the_catalogue_builds_and_runs() {
         let file = PipelineFile::parse(&text, part.name).unwrap();
         let stage = file.build().unwrap_or_else(|e| panic!("{e}\n{text}"));
         let refined = Refiner::boxed(stage).refine(&scene.model, &scene.observation, &init);
-        // The guard around it holds whatever the part does.
+        // The guard around the part keeps the MVE from rising, whatever the part does.
         assert!(
             refined.mve <= refined.mve_initial,
             "{}: {refined:?}",
@@ -134,7 +134,7 @@ fn every_part_of_the_catalogue_builds_and_runs() {
 }
 
 #[test]
-fn names_in_the_catalogue_are_unique_within_a_kind() {
+fn names_in_the_catalog_are_unique_within_a_kind() {
     let mut names = HashSet::new();
     for part in Catalog::built_in().parts() {
         assert!(names.insert((part.kind, part.name)), "{} twice", part.name);
@@ -153,7 +153,7 @@ fn message(text: &str) -> String {
 }
 
 #[test]
-fn messages_name_the_line_the_field_and_what_would_be_right() {
+fn messages_name_the_line_the_field_and_the_expected_value() {
     let icp = "type = \"icp\"\nselection = \"all-samples\"\nassociation = \"projective\"\nmetric = \"point-to-plane\"\n";
     assert_eq!(message(icp), "built");
     for (text, wanted) in [
@@ -202,14 +202,14 @@ fn messages_name_the_line_the_field_and_what_would_be_right() {
 }
 
 #[test]
-fn overrides_reach_into_the_tree() {
+fn overrides_change_nested_fields() {
     let parse = || PipelineFile::parse(Preset::Hybrid.toml(), "hybrid").unwrap();
     let mut file = parse();
     file.set("times=1").unwrap();
     file.set("stage.switcher.alpha = 0.5").unwrap();
     file.set("stage.aligned.stages.1.metric=point-to-point")
         .unwrap();
-    // A bare name becomes a table when a field of it is set.
+    // A bare name becomes a table if one of its fields is set.
     file.set("stage.misaligned.association.points=500").unwrap();
     assert!(file.build().is_ok());
     assert_ne!(file, parse());
@@ -240,7 +240,7 @@ fn overrides_reach_into_the_tree() {
 }
 
 #[test]
-fn the_text_of_a_file_is_what_is_read_and_an_absent_one_is_named() {
+fn the_text_of_a_file_is_returned_and_an_absent_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
     std::fs::write(&path, Preset::Hybrid.toml()).unwrap();
@@ -259,7 +259,7 @@ fn the_text_of_a_file_is_what_is_read_and_an_absent_one_is_named() {
     assert!(absent.unwrap_err().to_string().contains("absent.toml"));
 }
 
-/// Most of the time of a large file was once spent on counting its lines, again for every value.
+/// Reading a large file once took more than a minute, because every value counted the lines again.
 #[test]
 fn reading_a_large_file_takes_time_in_proportion_to_its_size() {
     let stage = "\n[[stages]]\ntype = \"icp\"\nselection = { type = \"visible-surface\", points = 500 }\n\
@@ -278,7 +278,7 @@ fn reading_a_large_file_takes_time_in_proportion_to_its_size() {
         error.starts_with("large.toml:36002: stages.5999.points: icp has no such field"),
         "{error}"
     );
-    // A tenth of a second where the code is optimized; counting lines took more than a minute.
+    // Optimized code takes 0.1 s.
     let elapsed = start.elapsed();
     assert!(elapsed < Duration::from_secs(20), "{elapsed:?}");
 }

@@ -1,4 +1,4 @@
-//! Pipeline files that ask for years of work are refused, with the field, what is there and the limit.
+//! Pipeline files with too much work are refused with the field, the value found and the limit.
 
 use hicp_sim::Household;
 use hicp_tests::render;
@@ -15,7 +15,7 @@ fn message(text: &str) -> String {
 }
 
 #[test]
-fn a_billion_of_anything_is_refused_by_its_field() {
+fn a_count_of_a_billion_is_refused_with_its_field() {
     const RAISE: &str = "expected at most 1000000: raise the limit (--max-iterations N, PipelineLimits::max_iterations) if that is meant";
     let solver = |name: &str| {
         ICP.replace(
@@ -48,7 +48,8 @@ fn a_billion_of_anything_is_refused_by_its_field() {
             "my.toml:4: max_steps",
             "1000000000, up to 50000000000 iterations in all",
         ),
-        // The innermost field that goes too far: three times a thousand times 50, and then a hundred times that.
+        // The innermost field that exceeds the limit: 3 times 1000 times 50 iterations, and then
+        // 100 times as many.
         (
             format!(
                 "type = \"repeat\"\ntimes = 3\n[stage]\ntype = \"repeat\"\ntimes = 100\n[stage.stage]\ntype = \"repeat\"\ntimes = 1000\nstage = {ICP}\n"
@@ -90,13 +91,13 @@ fn a_billion_of_anything_is_refused_by_its_field() {
 }
 
 #[test]
-fn stages_without_a_limit_of_their_own_count_with_that_of_the_engine() {
+fn stages_without_an_iteration_limit_count_with_the_default_limit() {
     let endless = ICP.replace(" }", ", stop = [\"convergence\"] }");
     let text = |times: u32| format!("type = \"repeat\"\ntimes = {times}\nstage = {endless}\n");
     let file = PipelineFile::parse(&text(1000), "my.toml").unwrap();
     assert!(file.build().is_ok());
     assert!(message(&text(1001)).contains("times: found 1001, up to 1001000 iterations"));
-    // Many stages one after the other, none of which is too much.
+    // A sequence of many stages, none of which exceeds the limit.
     let part = format!("{{ type = \"repeat\", times = 400, stage = {endless} }}");
     let text = |count: usize| {
         let parts = vec![part.as_str(); count].join(",\n");
@@ -104,12 +105,12 @@ fn stages_without_a_limit_of_their_own_count_with_that_of_the_engine() {
     };
     let built = PipelineFile::parse(&text(2), "my.toml").unwrap().build();
     assert!(built.is_ok());
-    let told = message(&text(3));
+    let found = message(&text(3));
     assert!(
-        told.starts_with("my.toml:2: stages: found up to 1200000 iterations in all, "),
-        "{told}"
+        found.starts_with("my.toml:2: stages: found up to 1200000 iterations in all, "),
+        "{found}"
     );
-    // Of those that are chosen among only one runs.
+    // A switch runs only one of its stages.
     for kind in ["switch", "switch-among"] {
         let both = match kind {
             "switch" => format!("aligned = {part}\nmisaligned = {part}\n"),
@@ -128,7 +129,7 @@ fn stages_without_a_limit_of_their_own_count_with_that_of_the_engine() {
 }
 
 #[test]
-fn limits_can_be_raised_and_lowered_to_the_count() {
+fn limits_are_exact_when_raised_or_lowered() {
     let mut file = PipelineFile::parse(Preset::Search.toml(), "search").unwrap();
     file.set("hypotheses=100001").unwrap();
     let defaults = PipelineLimits::DEFAULT;
@@ -154,9 +155,9 @@ fn limits_can_be_raised_and_lowered_to_the_count() {
     );
 }
 
-/// A hundredth of the defaults, or a tenth, is enough for every preset.
+/// A hundredth or a tenth of the default limits is enough for every preset.
 #[test]
-fn presets_are_far_below() {
+fn presets_are_far_below_the_limits() {
     let hundredth = PipelineLimits {
         max_iterations: PipelineLimits::DEFAULT.max_iterations / 100,
         max_hypotheses: PipelineLimits::DEFAULT.max_hypotheses / 100,
@@ -188,9 +189,9 @@ fn numbers_that_overflow_are_refused_and_do_not_wrap() {
     assert!(file.build_within(&PipelineLimits::NONE).is_ok());
 }
 
-/// Memory: sampling a model at four billion points would take a hundred gigabytes.
+/// Sampling a model at four billion points would need 100 GB of memory.
 #[test]
-fn sizes_are_refused_wherever_they_stand() {
+fn excessive_sizes_are_refused_wherever_they_are() {
     let observing = ICP.replace(
         "\"projective\"",
         "{ type = \"reciprocal\", association = { type = \"observation-to-model\", samples = 4294967295 } }",
@@ -223,16 +224,18 @@ fn sizes_are_refused_wherever_they_stand() {
             "my.toml:2: stages.1.association.k: found 4294967295, 4294967295 neighbors, expected at most 100: raise",
         ),
     ] {
-        let told = message(&text);
-        assert!(told.starts_with(wanted), "{told}");
+        let found = message(&text);
+        assert!(found.starts_with(wanted), "{found}");
         let built = PipelineFile::parse(&text, "my.toml").unwrap();
         assert!(built.build_within(&PipelineLimits::NONE).is_ok());
     }
 }
 
-/// Every count of every part at the largest number there is: refused, or a run that ends and is honest.
+/// Sets every count of every part to the largest number.
+///
+/// Each is refused, or the run ends with a truthful outcome.
 #[test]
-fn the_largest_counts_are_refused_or_survived() {
+fn the_largest_counts_are_refused_or_end() {
     let model = Model::new(Household::Mug.solid().to_mesh().unwrap());
     let camera = PinholeCamera::new(60.0, 60.0, 23.5, 17.5, 48, 36).unwrap();
     let truth = Isometry3::translation(0.0, 0.0, 0.4);
@@ -243,7 +246,7 @@ fn the_largest_counts_are_refused_or_survived() {
             Vector3::new(0.003, 0.0, 0.002),
             Vector3::new(0.05, 0.0, 0.03),
         );
-    let (mut refused, mut survived) = (Vec::new(), 0);
+    let (mut refused, mut ended) = (Vec::new(), 0);
     for part in Catalog::built_in().parts() {
         for parameter in &part.parameters {
             if !matches!(parameter.accepts, Accepts::Count { .. }) {
@@ -257,7 +260,7 @@ fn the_largest_counts_are_refused_or_survived() {
                 Ok(stage) => {
                     let refined = Refiner::boxed(stage).refine(&model, &observation, &init);
                     assert!((0.0..=1.0).contains(&refined.mve), "{text}");
-                    survived += 1;
+                    ended += 1;
                 }
             }
         }
@@ -281,10 +284,10 @@ fn the_largest_counts_are_refused_or_survived() {
             ("sampled-mve", "samples"),
         ]
     );
-    assert!(survived > 20, "{survived}");
+    assert!(ended > 20, "{ended}");
 }
 
-/// A pipeline around a part, with one of its counts at the largest number, and what it must be given.
+/// Returns a pipeline around a part, with one count at the largest number and all required fields.
 fn use_of(part: &Part, largest: &str) -> String {
     let fields = part.parameters.iter().filter_map(|parameter| {
         let value = match parameter.accepts {

@@ -1,4 +1,6 @@
-//! What other libraries got wrong, where it takes several crates to see it. `docs/pitfalls.md` lists all of it with the tests.
+//! Tests of mistakes in other libraries that need several crates.
+//!
+//! `docs/pitfalls.md` lists all of these mistakes with their tests.
 
 use std::ops::ControlFlow;
 
@@ -37,9 +39,9 @@ fn run(
     stage.run(&problem, init, &mut Session::new(&mut workspace, observer))
 }
 
-/// Without a single pair there is nothing to measure, and a perfect-looking 0 or an identity pose would be a lie.
+/// Without a pair there is nothing to measure. A perfect 0 or an identity pose would be false.
 #[test]
-fn nothing_is_measured_without_pairs_and_the_initial_pose_stays() {
+fn without_pairs_there_is_no_quality_and_the_initial_pose_stays() {
     let scene = scene(Household::Mug, 0.0, &mut rng(31));
     let (width, height) = (camera().width(), camera().height());
     let nothing = vec![false; (width * height) as usize];
@@ -76,9 +78,11 @@ fn nothing_is_measured_without_pairs_and_the_initial_pose_stays() {
     );
 }
 
-/// A handful of valid pixels gives no normals, or fewer rows than unknowns: the initial pose is kept and flagged, not the identity.
+/// A few valid pixels give no normals, or fewer rows than unknowns.
+///
+/// The initial pose is kept and flagged. The result is not the identity.
 #[test]
-fn a_handful_of_valid_pixels_keeps_the_initial_pose_and_says_so() {
+fn a_few_valid_pixels_keep_the_initial_pose_and_report_it() {
     let scene = scene(Household::Iron, 0.0, &mut rng(33));
     let init = perturb(&mut rng(34), &scene.truth, 0.005, 0.1);
     for n in 1..=3 {
@@ -106,7 +110,7 @@ fn a_handful_of_valid_pixels_keeps_the_initial_pose_and_says_so() {
     }
 }
 
-/// Pairs every model point with where it truly is.
+/// Pairs every model point with its true place.
 #[derive(Clone)]
 struct TruePairs(Isometry3<f64>);
 
@@ -130,10 +134,12 @@ impl DataAssociation for TruePairs {
     }
 }
 
-/// Rotations composed on one side and translations added up on the other leave centimetres, which the loss of the points moved
-/// inside does not show: the returned pose itself must carry the points onto their targets.
+/// The returned pose itself must move the points onto their targets.
+///
+/// If rotations are composed on one side and translations are added on the other, an error of
+/// centimeters remains. The loss of the internally moved points does not show it.
 #[test]
-fn the_returned_pose_carries_the_points_onto_their_targets_far_from_the_origin() {
+fn the_returned_pose_moves_points_onto_their_targets_far_from_the_origin() {
     let scene = scene(Household::Hammer, 0.0, &mut rng(35));
     let mut rng = rng(36);
     let metrics: [fn() -> Box<dyn Minimize + Send>; 7] = [
@@ -165,14 +171,14 @@ fn the_returned_pose_carries_the_points_onto_their_targets_far_from_the_origin()
                 let point = s.point.cast::<f64>();
                 (found * point - truth * point).norm()
             });
-            // f32 resolves 5·10⁻⁷ m at 5 m.
+            // At 5 m, `f32` has a resolution of 5·10⁻⁷ m.
             let worst = off.fold(0.0, f64::max);
             assert!(worst < 2e-6, "{name} {degrees}°: {worst}");
         }
     }
 }
 
-/// Where every evaluation stood, by its bits, and what it found.
+/// Every evaluation with the bits of its pose.
 #[derive(Default)]
 struct Evaluations {
     poses: Vec<([u64; 7], hybrid_icp::icp::Evaluation)>,
@@ -191,10 +197,11 @@ impl Observer for Evaluations {
     }
 }
 
-/// A pose stored after the update with the residual from before it is better or worse than it claims; and an initial pose that
-/// is not the first to be evaluated was ignored.
+/// A pose stored after the update, with the residual from before it, is reported wrongly.
+///
+/// An initial pose that is not evaluated first was ignored.
 #[test]
-fn the_initial_pose_is_evaluated_first_and_the_returned_one_was_evaluated_itself() {
+fn the_initial_pose_is_evaluated_first_and_the_returned_pose_was_evaluated() {
     let mut refined = 0;
     for seed in 0..4 {
         let scene = scene(Household::Car, 0.5, &mut rng(40 + seed));
@@ -209,11 +216,12 @@ fn the_initial_pose_is_evaluated_first_and_the_returned_one_was_evaluated_itself
             );
             assert!(seen.poses.contains(&claimed), "{preset}: {outcome:?}");
             refined += usize::from(outcome.verdict == Verdict::Refined);
-            // A plain stage that judges by the loss returns the best that it saw, to within what counts as a rise.
+            // A single stage that compares losses returns the best evaluated pose, up to the
+            // tolerance of a rise.
             if let [end] = seen.last_of_stages[..] {
                 let losses = seen.poses[..end].iter().map(|(_, e)| e.mean_loss);
                 let least = losses.fold(f64::INFINITY, f64::min);
-                // A pose that was turned down for the pairs it lost may have had a lower mean.
+                // A pose that was rejected because it lost pairs may have a lower mean loss.
                 let accepted = claimed.1.mean_loss <= least * 1.01;
                 let lost = outcome.termination == hybrid_icp::icp::Termination::PairsLost;
                 assert!(accepted || lost, "{preset}: {outcome:?}, {least}");
@@ -223,10 +231,12 @@ fn the_initial_pose_is_evaluated_first_and_the_returned_one_was_evaluated_itself
     assert!(refined > 18, "{refined}");
 }
 
-/// Absolute thresholds and mixed units make the result depend on whether coordinates are metres or millimetres. A scene twice as
-/// large and twice as far looks the same; a power of two rounds the same.
+/// Absolute thresholds and mixed units make the result depend on the unit of length.
+///
+/// A scene that is twice as large and twice as far away looks the same. Powers of two do not change
+/// the rounding.
 #[test]
-fn a_scene_of_another_size_is_refined_alike() {
+fn a_scaled_scene_is_refined_alike() {
     let mut compared = 0;
     for (object, seed) in [(Household::Iron, 60), (Household::Hammer, 61)] {
         let small = scene(object, 0.3, &mut rng(seed));
@@ -266,10 +276,12 @@ fn a_scene_of_another_size_is_refined_alike() {
     assert!(compared > 30, "{compared}");
 }
 
-/// A residual in normalised coordinates, or of points that were never moved, says the same of a good fit and of one 11 mm off,
-/// and a perfect fit must not look like a failure.
+/// A residual must separate a good fit from one that is 11 mm off.
+///
+/// In normalized coordinates, or for points that were never moved, it does not. A perfect fit must
+/// not look like a failure.
 #[test]
-fn rmse_is_the_distance_in_metres_at_the_pose_and_zero_for_a_perfect_fit() {
+fn rmse_is_the_distance_in_meters_at_the_pose_and_zero_for_a_perfect_fit() {
     let normal = UnitVector3::new_normalize(Vector3::new(0.0, 0.6, -0.8));
     let at = |offset: Vector3<f32>| -> Correspondences {
         (0..50)
@@ -290,16 +302,16 @@ fn rmse_is_the_distance_in_metres_at_the_pose_and_zero_for_a_perfect_fit() {
         |offset| Quality::of(&Iteration::default(), &at(offset), &mut PointToPlane).unwrap();
     let perfect = quality(Vector3::zeros());
     assert_eq!((perfect.point_rmse, perfect.plane_rmse), (0.0, 0.0));
-    // 11 mm along the normal, and 11 mm across it.
+    // An offset of 11 mm along the normal, and one of 11 mm across it.
     let along = quality(normal.into_inner() * 0.011);
     assert!((along.point_rmse - 0.011).abs() < 1e-7 && (along.plane_rmse - 0.011).abs() < 1e-7);
     let across = quality(Vector3::new(0.0, 0.8, 0.6) * 0.011);
     assert!((across.point_rmse - 0.011).abs() < 1e-7 && across.plane_rmse < 1e-7);
 }
 
-/// A minimum number of points that nobody asked for leaves small and far objects as they were, silently.
+/// A hidden minimum number of points would silently skip small and far objects.
 #[test]
-fn a_far_object_of_some_hundred_pixels_is_refined() {
+fn a_far_object_of_a_few_hundred_pixels_is_refined() {
     let model = Household::Car.model().unwrap();
     let camera = PinholeCamera::new(143.1, 143.4, 80.1, 59.8, 160, 120).unwrap();
     let mut rng = rng(70);
@@ -323,7 +335,7 @@ fn a_far_object_of_some_hundred_pixels_is_refined() {
     assert!(improved >= 7, "{improved} of 10");
 }
 
-/// Shifting the model's centroid onto that of what is seen draws a half-hidden object toward its visible half.
+/// Moving the model's centroid to that of the visible points would pull a half-hidden object aside.
 #[test]
 fn a_half_hidden_object_at_its_true_pose_stays_there() {
     for object in [Household::Iron, Household::Car] {

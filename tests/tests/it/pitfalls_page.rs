@@ -1,12 +1,12 @@
-//! `docs/pitfalls.md` names tests that exist.
+//! Checks that the tests that `docs/pitfalls.md` names exist.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// The cells of the table rows of a page, heads and rules left out.
+/// Returns the cells of the table rows of a page, without headers and rules.
 fn rows(page: &str) -> Vec<[String; 3]> {
-    // A bar inside a cell is written with a backslash.
+    // A bar inside a cell is escaped with a backslash.
     let page = page.replace("\\|", "¦");
     page.lines()
         .filter(|line| line.starts_with('|'))
@@ -16,24 +16,24 @@ fn rows(page: &str) -> Vec<[String; 3]> {
             let cells: Vec<String> = cells.map(|cell| cell.trim().to_owned()).collect();
             cells
                 .try_into()
-                .unwrap_or_else(|cells| panic!("three cells in {line}, not {cells:?}"))
+                .unwrap_or_else(|cells| panic!("expected three cells in {line}, found {cells:?}"))
         })
         .collect()
 }
 
-/// The `path::name` entries of a cell.
+/// Returns the `path::name` entries of a cell.
 fn named_tests(cell: &str) -> Vec<(&str, &str)> {
     cell.split(", ")
         .map(|entry| {
             let entry = entry.strip_prefix('`').and_then(|e| e.strip_suffix('`'));
             entry
                 .and_then(|e| e.rsplit_once("::"))
-                .unwrap_or_else(|| panic!("`path::name`, not {cell}"))
+                .unwrap_or_else(|| panic!("expected `path::name`, found {cell}"))
         })
         .collect()
 }
 
-/// Whether a source file has a function of that name marked as a test, by itself or inside `proptest!`.
+/// Returns whether a source file has a test function of that name, also inside `proptest!`.
 fn has_test(source: &str, name: &str) -> bool {
     let mut marked = false;
     for line in source.lines().map(str::trim) {
@@ -64,7 +64,7 @@ fn every_test_named_on_the_page_exists() {
             assert!(has_test(&source, name), "no test {name} in {path}");
         }
     }
-    // Those that apply are all there; the page says why the last does not.
+    // The page has all 28 pitfalls that apply, and explains why one does not.
     let numbers: BTreeSet<u32> = rows
         .iter()
         .filter_map(|[what, ..]| what.split_once(". ")?.0.parse().ok())
@@ -72,9 +72,9 @@ fn every_test_named_on_the_page_exists() {
     assert_eq!(numbers, (1..=28).collect());
 }
 
-/// And the check can fail.
+/// The check itself finds each kind of missing test.
 #[test]
-fn a_missing_an_unmarked_and_an_ignored_test_are_told() {
+fn missing_unmarked_and_ignored_tests_are_found() {
     let source =
         "#[test]\nfn real() {}\nfn helper() {}\n#[test]\n#[ignore = \"slow\"]\nfn idle() {}\n";
     let found = ["real", "helper", "idle", "rea", "none"].map(|name| has_test(source, name));

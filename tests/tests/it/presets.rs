@@ -1,4 +1,4 @@
-//! Presets changed in Rust.
+//! Presets that are changed in Rust.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +11,7 @@ use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{Preset, Refiner, presets};
 
 #[test]
-fn a_preset_changed_in_place_gives_the_bits_of_its_file_with_the_same_override() {
+fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let mut rng = rng(31);
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.05, 0.8);
@@ -56,7 +56,7 @@ impl Renderer for Counted {
 }
 
 #[test]
-fn a_refiner_renders_with_the_renderer_that_it_is_given() {
+fn a_refiner_uses_the_given_renderer() {
     let mut rng = rng(32);
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.005, 0.1);

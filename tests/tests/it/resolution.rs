@@ -1,4 +1,4 @@
-//! Coarser observations mean the same as fine ones.
+//! Checks that coarser observations agree with fine ones.
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{scene, symmetric_pose_distance};
@@ -7,7 +7,7 @@ use hybrid_icp::icp::{AtResolution, Cascade};
 use hybrid_icp::{Refiner, presets};
 
 #[test]
-fn a_coarse_pixel_holds_the_surfel_of_its_fine_pixel() {
+fn a_coarse_pixel_has_the_surfel_of_its_fine_pixel() {
     let scene = scene(Household::Iron, 0.5, &mut rng(3));
     for factor in [1, 2, 3, 4, 7] {
         let fine: &Observation = &scene.observation;
@@ -22,7 +22,7 @@ fn a_coarse_pixel_holds_the_surfel_of_its_fine_pixel() {
                 assert_eq!(a, b, "factor {factor}, pixel ({u}, {v})");
                 let Some(surfel) = a else { continue };
                 found += 1;
-                // Phase alignment: the coarse camera sees the point at the middle of its pixel.
+                // The coarse camera projects the point onto the center of its pixel.
                 let pixel = coarse.camera().project(&surfel.point.cast()).unwrap();
                 assert!((pixel.x - f64::from(u)).abs() < 1e-3, "factor {factor}");
                 assert!((pixel.y - f64::from(v)).abs() < 1e-3, "factor {factor}");
@@ -37,7 +37,7 @@ fn a_coarse_pixel_holds_the_surfel_of_its_fine_pixel() {
 }
 
 #[test]
-fn coarse_to_fine_ends_where_fine_does() {
+fn coarse_to_fine_ends_at_the_same_pose_as_fine() {
     let mut rng = rng(8);
     let scene = scene(Household::Iron, 0.0, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);

@@ -1,4 +1,4 @@
-//! Real depth frames integrate into one surface.
+//! Checks that real depth frames integrate into one surface.
 
 use hicp_sim::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen, components};
 use hicp_tests::median;
@@ -8,7 +8,7 @@ use hybrid_icp::raster::render_depth_image;
 #[test]
 fn real_frames_become_one_surface() {
     let Some(folder) = root() else {
-        eprintln!("no recorded frames on this machine: set HICP_DATA to run this test");
+        eprintln!("SKIPPED: no recorded frames on this machine; set HICP_DATA to run this test");
         return;
     };
     let frames = frames(&folder).unwrap();
@@ -34,14 +34,14 @@ fn real_frames_become_one_surface() {
     }
     let mesh = volume.surface(Unseen::Open).unwrap();
     let parts = components(&mesh).unwrap();
-    // A worktop that reflects, and so has no depth, parts what is above it from what is below.
+    // A reflecting worktop has no depth, so it separates the surfaces above from those below.
     let share = parts[0].area / mesh.area();
     assert!(
         share > 0.5,
         "the largest of {} parts has {share} of the area",
         parts.len()
     );
-    // Frames that were left out see what the others saw, where they saw it.
+    // Frames that were not integrated must agree with the surface from the others.
     for frame in frames.iter().skip(1).step_by(12) {
         let rendered = render_depth_image(&mesh, &frame.camera, &frame.camera_from_world);
         let pixels = rendered.pixels().iter().zip(frame.depth.pixels());

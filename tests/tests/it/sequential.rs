@@ -1,4 +1,4 @@
-//! The sequential estimator along simulated paths (§V, §VI-C).
+//! Tests of the sequential estimator along simulated paths (§V, §VI-C).
 
 use std::time::{Duration, Instant};
 
@@ -14,13 +14,13 @@ use hybrid_icp::{
     Calibration, Preset, SequentialConfig, SequentialEstimator, SequentialEvent, Trace, presets,
 };
 
-/// What a camera sees that moves toward an object: images, true poses, and the motion before each.
+/// Images of a camera that moves toward an object, with the true poses and the camera motions.
 struct Path {
     model: Model,
     frames: Vec<(Observation, Isometry3<f64>, CameraMotion)>,
 }
 
-/// An approach from 60 cm by 2 cm and 1° per frame, with depth noise in percent.
+/// Creates an approach from 60 cm by 2 cm and 1° per frame, with depth noise in percent.
 fn path(object: Household, frames: usize, noise_percent: f64, seed: u64) -> Path {
     let mut rng = rng(seed);
     let model = object.model().expect("the objects that ship are valid");
@@ -71,7 +71,7 @@ fn every_method_follows_an_object_from_a_rough_pose() {
         for (observation, truth, motion) in &path.frames {
             let before = fused;
             let step = estimator.step(&path.model, observation, motion);
-            // The start is what was fused before, in this frame.
+            // The step starts at the previous fused pose, moved into this frame.
             let expected = before.map_or(init, |pose| motion.apply(&pose));
             let (angle, distance) = se3::pose_distance(&step.init, &expected);
             assert!(angle < 1e-9 && distance < 1e-9, "{method}: {step:?}");
@@ -126,7 +126,7 @@ fn fusing_is_better_than_the_last_estimate_where_the_noise_is_large() {
 }
 
 #[test]
-fn an_image_of_nothing_is_no_estimate() {
+fn an_empty_image_gives_no_estimate() {
     let path = path(Household::Mug, 2, 0.3, 3);
     let (observation, truth, _) = &path.frames[0];
     let mut estimator = SequentialEstimator::for_object(
@@ -143,7 +143,7 @@ fn an_image_of_nothing_is_no_estimate() {
         "{step:?}"
     );
     assert_eq!((step.covariance, step.mve), (None, None));
-    // The initial pose moves with the camera all the same.
+    // The initial pose still moves with the camera.
     assert_eq!(step.camera_from_object, motion.apply(truth));
 
     estimator.restart(truth).expect("valid");
@@ -156,14 +156,14 @@ fn an_image_of_nothing_is_no_estimate() {
     assert!(step.covariance.is_some());
 }
 
-/// Refines, but for one image, where it goes astray.
-struct Astray<S> {
+/// Refines every image, but returns a wrong pose for one of them.
+struct WrongOnce<S> {
     stage: S,
     image: usize,
     seen: usize,
 }
 
-impl<S: Stage> Stage for Astray<S> {
+impl<S: Stage> Stage for WrongOnce<S> {
     fn run(
         &mut self,
         problem: &Problem<'_>,
@@ -183,7 +183,7 @@ impl<S: Stage> Stage for Astray<S> {
 #[test]
 fn a_failed_registration_does_not_drag_the_pose() {
     let path = path(Household::Mug, 4, 0.3, 4);
-    let astray = || Astray {
+    let wrong_once = || WrongOnce {
         stage: presets::hybrid(),
         image: 2,
         seen: 0,
@@ -206,11 +206,11 @@ fn a_failed_registration_does_not_drag_the_pose() {
     };
     let method = FusionMethod::Average;
     let mut gated =
-        SequentialEstimator::for_object(astray(), method, &path.model, truth).expect("valid");
+        SequentialEstimator::for_object(wrong_once(), method, &path.model, truth).expect("valid");
     let (worst, rejected) = error(&mut gated);
     assert_eq!(rejected, 1);
     assert!(worst < 0.004, "{worst}");
-    let mut plain = SequentialEstimator::paper(astray(), method, truth).expect("valid");
+    let mut plain = SequentialEstimator::paper(wrong_once(), method, truth).expect("valid");
     assert!(error(&mut plain).0 > 0.02);
 }
 
@@ -239,14 +239,14 @@ fn the_covariance_of_the_registration_reaches_the_fuser() {
     let expected = inflated.covariance(pose, step.mve, registration.as_ref());
     let found = step.covariance.expect("an estimate");
     assert!((found - expected).amax() < 1e-15 * expected.amax());
-    // A second image makes it surer.
+    // A second image reduces the uncertainty.
     let (observation, _, motion) = &path.frames[1];
     let second = estimator.step(model, observation, motion).covariance;
     assert!(second.expect("an estimate").determinant() < 0.5 * found.determinant());
 }
 
 #[test]
-fn a_calibrated_estimator_states_what_no_number_of_images_averages_away() {
+fn a_calibrated_estimator_includes_the_error_that_images_share() {
     let path = path(Household::Mug, 6, 0.5, 5);
     let (model, (_, truth, _)) = (&path.model, &path.frames[0]);
     let calibration = Calibration::HYBRID;
@@ -270,7 +270,8 @@ fn a_calibrated_estimator_states_what_no_number_of_images_averages_away() {
         );
         let covariance = step.covariance.expect("an estimate");
         let shared = unit.at(&step.camera_from_object) * calibration.shared.powi(2);
-        // What is beyond the shared error is a covariance too, and what is stated holds the error.
+        // The stated covariance without the shared error is a covariance too, and the whole one
+        // covers the error.
         assert!((covariance - shared).cholesky().is_some());
         let error = se3::log(&(truth * step.camera_from_object.inverse()));
         let solved = covariance.cholesky().expect("positive").solve(&error);
@@ -288,7 +289,7 @@ fn a_calibrated_estimator_states_what_no_number_of_images_averages_away() {
 }
 
 #[test]
-fn steps_are_deterministic_and_restart_forgets() {
+fn steps_are_deterministic_and_restart_clears_the_state() {
     let path = path(Household::Bottle, 3, 0.5, 6);
     let init = perturb(&mut rng(7), &path.frames[0].1, 0.006, 0.16);
     let make = || {
@@ -340,11 +341,11 @@ impl<S: Stage> Stage for Timed<S> {
     }
 }
 
-/// Alone on a quiet machine: `cargo test -p hicp-tests --test it sequential -- --ignored --nocapture`.
+/// Run `cargo test -p hicp-tests --test it sequential -- --ignored --nocapture` on an idle machine.
 #[test]
-#[ignore = "reads a clock, and other work on the machine moves it"]
-fn a_step_beyond_its_icp_costs_less_than_a_hundredth_of_it() {
-    // What a step costs beyond the stage and, where one is asked for, the score: one render, like each of those in the stage.
+#[ignore = "measures time, which other work on the machine changes"]
+fn a_step_costs_less_than_a_hundredth_more_than_its_icp() {
+    // A step costs one render more than the stage and an optional score.
     let path = path(Household::Mug, 11, 0.3, 8);
     let (_, truth, _) = &path.frames[0];
     let model = &path.model;
@@ -396,7 +397,7 @@ fn a_step_beyond_its_icp_costs_less_than_a_hundredth_of_it() {
 }
 
 #[test]
-fn a_camera_that_moves_without_an_image_takes_the_pose_along() {
+fn a_camera_motion_without_an_image_moves_the_pose() {
     let Path { model, frames } = path(Household::Mug, 3, 0.3, 12);
     let (observation, truth, _) = &frames[0];
     let estimator = || {
@@ -405,12 +406,12 @@ fn a_camera_that_moves_without_an_image_takes_the_pose_along() {
             .expect("a valid start")
     };
     let motion = frames[1].2;
-    // Before any estimate it is the initial pose that moves.
+    // Before any estimate, the initial pose moves.
     let mut blind = estimator();
     assert!(blind.fuser().estimate().is_none());
     blind.move_camera(&motion);
     assert_eq!(blind.camera_from_object(), motion.apply(truth));
-    // Two motions without an image in between are as one step with both.
+    // Two motions without an image in between equal one step with both.
     let mut first = estimator();
     let mut trace = Trace::new();
     let step = first.step_observed(&model, observation, &CameraMotion::none(), &mut trace);

@@ -1,4 +1,4 @@
-//! Cameras, configurations and results through JSON, with the feature `serde`.
+//! Serialization of cameras, configurations and results as JSON, with the feature `serde`.
 
 use hicp_sim::{Household, rng};
 use hicp_tests::scene;
@@ -9,14 +9,14 @@ use hybrid_icp::{Calibration, Preset, Refiner, SequentialConfig, Trace};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Asserts that a value comes back from JSON as it was.
+/// Asserts that a value is equal after a round trip through JSON.
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(value: &T) {
     let text = serde_json::to_string(value).unwrap();
     assert_eq!(&serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
 }
 
 #[test]
-fn cameras_and_configurations_survive_json() {
+fn cameras_and_configurations_round_trip_through_json() {
     round_trip(&PinholeCamera::new(600.5, 601.0, 319.5, 239.5, 640, 480).unwrap());
     round_trip(&ModelConfig {
         diameter: Some(0.1),
@@ -44,7 +44,7 @@ fn impossible_cameras_and_axes_are_refused() {
 }
 
 #[test]
-fn results_are_written_with_their_names_and_numbers() {
+fn results_are_serialized_with_their_names_and_numbers() {
     let scene = scene(Household::Mug, 0.5, &mut rng(31));
     let mut trace = Trace::default();
     let mut refiner = Refiner::new(Preset::Hybrid.build());

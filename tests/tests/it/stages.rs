@@ -30,7 +30,7 @@ fn run(stage: &mut dyn Stage, scene: &Scene, init: &Isometry3<f64>) -> Outcome {
     stage.run(&problem, init, &mut Session::new(&mut workspace, &mut ()))
 }
 
-fn creeping<S>(stop: S) -> Icp<AllSamples, NearestNeighbor, (), PointToPoint, S> {
+fn slow_icp<S>(stop: S) -> Icp<AllSamples, NearestNeighbor, (), PointToPoint, S> {
     Icp {
         selection: AllSamples,
         association: NearestNeighbor::default(),
@@ -40,7 +40,7 @@ fn creeping<S>(stop: S) -> Icp<AllSamples, NearestNeighbor, (), PointToPoint, S>
     }
 }
 
-/// Notes the loss at which every ICP stage ended.
+/// Records the loss at the end of every ICP stage.
 #[derive(Default)]
 struct StepLosses(Vec<f64>);
 
@@ -59,11 +59,11 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
     let (mut plain_steps, mut fast_steps) = (0, 0);
     for seed in 0..6 {
         let (scene, init) = case(Household::Iron, seed, 0.004, 0.08);
-        // The plain iteration: one increment per step, until it stands still.
+        // The plain iteration makes one increment per step until it converges.
         let mut pose = init;
         let mut losses = Vec::new();
         for _ in 0..60 {
-            let outcome = run(&mut creeping(IterationLimit(2)), &scene, &pose);
+            let outcome = run(&mut slow_icp(IterationLimit(2)), &scene, &pose);
             let Some(evaluation) = outcome.evaluation else {
                 break;
             };
@@ -75,7 +75,7 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
         let problem = Problem::new(&scene.model, &scene.observation);
         let mut workspace = Workspace::new(Rasterizer::default());
         let mut steps = StepLosses::default();
-        let mut fast = Anderson::new(creeping(IterationLimit(2)));
+        let mut fast = Anderson::new(slow_icp(IterationLimit(2)));
         fast.run(
             &problem,
             &init,
@@ -94,8 +94,8 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
 fn anderson_never_returns_a_higher_loss_than_its_first_step() {
     for seed in 0..6 {
         let (scene, init) = case(Household::Car, seed, 0.01, 0.3);
-        let first = run(&mut creeping(IterationLimit(2)), &scene, &init);
-        let mut fast = Anderson::new(creeping(IterationLimit(2)));
+        let first = run(&mut slow_icp(IterationLimit(2)), &scene, &init);
+        let mut fast = Anderson::new(slow_icp(IterationLimit(2)));
         let outcome = run(&mut fast, &scene, &init);
         let loss = |o: &Outcome| o.evaluation.map_or(f64::INFINITY, |e| e.mean_loss);
         assert!(loss(&outcome) <= loss(&first), "{outcome:?}");
@@ -103,7 +103,7 @@ fn anderson_never_returns_a_higher_loss_than_its_first_step() {
     }
 }
 
-/// Notes how many pairs every iteration had.
+/// Records the number of pairs of every iteration.
 #[derive(Default)]
 struct PairCounts(Vec<usize>);
 
@@ -115,7 +115,7 @@ impl Observer for PairCounts {
 }
 
 #[test]
-fn a_schedule_applies_one_filter_per_iteration_and_starts_anew() {
+fn a_schedule_applies_one_filter_per_iteration_and_restarts_with_each_run() {
     let (scene, init) = case(Household::Mug, 3, 0.004, 0.05);
     let gates = [0.5_f32, 0.02, 0.01, 0.3];
     let mut stage = Icp {
@@ -142,7 +142,7 @@ fn a_schedule_applies_one_filter_per_iteration_and_starts_anew() {
         counts[1] < counts[0] && counts[2] < counts[1] && counts[3] > counts[2],
         "{counts:?}"
     );
-    // The numbers at the returned pose are those of its iteration.
+    // The outcome states the numbers of the iteration at the returned pose.
     assert_eq!(outcome.n_pairs(), counts[5]);
     assert_eq!(record(&mut stage), (counts, outcome), "a second stage run");
 }
@@ -161,7 +161,7 @@ fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
         let Some(quality) = outcome.quality else {
             continue;
         };
-        // From the returned pose, with the points chosen at the initial one, the same pairs must come out.
+        // The same points, associated again at the returned pose, must give the same pairs.
         let problem = Problem::new(&scene.model, &scene.observation);
         let mut workspace = Workspace::new(Rasterizer::default());
         let mut context = workspace.context(&problem);
@@ -186,7 +186,7 @@ fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
 }
 
 #[test]
-fn a_guard_never_lets_the_score_rise_and_keep_best_keeps_it() {
+fn a_guard_never_raises_the_score_and_keep_best_keeps_the_lowest() {
     let mut worse_without = 0;
     for (seed, object) in (0..).zip([
         Household::Bowl,
@@ -222,11 +222,11 @@ fn a_guard_never_lets_the_score_rise_and_keep_best_keeps_it() {
             assert!(best.mve <= plain.mve.min(plain.mve_initial), "{best:?}");
         }
     }
-    assert!(worse_without > 0, "no case in which the guard matters");
+    assert!(worse_without > 0, "no case needs the guard");
 }
 
 #[test]
-fn a_switch_among_two_is_the_switch() {
+fn a_switch_among_two_stages_equals_the_switch() {
     let (scene, init) = case(Household::Mug, 5, 0.05, 1.0);
     let bounds = vec![0.4];
     let score = MeanVsd::default();
@@ -259,13 +259,13 @@ fn a_switch_among_two_is_the_switch() {
     );
 }
 
-/// Asks to stop after a number of iterations of every stage.
-struct Impatient {
+/// Stops every stage after a number of iterations.
+struct StopAfter {
     after: usize,
     ended: Vec<Termination>,
 }
 
-impl Observer for Impatient {
+impl Observer for StopAfter {
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> std::ops::ControlFlow<()> {
         if event.iteration + 1 >= self.after {
             std::ops::ControlFlow::Break(())
@@ -283,12 +283,12 @@ impl Observer for Impatient {
 fn an_observer_can_stop_a_stage() {
     let (scene, init) = case(Household::Iron, 1, 0.004, 0.05);
     let mut stage = Cascade((
-        creeping(SmallMotion::default()),
-        creeping(SmallMotion::default()),
+        slow_icp(SmallMotion::default()),
+        slow_icp(SmallMotion::default()),
     ));
     let problem = Problem::new(&scene.model, &scene.observation);
     let mut workspace = Workspace::new(Rasterizer::default());
-    let mut observer = Impatient {
+    let mut observer = StopAfter {
         after: 2,
         ended: Vec::new(),
     };
@@ -308,13 +308,13 @@ fn an_observer_can_stop_a_stage() {
 #[test]
 fn filters_in_vectors_options_and_boxes_receive_the_iteration_too() {
     #[derive(Default)]
-    struct Told(Vec<usize>);
-    impl OutlierFilter for Told {
+    struct Indices(Vec<usize>);
+    impl OutlierFilter for Indices {
         fn filter(&mut self, iteration: &Iteration<'_>, _: &mut Correspondences) {
             self.0.push(iteration.index);
         }
     }
-    let mut nested = (vec![Some(Box::new(Told::default()))],);
+    let mut nested = (vec![Some(Box::new(Indices::default()))],);
     for index in [0, 1] {
         let iteration = Iteration::new(index, &Isometry3::identity(), Problem::default());
         nested.filter(&iteration, &mut Correspondences::new());

@@ -1,11 +1,12 @@
-//! Hybrid ICP from the paper's mean initialisation error (§VI-A.5), noise-free and with a full mask.
+//! Hybrid ICP from the paper's mean initialization error (§VI-A.5), without noise and with full
+//! masks.
 
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hicp_tests::{OBJECTS, scene, symmetric_pose_distance};
 use hybrid_icp::{Preset, Refiner};
 
 #[test]
-fn the_median_start_is_refined_to_a_fraction_of_a_degree_and_of_a_millimetre() {
+fn the_median_start_is_refined_to_a_fraction_of_a_degree_and_a_millimeter() {
     let mut refiner = Refiner::preset(Preset::Hybrid);
     let (mut angles, mut distances) = (Vec::new(), Vec::new());
     for (seed, object) in (0..).zip(OBJECTS) {

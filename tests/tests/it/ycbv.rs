@@ -1,4 +1,7 @@
-//! Real YCB-Video frames: ground truth stays put, and real detectors' estimates improve. Skipped, aloud, without the data.
+//! Tests on real YCB-Video frames.
+//!
+//! A refinement from the ground truth stays there, and the estimates of real detectors improve.
+//! Without the data, the tests are skipped with a message.
 
 use hicp_io::bop::{Dataset, read_results};
 use hicp_tests::median;
@@ -8,7 +11,7 @@ use hybrid_icp::score::adi;
 use hybrid_icp::{Preset, Refiner};
 
 #[test]
-fn from_the_true_pose_hybrid_stays_within_five_millimetres() {
+fn hybrid_stays_within_five_millimeters_of_the_true_pose() {
     let Some(root) = root() else {
         eprintln!("SKIPPED: no ycbv dataset; set BOP_PATH to the folder that holds it");
         return;
@@ -25,14 +28,14 @@ fn from_the_true_pose_hybrid_stays_within_five_millimetres() {
 }
 
 #[test]
-fn hybrid_improves_what_real_detectors_found() {
+fn hybrid_improves_the_poses_of_real_detectors() {
     let Some(root) = root() else {
         eprintln!("SKIPPED: no ycbv dataset; set BOP_PATH to the folder that holds it");
         return;
     };
     let instances = instances(&Dataset::open(&root).unwrap());
     let mut refiner = Refiner::preset(Preset::Hybrid);
-    // The largest median after refinement, as a share of the median before, and how far it may rise above it (mm).
+    // The largest median after refinement as a share of the median before, and the slack in mm.
     for (file, share, slack) in [
         ("cosypose_ycbv-test.csv", 0.7, 0.0),
         ("posecnn-rss2018_ycbv-test.csv", 0.5, 0.0),
