@@ -1,4 +1,4 @@
-//! A data association of one's own: soft correspondences with all pixels of a window.
+//! A custom data association: soft correspondences with all pixels of a window.
 
 use hicp_testkit::{AssociationLaws, check_association};
 use hicp_tests::starts::{measure_stage, starts};
@@ -9,13 +9,15 @@ use hybrid_icp::metric::PointToPoint;
 
 // --- The component ---
 
-/// Pairs a model point with every observed point in a window about its projection, each with a share of a weight of one that
-/// falls with its distance as a Gaussian: the E-step of EM-ICP (Granger & Pennec 2002), with the image in the place of a tree.
+/// Pairs a model point with every observed point in a window around its projection.
+///
+/// The weights of a point's pairs sum to one and fall with distance as a Gaussian. This is the
+/// E-step of EM-ICP (Granger & Pennec 2002), with the image instead of a tree.
 #[derive(Clone, Copy, Debug)]
 pub struct SoftProjective {
     /// Half the width of the window, pixels.
     pub radius_pixels: u8,
-    /// Standard deviation of the distances, metres.
+    /// Standard deviation of the distances, meters.
     pub sigma_meters: f32,
 }
 

@@ -1,4 +1,4 @@
-//! A filter of one's own: weights that grow stricter from iteration to iteration.
+//! A custom filter: weights that grow stricter from iteration to iteration.
 
 use hicp_sim::MEAN_ROTATION_ERROR_DEGREES;
 use hicp_testkit::{FilterLaws, check_filter};
@@ -11,16 +11,18 @@ use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 
-/// Graduated non-convexity (Yang, Antonante, Tzoumas & Carlone 2020): multiplies weights by those of a Geman–McClure kernel that is
-/// nearly quadratic at first and reaches its true width in the course of the iterations, w = (μσ²/(r² + μσ²))², r the distance
-/// to the observed tangent plane.
+/// Graduated non-convexity (Yang, Antonante, Tzoumas & Carlone 2020).
+///
+/// Multiplies weights by w = (μσ²/(r² + μσ²))², where r is the distance to the observed tangent
+/// plane. The Geman–McClure kernel is nearly quadratic at first and reaches its true width over the
+/// iterations.
 #[derive(Clone, Copy, Debug)]
 struct Graduated {
-    /// σ: what a right pair is off by, metres.
+    /// σ: standard deviation of a correct pair, meters.
     sigma_meters: f32,
     /// μ of the first iteration.
     start: f32,
-    /// What μ is divided by from one iteration to the next, until it is 1.
+    /// Divisor of μ from one iteration to the next, until μ is 1.
     rate: f32,
 }
 

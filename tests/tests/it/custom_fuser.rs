@@ -12,10 +12,12 @@ use hybrid_icp::{Preset, SequentialConfig, SequentialEstimator, SequentialEvent}
 
 // --- The component ---
 
-/// Covariance intersection (Julier and Uhlmann 1997): correct however the errors of the estimates are
-/// correlated, as those of images along a path are (model, calibration, the start of ICP).
+/// Covariance intersection (Julier and Uhlmann 1997): correct for any correlation of the errors.
 ///
-/// The information is ω Σ_held⁻¹ + (1 − ω) Σ_new⁻¹ with the ω of five that gives the smallest det Σ.
+/// Errors of images along a path are correlated by the model, the calibration and the start of ICP.
+///
+/// The information is ω Σ_held⁻¹ + (1 − ω) Σ_new⁻¹ with the ω of five that gives the smallest det
+/// Σ.
 #[derive(Default)]
 struct CovarianceIntersection {
     held: Option<PoseEstimate>,
@@ -61,7 +63,7 @@ impl Fuser for CovarianceIntersection {
             .chain(mixtures)
             .flatten()
         {
-            // By more than rounding, so that equal estimates leave the held one as it is.
+            // The margin exceeds rounding, so that equal estimates leave the held one unchanged.
             if size(&candidate.0) < best.0 * (1.0 - 1e-9) {
                 best = (size(&candidate.0), Some(candidate));
             }
@@ -129,7 +131,7 @@ fn the_same_estimate_again_is_no_new_evidence() {
         }
     }
     assert_eq!(fuser.estimate(), Some(estimate));
-    // The filter takes the ten for independent.
+    // The filter treats the ten estimates as independent.
     let filtered = filter.estimate().unwrap().covariance()[(0, 0)];
     assert!((filtered / 1e-5 - 1.0).abs() < 1e-6, "{filtered}");
 }

@@ -1,4 +1,4 @@
-//! An error metric of one's own: what the sensor measures, the depth along the viewing ray.
+//! A custom error metric: the depth along the viewing ray, as the sensor measures it.
 
 use hicp_testkit::{MetricLaws, check_metric, check_minimize};
 use hicp_tests::starts::{measure_stage, starts};
@@ -9,9 +9,11 @@ use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, PointToPlane, W
 
 // --- The component ---
 
-/// How far the model lies from the observed tangent plane *along the viewing ray*, r = nᵀ(p − c) / nᵀd, d the unit ray to c, as
-/// dense trackers align depth images: a sensor's noise adds to the length of the ray, not to the distance from a plane.
-/// Rays more grazing than `min_cosine` count as that, since there the quotient explodes.
+/// The distance of the model from the observed tangent plane *along the viewing ray*.
+///
+/// r = nᵀ(p − c) / nᵀd, where d is the unit ray to c. Dense trackers align depth images this way:
+/// noise of a sensor adds to the length of the ray, not to the distance from a plane. The cosine
+/// between ray and normal is at least `min_cosine`, which bounds the quotient.
 #[derive(Clone, Copy, Debug)]
 pub struct AlongRay {
     /// Smallest cosine between ray and normal, above 0.
@@ -57,7 +59,7 @@ fn projective<M: Minimize>(metric: M) -> impl Stage {
 
 #[test]
 fn it_keeps_the_laws() {
-    // The rays start at the camera: moving model and image together is another measurement.
+    // The rays start at the camera, so moving model and image together gives another measurement.
     let laws = MetricLaws {
         frame: false,
         ..MetricLaws::default()

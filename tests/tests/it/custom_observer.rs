@@ -1,4 +1,4 @@
-//! An observer of one's own: the error at every iteration, within a budget.
+//! A custom observer: the error at every iteration, within a budget.
 
 use std::ops::ControlFlow;
 
@@ -10,13 +10,14 @@ use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 
-/// Writes down how far off a known truth every evaluated pose is, for a plot of convergence, and ends the run when all stages
-/// together have used up a number of iterations, which no stop rule of one stage can know.
+/// Records the error of every evaluated pose, and ends the run after a number of iterations.
+///
+/// The iterations of all stages count together. A stop rule sees those of its own stage only.
 #[derive(Debug)]
 struct ErrorCurve {
     truth: Isometry3<f64>,
     budget: usize,
-    /// Stage, metric loss, degrees, millimetres.
+    /// Stage, metric loss, degrees, millimeters.
     rows: Vec<(usize, f64, f64, f64)>,
     ended: Vec<(&'static str, Termination)>,
 }

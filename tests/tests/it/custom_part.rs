@@ -69,7 +69,7 @@ fn a_program_can_add_its_own_parts_under_a_name() {
         let expected = Refiner::new(stage).refine(&scene.model, &scene.observation, &init);
         assert_eq!(found, expected);
     }
-    // It can stand wherever a metric stands, and its messages are those of the others.
+    // It is accepted wherever a metric is, with the same error messages.
     assert!(build("{ type = \"robust\", metric = \"gained\" }", &catalog).is_ok());
     for (metric, wanted) in [
         (

@@ -1,4 +1,4 @@
-//! A renderer of one's own: what the sensor would return rather than what a perfect camera would see.
+//! A custom renderer: a sensor that returns nothing at grazing angles.
 
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
 use hicp_testkit::{RendererLaws, check_renderer};
@@ -14,12 +14,14 @@ use hybrid_icp::score::{MeanVsd, Score};
 
 // --- The component ---
 
-/// Renders and takes away what is seen at a grazing angle: structured light and time of flight return nothing there, so nothing
-/// should be selected there, and nothing missing there be held against a pose.
+/// Renders, and removes surfaces that are seen at a grazing angle.
+///
+/// Structured light and time of flight return nothing there. Points should not be selected there,
+/// and missing depth there should not count against a pose.
 #[derive(Debug, Default)]
 struct Grazing {
     inner: Rasterizer,
-    /// Cosine of the widest angle between the ray and the normal that still returns light.
+    /// Cosine of the largest angle between ray and normal that returns light.
     min_cosine: f64,
 }
 
@@ -64,7 +66,8 @@ fn grazing() -> Grazing {
     }
 }
 
-/// The scene as a sensor records it that returns nothing at grazing angles; the mask, made from colour, knows of no angle.
+/// Returns the scene as such a sensor records it. The mask comes from color and includes grazing
+/// angles.
 fn sensed(object: Household, seed: u64) -> (Scene, Isometry3<f64>) {
     let mut rng = rng(seed);
     let mut scene = scene(object, 0.0, &mut rng);
@@ -89,7 +92,7 @@ fn sensed(object: Household, seed: u64) -> (Scene, Isometry3<f64>) {
 
 #[test]
 fn it_keeps_the_laws() {
-    // It leaves out on purpose what the rasterizer draws.
+    // It omits surfaces on purpose.
     check_renderer(
         grazing,
         RendererLaws {
@@ -122,7 +125,7 @@ fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
             depth.iter().filter(|z| **z > 0.0).count()
         };
         let (few, all) = (shown(&mut mine), shown(&mut plain));
-        // A lid seen face on has no grazing surface, but most objects do.
+        // A lid that faces the camera has no grazing surface, but most objects do.
         assert!(few <= all, "{few} of {all} pixels of the {}", object.name());
         with_grazing += usize::from(few < all);
         assert_eq!(few, scene.observation.n_measured(), "{}", object.name());

@@ -1,4 +1,4 @@
-//! A score of one's own: the silhouette against the mask.
+//! A custom score: the silhouette against the mask.
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{ScoreLaws, check_score};
@@ -11,8 +11,10 @@ use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 
-/// 1 − the intersection over union of the rendered silhouette and the mask: 0 for a silhouette that is the mask, 1 for one
-/// beside it. It looks at no depth, so it judges glass and shiny metal, too.
+/// 1 − intersection over union of the rendered silhouette and the mask.
+///
+/// It is 0 if the silhouette equals the mask and 1 if they do not overlap. It reads no depth, so it
+/// also scores glass and shiny metal.
 #[derive(Clone, Copy, Debug)]
 struct Silhouette;
 

@@ -1,4 +1,4 @@
-//! A point selection of one's own: the visible surface without what something nearer hides.
+//! A custom point selection: the visible surface without occluded points.
 
 use hicp_testkit::check_selection;
 use hicp_tests::starts::{Start, measure_stage, starts};
@@ -9,8 +9,9 @@ use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 
-/// Leaves out the points of another selection where the camera measured something nearer by more than a margin: they are
-/// behind a hand, a gripper or a shelf, and whatever they are paired with is wrong.
+/// Drops the points of another selection that are behind a measured surface by more than a margin.
+///
+/// They are behind a hand, a gripper or a shelf, and every pair of them is wrong.
 #[derive(Clone, Copy, Debug)]
 struct Unhidden<P> {
     inner: P,

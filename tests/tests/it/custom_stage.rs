@@ -1,4 +1,4 @@
-//! A stage of one's own: the other way round, too.
+//! A custom stage: also starts from the opposite orientation.
 
 use std::f64::consts::PI;
 
@@ -14,13 +14,16 @@ use hybrid_icp::{Preset, Refiner};
 
 // --- The component ---
 
-/// Runs a stage from the initial pose and from the same turned by 180° about an axis through the object's centre, and returns
-/// what scores better: detectors confuse the front and the back of cars, boxes and tools.
+/// Runs a stage from the initial pose and from that pose rotated by 180°, and returns the better
+/// one.
+///
+/// The axis of rotation passes through the object's center. Detectors confuse the front and the
+/// back of cars, boxes and tools.
 #[derive(Clone, Copy, Debug)]
 struct BothWays<S, C> {
     stage: S,
     score: C,
-    /// In the object frame.
+    /// Axis in the object frame.
     axis: UnitVector3<f64>,
 }
 
@@ -41,7 +44,7 @@ impl<S: Stage, C: Score> Stage for BothWays<S, C> {
             let mut context = session.workspace.context(problem);
             self.score.score(&mut context, &outcome.camera_from_object)
         };
-        // The turned pose itself was evaluated by nobody: it must have been refined.
+        // The rotated pose itself was never evaluated, so it must have been refined.
         let better =
             outcomes[1].verdict == Verdict::Refined && score(&outcomes[1]) < score(&outcomes[0]);
         let chosen = &mut outcomes[usize::from(better)];

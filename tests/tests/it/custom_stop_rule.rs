@@ -1,4 +1,4 @@
-//! A stop rule of one's own: patience.
+//! A custom stop rule: patience.
 
 use hicp_testkit::{StopRuleLaws, check_stop_rule};
 use hicp_tests::starts::{measure_stage, starts};
@@ -10,8 +10,10 @@ use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
 
-/// Ends a stage as converged when the lowest loss so far has not fallen by a relative gain for a number of turns: losses that
-/// go up and down on their way, as those of projective association do, are given time; noise is not.
+/// Ends a stage as converged if the lowest loss has not improved for a number of iterations.
+///
+/// An improvement is a relative gain of at least a limit. The loss of projective association rises
+/// and falls on its way; this rule gives it time.
 #[derive(Clone, Copy, Debug)]
 struct Patience {
     turns: usize,

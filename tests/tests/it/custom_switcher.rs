@@ -1,4 +1,4 @@
-//! A switcher of one's own: by how well the visible surface holds a point-to-plane step.
+//! A custom switcher: selects by how well the visible normals determine a point-to-plane step.
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_testkit::{SwitcherLaws, check_switcher};
@@ -16,8 +16,11 @@ use hybrid_icp::switch::{Switch, Switcher};
 
 // --- The component ---
 
-/// Misaligned when the visible normals leave a direction free: when the smallest eigenvalue of their mean outer product is
-/// below a bound. A box seen face on is 0, a corner or a ball up to ⅓. There, point-to-plane slides and something else must hold.
+/// Selects the misaligned branch if the visible normals leave a direction free.
+///
+/// A direction is free if the smallest eigenvalue of the mean outer product of the normals is below
+/// a bound. The eigenvalue is 0 for one face of a box and at most ⅓ for a corner or a ball.
+/// Point-to-plane slides along a free direction.
 #[derive(Clone, Copy, Debug)]
 struct Planarity {
     bound: f64,
@@ -90,7 +93,7 @@ fn switching() -> impl Stage + Send + 'static {
     }
 }
 
-/// Notes the regimes taken.
+/// Records the selected regimes.
 #[derive(Default)]
 struct Regimes(Vec<Regime>);
 
@@ -100,7 +103,7 @@ impl Observer for Regimes {
     }
 }
 
-/// How far off the truth the centre ends, metres, and which regimes were taken.
+/// Returns the final error of the center in meters and the selected regimes.
 fn run(
     stage: impl Stage + Send + 'static,
     scene: &Scene,
