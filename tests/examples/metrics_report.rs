@@ -14,12 +14,12 @@ use hicp_tests::starts::{NEAREST_OF_ALL, measure, plain_icp, starts};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let noise = arguments.next().map_or(0.0, |text| {
-        text.parse().expect("a noise level in percent of the depth")
-    });
+    let noise = arguments
+        .next()
+        .map_or(0.0, |text| text.parse().expect("NOISE_PERCENT is a number"));
     let per_object = arguments
         .next()
-        .map_or(20, |text| text.parse().expect("a number of starts"));
+        .map_or(20, |text| text.parse().expect("STARTS is a whole number"));
     let starts = starts(per_object, noise);
     println!(
         "| metric | association | median rotation error | 90th percentile | median translation error | median iterations |"

@@ -16,7 +16,7 @@ use hybrid_icp::metric::{Generalized, PlaneToPoint, PointToPlane};
 fn main() {
     let runs = std::env::args()
         .nth(1)
-        .map_or(500, |text| text.parse().expect("a number of runs"));
+        .map_or(500, |text| text.parse().expect("RUNS is a whole number"));
     let visible = VisibleSurface {
         stride: Stride::Pixels(1),
     };

@@ -25,9 +25,9 @@ struct Column {
 }
 
 fn main() {
-    let noise: f64 = std::env::args()
-        .nth(1)
-        .map_or(0.0, |text| text.parse().expect("a noise level in percent"));
+    let noise: f64 = std::env::args().nth(1).map_or(0.0, |text| {
+        text.parse().expect("DEPTH_NOISE_PERCENT is a number")
+    });
     let mut refiners =
         Preset::ALL.map(|preset| (preset, Refiner::preset(preset), Column::default()));
     for (seed, object) in (0..).zip(OBJECTS) {

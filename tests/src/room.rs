@@ -23,10 +23,10 @@ pub struct Frame {
 ///
 /// It is `traj/tsdf_fusion_50` in `HICP_DATA`, or in the shared data next to the project.
 pub fn root() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folders = [
         std::env::var_os("HICP_DATA").map(PathBuf::from),
-        Some(beside),
+        Some(shared),
     ];
     let folders = folders.into_iter().flatten();
     folders
@@ -55,7 +55,7 @@ pub fn frames(folder: &Path) -> Result<Vec<Frame>, Box<dyn std::error::Error>> {
         let depth = DepthImage::from_meters(width, height, near.collect())?;
         let camera_from_world = camera
             .camera_from_world
-            .ok_or("a frame has no camera pose")?;
+            .ok_or("a frame has no camera pose in scene_camera.json")?;
         let camera = PinholeCamera::from_matrix(&camera.matrix, width, height)?;
         frames.push(Frame {
             depth,

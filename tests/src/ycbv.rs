@@ -13,11 +13,11 @@ use hybrid_icp::core::{
 /// It is `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data next to the project. The
 /// tests need the excerpt with its folder `results`.
 pub fn root() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/bop");
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/bop");
     let folders = [
         std::env::var_os("BOP_PATH").map(PathBuf::from),
         std::env::var_os("HICP_DATA").map(|data| PathBuf::from(data).join("bop")),
-        Some(beside),
+        Some(shared),
     ];
     folders
         .into_iter()
@@ -53,16 +53,18 @@ pub fn instances(dataset: &Dataset) -> Vec<Instance> {
     let infos = dataset.read_models_info().expect("models_info.json reads");
     let mut models = std::collections::BTreeMap::new();
     let mut instances = Vec::new();
-    for scene_id in dataset.scene_ids("test").expect("the split is there") {
+    for scene_id in dataset.scene_ids("test").expect("the split exists") {
         let scene = dataset.scene("test", scene_id).expect("the scene opens");
         for im_id in scene.image_ids() {
             let depth = Arc::new(scene.read_depth(im_id).expect("the depth image reads"));
             let camera = scene
                 .camera(im_id)
-                .expect("the camera is there")
+                .expect("the image has a camera")
                 .pinhole(depth.width(), depth.height())
-                .expect("the camera is one");
-            let truths = scene.ground_truth(im_id).expect("there is ground truth");
+                .expect("the camera is valid");
+            let truths = scene
+                .ground_truth(im_id)
+                .expect("the image has ground truth");
             for (index, truth) in truths.iter().enumerate() {
                 let model = models.entry(truth.obj_id).or_insert_with(|| {
                     let mesh = dataset.read_model(truth.obj_id).expect("the model reads");

@@ -1,4 +1,6 @@
-//! Checks that a warm run with custom components makes no heap allocation. The conformance kit cannot test this.
+//! Checks that a warm run with custom components makes no heap allocation.
+//!
+//! The conformance kit cannot test this.
 
 use crate::custom_association::SoftProjective;
 use crate::custom_metric::AlongRay;

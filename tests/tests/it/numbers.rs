@@ -172,7 +172,7 @@ fn depth_in_another_unit_causes_a_warning() {
         let observation = scene.observe(scene.changed(|z| z * factor));
         let found = warnings(&scene.model, &observation, &scene.truth);
         let [Warning::Depth { measured, .. }] = found[..] else {
-            panic!("{factor}: {found:?}");
+            panic!("factor {factor}: expected a depth warning, found {found:?}");
         };
         assert!((measured / expected - 1.0).abs() < 0.2, "{measured}");
         for preset in Preset::ALL {
@@ -334,7 +334,7 @@ fn results_with_bad_scores_cause_a_warning() {
             warnings_of_result(0.95, 0.97, None)[..],
             [Warning::Worse { .. }, Warning::Unexplained { .. }]
         ),
-        "both are so"
+        "expected both warnings"
     );
 }
 

@@ -368,7 +368,7 @@ fn a_half_hidden_object_at_its_true_pose_stays_there() {
             let pose = refined.outcome.camera_from_object;
             let (angle, distance) = se3::pose_distance(&pose, &scene.truth);
             assert!(refined.outcome.n_pairs() > 100, "{name}: {refined:?}");
-            // The centroid of the visible half is centimetres away.
+            // The centroid of the visible half is centimeters away.
             assert!(
                 angle < 1e-4 && distance < 5e-5,
                 "{object:?} {name}: {angle} {distance}"
