@@ -49,7 +49,7 @@ def refine(programs, folder, threads):
 
 
 def peak_memory(programs, folder, threads):
-    """Returns the peak resident memory as words.
+    """Returns the peak resident memory as text.
 
     The peak is read from the running process. After its end, the system's report would include the
     memory of this process at the fork. The peak only grows, so the last value misses only the growth

@@ -8,7 +8,7 @@ use hybrid_icp::core::{DepthImage, Isometry3, PinholeCamera, Point3};
 /// Largest depth that is used, meters. Structured light is inaccurate beyond it.
 pub const MAX_DEPTH_METERS: f32 = 5.0;
 
-/// A depth image and the camera pose of it.
+/// A depth image with its camera and camera pose.
 #[derive(Debug)]
 pub struct Frame {
     /// The depth image.

@@ -9,7 +9,7 @@ mod parts;
 mod readers;
 mod refine;
 
-/// A body of a fuzz target.
+/// The body of a fuzz target.
 pub type Target = fn(&[u8]);
 
 /// Every target by name: one per reader, and one for whole refinements.
