@@ -30,7 +30,7 @@ const EXCEPT: [&str; 4] = [
     "CHANGELOG.md",
 ];
 /// Folders and files in which a finding is an error. Findings elsewhere are counted.
-const CLEAN: [&str; 19] = [
+const CLEAN: [&str; 20] = [
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "README.md",
@@ -45,6 +45,7 @@ const CLEAN: [&str; 19] = [
     "crates/hicp-raster/",
     "crates/hicp-score/",
     "crates/hicp-switch/",
+    "crates/hybrid-icp-python/",
     "crates/hybrid-icp/",
     "docs/",
     "fuzz/",

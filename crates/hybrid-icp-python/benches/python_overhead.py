@@ -1,9 +1,9 @@
-"""What a call from Python costs over Rust, and how a batch scales with threads.
+"""Measures the overhead of a call from Python, and the speedup of a batch with two threads.
 
     python benches/python_overhead.py
 
-Ratios and differences within one run; a quiet machine, please. A pipeline that finds no pairs at once is timed for the overhead, as all that
-is left of `refine` then is the call, the two scores, and what the module adds.
+Run this on a quiet machine, and compare only times of one run. The overhead is the time of a
+pipeline that finds no pairs: only the call, the two scores and the work of the module remain.
 """
 
 from __future__ import annotations
@@ -34,23 +34,27 @@ def median_us(call: Callable[[], object], times: int = 200) -> float:
 
 def main() -> None:
     frame = scene()
-    model, camera, depth, mask, observation = frame.model, frame.camera, frame.depth, frame.mask, frame.observation
+    model, camera, observation = frame.model, frame.camera, frame.observation
+    depth, mask = frame.depth, frame.mask
     true, rough = frame.true, frame.rough
     hybrid = Pipeline.preset("hybrid")
 
     image = DepthImage(depth)
     print(f"DepthImage of 640x480: {median_us(lambda: DepthImage(depth)):.0f} us")
-    print(f"Observation of an array, {mask.sum()} masked: {median_us(lambda: Observation(depth, mask, camera)):.0f} us")
-    print(f"Observation of a DepthImage: {median_us(lambda: Observation(image, mask, camera)):.0f} us")
+    of_array = median_us(lambda: Observation(depth, mask, camera))
+    print(f"Observation of an array, {mask.sum()} masked: {of_array:.0f} us")
+    of_image = median_us(lambda: Observation(image, mask, camera))
+    print(f"Observation of a DepthImage: {of_image:.0f} us")
     print(f"refine, hybrid: {median_us(lambda: hybrid.refine(model, observation, rough)):.0f} us")
     print(f"mve: {median_us(lambda: mve(model, observation, rough)):.0f} us")
 
-    # Nothing to render, nothing to pair: the object is beside the image.
-    beside = true.copy()
-    beside[0, 3] = 5.0
+    # The object is outside the image: there is nothing to render and nothing to pair.
+    outside = true.copy()
+    outside[0, 3] = 5.0
     nothing = Pipeline.preset("projective-point-to-point")
-    print(f"overhead of refine, at most: {median_us(lambda: nothing.refine(model, observation, beside), 2000):.1f} us")
-    two = np.stack([beside, beside])
+    call = median_us(lambda: nothing.refine(model, observation, outside), 2000)
+    print(f"overhead of refine, at most: {call:.1f} us")
+    two = np.stack([outside, outside])
     threaded = median_us(lambda: nothing.refine_batch(model, observation, two, threads=2), 500)
     print(f"overhead of refine_batch on two threads, at most: {threaded:.0f} us")
 
@@ -66,10 +70,13 @@ def main() -> None:
             hybrid.refine_batch(model, observation, poses, threads=threads)
             times.append(time.perf_counter() - start)
     for threads, times in spent.items():
-        print(f"refine_batch of 256, {threads} threads: median {statistics.median(times) * 1e3:.0f} ms, fastest {min(times) * 1e3:.0f} ms")
-    # Each pair of runs stood side by side; the fastest of either is what other programs on the machine disturbed least.
+        median, fastest = statistics.median(times) * 1e3, min(times) * 1e3
+        print(f"refine_batch of 256, {threads} threads: median {median:.0f} ms", end=", ")
+        print(f"fastest {fastest:.0f} ms")
+    # The two runs of a pair are adjacent in time. Other programs disturb the fastest run least.
     pairs = statistics.median(one / both for one, both in zip(spent[1], spent[2]))
-    print(f"two threads over one: median of pairs {pairs:.2f}x, fastest {min(spent[1]) / min(spent[2]):.2f}x")
+    fastest = min(spent[1]) / min(spent[2])
+    print(f"speedup of two threads: median of pairs {pairs:.2f}x, fastest {fastest:.2f}x")
 
 
 if __name__ == "__main__":

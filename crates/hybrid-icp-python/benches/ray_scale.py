@@ -1,8 +1,9 @@
-"""What Ray adds to `bop refine`: the same rows on as many workers, and once more with one of them killed in the middle.
+"""Measures the overhead of Ray over `bop refine` for the same rows and number of workers.
 
     cargo xtask scale --ray --threads 2
 
-runs this after `bop refine`, whose output and seconds it is told. Fails where the bytes differ.
+runs `bop refine`, and then this program with its output and time. A second run kills one worker in
+the middle. Fails if the bytes differ.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def main() -> None:
         parser.add_argument(name, type=Path)
     parser.add_argument("--rows", type=int, required=True)
     parser.add_argument("--workers", type=int, required=True)
-    parser.add_argument("--seconds", type=float, required=True, help="of bop refine on as many threads")
+    parser.add_argument("--seconds", type=float, required=True, help="time of bop refine")
     options = parser.parse_args()
 
     began = time.perf_counter()
@@ -35,7 +36,8 @@ def main() -> None:
 
     imported = time.perf_counter()
     start(cpus=options.workers)
-    print(f"Ray: imported in {imported - began:.1f} s, started in {time.perf_counter() - imported:.1f} s")
+    started = time.perf_counter() - imported
+    print(f"Ray: imported in {imported - began:.1f} s, started in {started:.1f} s")
     expected = options.expected.read_bytes()
 
     def run(kill: bool) -> None:
@@ -53,19 +55,22 @@ def main() -> None:
         output = options.expected.with_name("ray.csv")
         began = time.perf_counter()
         hybrid_icp.ray.refine(
-            options.dataset, options.results, output, pipeline=Pipeline.preset("hybrid"), rescore="mve", workers=options.workers,
-            limit=options.rows, resume=False, progress=watch,
+            options.dataset, options.results, output, pipeline=Pipeline.preset("hybrid"),
+            rescore="mve", workers=options.workers, limit=options.rows, resume=False,
+            progress=watch,
         )
         seconds = time.perf_counter() - began
         if kill and not killed:
-            raise SystemExit("no worker was found to kill")
+            raise SystemExit("found no worker to kill, expected at least one")
         same = output.read_bytes() == expected
         more = (seconds - options.seconds) / options.rows * 1000
         first, last = seen[0], seen[-1]
+        rate = (last[1] - first[1]) / (last[0] - first[0])
         print(
-            f"{options.rows} rows, {options.workers} workers{', one killed' if kill else ''}: {seconds:.1f} s,"
-            f" {options.rows / seconds:.0f} rows/s, {more:.2f} ms a row more than bop refine ({options.seconds:.1f} s);"
-            f" the first task after {first[0]:.1f} s, from then on {(last[1] - first[1]) / (last[0] - first[0]):.0f} rows/s;"
+            f"{options.rows} rows, {options.workers} workers{', one killed' if kill else ''}:"
+            f" {seconds:.1f} s, {options.rows / seconds:.0f} rows/s,"
+            f" {more:.2f} ms per row more than bop refine ({options.seconds:.1f} s);"
+            f" first task after {first[0]:.1f} s, then {rate:.0f} rows/s;"
             f" {'the same bytes' if same else 'OTHER BYTES'}"
         )
         if not same:

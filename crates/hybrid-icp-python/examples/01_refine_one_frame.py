@@ -1,10 +1,11 @@
-"""Refine one pose in one depth image.
+"""Refines one pose in one depth image.
 
     python 01_refine_one_frame.py                          # a generated frame
     python 01_refine_one_frame.py --model mug.ply --unit mm --depth depth.png --scale 0.001 \\
         --mask mask.png --camera camera.json --pose pose.json
 
-camera.json is {"cam_K": [nine numbers]}, pose.json {"cam_R_m2c": [nine numbers], "cam_t_m2c": [three, mm]}, as in BOP.
+The JSON files have the format of BOP: camera.json is {"cam_K": [nine numbers]}, and pose.json is
+{"cam_R_m2c": [nine numbers], "cam_t_m2c": [three numbers, mm]}.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from hybrid_icp import Camera, Model, Observation, Pipeline, adi, read_depth_png
 
 
 def read(options: argparse.Namespace) -> tuple[Model, Observation, Array]:
-    """The model, the image and the rough pose."""
+    """Reads the model, the image and the initial pose."""
     depth = read_depth_png(options.depth, options.scale)
     height, width = depth.shape
-    camera = Camera.from_K(np.reshape(json.loads(options.camera.read_text())["cam_K"], (3, 3)), (width, height))
+    calibration = json.loads(options.camera.read_text())
+    camera = Camera.from_K(np.reshape(calibration["cam_K"], (3, 3)), (width, height))
     pose = json.loads(options.pose.read_text())
     rough = np.eye(4)
     rough[:3, :3] = np.reshape(pose["cam_R_m2c"], (3, 3))
@@ -40,7 +42,7 @@ def main() -> None:
     parser.add_argument("--scale", type=float, default=0.001)
     options = parser.parse_args()
 
-    pipeline = Pipeline.preset("auto")
+    pipeline = Pipeline()
     if options.model:
         model, observation, rough = read(options)
     else:
@@ -55,7 +57,7 @@ def main() -> None:
         before, after = (adi(pose, frame.true, model) for pose in (rough, result.T_co))
         print(f"ADI {before * 1000:.2f} mm -> {after * 1000:.2f} mm")
         if after > 0.001:
-            raise SystemExit("the pose is not within a millimetre")
+            raise SystemExit(f"the ADI is {after * 1000:.2f} mm, expected at most 1 mm")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Plug in after a detector, with meshes, images and cameras of trimesh and Open3D.
+"""Refines the pose of a detector, with meshes, images and cameras of trimesh and Open3D.
 
-Each conversion is one line. What is not installed is left out, and said.
+Each conversion is one line. Libraries that are not installed are skipped with a message.
 """
 
 from __future__ import annotations
@@ -13,20 +13,21 @@ from hybrid_icp import Camera, Model, Observation, Pipeline, adi
 
 
 def detect(depth: npt.NDArray[np.float32]) -> tuple[npt.NDArray[np.bool_], Array]:
-    """Stands in for a detector: a mask, and a pose that is a centimetre and some degrees off."""
+    """Simulates a detector: returns a mask and a pose with an error of 1 cm and some degrees."""
     rough = np.round(scene().rough, 3)
-    # Detectors print rotations with few digits; the module refuses what is not orthogonal, so take the nearest rotation.
+    # Detectors often round rotations, but the module requires an orthogonal matrix. Compute the
+    # nearest rotation.
     u, _, vt = np.linalg.svd(rough[:3, :3])
     rough[:3, :3] = u @ vt
     return depth < 0.65, rough
 
 
 def refine(model: Model, camera: Camera, depth: npt.NDArray[np.float32]) -> Array:
-    """What a robot calls per detection: a pose to trust, or an exception."""
+    """Returns a pose that a robot can trust, or raises an exception."""
     mask, rough = detect(depth)
-    result = Pipeline.preset("auto").refine(model, Observation(depth, mask, camera), rough)
-    if result.mve > 0.4:
-        raise RuntimeError(f"not to be trusted: {result}")
+    result = Pipeline().refine(model, Observation(depth, mask, camera), rough)
+    if result.mve >= 0.3 or result.warnings:
+        raise RuntimeError(f"the pose is uncertain: {result} {result.warnings}")
     return result.T_co
 
 
@@ -41,7 +42,10 @@ def from_open3d() -> tuple[Model, Camera]:
     import open3d
 
     vertices, faces = bracket()
-    mesh = open3d.geometry.TriangleMesh(open3d.utility.Vector3dVector(vertices), open3d.utility.Vector3iVector(faces.astype(np.int32)))
+    mesh = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(vertices),
+        open3d.utility.Vector3iVector(faces.astype(np.int32)),
+    )
     intrinsic = open3d.camera.PinholeCameraIntrinsic(640, 480, 600, 600, 319.5, 239.5)
     model = Model(np.asarray(mesh.vertices), np.asarray(mesh.triangles), unit="mm")
     return model, Camera.from_K(intrinsic.intrinsic_matrix, (intrinsic.width, intrinsic.height))
@@ -53,11 +57,11 @@ def main() -> None:
     try:
         tried.append(("trimesh", from_trimesh(), frame.camera))
     except ImportError as error:
-        print(f"left out: {error}")
+        print(f"skipped: {error}")
     try:
         tried.append(("Open3D", *from_open3d()))
     except (ImportError, OSError) as error:
-        print(f"left out: {error}")
+        print(f"skipped: {error}")
     for name, model, camera in tried:
         # An Open3D depth image is np.asarray(image), uint16, with scale=0.001.
         found = refine(model, camera, frame.depth)

@@ -1,4 +1,7 @@
-"""The frame that the examples generate: an angle bracket 42 cm away, noise-free, and a pose that is a centimetre and five degrees off."""
+"""Generates the frame of the examples.
+
+An angle bracket is 42 cm away, without noise. The initial pose has an error of 1 cm and 5 degrees.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,19 @@ Array = npt.NDArray[np.float64]
 
 
 def bracket() -> tuple[Array, npt.NDArray[np.int64]]:
-    """Vertices (V, 3) in millimetres and faces (F, 3) of an angle bracket of about 9 cm, narrower at one end: no two of its poses look the same."""
+    """Returns vertices (V, 3) in millimeters and faces (F, 3) of an angle bracket of about 9 cm.
+
+    It is narrower at one end, so that no two of its poses look the same.
+    """
     profile = np.array([[-12, -8], [58, -8], [58, 10], [10, 14], [6, 62], [-12, 62.0]])
-    vertices = np.concatenate([np.insert(profile, 1, -40, axis=1), np.insert(0.7 * profile, 1, 50, axis=1)])
+    ends = [np.insert(profile, 1, -40, axis=1), np.insert(0.7 * profile, 1, 50, axis=1)]
+    vertices = np.concatenate(ends)
     corners = len(profile)
     faces = []
     for a in range(corners):
         b = (a + 1) % corners
         faces += [(a, b + corners, b), (a, a + corners, b + corners)]
-    # The inner corner sees all of either end.
+    # Each end is a fan of triangles from its inner corner.
     inner = 3
     for step in range(1, corners - 1):
         a, b = (inner + step) % corners, (inner + step + 1) % corners
@@ -30,7 +37,7 @@ def bracket() -> tuple[Array, npt.NDArray[np.int64]]:
 
 
 def pose(rotation_vector: npt.ArrayLike, translation: npt.ArrayLike) -> Array:
-    """A 4x4 pose from an axis times an angle in radians, and metres."""
+    """Returns a 4x4 pose from a rotation vector in radians and a translation in meters."""
     vector = np.asarray(rotation_vector, float)
     angle = float(np.linalg.norm(vector))
     x, y, z = vector / angle if angle else vector
@@ -43,21 +50,21 @@ def pose(rotation_vector: npt.ArrayLike, translation: npt.ArrayLike) -> Array:
 
 @dataclass
 class Scene:
-    """A frame in which the truth is known."""
+    """A frame with its ground truth."""
 
     model: Model
     camera: Camera
-    #: Metres, shape (H, W), a wall behind the object.
+    #: Meters, shape (H, W), with a wall behind the object.
     depth: npt.NDArray[np.float32]
     mask: npt.NDArray[np.bool_]
     observation: Observation
-    #: The true pose and a rough one, camera from object, metres.
+    #: The true pose and the initial pose, camera from object, meters.
     true: Array
     rough: Array
 
 
 def scene(camera: Camera | None = None) -> Scene:
-    """Makes the frame, 640x480 unless a camera is given."""
+    """Returns the frame. The default camera has 640x480 pixels."""
     model = Model(*bracket(), unit="mm")
     camera = camera or Camera(600, 600, 319.5, 239.5, 640, 480)
     true = pose([0.9, -0.5, 0.3], [0.02, -0.01, 0.42])

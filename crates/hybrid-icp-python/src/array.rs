@@ -10,10 +10,11 @@ use pyo3::prelude::*;
 
 use crate::errors::InputError;
 
-/// Translations beyond this many metres are taken for millimetres: no depth camera sees as far.
+/// The largest translation accepted, meters: larger ones are probably millimeters, because no depth
+/// camera measures as far.
 const MAX_TRANSLATION_METERS: f64 = 100.0;
 
-/// Describes a value: its type, and for arrays dtype and shape.
+/// Describes a value by its type, and arrays by dtype and shape.
 pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     match value.cast::<PyUntypedArray>() {
         Ok(array) => format!("{} with shape {}", kind(value), shape(array.shape())),
@@ -21,7 +22,7 @@ pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     }
 }
 
-/// Names the type of a value, and for arrays the dtype.
+/// Describes a value by its type, and arrays by dtype.
 pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
         format!("an array of {}", array.dtype())
@@ -31,7 +32,7 @@ pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     }
 }
 
-/// A shape as NumPy writes it.
+/// Formats a shape as NumPy does.
 pub(crate) fn shape(lengths: &[usize]) -> String {
     let numbers: Vec<String> = lengths.iter().map(ToString::to_string).collect();
     match &numbers[..] {
@@ -40,7 +41,7 @@ pub(crate) fn shape(lengths: &[usize]) -> String {
     }
 }
 
-/// Returns the one of two choices that a word names.
+/// Returns the choice that `word` names.
 pub(crate) fn choice<T>(name: &str, word: &str, [a, b]: [(&str, T); 2]) -> PyResult<T> {
     if word == a.0 {
         Ok(a.1)
@@ -54,7 +55,7 @@ pub(crate) fn choice<T>(name: &str, word: &str, [a, b]: [(&str, T); 2]) -> PyRes
     }
 }
 
-/// Creates the error that names a value and what was expected.
+/// Creates the error for a value of the wrong type or shape.
 pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
     InputError::new_err(format!(
         "{name} is {}, expected {expected}",
@@ -62,7 +63,7 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     ))
 }
 
-/// Returns an aligned array: a copy of one that is not, such as a field of packed records.
+/// Returns the array if it is aligned, and a copy otherwise (for a field of packed records).
 pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match value.cast::<PyUntypedArray>() {
         Ok(array) if !array.is_aligned() => value.call_method0("copy"),
@@ -70,7 +71,7 @@ pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
     }
 }
 
-/// Reads anything array-like into row-major numbers. `None` in `lengths` stands for any length.
+/// Reads any array-like value into row-major numbers. `None` in `lengths` accepts any length.
 pub(crate) fn numbers<T: Element + Copy>(
     value: &Bound<'_, PyAny>,
     lengths: &[Option<usize>],
@@ -103,8 +104,10 @@ where
     Ok((numbers, found.to_vec()))
 }
 
-/// Copies an array in row-major order, in one piece where it lies so. (`PyReadonlyArray::as_slice`
-/// also takes column-major ones.)
+/// Copies an array in row-major order.
+///
+/// Contiguous arrays are copied in one piece. `PyReadonlyArray::as_slice` would also accept
+/// column-major arrays.
 pub(crate) fn row_major<T: Copy, D: Dimension>(array: &ArrayView<'_, T, D>) -> Vec<T> {
     match array.as_slice() {
         Some(contiguous) => contiguous.to_vec(),
@@ -118,7 +121,7 @@ pub(crate) fn matrix6(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix6<
     Ok(Matrix6::from_row_slice(&numbers))
 }
 
-/// Reads points of shape (N, 3), metres.
+/// Reads points from an array of shape (N, 3), meters.
 pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point3<f32>>> {
     let expected = "an (N, 3) array of finite float32";
     let (numbers, _) = numbers::<f32>(value, &[None, Some(3)], name, expected)?;
@@ -136,21 +139,21 @@ pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point
         .collect())
 }
 
-/// A rigid motion with the numbers that it was read from.
+/// A rigid motion with the numbers that it was created from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
     pub(crate) isometry: Isometry3<f64>,
     pub(crate) matrix: [f64; 16],
 }
 
-/// Reads a rigid motion from a 4×4 matrix, metres.
+/// Reads a rigid motion from a 4×4 matrix, meters.
 pub(crate) fn motion(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Motion> {
-    let expected = "a (4, 4) float64 matrix [R t; 0 0 0 1], metres";
+    let expected = "a (4, 4) float64 matrix [R t; 0 0 0 1], meters";
     let (numbers, _) = numbers::<f64>(value, &[Some(4), Some(4)], name, expected)?;
     rigid(&numbers, name)
 }
 
-/// Reads rigid motions from an array of shape (N, 4, 4) with translations in some unit.
+/// Reads rigid motions from an array of shape (N, 4, 4), with translations in the given unit.
 pub(crate) fn motions(
     value: &Bound<'_, PyAny>,
     name: &str,
@@ -169,7 +172,7 @@ pub(crate) fn motions(
         .collect()
 }
 
-/// Reads a rigid motion from sixteen row-major numbers.
+/// Reads a rigid motion from 16 row-major numbers.
 fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     let mut matrix = [0.0; 16];
     matrix.copy_from_slice(numbers);
@@ -185,12 +188,13 @@ fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     let [x, y, z] = translation;
     if translation.iter().any(|t| !t.is_finite()) {
         return Err(InputError::new_err(format!(
-            "{name} has the translation ({x}, {y}, {z}), expected finite numbers in metres"
+            "{name} has the translation ({x}, {y}, {z}), expected finite numbers in meters"
         )));
     }
     if translation.iter().any(|t| t.abs() > MAX_TRANSLATION_METERS) {
         return Err(InputError::new_err(format!(
-            "{name} looks like millimetres: its translation is ({x}, {y}, {z}), expected metres within ±{MAX_TRANSLATION_METERS}"
+            "{name} looks like millimeters: its translation is ({x}, {y}, {z}), expected meters \
+             within ±{MAX_TRANSLATION_METERS}"
         )));
     }
     let entries = Matrix3::from_fn(|row, column| matrix[4 * row + column]);
@@ -202,7 +206,7 @@ fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     })
 }
 
-/// A rigid motion as a row-major 4×4 matrix.
+/// Returns a rigid motion as a row-major 4×4 matrix.
 pub(crate) fn to_matrix(motion: &Isometry3<f64>) -> [f64; 16] {
     let rotation = motion.rotation.to_rotation_matrix().into_inner();
     let translation = &motion.translation.vector;
@@ -229,7 +233,7 @@ impl<T> Matrix<T> {
 }
 
 impl Matrix {
-    /// Returns the translation of a pose as text, metres.
+    /// Returns the translation of a pose as text, meters.
     pub(crate) fn translation(&self) -> String {
         let [x, y, z] = [3, 7, 11].map(|entry| self.numbers[entry]);
         format!("({x:.4}, {y:.4}, {z:.4})")

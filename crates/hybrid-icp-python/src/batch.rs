@@ -1,4 +1,4 @@
-//! Many hypotheses on several threads, with Ctrl-C.
+//! Refines many hypotheses on several threads, and stops on Ctrl-C.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -9,31 +9,32 @@ use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::{Refinement, Refiner, StageRecord, Trace};
 use pyo3::prelude::*;
 
-/// How often signals are looked for.
+/// Interval between checks for signals.
 const SIGNALS: Duration = Duration::from_millis(50);
 
-/// One hypothesis refined.
+/// A refined hypothesis with its stages.
 pub(crate) type Refined = (Refinement, Vec<StageRecord>);
 
-/// Refines every hypothesis, one refiner per thread; results are in the order of the hypotheses,
-/// with the bits of single calls.
+/// Refines every hypothesis, with one refiner per thread.
 ///
-/// Called without the GIL. The threads take one hypothesis after the other from a counter and keep
-/// their results to themselves; the caller sleeps meanwhile, but for a look at the signals now and
-/// then. An exception of a signal handler, such as `KeyboardInterrupt`, ends it after the
-/// hypotheses in hand. Threads are started anew for every batch: a pool would be lost, and waited
-/// for in vain, in a process that was forked.
+/// The results are in the order of the hypotheses and have the bits of single calls. Call it
+/// without the GIL. Each thread takes the next hypothesis from a shared counter and keeps its own
+/// results. The caller waits and checks for signals at intervals. If a signal handler raises an
+/// exception, such as `KeyboardInterrupt`, the threads finish their current hypotheses and stop.
+///
+/// Every batch starts new threads. After a fork, the child process would wait forever for the
+/// threads of a pool, which exist only in the parent.
 pub(crate) fn run(
     model: &Model,
     observation: &Observation,
     inits: &[Isometry3<f64>],
     refiners: &mut [Refiner],
 ) -> PyResult<Vec<Refined>> {
-    let (cancelled, next) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let (cancelled, next) = (&cancelled, &next);
+    let (canceled, next) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let (canceled, next) = (&canceled, &next);
     let mut ordered: Vec<Option<Refined>> = inits.iter().map(|_| None).collect();
     std::thread::scope(|scope| {
-        // Nothing is sent: that the last thread has dropped its end is the message.
+        // Nothing is sent. The channel closes when the last thread drops its end.
         let (at_work, ended) = mpsc::channel::<()>();
         let threads: Vec<_> = refiners
             .iter_mut()
@@ -41,7 +42,7 @@ pub(crate) fn run(
                 let at_work = at_work.clone();
                 scope.spawn(move || {
                     let mut results = Vec::with_capacity(inits.len());
-                    while !cancelled.load(Ordering::Relaxed) {
+                    while !canceled.load(Ordering::Relaxed) {
                         let index = next.fetch_add(1, Ordering::Relaxed);
                         let Some(init) = inits.get(index) else { break };
                         let mut trace = Trace::new();
@@ -55,7 +56,7 @@ pub(crate) fn run(
             .collect();
         drop(at_work);
         let waited = wait(&ended);
-        cancelled.store(true, Ordering::Relaxed);
+        canceled.store(true, Ordering::Relaxed);
         for thread in threads {
             for (index, refined) in thread.join().unwrap_or_else(|panic| resume_unwind(panic)) {
                 ordered[index] = Some(refined);
@@ -66,7 +67,7 @@ pub(crate) fn run(
     Ok(ordered.into_iter().flatten().collect())
 }
 
-/// Waits until the other end is dropped, and looks for signals meanwhile.
+/// Waits until the other end is dropped, and checks for signals meanwhile.
 fn wait(ended: &Receiver<()>) -> PyResult<()> {
     while ended.recv_timeout(SIGNALS) == Err(RecvTimeoutError::Timeout) {
         Python::attach(|py| py.check_signals())?;

@@ -1,4 +1,4 @@
-//! Whole result files, image by image: what `hybrid_icp.bop` and the engines above it are made of.
+//! Refines result files image by image, for `hybrid_icp.bop` and the engines that build on it.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,11 +16,10 @@ use crate::errors::{self, InputError};
 use crate::mutex::locked;
 use crate::pipeline::PyPipeline;
 
-/// Scenes whose annotations are kept at hand: images come scene by scene.
+/// Number of scenes whose annotations stay in memory. Images arrive scene by scene.
 const OPEN_SCENES: usize = 2;
 
-/// The rows of one image: scene, image, where they stand in the file, and their lines under a
-/// header.
+/// The rows of one image: scene, image, indices in the file, and their lines with a header.
 type ImageRows = (u32, u32, Vec<usize>, String);
 
 /// Reads a result file and groups its rows by image, in the order of scene and image.
@@ -35,7 +34,7 @@ type ImageRows = (u32, u32, Vec<usize>, String);
 /// Returns
 /// -------
 /// list of (int, int, list of int, str)
-///     Scene, image, where its rows stand in the file, and those rows as CSV with a header.
+///     Scene, image, indices of its rows in the file, and those rows as CSV with a header.
 #[pyfunction]
 #[pyo3(signature = (results, *, limit = None))]
 pub(crate) fn read_images(
@@ -59,7 +58,7 @@ pub(crate) fn read_images(
     })
 }
 
-/// The first line of a result file, without its end.
+/// Returns the first line of a result file, without the line end.
 ///
 /// Returns
 /// -------
@@ -69,22 +68,23 @@ pub(crate) fn result_header() -> String {
     ResultRow::header()
 }
 
-/// Refines the rows of result files, image by image, with the models of a dataset read once:
-/// `hybrid-icp bop refine` without its threads and files.
+/// Refines the rows of result files image by image, like `hybrid-icp bop refine`.
+///
+/// It reads the models of the dataset once. It has no threads and writes no files.
 ///
 /// Parameters
 /// ----------
 /// dataset : str or os.PathLike
-///     The dataset's folder, with models/ and the split's folder.
+///     The folder of the dataset, with models/ and the folder of the split.
 /// split : str
-///     The split's folder, such as "test".
+///     The folder of the split, such as "test".
 /// pipeline : Pipeline
 /// objects : sequence of int
-///     Ids of the objects whose models are read, now.
+///     Ids of the objects whose models the constructor reads.
 /// detections : str or os.PathLike, optional
-///     Take the masks from a detections file instead of mask_visib.
+///     Use the masks of a detections file instead of mask_visib.
 /// rescore : {"keep", "mve"}, optional
-///     What becomes the score: the row's own, or 1 − MVE.
+///     The score of a refined row: its old score, or 1 − MVE.
 #[pyclass(frozen, module = "hybrid_icp.bop", name = "DatasetRefiner")]
 pub(crate) struct PyDatasetRefiner {
     shared: DatasetRefiner,
@@ -132,8 +132,8 @@ impl PyDatasetRefiner {
 
     /// Refines the rows of one image.
     ///
-    /// Rows that cannot be refined keep their numbers. The time column is -1: equal input gives
-    /// equal bytes.
+    /// Rows that cannot be refined keep their numbers. The time column is -1, so that equal input
+    /// gives equal bytes.
     ///
     /// Parameters
     /// ----------
@@ -143,11 +143,11 @@ impl PyDatasetRefiner {
     /// Returns
     /// -------
     /// lines : list of str
-    ///     The refined rows in the order given, without line ends.
+    ///     The refined rows in the same order, without line ends.
     /// statuses : list of str
-    ///     What became of each.
+    ///     The status of each row.
     /// faults : list of str
-    ///     Files that are damaged.
+    ///     The damaged files.
     #[allow(clippy::type_complexity)] // Three lists.
     fn refine(
         &self,
@@ -160,12 +160,12 @@ impl PyDatasetRefiner {
             let images = frames_of(&rows);
             let [(key, indices)] = &images[..] else {
                 return Err(InputError::new_err(format!(
-                    "rows are of {} images, expected one",
+                    "rows belong to {} images, expected the rows of one image",
                     images.len()
                 )));
             };
-            // One image at a time: the scratch memory is one thread's. A panic leaves it usable,
-            // for runs do not depend on it.
+            // One image at a time, because one thread uses the scratch memory. It stays usable
+            // after a panic, because runs do not depend on its contents.
             let result = self
                 .shared
                 .frame(&mut locked(&self.refiner), *key, &rows, indices);
@@ -186,17 +186,14 @@ impl PyDatasetRefiner {
         })
     }
 
-    /// What is wrong with models, by object id; rows of these objects keep their numbers.
-    ///
-    /// Returns
-    /// -------
-    /// dict of int to str
+    /// The faults of models, as a dict from object id to message. Rows of these objects keep their
+    /// numbers.
     #[getter]
     fn broken_models(&self) -> std::collections::BTreeMap<u32, String> {
         self.shared.models.broken.clone()
     }
 
-    /// Ids of the objects that the dataset has no model of.
+    /// Ids of the objects without a model in the dataset.
     #[getter]
     fn missing_models(&self) -> Vec<u32> {
         self.shared.models.missing.iter().copied().collect()

@@ -6,10 +6,10 @@ use pyo3::prelude::*;
 use crate::array::{self, Matrix};
 use crate::errors;
 
-/// A pinhole camera without distortion, looking along +z with x right and y down (the OpenCV
-/// frame).
+/// A pinhole camera without distortion, in the frame of OpenCV.
 ///
-/// A point (x, y, z) in metres is seen at u = fx·x/z + cx, v = fy·y/z + cy.
+/// It looks along +z, with x right and y down. A point (x, y, z) in meters projects to
+/// u = fx·x/z + cx and v = fy·y/z + cy.
 ///
 /// Parameters
 /// ----------
@@ -18,10 +18,10 @@ use crate::errors;
 /// cx, cy : float
 ///     Principal point, pixels.
 /// width, height : int
-///     Size of the image, pixels.
+///     Image size, pixels.
 /// pixel_centers : {"integers", "halves"}, optional
-///     Where the calibration puts the centre of the first pixel: at (0, 0), as OpenCV and BOP do,
-///     or at (½, ½), as OpenGL and BlenderProc do.
+///     Position of the center of the first pixel in the calibration. It is (0, 0) for "integers",
+///     as in OpenCV and BOP, and (½, ½) for "halves", as in OpenGL and BlenderProc.
 ///
 /// Examples
 /// --------
@@ -56,12 +56,12 @@ impl PyCamera {
             .map_err(errors::input)
     }
 
-    /// Makes a camera from a calibration matrix.
+    /// Creates a camera from a calibration matrix.
     ///
     /// Parameters
     /// ----------
     /// K : array_like, shape (3, 3)
-    ///     [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, pixel centres at integers.
+    ///     [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pixels, pixel centers at integers.
     /// size : (int, int)
     ///     Width and height of the image, pixels.
     ///
@@ -97,13 +97,13 @@ impl PyCamera {
         self.0.fy()
     }
 
-    /// Column of the principal point, pixels, centres at integers.
+    /// Column of the principal point, pixels, centers at integers.
     #[getter]
     fn cx(&self) -> f64 {
         self.0.cx()
     }
 
-    /// Row of the principal point, pixels, centres at integers.
+    /// Row of the principal point, pixels, centers at integers.
     #[getter]
     fn cy(&self) -> f64 {
         self.0.cy()

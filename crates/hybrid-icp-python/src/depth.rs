@@ -1,4 +1,4 @@
-//! `DepthImage`, and masks out of NumPy arrays.
+//! Reads `DepthImage`s and masks from NumPy arrays.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,37 +12,35 @@ use crate::array::{self, Matrix, unexpected};
 use crate::errors::{self, InputError};
 
 const EXPECTED_DEPTH: &str =
-    "an (H, W) array of float32 metres, or of uint16 together with scale= (metres per unit)";
+    "an (H, W) array of float32 meters, or of uint16 together with scale= (meters per unit)";
 
-/// Medians beyond this many metres are taken for millimetres; those of real millimetres are above
-/// it, as no camera sees so near.
+/// The largest median depth accepted, meters. Larger values are probably millimeters: no camera
+/// measures below 100 mm or beyond 100 m.
 const MAX_MEDIAN_METERS: f32 = 100.0;
 
-/// Medians below this many metres are taken for metres that were scaled twice.
+/// The smallest median depth accepted, meters. Smaller values were probably scaled twice.
 const MIN_MEDIAN_METERS: f32 = 0.01;
 
-/// Rows and columns of the grid of pixels by which an image is judged before the others are looked
-/// at.
+/// Rows and columns of the pixel grid that the check of the unit reads first.
 const GRID: usize = 64;
 
-/// A depth image to be shared by the observations of its objects: read and checked once, however
-/// many masks there are.
+/// A depth image that the observations of several masks share.
 ///
-/// The array is read in one pass, which copies it: other threads may write to it while the GIL is
-/// released. Masks share the copy.
+/// The array is read, checked and copied once. The copy is necessary: other threads can write to
+/// the array while the GIL is released.
 ///
 /// Parameters
 /// ----------
 /// depth : numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0,
-///     negative or NaN where nothing was measured.
+///     Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
+///     without a measurement are 0, negative or NaN.
 /// scale : float, optional
-///     Metres per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///
 /// Raises
 /// ------
 /// InputError
-///     When shape, dtype or unit do not fit, saying what was passed and what was expected.
+///     If the shape, dtype or unit is wrong. The message has the value found and the one expected.
 ///
 /// Examples
 /// --------
@@ -68,13 +66,13 @@ impl PyDepthImage {
         read(depth, scale).map(|image| Self(Arc::new(image)))
     }
 
-    /// Reads a 16-bit grey PNG, without an array between.
+    /// Reads a 16-bit gray PNG without an intermediate array.
     ///
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
     /// scale : float
-    ///     Metres per unit, such as 0.001; BOP's `depth_scale` divided by 1000.
+    ///     Meters per unit, such as 0.001; BOP's `depth_scale` divided by 1000.
     ///
     /// Returns
     /// -------
@@ -83,7 +81,7 @@ impl PyDepthImage {
     /// Raises
     /// ------
     /// FileError
-    ///     When the file cannot be read or is no such image.
+    ///     If the file cannot be read or is not such an image.
     #[staticmethod]
     pub(crate) fn from_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Self> {
         py.detach(|| hicp_io::read_depth_png(&path, scale * 1000.0))
@@ -108,7 +106,7 @@ impl PyDepthImage {
     /// Returns
     /// -------
     /// numpy.ndarray, shape (H, W), float32
-    ///     Metres, 0 where nothing was measured.
+    ///     Meters; 0 for pixels without a measurement.
     pub(crate) fn to_numpy(&self) -> Matrix<f32> {
         image(self.0.width(), self.0.pixels())
     }
@@ -118,18 +116,19 @@ impl PyDepthImage {
     }
 }
 
-/// Takes a `DepthImage` as it is, or reads an array.
+/// Returns the image of a `DepthImage`, or reads an array.
 pub(crate) fn shared(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<Arc<DepthImage>> {
     match value.cast::<PyDepthImage>() {
         Ok(image) if scale.is_none() => Ok(Arc::clone(&image.get().0)),
         Ok(_) => Err(InputError::new_err(
-            "scale= was passed with depth as a DepthImage, expected it when the DepthImage is made: its depths are metres",
+            "scale= was passed with depth as a DepthImage, which is in meters: expected scale= \
+             where the DepthImage is created",
         )),
         Err(_) => read(value, scale).map(Arc::new),
     }
 }
 
-/// Reads a depth image, metres, in one pass.
+/// Reads a depth image, meters, in one pass.
 fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
     let array = value
         .cast::<PyUntypedArray>()
@@ -147,16 +146,17 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
     } else if let Ok(units) = value.extract::<PyReadonlyArray2<'_, u16>>() {
         let scale = scale.ok_or_else(|| {
             InputError::new_err(format!(
-                "depth is {} without scale=, expected {EXPECTED_DEPTH}, such as scale=0.001 for millimetres",
+                "depth is {} without scale=, expected {EXPECTED_DEPTH}, such as scale=0.001 for \
+                 millimeters",
                 array::describe(value)
             ))
         })?;
         if !(scale.is_finite() && scale > 0.0) {
             return Err(InputError::new_err(format!(
-                "scale is {scale}, expected metres per unit above 0, such as 0.001 for millimetres"
+                "scale is {scale}, expected meters per unit above 0, such as 0.001 for millimeters"
             )));
         }
-        // As depth PNGs are read: units times millimetres per unit, brought to metres.
+        // The same rounding as for depth PNGs: units times millimeters per unit, then to meters.
         let scale = scale * 1000.0;
         convert(&units.as_array(), |z| narrow(f64::from(z) * scale / 1000.0))
     } else {
@@ -164,7 +164,7 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
     }
 }
 
-/// Judges the unit by some pixels, then copies, converts and cleans all of them in one go.
+/// Checks the unit, then copies, converts and cleans all pixels in one pass.
 fn convert<T: Copy>(
     array: &ArrayView2<'_, T>,
     meters: impl Fn(T) -> f32 + Copy,
@@ -178,7 +178,7 @@ fn convert<T: Copy>(
     .map_err(errors::input)
 }
 
-/// Reads a mask; `None` is every pixel.
+/// Reads a mask. `None` selects every pixel.
 pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyResult<Mask> {
     let Some(value) = value else {
         return Ok(Mask::full(depth.width(), depth.height()));
@@ -205,15 +205,14 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
     Mask::new(size.0, size.1, set).map_err(errors::input)
 }
 
-/// Returns the median of the positive depths; `None` without any.
+/// Returns the median of the positive depths, or `None` if there are none.
 pub(crate) fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
     let mut positive: Vec<f32> = depths.filter(|z| *z > 0.0).collect();
     let middle = positive.len() / 2;
     (middle < positive.len()).then(|| *positive.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-/// Returns the strides at which at most 64 × 64 pixels of an area of some height and width are
-/// looked at.
+/// Returns the strides that visit at most 64 × 64 pixels of an area.
 pub(crate) fn strides(height: usize, width: usize) -> (usize, usize) {
     (height.div_ceil(GRID).max(1), width.div_ceil(GRID).max(1))
 }
@@ -227,24 +226,29 @@ fn no_scale(scale: Option<f64>, depth: &Bound<'_, PyAny>) -> PyResult<()> {
     match scale {
         None => Ok(()),
         Some(scale) => Err(InputError::new_err(format!(
-            "scale={scale} was passed with depth as {}, expected scale= with uint16 only: floats are metres",
+            "scale={scale} was passed with depth as {}, which is in meters: expected scale= only \
+             with uint16",
             array::describe(depth)
         ))),
     }
 }
 
-/// Width and height.
+/// Returns width and height.
 fn size<T>(array: &ArrayView2<'_, T>) -> PyResult<(u32, u32)> {
     let side = |length: usize| {
         u32::try_from(length).map_err(|_| {
-            InputError::new_err(format!("image side is {length} pixels, expected fewer"))
+            InputError::new_err(format!(
+                "an image side is {length} pixels, expected at most {}",
+                u32::MAX
+            ))
         })
     };
     Ok((side(array.ncols())?, side(array.nrows())?))
 }
 
-/// Refuses what cannot be metres, by pixels on a grid; by all of them only where none of those was
-/// measured.
+/// Returns an error if the depths cannot be in meters.
+///
+/// Reads the pixels of a grid. If none of them was measured, reads all pixels.
 fn check_unit<T: Copy>(
     array: &ArrayView2<'_, T>,
     meters: impl Fn(T) -> f32 + Copy,
@@ -260,18 +264,21 @@ fn check_unit<T: Copy>(
     };
     if middle > MAX_MEDIAN_METERS {
         return Err(InputError::new_err(format!(
-            "depth looks like millimetres: median {middle:.0}, expected metres (divide by 1000, or pass uint16 with scale=0.001)"
+            "depth looks like millimeters: median {middle:.0}, expected meters (divide by 1000, or \
+             pass uint16 with scale=0.001)"
         )));
     }
     if middle < MIN_MEDIAN_METERS {
         return Err(InputError::new_err(format!(
-            "depth looks too small for metres: median {middle:e}, expected metres: was it scaled twice?"
+            "depth looks too small for meters: median {middle:e}, expected at least \
+             {MIN_MEDIAN_METERS} (scale it only once)"
         )));
     }
     Ok(())
 }
 
-#[allow(clippy::cast_possible_truncation)] // f32 is the precision of images; what overflows becomes infinite and is refused as missing.
+// Images have the precision of f32. Values that overflow become infinite, hence missing.
+#[allow(clippy::cast_possible_truncation)]
 fn narrow(z: f64) -> f32 {
     z as f32
 }

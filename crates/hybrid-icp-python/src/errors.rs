@@ -1,6 +1,6 @@
 //! The exceptions of `hybrid_icp._errors`, created from the errors of the libraries.
 
-// The macro makes public types, in a module that is private.
+// The macro creates public types in a private module.
 #![allow(missing_docs, unreachable_pub)]
 
 use std::error::Error;

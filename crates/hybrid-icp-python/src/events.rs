@@ -1,4 +1,4 @@
-//! The events that observers receive.
+//! Events for observers.
 
 use hybrid_icp::StageRecord;
 use hybrid_icp::icp::{IterationEvent, RegimeEvent, StageEvent, Verdict};
@@ -7,17 +7,17 @@ use pyo3::types::PyDict;
 
 use crate::array::Matrix;
 
-/// An iteration: a pose that was evaluated.
+/// One iteration, with the pose that was evaluated.
 #[pyclass(frozen, get_all, module = "hybrid_icp", name = "IterationEvent")]
 #[derive(Debug)]
 #[allow(non_snake_case)]
 pub(crate) struct PyIterationEvent {
     /// Iteration within the stage, from 0.
     iteration: usize,
-    /// The pose evaluated, camera from object, shape (4, 4), float64, metres.
+    /// The pose evaluated, camera from object, shape (4, 4), float64, meters.
     T_co: Matrix,
-    /// The increment found there, shape (4, 4), float64, metres: the next pose is `increment @
-    /// T_co`.
+    /// The increment found at that pose, shape (4, 4), float64, meters. The next pose is
+    /// `increment @ T_co`.
     increment: Matrix,
     /// Number of pairs after filtering.
     n_pairs: usize,
@@ -81,10 +81,11 @@ impl PyRegimeEvent {
 #[derive(Debug)]
 #[allow(non_snake_case)]
 pub(crate) struct PyStageEvent {
-    /// The branch that the switch selected before this stage, if this is the first stage after a
-    /// choice; always None in an observer.
+    /// The branch that the switcher selected, if this is the first stage after a choice.
+    ///
+    /// Always None in an observer.
     regime: Option<&'static str>,
-    /// The MVE of that choice.
+    /// The MVE for which it was selected.
     regime_mve: Option<f64>,
     /// Name of the point selection.
     selection: &'static str,
@@ -98,17 +99,18 @@ pub(crate) struct PyStageEvent {
     stop_rules: Vec<&'static str>,
     /// Number of points selected.
     n_source: usize,
-    /// The pose that the stage returned, camera from object, shape (4, 4), float64, metres.
+    /// The pose that the stage returned, camera from object, shape (4, 4), float64, meters.
     T_co: Matrix,
     /// "refined", or "kept_initial" if the stage returned the pose that it started from.
     outcome: &'static str,
-    /// Why the stage ended.
+    /// The reason why the stage ended.
     termination: &'static str,
     /// Number of evaluations, including rejected ones.
     iterations: usize,
     /// Number of pairs at the pose that was returned.
     n_pairs: usize,
-    /// Weighted mean of the metric's squared residuals there, m²; None if it was never evaluated.
+    /// Weighted mean of the metric's squared residuals at that pose, m²; None if it was never
+    /// evaluated.
     mean_loss: Option<f64>,
 }
 
@@ -140,7 +142,7 @@ impl PyStageEvent {
     }
 }
 
-/// Name of a verdict, as in the program's reports.
+/// Returns the name of a verdict, as in the reports of the program.
 pub(crate) fn name(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Refined => "refined",
@@ -150,7 +152,7 @@ pub(crate) fn name(verdict: Verdict) -> &'static str {
 
 #[pymethods]
 impl PyStageEvent {
-    /// Returns everything but the pose as plain Python values.
+    /// Returns all attributes except the pose as plain Python values.
     ///
     /// Returns
     /// -------
@@ -187,7 +189,7 @@ impl PyStageEvent {
     }
 }
 
-/// Returns attributes as plain Python values that `json.dumps` accepts: arrays as nested lists.
+/// Returns attributes as plain Python values that `json.dumps` accepts. Arrays become nested lists.
 pub(crate) fn plain<'py>(
     object: &Bound<'py, PyAny>,
     names: &[&str],

@@ -1,4 +1,4 @@
-//! Fusing pose estimates.
+//! Fuses pose estimates.
 
 use std::sync::Mutex;
 
@@ -13,15 +13,15 @@ use crate::errors;
 use crate::model::PyModel;
 use crate::mutex::locked;
 
-/// An estimate of an object's pose with its covariance and, where known, its MVE.
+/// An estimate of the pose of an object, with its covariance and, if known, its MVE.
 ///
 /// Parameters
 /// ----------
 /// T_co : array_like, shape (4, 4)
-///     Camera from object, metres.
+///     Camera from object, meters.
 /// covariance : array_like, shape (6, 6)
-///     Of ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera frame;
-///     may be singular.
+///     Covariance of ξ = [ρ; φ], a left perturbation in the camera frame, translation first
+///     (meters, radians). It may be singular.
 /// mve : float, optional
 ///     Mean VSD estimate, 0 to 1.
 ///
@@ -55,7 +55,7 @@ impl PyPoseEstimate {
         Ok(Self(estimate))
     }
 
-    /// The pose, camera from object, shape (4, 4), float64, metres.
+    /// The pose, camera from object, shape (4, 4), float64, meters.
     #[getter]
     fn T_co(&self) -> Matrix {
         self.0.camera_from_object().into()
@@ -67,14 +67,15 @@ impl PyPoseEstimate {
         self.0.covariance().into()
     }
 
-    /// The mean VSD estimate, where known.
+    /// The mean VSD estimate, if known.
     #[getter]
     fn mve(&self) -> Option<f64> {
         self.0.mve()
     }
 
-    /// Squared Mahalanobis distance of two independent estimates of one pose: χ² with 6 degrees of
-    /// freedom if both covariances are right and small.
+    /// Returns the squared Mahalanobis distance of two independent estimates of one pose.
+    ///
+    /// It follows χ² with 6 degrees of freedom if both covariances are right and small.
     ///
     /// Parameters
     /// ----------
@@ -105,12 +106,13 @@ impl PyPoseEstimate {
 ///
 /// Examples
 /// --------
-/// Two cameras disagree by 2 mm; the second is half as sure (twice the standard deviation):
+/// Two estimates differ by 2 mm, and the second has twice the standard deviation:
 ///
 /// >>> import numpy as np
 /// >>> from hybrid_icp import PoseEstimate, fuse
 /// >>> other = np.eye(4); other[2, 3] = 0.002
-/// >>> fused = fuse([PoseEstimate(np.eye(4), np.eye(6) * 1e-6), PoseEstimate(other, np.eye(6) * 4e-6)])
+/// >>> first = PoseEstimate(np.eye(4), np.eye(6) * 1e-6)
+/// >>> fused = fuse([first, PoseEstimate(other, np.eye(6) * 4e-6)])
 /// >>> round(float(fused.T_co[2, 3]), 9)
 /// 0.0004
 #[pyfunction]
@@ -121,24 +123,27 @@ pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
         .map_err(errors::input)
 }
 
-/// Turns the estimates that come in while the camera moves into one, in the current camera frame
-/// (§V of the paper).
+/// Fuses pose estimates while the camera moves (§V of the paper).
+///
+/// The fused estimate is in the current camera frame.
 ///
 /// Parameters
 /// ----------
 /// method : str
 ///     One of `Fuser.methods()`.
 /// model : Model, optional
-///     With it one unit of uncertainty is the object's radius and 1 rad about its centre, and
-///     symmetric poses are brought together; without, it is 1 m and 1 rad about the camera.
+///     With a model, one unit of uncertainty is the radius of the object and 1 rad around its
+///     center, and symmetric poses are fused as one. Without, it is 1 m and 1 rad around the
+///     camera.
 /// max_mve, max_mahalanobis_squared : float, optional
-///     Estimates beyond are left out.
+///     The gate. Estimates above one of these limits are rejected.
 /// restart_after : int, optional
-///     Consecutive estimates too far from what is held after which that is forgotten.
+///     Number of consecutive estimates too far from the fused estimate after which the fuser starts
+///     again.
 /// window : int, optional
-///     The most estimates that "average" and "weighted-average" hold, the newest.
+///     Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
 /// transport : {"adjoint", "kept"}, optional
-///     Whether covariances move along with the camera, or stay as they are.
+///     Whether covariances are transformed with the camera motion ("adjoint") or not ("kept").
 ///
 /// Examples
 /// --------
@@ -207,7 +212,7 @@ impl PyFuser {
         })
     }
 
-    /// Names of the methods, in the paper's order.
+    /// Returns the names of the methods, in the order of the paper.
     ///
     /// Returns
     /// -------
@@ -217,14 +222,15 @@ impl PyFuser {
         FusionMethod::ALL.map(FusionMethod::name).to_vec()
     }
 
-    /// Takes what is held to the next camera frame.
+    /// Moves the fused estimate to the next camera frame.
     ///
     /// Parameters
     /// ----------
     /// T_nc : array_like, shape (4, 4)
-    ///     Next camera from camera, metres.
+    ///     Next camera from camera, meters.
     /// covariance : array_like, shape (6, 6), optional
-    ///     Of a left perturbation in the next camera frame, where the motion is not known exactly.
+    ///     Covariance of the motion, as a left perturbation in the next camera frame. By default,
+    ///     the motion is exact.
     #[pyo3(signature = (T_nc, covariance = None))]
     fn propagate(
         &self,
@@ -235,7 +241,7 @@ impl PyFuser {
         Ok(())
     }
 
-    /// Takes in an estimate in the current camera frame.
+    /// Adds an estimate in the current camera frame.
     ///
     /// Parameters
     /// ----------
@@ -244,19 +250,19 @@ impl PyFuser {
     /// Returns
     /// -------
     /// str
-    ///     "accepted"; "provisional" when it failed the gate but there is nothing else; "rejected";
-    ///     or "restarted".
+    ///     "accepted", "rejected" or "restarted"; "provisional" if it failed the gate but there is
+    ///     no other estimate.
     fn update(&self, estimate: &PyPoseEstimate) -> &'static str {
         locked(&self.fuser).update(&estimate.0).name()
     }
 
-    /// The fused estimate in the current camera frame; None before the first.
+    /// The fused estimate in the current camera frame; None before the first estimate.
     #[getter]
     fn estimate(&self) -> Option<PyPoseEstimate> {
         locked(&self.fuser).estimate().map(PyPoseEstimate)
     }
 
-    /// Forgets everything.
+    /// Removes all estimates.
     fn reset(&self) {
         locked(&self.fuser).reset();
     }
@@ -266,7 +272,7 @@ impl PyFuser {
     }
 }
 
-/// Reads a motion of the camera; `None` is a camera that stands still.
+/// Reads a motion of the camera. `None` is a camera that does not move.
 #[allow(non_snake_case)]
 pub(crate) fn motion(
     T_nc: Option<&Bound<'_, PyAny>>,

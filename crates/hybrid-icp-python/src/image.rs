@@ -1,4 +1,4 @@
-//! PNG files.
+//! Reads PNG files.
 
 use std::path::PathBuf;
 
@@ -8,24 +8,24 @@ use crate::array::Matrix;
 use crate::depth::{self, PyDepthImage};
 use crate::errors;
 
-/// Reads a 16-bit grey PNG as metres.
+/// Reads a 16-bit gray PNG as an array of meters.
 ///
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
 /// scale : float
-///     Metres per unit, such as 0.001; BOP's `depth_scale` divided by 1000.
+///     Meters per unit, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///
 /// Returns
 /// -------
 /// numpy.ndarray, shape (H, W), float32
-///     Metres, 0 where nothing was measured.
+///     Meters; 0 for pixels without a measurement.
 #[pyfunction]
 pub(crate) fn read_depth_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Matrix<f32>> {
     Ok(PyDepthImage::from_png(py, path, scale)?.to_numpy())
 }
 
-/// Reads a mask: a PNG that is not zero on the object.
+/// Reads a mask from a PNG that is nonzero on the object.
 ///
 /// Parameters
 /// ----------

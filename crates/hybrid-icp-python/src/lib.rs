@@ -1,8 +1,8 @@
 //! The Python module `hybrid_icp`: refine 6D object poses in depth images from NumPy arrays.
 //!
-//! **Should you use this crate?** From Python, through the wheel that `cargo xtask wheel` builds.
-//! Rust programs depend on `hybrid-icp`, which this crate only translates: arrays are checked and
-//! read, the GIL is released, and results are the same bits.
+//! **Should you use this crate?** Use it from Python, through the wheel that `cargo xtask wheel`
+//! builds. Rust programs depend on `hybrid-icp` directly. This crate only translates: it checks and
+//! reads arrays, releases the GIL, and returns the same bits.
 //!
 //! ```python
 //! from hybrid_icp import Camera, Model, Observation, Pipeline
@@ -12,8 +12,8 @@
 //! result = Pipeline().refine(model, observation, T_co)
 //! ```
 //!
-//! The docstrings are the doc comments here, in NumPy's format; `python/hybrid_icp/_native.pyi` has
-//! the types, and a test compares the two.
+//! The doc comments of this crate become the docstrings, in the format of NumPy. The file
+//! `python/hybrid_icp/_native.pyi` has the types, and `stubtest` compares it with the module.
 
 mod array;
 mod batch;

@@ -16,30 +16,30 @@ use pyo3::prelude::*;
 use crate::array::{self, Matrix};
 use crate::errors::{self, InputError};
 
-/// An object to be registered: its mesh, surface samples, size and symmetries. Immutable; share it
-/// between threads.
+/// The model of an object: its mesh, surface samples, size and symmetries.
 ///
-/// Make one per object: it holds what is computed from the mesh once.
+/// Create one per object, because the samples are computed once. It is immutable, and threads can
+/// share it.
 ///
 /// Parameters
 /// ----------
 /// vertices : array_like, shape (V, 3)
-///     Coordinates in the object frame, in `unit`; kept as float32 metres.
+///     Coordinates in the object frame, in `unit`. They are stored as float32 meters.
 /// faces : array_like of int, shape (F, 3)
-///     Indices of the triangles' corners, counter-clockwise seen from outside.
+///     Indices of the triangle corners, counter-clockwise seen from outside.
 /// unit : {"m", "mm", "cm"}, optional
-///     Unit of the vertices and of `diameter`, of the offsets and translations of the symmetries
-///     too.
+///     Unit of the vertices, of `diameter`, and of the offsets and translations of the symmetries.
 /// samples : int, optional
 ///     Number of area-uniform surface samples.
 /// diameter : float, optional
-///     Where a dataset prescribes one; otherwise the largest distance between two vertices.
+///     The diameter that a dataset prescribes. The default is the largest distance between two
+///     vertices.
 /// symmetries : array_like, shape (N, 4, 4), optional
-///     Discrete symmetries: rigid motions of the object frame that leave it looking the same, the
-///     identity not counted.
+///     Discrete symmetries: rigid motions of the object frame that do not change its appearance,
+///     without the identity.
 /// symmetry_axes : sequence of (axis, offset), optional
-///     Continuous symmetries: any rotation about the line through `offset` along `axis`, three
-///     numbers each.
+///     Continuous symmetries: any rotation around the line through `offset` along `axis`. Both
+///     have three numbers.
 ///
 /// Examples
 /// --------
@@ -52,11 +52,11 @@ use crate::errors::{self, InputError};
 #[derive(Debug)]
 pub(crate) struct PyModel {
     pub(crate) model: Model,
-    /// Made when a pose error is first asked for.
+    /// Computed for the first pose error.
     points: OnceLock<ModelPoints>,
 }
 
-/// What both ways to make a model take besides the mesh.
+/// The arguments that both constructors have in addition to the mesh.
 struct Options<'a, 'py> {
     unit: LengthUnit,
     samples: usize,
@@ -85,14 +85,14 @@ impl PyModel {
         options.model(py, mesh)
     }
 
-    /// Reads a mesh: OBJ, OFF, PLY or STL.
+    /// Reads a mesh from an OBJ, OFF, PLY or STL file.
     ///
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
     ///     The file.
     /// unit : {"m", "mm", "cm"}
-    ///     Unit of its coordinates, which mesh formats do not state. BOP's models are in "mm".
+    ///     Unit of its coordinates, which mesh files do not contain. BOP models are in "mm".
     /// samples, diameter, symmetries, symmetry_axes
     ///     As for `Model`.
     ///
@@ -103,7 +103,7 @@ impl PyModel {
     /// Raises
     /// ------
     /// FileError
-    ///     When the file cannot be read or holds no mesh; the message names the place.
+    ///     If the file cannot be read or has no mesh. The message names the place.
     #[staticmethod]
     #[pyo3(signature = (path, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new()))]
     fn from_file(
@@ -123,7 +123,7 @@ impl PyModel {
         options.model(py, mesh)
     }
 
-    /// The vertices, shape (V, 3), float32, metres, object frame.
+    /// The vertices, shape (V, 3), float32, meters, object frame.
     #[getter]
     fn vertices(&self) -> Matrix<f32> {
         let vertices = self.model.mesh().vertices().iter();
@@ -136,20 +136,20 @@ impl PyModel {
         Matrix::new(3, self.model.mesh().triangles().concat())
     }
 
-    /// Largest distance between two vertices, or as prescribed, metres.
+    /// Largest distance between two vertices, or the prescribed diameter, meters.
     #[getter]
     fn diameter(&self) -> f64 {
         self.model.diameter()
     }
 
-    /// Centre of the bounding box, metres, object frame.
+    /// Center of the bounding box, meters, object frame.
     #[getter]
     fn center(&self) -> (f64, f64, f64) {
         let center = self.model.center();
         (center.x, center.y, center.z)
     }
 
-    /// Largest distance of a vertex from `center`, metres.
+    /// Largest distance of a vertex from `center`, meters.
     #[getter]
     fn radius(&self) -> f64 {
         self.model.radius()
@@ -167,7 +167,7 @@ impl PyModel {
 }
 
 impl PyModel {
-    /// The model made ready for pose errors, once.
+    /// Returns the points for pose errors, computed on the first call.
     pub(crate) fn points(&self) -> &ModelPoints {
         self.points.get_or_init(|| ModelPoints::new(&self.model))
     }
@@ -226,7 +226,8 @@ impl<'a, 'py> Options<'a, 'py> {
         let motions = symmetries.n_motions();
         if motions > MAX_SYMMETRY_MOTIONS {
             return Err(InputError::new_err(format!(
-                "symmetries and symmetry_axes make {motions} motions, expected at most {MAX_SYMMETRY_MOTIONS}"
+                "symmetries and symmetry_axes define {motions} motions, expected at most \
+                 {MAX_SYMMETRY_MOTIONS}"
             )));
         }
         let config = ModelConfig {
@@ -267,7 +268,7 @@ fn mesh(
         })
         .collect();
     let expected = "an (F, 3) array of integers";
-    // Asked for integers, NumPy would cut the fractions of a list off.
+    // Without a dtype: with an integer dtype, NumPy would truncate the fractions of a list.
     let numpy = faces.py().import("numpy")?;
     let indices = numpy
         .call_method1("asarray", (faces,))
@@ -284,7 +285,7 @@ fn mesh(
         for (corner, index) in triangle.iter_mut().zip(corners) {
             *corner = u32::try_from(*index).map_err(|_| {
                 InputError::new_err(format!(
-                    "faces[{face}] holds {index}, expected indices from 0"
+                    "faces[{face}] has the index {index}, expected 0 or more"
                 ))
             })?;
         }

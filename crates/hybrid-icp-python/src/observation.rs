@@ -10,28 +10,28 @@ use crate::camera::PyCamera;
 use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
 
-/// A segmented depth image: what poses are refined against. Immutable; share it between hypotheses
-/// and threads.
+/// A segmented depth image, for refining poses.
 ///
-/// Arrays are copied, each once; changing them afterwards changes nothing. Several objects of one
-/// image share its depth: make a `DepthImage`, and an observation of it for each mask.
+/// It is immutable, and hypotheses and threads can share it. Each array is copied once, so later
+/// changes of the arrays have no effect. For several objects in one image, create one `DepthImage`
+/// and an observation per mask.
 ///
 /// Parameters
 /// ----------
 /// depth : DepthImage or numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) metres, or uint16 with `scale`. 0,
-///     negative or NaN where nothing was measured. A `DepthImage` is shared, not copied.
+///     Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
+///     without a measurement are 0, negative or NaN. A `DepthImage` is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W), or None
-///     Not zero on the object; `None` for every pixel.
+///     Nonzero on the object. `None` selects every pixel.
 /// camera : Camera
-///     Of the image's size.
+///     A camera for images of this size.
 /// scale : float, optional
-///     Metres per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///
 /// Raises
 /// ------
 /// InputError
-///     When shapes, dtypes or units do not fit, saying what was passed and what was expected.
+///     If a shape, dtype or unit is wrong. The message has the value found and the one expected.
 ///
 /// Examples
 /// --------
@@ -44,13 +44,13 @@ use crate::errors::{self, InputError};
 /// >>> Observation(wall * 1000, None, camera)
 /// Traceback (most recent call last):
 /// ...
-/// hybrid_icp.InputError: depth looks like millimetres: median 800, expected metres (divide by
+/// hybrid_icp.InputError: depth looks like millimeters: median 800, expected meters (divide by
 /// 1000, or pass uint16 with scale=0.001)
 #[pyclass(frozen, module = "hybrid_icp", name = "Observation")]
 #[derive(Debug)]
 pub(crate) struct PyObservation {
     pub(crate) observation: Observation,
-    /// Median depth inside the mask, metres; `None` without any.
+    /// Median depth inside the mask, meters; `None` if no masked pixel was measured.
     pub(crate) median_depth: Option<f64>,
 }
 
@@ -70,7 +70,8 @@ impl PyObservation {
         let camera = camera.0;
         if (camera.width(), camera.height()) != (image.width(), image.height()) {
             return Err(InputError::new_err(format!(
-                "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape ({}, {})",
+                "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape \
+                 ({}, {})",
                 camera.width(),
                 camera.height(),
                 array::kind(depth),
@@ -89,14 +90,16 @@ impl PyObservation {
         PyCamera(*self.observation.camera())
     }
 
-    /// A copy of the depth image, shape (H, W), float32, metres, 0 where nothing was measured.
+    /// A copy of the depth image, shape (H, W), float32, meters; 0 for pixels without a
+    /// measurement.
     #[getter]
     fn depth(&self) -> Matrix<f32> {
         self.image().to_numpy()
     }
 
-    /// The depth image, to make observations of other masks with: a `DepthImage`, (H, W) metres,
-    /// shared and not copied.
+    /// The depth image as a `DepthImage`, (H, W) meters, for observations with other masks.
+    ///
+    /// It is shared and not copied.
     #[getter]
     fn image(&self) -> PyDepthImage {
         PyDepthImage(Arc::clone(self.observation.shared_depth()))
@@ -109,26 +112,26 @@ impl PyObservation {
         depth::image(mask.width(), mask.pixels())
     }
 
-    /// Number of masked pixels that have a depth.
+    /// Number of masked pixels with a depth.
     #[getter]
     fn n_measured(&self) -> usize {
         self.observation.n_measured()
     }
 
-    /// Number of pixels that have a point with a normal: what is registered.
+    /// Number of masked pixels with a surfel (a point with a normal).
     #[getter]
     fn n_surfels(&self) -> usize {
         self.observation.n_surfels()
     }
 
-    /// Points and normals of the masked surface, in the camera frame.
+    /// Returns the points and normals of the masked surface, in the camera frame.
     ///
     /// Returns
     /// -------
     /// points : numpy.ndarray, shape (n_surfels, 3), float32
-    ///     Metres.
+    ///     Meters.
     /// normals : numpy.ndarray, shape (n_surfels, 3), float32
-    ///     Of unit length, facing the camera.
+    ///     Unit length, toward the camera.
     fn surfels(&self) -> (Matrix<f32>, Matrix<f32>) {
         let (mut points, mut normals) = (Vec::new(), Vec::new());
         for (_, surfel) in self.observation.surfels(1) {
@@ -165,7 +168,7 @@ impl PyObservation {
     }
 }
 
-/// The median depth of masked pixels at these strides; `None` where none of them was measured.
+/// Returns the median depth of masked pixels at these strides, or `None` if none was measured.
 fn masked_median(observation: &Observation, down: usize, right: usize) -> Option<f32> {
     let region = observation.region();
     let (depth, mask) = (observation.depth(), observation.mask());

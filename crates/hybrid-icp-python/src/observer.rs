@@ -1,4 +1,4 @@
-//! Python observers.
+//! Passes events to Python observers.
 
 use std::ops::ControlFlow;
 
@@ -23,7 +23,8 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Creates a watch for an object with any of the [`METHODS`], or for a callable for iterations.
+    /// Creates a watch for an object with any of the [`METHODS`], or for a callable that receives
+    /// the iterations.
     pub(crate) fn new(observer: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut methods = [None, None, None];
         if let Some(observer) = observer {
@@ -33,7 +34,8 @@ impl Watch {
             if methods.iter().all(Option::is_none) {
                 if !observer.is_callable() {
                     return Err(InputError::new_err(format!(
-                        "observer is {}, expected a callable or an object with on_iteration, on_regime or on_stage_end",
+                        "observer is {}, expected a callable or an object with on_iteration, on_regime \
+                         or on_stage_end",
                         crate::array::describe(observer)
                     )));
                 }
@@ -53,7 +55,7 @@ impl Watch {
         self.raised.map_or(Ok(self.trace), Err)
     }
 
-    /// Calls a method; `False` and exceptions stop the run.
+    /// Calls a method. `False` and exceptions stop the run.
     fn call<E>(&mut self, method: usize, event: impl FnOnce() -> E)
     where
         E: for<'py> IntoPyObject<'py>,

@@ -17,29 +17,37 @@ use crate::observation::PyObservation;
 use crate::observer::Watch;
 use crate::result::PyResultOf;
 
-const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], metres";
+const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], meters";
 
-/// A refinement pipeline: Hybrid ICP, one of the classical variants that it was compared with, or
-/// your own from a TOML file.
+/// A refinement pipeline: the default, another preset, or a custom pipeline from a TOML file.
 ///
-/// `Pipeline()` is the default, "auto". `Pipeline.from_toml` reads a custom one. A pipeline keeps
-/// scratch memory from call to call, and threads may share it.
+/// `Pipeline()` is "auto", which suits most uses. `Pipeline.from_toml` reads a custom pipeline. A
+/// pipeline keeps scratch memory between calls. Threads can share it.
 ///
 /// Parameters
 /// ----------
 /// name : str, optional
-///     One of `Pipeline.presets()`: "auto" refines and, if the score stays bad, searches; "local"
-///     never searches; "hybrid" is the method of the paper.
+///     One of `Pipeline.presets()`. "local" refines the pose near its start. "search" and "auto"
+///     also search for the object: "search" unless the refined pose explains the image well, "auto"
+///     only if it explains the image badly. "hybrid" is Hybrid ICP as in the paper, and
+///     "hybrid-visible" is a variant of it.
 /// overrides : sequence of str, optional
 ///     Fields to set, such as "threshold=0.3" of "auto" or "times=3" of "hybrid".
+///
+/// Raises
+/// ------
+/// InputError
+///     If there is no such preset or field. The message suggests similar names.
 ///
 /// Examples
 /// --------
 /// >>> from hybrid_icp import Pipeline
 /// >>> Pipeline()
 /// Pipeline('auto')
-/// >>> Pipeline.preset("hybrid", overrides=["times=1"]).name
-/// 'hybrid times=1'
+/// >>> Pipeline(overrides=["threshold=0.3"]).name
+/// 'auto threshold=0.3'
+/// >>> Pipeline("hybrid")
+/// Pipeline('hybrid')
 #[pyclass(frozen, module = "hybrid_icp", name = "Pipeline")]
 #[derive(Debug)]
 pub(crate) struct PyPipeline {
@@ -48,11 +56,11 @@ pub(crate) struct PyPipeline {
     file: PipelineFile,
     toml: String,
     overrides: Vec<String>,
-    /// Warm refiners that are not in use.
+    /// Refiners that are not in use, with their scratch memory.
     refiners: Mutex<Vec<Refiner>>,
 }
 
-/// What restores a pipeline, and what it takes: origin, text and overrides.
+/// The function that restores a pipeline, and its arguments: origin, text and overrides.
 type Pickled = (Py<PyAny>, (String, String, Vec<String>));
 
 #[pymethods]
@@ -61,19 +69,18 @@ impl PyPipeline {
     #[new]
     #[pyo3(signature = (name = "auto", *, overrides = Vec::new()))]
     fn new(name: &str, overrides: Vec<String>) -> PyResult<Self> {
-        Self::preset(name, overrides)
+        let preset: Preset = name.parse().map_err(errors::input)?;
+        Self::parse(name, preset.toml().to_owned(), overrides)
     }
 
-    /// Makes a pipeline by name: the same as `Pipeline(name)`.
+    /// Creates a pipeline by name, like `Pipeline(name)`.
     ///
     /// Parameters
     /// ----------
     /// name : str
-    ///     One of `Pipeline.presets()`: "hybrid" is Hybrid ICP; "hybrid-visible" and "local" refine
-    ///     better than it, "search" and "auto" also find the object where refinement fails, and
-    ///     take longer.
+    ///     One of `Pipeline.presets()`.
     /// overrides : sequence of str, optional
-    ///     Fields to set, such as "times=3" or "stage.switcher.alpha=0.5".
+    ///     Fields to set, as for `Pipeline`.
     ///
     /// Returns
     /// -------
@@ -81,18 +88,17 @@ impl PyPipeline {
     #[staticmethod]
     #[pyo3(signature = (name, *, overrides = Vec::new()))]
     fn preset(name: &str, overrides: Vec<String>) -> PyResult<Self> {
-        let preset: Preset = name.parse().map_err(errors::input)?;
-        Self::parse(name, preset.toml().to_owned(), overrides)
+        Self::new(name, overrides)
     }
 
-    /// Makes a pipeline from a TOML file or its text.
+    /// Creates a pipeline from a TOML file or its text.
     ///
     /// Parameters
     /// ----------
     /// text_or_path : str or os.PathLike
     ///     A path object, a string that ends with ".toml", or the text itself.
     /// overrides : sequence of str, optional
-    ///     Fields to set, as for `preset`.
+    ///     Fields to set, as for `Pipeline`.
     ///
     /// Returns
     /// -------
@@ -101,9 +107,10 @@ impl PyPipeline {
     /// Raises
     /// ------
     /// InputError
-    ///     Naming the line and field, what is there, and what would be right.
+    ///     If the text is not a valid pipeline. The message names the line, the field, the value
+    ///     found and the values expected.
     /// FileError
-    ///     When the file cannot be read.
+    ///     If the file cannot be read.
     ///
     /// Examples
     /// --------
@@ -135,7 +142,7 @@ impl PyPipeline {
         Self::parse(&path.to_string_lossy(), text, overrides)
     }
 
-    /// Names of the pipelines that ship with the library, Hybrid ICP first.
+    /// Returns the names of the pipelines that ship with the library, Hybrid ICP first.
     ///
     /// Returns
     /// -------
@@ -145,13 +152,13 @@ impl PyPipeline {
         Preset::ALL.map(Preset::name).to_vec()
     }
 
-    /// Name in reports: that of the preset or file, and the overrides.
+    /// Name in reports: the name of the preset or file, followed by the overrides.
     #[getter]
     fn name(&self) -> &str {
         &self.name
     }
 
-    /// The pipeline as a file, before the overrides.
+    /// The pipeline as TOML text, without the overrides.
     #[getter]
     fn toml(&self) -> &str {
         &self.toml
@@ -159,8 +166,8 @@ impl PyPipeline {
 
     /// Refines a pose.
     ///
-    /// Deterministic, and never fails on data: no overlap, degenerate geometry and the like end
-    /// with a result that says so. The GIL is released.
+    /// The result is deterministic. Data never causes an exception: without overlap, or with
+    /// degenerate geometry, the result reports the reason. The call releases the GIL.
     ///
     /// Parameters
     /// ----------
@@ -169,11 +176,12 @@ impl PyPipeline {
     /// observation : Observation
     ///     The image.
     /// T_co : array_like, shape (4, 4)
-    ///     The rough pose, camera from object, metres.
+    ///     The initial pose, camera from object, meters.
     /// observer : callable or object, optional
-    ///     A callable gets an `IterationEvent` per iteration; an object is told by those of its
-    ///     methods `on_iteration`, `on_regime` and `on_stage_end` that it has. `False` from any of
-    ///     them stops the run at the pose last evaluated; an exception stops it and is raised.
+    ///     A callable receives an `IterationEvent` per iteration. An object can have any of the
+    ///     methods `on_iteration`, `on_regime` and `on_stage_end`. If one of them returns `False`,
+    ///     the run stops at the pose last evaluated. An exception stops the run and is raised
+    ///     again.
     ///
     /// Returns
     /// -------
@@ -182,21 +190,22 @@ impl PyPipeline {
     /// Raises
     /// ------
     /// InputError
-    ///     When the pose is no rigid motion in metres.
+    ///     If the pose is not a rigid motion in meters.
     ///
     /// Warns
     /// -----
     /// InputWarning
-    ///     When pose and image do not go together: the object behind the camera, or at a third or
-    ///     three times of the depth measured.
+    ///     If the pose does not fit the image: the object is behind the camera, or at less than a
+    ///     third or more than three times the measured depth.
     ///
     /// Examples
     /// --------
-    /// A plate half a metre in front of the camera, and a detector that is four centimetres off:
+    /// A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
     ///
     /// >>> import numpy as np
     /// >>> from hybrid_icp import Camera, Model, Observation, Pipeline, render_depth
-    /// >>> model = Model([[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]], [[0, 2, 1], [0, 3, 2]])
+    /// >>> corners = [[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]]
+    /// >>> model = Model(corners, [[0, 2, 1], [0, 3, 2]])
     /// >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
     /// >>> true = np.eye(4); true[2, 3] = 0.5
     /// >>> depth = render_depth(model, camera, true)
@@ -233,17 +242,17 @@ impl PyPipeline {
 
     /// Refines many poses of one object in one image, on several threads.
     ///
-    /// Same bits as `refine` for each, whatever the number of threads. The GIL is released; Ctrl-C
-    /// ends it.
+    /// The results have the bits of single calls of `refine`, for any number of threads. The call
+    /// releases the GIL. Ctrl-C stops it.
     ///
     /// Parameters
     /// ----------
     /// model : Model
     /// observation : Observation
     /// T_co : array_like, shape (N, 4, 4)
-    ///     The rough poses, camera from object, metres.
+    ///     The initial poses, camera from object, meters.
     /// threads : int, optional
-    ///     Number of threads; as many as the machine runs at once if not given.
+    ///     Number of threads. The default is the number that the machine runs at once.
     ///
     /// Returns
     /// -------
@@ -253,7 +262,7 @@ impl PyPipeline {
     /// Warns
     /// -----
     /// InputWarning
-    ///     As `refine`, where it holds for every pose.
+    ///     As for `refine`, if no pose fits the image.
     #[pyo3(signature = (model, observation, T_co, threads = None))]
     fn refine_batch(
         &self,
@@ -303,7 +312,7 @@ impl PyPipeline {
         ))
     }
 
-    /// Makes a pipeline again from what it was pickled as.
+    /// Restores a pipeline from its pickled arguments.
     #[staticmethod]
     fn _restore(origin: &str, toml: String, overrides: Vec<String>) -> PyResult<Self> {
         Self::parse(origin, toml, overrides)
@@ -371,15 +380,15 @@ fn warn<'a>(
         Some(Warning::BehindCamera { z }) => errors::warn(
             py,
             &format!(
-                "T_co puts the object's centre at z = {z:.4} m, behind the camera, which looks along +z: expected camera \
-                 from object, not object from camera"
+                "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks \
+                 along +z: expected camera from object, not object from camera"
             ),
         ),
         Some(Warning::Depth { measured, expected }) => errors::warn(
             py,
             &format!(
-                "T_co puts the object's centre at z = {expected:.4} m, but the median depth inside the mask is {measured:.4} m: \
-                 check the units of both, expected metres"
+                "T_co puts the object's center at z = {expected:.4} m, but the median depth inside \
+                 the mask is {measured:.4} m: check the units of both, expected meters"
             ),
         ),
         _ => Ok(()),

@@ -8,10 +8,10 @@ use pyo3::types::PyDict;
 use crate::array::{self, Matrix, Motion};
 use crate::events::{self, PyStageEvent};
 
-/// What a refinement returns: a pose, how it came about, and how well it explains the image.
+/// The result of a refinement: a pose, its score, and the stages that ran.
 ///
-/// A pose that could not be refined is given back with the numbers that were passed, and `outcome`
-/// says so; that is no error.
+/// If the pose could not be refined, `T_co` has the numbers that were passed, and `outcome` is
+/// "kept_initial". This is not an error.
 #[pyclass(frozen, module = "hybrid_icp", name = "Result")]
 #[derive(Debug)]
 pub(crate) struct PyResultOf {
@@ -25,7 +25,7 @@ impl PyResultOf {
         let outcome = &refinement.outcome;
         let matrix = match outcome.verdict {
             Verdict::Refined => array::to_matrix(&outcome.camera_from_object),
-            // The very numbers that were given, though they be orthogonal only to their digits.
+            // The numbers that were passed, which can be orthogonal only to their precision.
             Verdict::KeptInitial(_) => init.matrix,
         };
         Self {
@@ -41,16 +41,17 @@ impl PyResultOf {
 }
 
 #[pymethods]
-#[allow(non_snake_case)] // T_co is the frame-explicit name of the pose, the same on both sides.
+#[allow(non_snake_case)] // T_co names the frames of the pose, as in Python.
 impl PyResultOf {
-    /// The pose, camera from object, shape (4, 4), float64, metres.
+    /// The pose, camera from object, shape (4, 4), float64, meters.
     #[getter]
     fn T_co(&self) -> Matrix {
         Matrix::new(4, self.matrix.to_vec())
     }
 
-    /// Mean VSD estimate of the returned pose: 0 where it explains the image everywhere, 1 nowhere.
-    /// Above 0.4, do not use the pose.
+    /// Mean VSD estimate of the returned pose: 0 if it explains the image everywhere, 1 if nowhere.
+    ///
+    /// Accept the pose if this is below 0.3 and `warnings` is empty.
     #[getter]
     fn mve(&self) -> f64 {
         self.refinement.mve
@@ -62,35 +63,38 @@ impl PyResultOf {
         self.refinement.mve_initial
     }
 
-    /// Why the pose is not to be trusted, in words: it does not explain the image, got worse, was
-    /// found where the initial pose explained nothing, or lies on a surface that is flat where the
-    /// model is not. Empty where the scores say nothing against it.
+    /// Reasons not to trust the pose, as sentences; empty if there are none.
+    ///
+    /// - The pose does not explain the image.
+    /// - The refinement made the pose worse.
+    /// - The initial pose explained nothing of the image.
+    /// - The measured surface is flat, but the model is not.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let warnings = self.refinement.warnings();
         warnings.iter().map(ToString::to_string).collect()
     }
 
-    /// "refined", or "kept_initial" when the initial pose is returned.
+    /// "refined", or "kept_initial" if the result is the initial pose.
     #[getter]
     fn outcome(&self) -> &'static str {
         events::name(self.refinement.outcome.verdict)
     }
 
-    /// Whether the returned pose is a new one.
+    /// Whether the pose was refined. If not, it is the initial pose.
     #[getter]
     fn refined(&self) -> bool {
         self.refinement.outcome.verdict == Verdict::Refined
     }
 
-    /// Why the pipeline ended, such as "converged", "iteration_limit", "loss_increased" or
-    /// "no_pairs".
+    /// The reason why the pipeline ended, such as "converged", "iteration_limit",
+    /// "loss_increased" or "no_pairs".
     #[getter]
     fn termination(&self) -> &'static str {
         self.refinement.outcome.termination.name()
     }
 
-    /// Number of evaluations, rejected ones included, over all stages.
+    /// Number of evaluations in all stages, including rejected ones.
     #[getter]
     fn iterations(&self) -> usize {
         self.refinement.outcome.iterations
@@ -109,38 +113,40 @@ impl PyResultOf {
         self.refinement.outcome.evaluation.map(|e| e.mean_loss)
     }
 
-    /// Share of the points that have a pair, 0 to 1; None if the pose was never evaluated.
+    /// Share of the points with a pair, 0 to 1; None if the pose was never evaluated.
     #[getter]
     fn fitness(&self) -> Option<f64> {
         self.quality().map(|quality| quality.fitness)
     }
 
-    /// Root mean square of the distances between the points of the pairs, metres; None if the pose
+    /// Root mean square of the distances between the points of the pairs, meters; None if the pose
     /// was never evaluated.
     #[getter]
     fn point_rmse(&self) -> Option<f64> {
         self.quality().map(|quality| quality.point_rmse)
     }
 
-    /// Root mean square of the distances from the observed tangent planes, metres; None if the pose
+    /// Root mean square of the distances from the observed tangent planes, meters; None if the pose
     /// was never evaluated.
     #[getter]
     fn plane_rmse(&self) -> Option<f64> {
         self.quality().map(|quality| quality.plane_rmse)
     }
 
-    /// Information of the pose, shape (6, 6), float64; None where the metric has none.
+    /// Information matrix of the pose, shape (6, 6), float64; None if the metric has none.
     ///
-    /// For ξ = [ρ; φ], translation first (metres, radians), a left perturbation in the camera
-    /// frame.
+    /// It refers to ξ = [ρ; φ], a left perturbation in the camera frame, translation first (meters,
+    /// radians).
     #[getter]
     fn information(&self) -> Option<Matrix> {
         let information = self.quality().and_then(Quality::information);
         information.as_ref().map(Matrix::from)
     }
 
-    /// Covariance of the pose in the same convention, shape (6, 6), float64, if pairs are right and
-    /// residuals independent; None where a direction is not determined.
+    /// Covariance of the pose, shape (6, 6), float64; None if a direction is not determined.
+    ///
+    /// It has the convention of `information`. It holds if the pairs are right and the residuals
+    /// are independent.
     #[getter]
     fn covariance(&self) -> Option<Matrix> {
         let covariance = self.quality().and_then(Quality::covariance);
@@ -153,7 +159,7 @@ impl PyResultOf {
         self.stages.iter().map(PyStageEvent::from).collect()
     }
 
-    /// Returns everything as plain Python values that `json.dumps` takes.
+    /// Returns all attributes as plain Python values that `json.dumps` accepts.
     ///
     /// Returns
     /// -------

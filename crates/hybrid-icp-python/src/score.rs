@@ -1,4 +1,4 @@
-//! Renders, scores and pose errors.
+//! Renders depth images, and computes scores and pose errors.
 
 use hybrid_icp::core::{Isometry3, Problem, RenderedView, Renderer};
 use hybrid_icp::icp::Workspace;
@@ -21,12 +21,12 @@ use crate::observation::PyObservation;
 /// model : Model
 /// camera : Camera
 /// T_co : array_like, shape (4, 4)
-///     Camera from object, metres.
+///     Camera from object, meters.
 ///
 /// Returns
 /// -------
 /// numpy.ndarray, shape (H, W), float32
-///     Depth along the optical axis, metres; 0 = nothing.
+///     Depth along the optical axis, meters; 0 for pixels that the model does not cover.
 #[pyfunction]
 #[allow(non_snake_case)]
 pub(crate) fn render_depth(
@@ -41,19 +41,21 @@ pub(crate) fn render_depth(
     Ok(depth::image(image.width(), image.pixels()))
 }
 
-/// Mean VSD estimate of a pose: 0 where it explains the image everywhere, 1 nowhere. Needs no
-/// ground truth.
+/// Computes the mean VSD estimate (MVE) of a pose, which needs no ground truth.
+///
+/// It is 0 if the pose explains the image everywhere, and 1 if it explains the image nowhere.
 ///
 /// Parameters
 /// ----------
 /// model : Model
 /// observation : Observation
 /// T_co : array_like, shape (4, 4)
-///     Camera from object, metres.
+///     Camera from object, meters.
 /// occlusion_tolerance : float or None, optional
-///     Rendered pixels outside the mask that something hides by more than this many metres do not
-///     count. Below 0, the measured surface may also lie that far behind, for masks that miss a
-///     part of the object. `None` is the paper's definition: every rendered pixel counts.
+///     Rendered pixels outside the mask do not count if the measured surface hides them by more
+///     than this distance, meters. With a negative value, the measured surface can also be that
+///     far behind, for masks that miss a part of the object. `None` is the definition of the
+///     paper: every rendered pixel counts.
 ///
 /// Returns
 /// -------
@@ -81,23 +83,22 @@ pub(crate) fn mve(
     }))
 }
 
-/// Visible surface discrepancy of BOP'19 between an estimated and a true pose.
+/// Computes the visible surface discrepancy (VSD) of BOP'19 between an estimated and a true pose.
 ///
 /// Parameters
 /// ----------
 /// model : Model
 /// observation : Observation
-///     Its depth image and camera count, its mask does not.
+///     Only its depth image and camera are used, not its mask.
 /// T_est, T_gt : array_like, shape (4, 4)
-///     The estimated and the true pose, camera from object, metres.
+///     The estimated and the true pose, camera from object, meters.
 /// delta : float, optional
-///     Visibility tolerance, metres.
+///     Visibility tolerance, meters.
 ///
 /// Returns
 /// -------
 /// numpy.ndarray, shape (10,), float64
-///     e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 where neither render shows a visible
-///     pixel.
+///     e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 if neither render has a visible pixel.
 #[pyfunction]
 #[pyo3(signature = (model, observation, T_est, T_gt, *, delta = VISIBILITY_TOLERANCE_METERS))]
 #[allow(non_snake_case)]
@@ -132,19 +133,19 @@ pub(crate) fn vsd<'py>(
     Ok(PyArray1::from_slice(py, &errors.map_err(errors::input)?))
 }
 
-/// ADD: mean distance between corresponding model points at two poses.
+/// Computes ADD, the mean distance between corresponding model points at two poses.
 ///
 /// Parameters
 /// ----------
 /// T_est, T_gt : array_like, shape (4, 4)
-///     The estimated and the true pose, camera from object, metres.
+///     The estimated and the true pose, camera from object, meters.
 /// model : Model
-///     Its vertices count.
+///     Its vertices are used.
 ///
 /// Returns
 /// -------
 /// float
-///     Metres.
+///     Meters.
 #[pyfunction]
 #[allow(non_snake_case)]
 pub(crate) fn add(
@@ -157,20 +158,21 @@ pub(crate) fn add(
     Ok(points.add(&estimate, &truth))
 }
 
-/// ADI (ADD-S): mean distance from a model point at the true pose to the closest model point at the
-/// estimate.
+/// Computes ADI (ADD-S), the mean distance between closest model points at two poses.
+///
+/// For each model point at the true pose, it uses the closest model point at the estimate.
 ///
 /// Parameters
 /// ----------
 /// T_est, T_gt : array_like, shape (4, 4)
-///     The estimated and the true pose, camera from object, metres.
+///     The estimated and the true pose, camera from object, meters.
 /// model : Model
-///     Its vertices count.
+///     Its vertices are used.
 ///
 /// Returns
 /// -------
 /// float
-///     Metres.
+///     Meters.
 #[pyfunction]
 #[allow(non_snake_case)]
 pub(crate) fn adi(
@@ -184,19 +186,19 @@ pub(crate) fn adi(
     Ok(py.detach(|| model.points().adi(&estimate, &truth)))
 }
 
-/// MSSD: maximum symmetry-aware surface distance of BOP.
+/// Computes MSSD, the maximum symmetry-aware surface distance of BOP.
 ///
 /// Parameters
 /// ----------
 /// T_est, T_gt : array_like, shape (4, 4)
-///     The estimated and the true pose, camera from object, metres.
+///     The estimated and the true pose, camera from object, meters.
 /// model : Model
-///     Its vertices and declared symmetries count.
+///     Its vertices and declared symmetries are used.
 ///
 /// Returns
 /// -------
 /// float
-///     Metres.
+///     Meters.
 #[pyfunction]
 #[allow(non_snake_case)]
 pub(crate) fn mssd(
@@ -210,20 +212,20 @@ pub(crate) fn mssd(
     Ok(py.detach(|| model.points().mssd(&estimate, &truth)))
 }
 
-/// MSPD: maximum symmetry-aware projection distance of BOP.
+/// Computes MSPD, the maximum symmetry-aware projection distance of BOP.
 ///
 /// Parameters
 /// ----------
 /// T_est, T_gt : array_like, shape (4, 4)
-///     The estimated and the true pose, camera from object, metres.
+///     The estimated and the true pose, camera from object, meters.
 /// model : Model
-///     Its vertices and declared symmetries count.
+///     Its vertices and declared symmetries are used.
 /// camera : Camera
 ///
 /// Returns
 /// -------
 /// float
-///     Pixels; infinite when a point is not in front of the camera.
+///     Pixels; infinite if a point is not in front of the camera.
 #[pyfunction]
 #[allow(non_snake_case)]
 pub(crate) fn mspd(

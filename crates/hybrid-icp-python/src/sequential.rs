@@ -1,4 +1,4 @@
-//! Estimates fused while the camera moves.
+//! Registers and fuses images while the camera moves.
 
 use std::sync::Mutex;
 
@@ -14,25 +14,24 @@ use crate::mutex::locked;
 use crate::observation::PyObservation;
 use crate::pipeline::PyPipeline;
 
-/// Estimates the pose of an object that stands still from images along the path of a moving camera
-/// (§V of the paper).
+/// Estimates the pose of a static object from the images of a moving camera (§V of the paper).
 ///
-/// Each image is registered from the pose fused so far, moved with the camera; what comes out is
-/// fused, and is the next start.
+/// Each image is registered from the fused pose, moved with the camera. The registered pose is then
+/// fused, and the next image starts from the result.
 ///
 /// Parameters
 /// ----------
 /// pipeline : Pipeline
-///     Registers each image.
+///     The pipeline that registers each image.
 /// method : str
-///     How estimates are fused, one of `Fuser.methods()`.
+///     The fusion method, one of `Fuser.methods()`.
 /// model : Model
 /// T_co : array_like, shape (4, 4)
-///     The rough pose in the first camera frame, camera from object, metres.
+///     The initial pose in the first camera frame, camera from object, meters.
 /// paper : bool, optional
-///     §V to the letter: no gate, covariances e_MVE·I₆ that stay as they are. Otherwise uncertainty
-///     is about the object's centre, estimates with an MVE above 0.4 are left out, and symmetric
-///     poses are brought together.
+///     If true, follows §V exactly: no gate, and covariances e_MVE·I₆ that do not move with the
+///     camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
+///     above 0.4 are rejected, and symmetric poses are fused as one.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
@@ -65,16 +64,16 @@ impl PySequentialEstimator {
         })
     }
 
-    /// Takes in an image of the object and how the camera moved since the one before.
+    /// Registers and fuses an image, after a motion of the camera since the previous image.
     ///
     /// Parameters
     /// ----------
     /// observation : Observation
     /// T_nc : array_like, shape (4, 4), optional
-    ///     This image's camera from that of the image before, metres; a camera that stood still if
-    ///     not given.
+    ///     Camera of this image from the camera of the previous image, meters. By default, the
+    ///     camera did not move.
     /// covariance : array_like, shape (6, 6), optional
-    ///     Of the motion: a left perturbation in this image's camera frame.
+    ///     Covariance of the motion, as a left perturbation in the camera frame of this image.
     ///
     /// Returns
     /// -------
@@ -89,7 +88,7 @@ impl PySequentialEstimator {
     ) -> PyResult<PySequentialStep> {
         let motion = fusion::motion(T_nc, covariance)?;
         let (model, observation) = (&self.model.get().model, &observation.get().observation);
-        // Without the GIL: another thread may hold the lock for a whole step.
+        // Release the GIL first: another thread may hold the lock for a whole step.
         let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
         Ok(PySequentialStep::new(&step))
     }
@@ -99,9 +98,9 @@ impl PySequentialEstimator {
     /// Parameters
     /// ----------
     /// T_nc : array_like, shape (4, 4)
-    ///     Next camera from camera, metres.
+    ///     Next camera from camera, meters.
     /// covariance : array_like, shape (6, 6), optional
-    ///     Of the motion.
+    ///     Covariance of the motion.
     #[pyo3(signature = (T_nc, covariance = None))]
     fn move_camera(
         &self,
@@ -114,26 +113,26 @@ impl PySequentialEstimator {
         Ok(())
     }
 
-    /// Forgets everything and starts from a rough pose in the current camera frame.
+    /// Removes all estimates and starts again from a pose in the current camera frame.
     ///
     /// Parameters
     /// ----------
     /// T_co : array_like, shape (4, 4)
-    ///     Camera from object, metres.
+    ///     Camera from object, meters.
     fn restart(&self, py: Python<'_>, T_co: &Bound<'_, PyAny>) -> PyResult<()> {
         let init = array::motion(T_co, "T_co")?.isometry;
         py.detach(|| locked(&self.estimator).restart(&init))
             .map_err(errors::input)
     }
 
-    /// The pose in the current camera frame, shape (4, 4), float64, metres: fused, or the initial
-    /// one while there is no estimate.
+    /// The fused pose in the current camera frame, shape (4, 4), float64, meters; the initial pose
+    /// while there is no estimate.
     #[getter]
     fn T_co(&self, py: Python<'_>) -> Matrix {
         (&py.detach(|| locked(&self.estimator).camera_from_object())).into()
     }
 
-    /// The fused estimate in the current camera frame; None before the first.
+    /// The fused estimate in the current camera frame; None before the first estimate.
     #[getter]
     fn estimate(&self, py: Python<'_>) -> Option<PyPoseEstimate> {
         py.detach(|| locked(&self.estimator).estimate())
@@ -141,26 +140,26 @@ impl PySequentialEstimator {
     }
 }
 
-/// The object's pose after one image and how it was estimated, in the camera frame of that image.
+/// The pose of the object after one image, in the camera frame of that image.
 #[pyclass(frozen, get_all, module = "hybrid_icp", name = "SequentialStep")]
 #[derive(Debug)]
 #[allow(non_snake_case)]
 pub(crate) struct PySequentialStep {
-    /// The fused pose, shape (4, 4), float64, metres. While there is no estimate, the initial pose,
+    /// The fused pose, shape (4, 4), float64, meters. While there is no estimate, the initial pose
     /// moved with the camera.
     T_co: Matrix,
     /// Its covariance of ξ = [ρ; φ], shape (6, 6), float64; None while there is no estimate.
     covariance: Option<Matrix>,
-    /// The pose that ICP started from, shape (4, 4), float64, metres: the last fused pose, moved
+    /// The pose that ICP started from, shape (4, 4), float64, meters: the last fused pose, moved
     /// with the camera.
     T_init: Matrix,
-    /// The pose that ICP found in this image alone, shape (4, 4), float64, metres.
+    /// The pose that ICP found in this image alone, shape (4, 4), float64, meters.
     T_registered: Matrix,
-    /// Why the registration ended.
+    /// The reason why the registration ended.
     termination: &'static str,
     /// The mean VSD estimate of `T_registered`; None if it was not scored.
     mve: Option<f64>,
-    /// One word for the result: as `Fuser.update` returns, or "no_estimate" or "refused".
+    /// The result of `Fuser.update`, or "no_estimate" or "refused".
     event: &'static str,
 }
 

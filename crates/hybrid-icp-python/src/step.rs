@@ -1,4 +1,4 @@
-//! Single steps of the error metrics.
+//! Computes single steps of the error metrics.
 
 use hybrid_icp::core::{
     Correspondences, Isometry3, Iteration, Pair, Point3, Surfel, UnitVector3, Vector3,
@@ -9,27 +9,28 @@ use pyo3::prelude::*;
 use crate::array::{self, Matrix};
 use crate::errors::InputError;
 
-/// One step of point-to-point ICP on given pairs: the rigid motion that minimises Σ|T pᵢ − cᵢ|²
-/// (Kabsch).
+/// Computes one step of point-to-point ICP on given pairs.
+///
+/// The step is the rigid motion that minimizes Σ|T pᵢ − cᵢ|² (Kabsch).
 ///
 /// Parameters
 /// ----------
 /// sources : array_like, shape (N, 3)
-///     Model points pᵢ, moved to the camera frame; read as float32, metres.
+///     Model points pᵢ in the camera frame, read as float32, meters.
 /// targets : array_like, shape (N, 3)
-///     Their observed points cᵢ, metres.
+///     The observed points cᵢ of the pairs, meters.
 ///
 /// Returns
 /// -------
 /// increment : numpy.ndarray, shape (4, 4), float64
-///     T, which multiplies the pose from the left; metres.
+///     T, meters. It multiplies the pose from the left.
 /// mean_loss : float
 ///     Mean of |pᵢ − cᵢ|² before the step, m².
 ///
 /// Raises
 /// ------
 /// InputError
-///     When the pairs do not determine a step.
+///     If the pairs do not determine a step.
 ///
 /// Examples
 /// --------
@@ -49,29 +50,31 @@ pub(crate) fn point_to_point_step(
     finish(step, pairs.len())
 }
 
-/// One step of point-to-plane ICP on given pairs: Gauss–Newton on Σ(nᵢ·(T pᵢ − cᵢ))².
+/// Computes one step of point-to-plane ICP on given pairs.
+///
+/// The step is a Gauss–Newton step on Σ(nᵢ·(T pᵢ − cᵢ))².
 ///
 /// Parameters
 /// ----------
 /// sources : array_like, shape (N, 3)
-///     Model points pᵢ, moved to the camera frame; read as float32, metres.
+///     Model points pᵢ in the camera frame, read as float32, meters.
 /// targets : array_like, shape (N, 3)
-///     Their observed points cᵢ, metres.
+///     The observed points cᵢ of the pairs, meters.
 /// normals : array_like, shape (N, 3)
-///     The observed normals nᵢ; brought to unit length.
+///     The observed normals nᵢ of the pairs. They are normalized to unit length.
 ///
 /// Returns
 /// -------
 /// increment : numpy.ndarray, shape (4, 4), float64
-///     T = exp(ξ^) of the linear least-squares solution ξ, which multiplies the pose from the left;
-///     metres.
+///     T = exp(ξ^) of the linear least-squares solution ξ, meters. It multiplies the pose from the
+///     left.
 /// mean_loss : float
 ///     Mean of (nᵢ·(pᵢ − cᵢ))² before the step, m².
 ///
 /// Raises
 /// ------
 /// InputError
-///     When the pairs do not determine a step.
+///     If the pairs do not determine a step.
 #[pyfunction]
 pub(crate) fn point_to_plane_step(
     sources: &Bound<'_, PyAny>,
@@ -84,8 +87,12 @@ pub(crate) fn point_to_plane_step(
 }
 
 fn finish(step: Option<Step>, count: usize) -> PyResult<(Matrix, f64)> {
-    let step = step
-        .ok_or_else(|| InputError::new_err(format!("the {count} pairs do not determine a step")))?;
+    let step = step.ok_or_else(|| {
+        InputError::new_err(format!(
+            "the {count} pairs do not determine a step, expected pairs that fix all six degrees of \
+             freedom"
+        ))
+    })?;
     Ok(((&step.increment).into(), step.mean_loss))
 }
 
@@ -98,13 +105,13 @@ fn pairs(
     let target_points = array::points(targets, "targets")?;
     let normals = match normals {
         Some(normals) => unit_normals(normals)?,
-        // Point-to-point does not look at them.
+        // Point-to-point does not use them.
         None => vec![-Vector3::z_axis(); points.len()],
     };
     for (name, count) in [("targets", target_points.len()), ("normals", normals.len())] {
         if count != points.len() {
             return Err(InputError::new_err(format!(
-                "{name} has {count} rows but sources {}, expected as many",
+                "{name} has {count} rows but sources has {}, expected the same number",
                 points.len()
             )));
         }
@@ -126,7 +133,7 @@ fn unit_normals(normals: &Bound<'_, PyAny>) -> PyResult<Vec<UnitVector3<f32>>> {
         .map(|(row, vector): (usize, _)| {
             UnitVector3::try_new(vector.coords, f32::MIN_POSITIVE).ok_or_else(|| {
                 InputError::new_err(format!(
-                    "normals[{row}] has no direction, expected a vector of non-zero length"
+                    "normals[{row}] has no direction, expected a vector of nonzero length"
                 ))
             })
         })

@@ -1,4 +1,4 @@
-"""One generated scene for all tests, that of the examples, smaller."""
+"""The fixtures: the scene of the examples with a smaller image, and the datasets."""
 
 import os
 import struct
@@ -13,7 +13,7 @@ import pytest
 import hybrid_icp as hi
 
 ROOT = Path(__file__).resolve().parents[3]
-# The implementation of BOP's errors that is written from their definitions.
+# The reference implementation of the BOP errors.
 sys.path.insert(0, str(ROOT / "tests" / "agreement"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 
@@ -27,14 +27,14 @@ def scene():
 
 
 def many(scene, count):
-    """Rough poses about the true one, the same every time."""
+    """Returns reproducible initial poses around the true pose."""
     random = np.random.default_rng(7)
     motions = [pose(random.normal(0, 0.06, 3), random.normal(0, 0.006, 3)) for _ in range(count)]
     return np.array([motion @ scene.true for motion in motions])
 
 
 def write_png(path, pixels):
-    """Writes a grey PNG of 8 or 16 bits."""
+    """Writes a gray PNG with 8 or 16 bits."""
     height, width = pixels.shape
     raw = b"".join(b"\0" + row.astype(pixels.dtype.newbyteorder(">")).tobytes() for row in pixels)
 
@@ -42,36 +42,39 @@ def write_png(path, pixels):
         return struct.pack(">I", len(data)) + tag + data + struct.pack(">I", zlib.crc32(tag + data))
 
     header = struct.pack(">IIBBBBB", width, height, 8 * pixels.dtype.itemsize, 0, 0, 0, 0)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
+    chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
 
 
 @pytest.fixture(scope="session")
 def ycbv():
-    """The folder of the YCB-Video frames that these tests are of, an excerpt with result files, or a skip that says so."""
-    named = [os.environ.get("BOP_PATH"), os.environ.get("HICP_DATA") and os.environ["HICP_DATA"] + "/bop"]
-    for folder in [Path(name) for name in named if name] + [ROOT.parent / "shared" / "data" / "bop"]:
+    """Returns the folder of the YCB-Video excerpt with result files, or skips the test."""
+    data = os.environ.get("HICP_DATA")
+    named = [os.environ.get("BOP_PATH"), data and data + "/bop"]
+    shared = ROOT.parent / "shared" / "data" / "bop"
+    for folder in [Path(name) for name in named if name] + [shared]:
         if (folder / "ycbv" / "results").is_dir():
             return folder / "ycbv"
-    pytest.skip("no ycbv dataset; set BOP_PATH to the folder that holds it")
+    pytest.skip("no ycbv dataset; set BOP_PATH to the folder that contains it")
 
 
 @pytest.fixture(scope="session")
 def program():
-    """The program hybrid-icp."""
+    """Returns the path of the program hybrid-icp."""
     path = os.environ.get("HYBRID_ICP_PROGRAM")
     if not path:
-        pytest.skip("HYBRID_ICP_PROGRAM does not name the program hybrid-icp; cargo xtask python sets it")
+        pytest.skip("HYBRID_ICP_PROGRAM is not set; run cargo xtask python")
     return path
 
 
 @pytest.fixture(scope="session")
 def dataset(program, tmp_path_factory):
-    """A generated dataset, its hypotheses, and what `bop refine` makes of them."""
+    """Generates a dataset with hypotheses, and the output of `bop refine` for them."""
     folder = tmp_path_factory.mktemp("bop")
-    subprocess.run([program, "bop", "generate", "--scenes", "2", "--out", folder / "synthetic"], check=True, capture_output=True)
-    results, expected = folder / "synthetic" / "initial_synthetic-test.csv", folder / "expected.csv"
-    subprocess.run(
-        [program, "bop", "refine", "--dataset", folder / "synthetic", "--results", results, "--output", expected, "--no-time"],
-        check=True, capture_output=True,
-    )
-    return folder / "synthetic", results, expected.read_bytes()
+    synthetic, expected = folder / "synthetic", folder / "expected.csv"
+    results = synthetic / "initial_synthetic-test.csv"
+    generate = ["generate", "--scenes", "2", "--out", synthetic]
+    refine = ["refine", "--dataset", synthetic, "--results", results, "--output", expected]
+    for command in (generate, [*refine, "--no-time"]):
+        subprocess.run([program, "bop", *command], check=True, capture_output=True)
+    return synthetic, results, expected.read_bytes()

@@ -1,4 +1,4 @@
-"""The processes of our actors on this machine, to be killed."""
+"""Finds the processes of our Ray actors on this machine, so that tests can kill them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ MARK = "HYBRID_ICP_RAY_TEST"
 
 
 def can_start(seconds: float) -> bool:
-    """Whether Ray starts on this machine at all: where it may not start processes it fails, or waits for ever."""
-    options = "num_cpus=1, include_dashboard=False, _node_ip_address='127.0.0.1', log_to_driver=False"
+    """Returns whether Ray starts. It fails or waits forever if it cannot start processes."""
+    options = "num_cpus=1, include_dashboard=False, log_to_driver=False"
+    options += ", _node_ip_address='127.0.0.1'"
     code = f"import ray; ray.init('local', {options}); ray.shutdown()"
     environment = os.environ | {"RAY_USAGE_STATS_ENABLED": "0"}
-    with subprocess.Popen([sys.executable, "-c", code], env=environment, start_new_session=True) as probe:
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, env=environment, start_new_session=True) as probe:
         try:
             return probe.wait(seconds) == 0
         except subprocess.TimeoutExpired:
@@ -26,22 +28,27 @@ def can_start(seconds: float) -> bool:
 
 
 def start(cpus: int) -> None:
-    """Starts Ray for this process alone."""
+    """Starts Ray for this process only."""
     import ray
 
-    # Workers inherit the environment of the process that starts Ray: the mark tells ours from any others.
+    # Workers inherit the environment of the process that starts Ray. The mark identifies ours.
     os.environ.update({MARK: uuid.uuid4().hex, "RAY_USAGE_STATS_ENABLED": "0"})
-    ray.init("local", num_cpus=cpus, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+    address = "127.0.0.1"
+    ray.init(
+        "local", num_cpus=cpus, include_dashboard=False, _node_ip_address=address,
+        log_to_driver=False,
+    )
 
 
 def workers() -> list[int]:
-    """Process ids of our actors."""
+    """Returns the process ids of our actors."""
     mark = f"{MARK}={os.environ[MARK]}".encode()
     found = []
     for process in Path("/proc").iterdir():
         try:
             command = (process / "cmdline").read_bytes()
-            if b"ray::" in command and b"Worker" in command and mark in (process / "environ").read_bytes().split(b"\0"):
+            environment = (process / "environ").read_bytes().split(b"\0")
+            if b"ray::" in command and b"Worker" in command and mark in environment:
                 found.append(int(process.name))
         except (OSError, ValueError):
             continue

@@ -1,4 +1,4 @@
-"""The examples run as they are, and do what they say."""
+"""Runs the examples, and the Python blocks of the READMEs and the book."""
 
 import csv
 import subprocess
@@ -12,30 +12,31 @@ FOLDER = Path(__file__).resolve().parents[1] / "examples"
 
 
 def run(name, *arguments):
-    return subprocess.run([sys.executable, FOLDER / name, *arguments], check=True, capture_output=True, text=True).stdout
+    command = [sys.executable, FOLDER / name, *arguments]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def test_one_frame_is_refined():
-    said = run("01_refine_one_frame.py").splitlines()[-1]
-    before, after = (float(word) for word in said.split() if word[0].isdigit())
+    printed = run("01_refine_one_frame.py").splitlines()[-1]
+    before, after = (float(word) for word in printed.split() if word[0].isdigit())
     assert before > 10 and after < 0.1
 
 
-def test_a_loop_of_ones_own_improves_a_dataset(dataset, tmp_path):
+def test_a_custom_loop_improves_a_dataset(dataset, tmp_path):
     folder, results, _ = dataset
-    said = run("02_bop_loop.py", folder, results, tmp_path / "refined.csv")
-    improved, count = int(said.split()[0]), int(said.split()[2])
+    words = run("02_bop_loop.py", folder, results, tmp_path / "refined.csv").split()
+    improved, count = int(words[0]), int(words[2])
     with open(tmp_path / "refined.csv", newline="") as file:
         assert len(list(csv.DictReader(file))) == count
     assert improved > count / 2
 
 
-def test_meshes_of_other_libraries_are_taken():
-    said = run("03_after_a_detector.py")
-    # Open3D may be there and miss a library of the system.
-    left_out = [line for line in said.splitlines() if line.startswith("left out: ")]
-    assert said.count(": Model(12 vertices, 20 faces") + len(left_out) == 2
-    assert "trimesh: Model" in said
+def test_meshes_of_other_libraries_are_accepted():
+    printed = run("03_after_a_detector.py")
+    # Open3D may be installed without a system library that it requires.
+    skipped = [line for line in printed.splitlines() if line.startswith("skipped: ")]
+    assert printed.count(": Model(12 vertices, 20 faces") + len(skipped) == 2
+    assert "trimesh: Model" in printed
 
 
 @pytest.mark.parametrize("readme", [FOLDER.parent / "README.md", FOLDER.parents[2] / "README.md"])
@@ -57,8 +58,9 @@ def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
     (tmp_path / "mug.ply").write_text(head + "\n".join(rows) + "\n")
     monkeypatch.chdir(tmp_path)
     names = {
-        "depth_m": frame.depth, "mask": frame.mask, "masks": [frame.mask], "K": frame.camera.K, "T_co": frame.rough,
-        "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model, "grasp": lambda pose: None,
+        "depth_m": frame.depth, "mask": frame.mask, "masks": [frame.mask], "K": frame.camera.K,
+        "T_co": frame.rough, "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model,
+        "grasp": lambda pose: None,
     }
     blocks = (FOLDER.parents[2] / "docs" / page).read_text().split("```python\n")[1:]
     assert blocks

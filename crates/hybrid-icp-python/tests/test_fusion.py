@@ -1,4 +1,4 @@
-"""Fusion and the sequential estimator."""
+"""Tests fusion and the sequential estimator."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def at(x, variance, **options):
     return hi.PoseEstimate(pose([0, 0, 0], [x, 0, 0.5]), np.eye(6) * variance, **options)
 
 
-def test_estimates_are_weighed_by_their_information():
+def test_estimates_are_weighted_by_their_information():
     fused = hi.fuse([at(0, 1e-6), at(0.004, 3e-6)])
     assert np.isclose(fused.T_co[0, 3], 0.001, atol=1e-9)
     assert np.isclose(fused.covariance[0, 0], 0.75e-6, rtol=1e-6)
@@ -29,8 +29,9 @@ def test_every_method_follows_the_camera(method):
     assert fuser.estimate is None
 
 
-def test_a_gate_leaves_out_what_is_far_or_does_not_explain_its_image(scene):
-    fuser = hi.Fuser("average", model=scene.model, max_mve=0.4, max_mahalanobis_squared=20, restart_after=2)
+def test_a_gate_rejects_estimates_that_are_far_or_have_a_high_mve(scene):
+    gate = {"max_mve": 0.4, "max_mahalanobis_squared": 20, "restart_after": 2}
+    fuser = hi.Fuser("average", model=scene.model, **gate)
     assert fuser.update(at(0, 1e-6, mve=0.1)) == "accepted"
     assert fuser.update(at(0, 1e-6, mve=0.9)) == "rejected"
     assert fuser.update(at(0.3, 1e-6, mve=0.1)) == "rejected"
@@ -40,7 +41,9 @@ def test_a_gate_leaves_out_what_is_far_or_does_not_explain_its_image(scene):
 @pytest.mark.parametrize("paper", [False, True])
 def test_the_sequential_estimator_follows_a_moving_camera(scene, paper):
     pipeline = hi.Pipeline.preset("hybrid")
-    estimator = hi.SequentialEstimator(pipeline, "weighted-average", scene.model, scene.rough, paper=paper)
+    estimator = hi.SequentialEstimator(
+        pipeline, "weighted-average", scene.model, scene.rough, paper=paper
+    )
     assert np.allclose(estimator.T_co, scene.rough) and estimator.estimate is None
     motion = pose([0.02, 0.01, 0.0], [0.005, 0.0, -0.01])
     true, step = scene.true, None

@@ -1,4 +1,4 @@
-"""What is refused, and what it is told."""
+"""Tests the checks of arguments and their messages."""
 
 import os
 
@@ -15,32 +15,32 @@ WALL = np.full((48, 64), 0.8, np.float32)
 @pytest.mark.parametrize(
     ("arguments", "scale", "message"),
     [
-        ((WALL * 1000, None, CAMERA), None, "depth looks like millimetres: median 800, expected metres"),
-        ((WALL / 1000, None, CAMERA), None, "depth looks too small for metres: median 8[.0-9]*e-4"),
+        ((WALL * 1000, None, CAMERA), None, "depth looks like millimeters: median 800, expected meters"),
+        ((WALL / 1000, None, CAMERA), None, "depth looks too small for meters: median 8[.0-9]*e-4, expected at least 0.01"),
         ((WALL.astype(np.uint16), None, CAMERA), None, r"depth is an array of uint16 with shape \(48, 64\) without scale="),
         ((WALL, None, CAMERA), 0.001, r"scale=0.001 was passed with depth as an array of float32"),
-        ((WALL.astype(np.uint16), None, CAMERA), -1.0, "scale is -1, expected metres per unit above 0"),
-        ((WALL.astype(np.int32), None, CAMERA), None, "depth is an array of int32 .* expected an .H, W. array of float32 metres"),
+        ((WALL.astype(np.uint16), None, CAMERA), -1.0, "scale is -1, expected meters per unit above 0"),
+        ((WALL.astype(np.int32), None, CAMERA), None, "depth is an array of int32 .* expected an .H, W. array of float32 meters"),
         ((WALL[None], None, CAMERA), None, r"depth is an array of float32 with shape \(1, 48, 64\)"),
         ((WALL.tolist(), None, CAMERA), None, "depth is a list, expected"),
         ((WALL.T, None, CAMERA), None, r"camera is for 64x48 images but depth is .* shape \(64, 48\), expected shape \(48, 64\)"),
         ((WALL, np.ones((64, 48), bool), CAMERA), None, r"mask is .* shape \(64, 48\), expected the shape of depth, \(48, 64\)"),
         ((hi.DepthImage(WALL.T), None, CAMERA), None, r"depth is a DepthImage with shape \(64, 48\), expected shape \(48, 64\)"),
-        ((hi.DepthImage(WALL), None, CAMERA), 0.001, "scale= was passed with depth as a DepthImage, expected it when"),
+        ((hi.DepthImage(WALL), None, CAMERA), 0.001, "scale= was passed with depth as a DepthImage, .* expected scale= where"),
         ((hi.DepthImage(WALL), np.ones((64, 48), bool), CAMERA), None, r"mask is .* expected the shape of depth, \(48, 64\)"),
         ((WALL, WALL, CAMERA), None, "mask is an array of float32 .* expected an .H, W. array of bool or uint8"),
     ],
 )
-def test_observations_say_what_was_passed(arguments, scale, message):
+def test_observation_errors_name_the_value(arguments, scale, message):
     with pytest.raises(hi.InputError, match=message):
         hi.Observation(*arguments, scale=scale)
 
 
-def test_units_are_told_where_few_pixels_were_measured():
-    # Two pixels, off the grid by which images are judged first.
+def test_units_are_checked_even_if_few_pixels_were_measured():
+    # Two pixels outside the grid that the check of the unit reads first.
     sparse = np.zeros((480, 640), np.float32)
     sparse[[1, 300], [2, 401]] = 823
-    with pytest.raises(hi.InputError, match="depth looks like millimetres: median 823"):
+    with pytest.raises(hi.InputError, match="depth looks like millimeters: median 823"):
         hi.DepthImage(sparse)
     assert hi.DepthImage(sparse / 1000).to_numpy().sum() == np.float32(0.823) * 2
     assert not hi.DepthImage(np.full((48, 64), np.nan, np.float32)).to_numpy().any()
@@ -55,30 +55,32 @@ def test_units_are_told_where_few_pixels_were_measured():
         (np.eye(4) * 2, "last row of a pose is 0 0 0 1"),
         (np.diag([1, 1, -1, 1.0]), "T_co: rotation has determinant -1"),
         (np.diag([1, 1.1, 1, 1.0]), "T_co: rotation is not orthogonal"),
-        (pose([0, 0, 0], [3, 4, 800]), "T_co looks like millimetres: its translation is \\(3, 4, 800\\)"),
+        (pose([0, 0, 0], [3, 4, 800]), "T_co looks like millimeters: its translation is \\(3, 4, 800\\)"),
         (pose([0, 0, 0], [np.nan, 0, 1]), "T_co has the translation \\(NaN, 0, 1\\)"),
     ],
 )
-def test_poses_say_what_was_passed(scene, value, message):
+def test_pose_errors_name_the_value(scene, value, message):
     with pytest.raises(hi.InputError, match=message):
         hi.Pipeline.preset("hybrid").refine(scene.model, scene.observation, value)
 
 
 def test_a_batch_names_the_pose_that_is_wrong(scene):
     poses = np.array([scene.rough, scene.rough * 2])
+    hybrid = hi.Pipeline.preset("hybrid")
     with pytest.raises(hi.InputError, match=r"T_co\[1\]\[3, 3\] is 2, expected 1"):
-        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, poses)
+        hybrid.refine_batch(scene.model, scene.observation, poses)
     with pytest.raises(hi.InputError, match=r"shape \(4, 4\), expected an \(N, 4, 4\)"):
-        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, scene.rough)
+        hybrid.refine_batch(scene.model, scene.observation, scene.rough)
     with pytest.raises(hi.InputError, match="threads is 0"):
-        hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, poses[:1], threads=0)
+        hybrid.refine_batch(scene.model, scene.observation, poses[:1], threads=0)
 
 
-def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
+def test_frames_and_units_that_do_not_match_cause_a_warning(scene):
     pipeline = hi.Pipeline.preset("hybrid")
     with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
         pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, -0.5]))
-    with pytest.warns(hi.InputWarning, match="at z = 5.0.* but the median depth inside the mask is 0.[45]"):
+    message = "at z = 5.0.* but the median depth inside the mask is 0.[45]"
+    with pytest.warns(hi.InputWarning, match=message):
         pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, 5]))
     vertices, faces = bracket()
     with pytest.warns(hi.InputWarning, match='diameter is 1.*: check unit="m"'):
@@ -94,9 +96,9 @@ def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], samples=10**12), "samples is 1000000000000, expected at most 10000000"),
         (
             lambda: hi.Model(np.eye(3), [[0, 1, 2]], symmetry_axes=[([0, 0, 1], [0, 0, 0])] * 4000),
-            "make 1260000 motions, expected at most 1000000",
+            "define 1260000 motions, expected at most 1000000",
         ),
-        (lambda: hi.Model(np.eye(3), [[0, 1, -1]]), r"faces\[0\] holds -1, expected indices from 0"),
+        (lambda: hi.Model(np.eye(3), [[0, 1, -1]]), r"faces\[0\] has the index -1, expected 0 or more"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 3]]), "triangle 0 uses vertex 3, but there are 3 vertices"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], unit="inch"), 'unit is "inch", expected m, mm or cm'),
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], diameter=-1), "diameter is -1, expected"),
@@ -111,7 +113,7 @@ def test_frames_and_units_that_do_not_go_together_are_warned_of(scene):
         (lambda: hi.fuse([]), "no estimate to fuse"),
     ],
 )
-def test_everything_else_says_what_was_passed(make, message):
+def test_other_errors_name_the_value(make, message):
     with pytest.raises(hi.InputError, match=message) as raised:
         make()
     assert isinstance(raised.value, ValueError) and isinstance(raised.value, hi.HybridIcpError)
@@ -133,7 +135,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
 
 
 def shifted(array):
-    """Returns an equal array of which no number lies where a processor likes it to."""
+    """Returns an equal array that is not aligned."""
     buffer = np.zeros(array.nbytes + 1, np.uint8)
     moved = buffer[1:].view(array.dtype).reshape(array.shape)
     moved[...] = array
@@ -142,7 +144,7 @@ def shifted(array):
 
 
 def packed(array):
-    """Returns an equal array that is a field of records without gaps."""
+    """Returns an equal array that is a field of packed records."""
     records = np.zeros(array.shape, dtype=[("valid", "u1"), ("value", array.dtype)])
     records["value"] = array
     assert not records["value"].flags.aligned
@@ -152,23 +154,27 @@ def packed(array):
 def test_layouts_and_types_of_arrays_do_not_matter(scene):
     def same(depth, mask, scale=None):
         other = hi.Observation(depth, mask, scene.camera, scale=scale)
-        assert np.array_equal(other.depth, expected.depth) and np.array_equal(other.mask, expected.mask)
+        assert np.array_equal(other.depth, expected.depth)
+        assert np.array_equal(other.mask, expected.mask)
         assert np.array_equal(other.surfels()[0], expected.surfels()[0])
 
     expected = scene.observation
     same(np.asfortranarray(scene.depth), np.asfortranarray(scene.mask))
     transposed = np.asfortranarray(scene.rough)
-    results = [hi.Pipeline.preset("hybrid").refine(scene.model, expected, T_co).to_dict() for T_co in (scene.rough, transposed)]
+    hybrid = hi.Pipeline.preset("hybrid")
+    both = (scene.rough, transposed)
+    results = [hybrid.refine(scene.model, expected, T_co).to_dict() for T_co in both]
     assert results[0] == results[1]
     same(np.repeat(scene.depth, 2, axis=1)[:, ::2], np.repeat(scene.mask, 2, axis=0)[::2])
     same(scene.depth.astype(np.float64), scene.mask.astype(np.uint8) * 255)
     for moved in (shifted, packed):
         same(moved(scene.depth), scene.mask)
         same(moved(scene.depth.astype(np.float64)), scene.mask)
-        refined = hi.Pipeline.preset("hybrid").refine(scene.model, expected, moved(scene.rough)).to_dict()
+        refined = hybrid.refine(scene.model, expected, moved(scene.rough)).to_dict()
         assert refined == results[0]
         vertices, faces = bracket()
-        model = hi.Model(moved(np.asarray(vertices, dtype=np.float64)), moved(np.asarray(faces, dtype=np.int64)), unit="mm")
+        numbers, indices = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+        model = hi.Model(moved(numbers), moved(indices), unit="mm")
         assert np.array_equal(model.vertices, hi.Model(vertices, faces, unit="mm").vertices)
     units = np.round(scene.depth * 10000).astype(np.uint16)
     expected = hi.Observation((units * 0.1 / 1000).astype(np.float32), scene.mask, scene.camera)
@@ -184,7 +190,8 @@ def test_observations_of_one_image_share_its_depth(scene):
     image = hi.DepthImage(scene.depth)
     left = scene.mask & (np.arange(320) < 160)
     for mask in (scene.mask, left, None):
-        apart, shared = (hi.Observation(depth, mask, scene.camera) for depth in (scene.depth, image))
+        depths = (scene.depth, image)
+        apart, shared = (hi.Observation(depth, mask, scene.camera) for depth in depths)
         assert all(map(np.array_equal, apart.surfels(), shared.surfels()))
         assert np.array_equal(shared.depth, image.to_numpy()) and shared.image == image
     again = hi.Observation(shared.image, left, scene.camera)
@@ -193,12 +200,12 @@ def test_observations_of_one_image_share_its_depth(scene):
     assert image != hi.DepthImage(scene.depth * 2)
 
 
-def test_masks_of_a_shared_image_take_no_memory_for_depth():
+def test_masks_of_a_shared_image_use_no_memory_for_depth():
     camera = hi.Camera(1000, 1000, 999.5, 749.5, 2000, 1500)
     image = hi.DepthImage(np.full((1500, 2000), 0.8, np.float32))
     masks = [np.zeros((1500, 2000), bool) for _ in range(20)]
     for index, mask in enumerate(masks):
-        mask[:] = False  # Memory that nobody has written to is not there yet.
+        mask[:] = False  # Write the mask, so that its memory is resident.
         mask[10 * index : 10 * index + 8, :8] = True
 
     def resident():
@@ -206,15 +213,15 @@ def test_masks_of_a_shared_image_take_no_memory_for_depth():
             return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
 
     if not os.path.exists("/proc/self/statm"):
-        pytest.skip("no /proc to read this process's memory from")
+        pytest.skip("the memory of this process is unknown without /proc")
     before = resident()
     observations = [hi.Observation(image, mask, camera) for mask in masks]
     grown = resident() - before
-    # A byte per pixel for each mask, 60 MB in all; a depth for each would be 240 MB more.
+    # The masks have one byte per pixel, 60 MB in total. A depth image per mask would add 240 MB.
     assert grown < 120e6 and sum(o.n_measured for o in observations) == 20 * 64
 
 
-def test_an_image_read_from_a_file_is_the_array_read_from_it(tmp_path):
+def test_an_image_from_a_file_equals_the_array_from_it(tmp_path):
     write_png(tmp_path / "depth.png", np.arange(48 * 64, dtype=np.uint16).reshape(48, 64))
     image = hi.DepthImage.from_png(tmp_path / "depth.png", 0.0001)
     array = hi.read_depth_png(tmp_path / "depth.png", 0.0001)
@@ -223,7 +230,7 @@ def test_an_image_read_from_a_file_is_the_array_read_from_it(tmp_path):
         hi.DepthImage.from_png(tmp_path / "none.png", 0.0001)
 
 
-def test_pixel_centres_shift_the_principal_point():
+def test_pixel_centers_shift_the_principal_point():
     camera = hi.Camera(100, 100, 32, 24, 64, 48, pixel_centers="halves")
     assert (camera.cx, camera.cy) == (31.5, 23.5) and camera == CAMERA
     assert np.array_equal(camera.K, [[100, 0, 31.5], [0, 100, 23.5], [0, 0, 1]])

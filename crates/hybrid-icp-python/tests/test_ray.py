@@ -1,4 +1,4 @@
-"""`hybrid_icp.ray` and `hybrid_icp.bop` against `hybrid-icp bop refine`, byte for byte, with a worker killed in the middle."""
+"""Compares the bytes of `hybrid_icp.ray` and `hybrid_icp.bop` with those of `bop refine`."""
 
 import json
 import os
@@ -26,15 +26,16 @@ def ray():
     ray.shutdown()
 
 
-def test_ray_is_not_imported_without_being_asked_for():
-    code = "import sys, hybrid_icp, hybrid_icp.bop; print(sorted(m for m in sys.modules if m.split('.')[0] in ('ray', 'pyarrow')))"
-    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+def test_the_package_does_not_import_ray():
+    code = "import sys, hybrid_icp.bop; print({'ray', 'pyarrow'} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert run.stdout.strip() == "set()"
 
 
 def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
     folder, results, expected = dataset
     images = bop.read_images(results)
-    refiner = bop.DatasetRefiner(folder, "test", hi.Pipeline.preset("auto"), bop.object_ids(images))
+    refiner = bop.DatasetRefiner(folder, "test", hi.Pipeline(), bop.object_ids(images))
     assert refiner.missing_models == [] and refiner.broken_models == {}
     lines = {}
     for _, _, indices, rows in reversed(images):
@@ -43,7 +44,7 @@ def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
         lines.update(zip(indices, refined))
     bop.write_results(tmp_path / "out.csv", (lines[i] for i in sorted(lines)))
     assert (tmp_path / "out.csv").read_bytes() == expected
-    with pytest.raises(hi.InputError, match="rows are of 2 images, expected one"):
+    with pytest.raises(hi.InputError, match="rows belong to 2 images, expected the rows of one"):
         refiner.refine(images[0][3] + images[1][3].removeprefix(bop.result_header()))
 
 
@@ -60,20 +61,22 @@ def test_a_killed_worker_changes_no_byte(dataset, ray, tmp_path):
             os.kill(alive[0], signal.SIGKILL)
             killed.append(alive[0])
 
-    # All may be done before the first is told of.
+    # All tasks may be finished before the first call of `kill_one`.
     for _ in range(10):
         seen.clear()
-        statuses = hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one)
+        statuses = hybrid_icp.ray.refine(
+            folder, results, tmp_path / "out.csv", rows_per_task=1, workers=2, progress=kill_one
+        )
         assert (tmp_path / "out.csv").read_bytes() == expected
         if killed:
             break
-    assert killed, "no worker was found to kill"
+    assert killed, "found no worker to kill"
     assert (tmp_path / "out.csv").read_bytes() == expected
     assert sum(statuses.values()) == expected.count(b"\n") - 1 == seen[-1][0] == seen[-1][1]
     assert not (tmp_path / "out.csv.journal").exists()
 
 
-def test_a_killed_driver_goes_on_from_its_journal(dataset, ray, tmp_path):
+def test_a_run_continues_from_the_journal_of_a_killed_driver(dataset, ray, tmp_path):
     import hybrid_icp.ray
 
     folder, results, expected = dataset
@@ -85,14 +88,15 @@ def test_a_killed_driver_goes_on_from_its_journal(dataset, ray, tmp_path):
         raise Killed
 
     def run(progress=None, **options):
-        return hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", rows_per_task=1, progress=progress, **options)
+        options |= {"rows_per_task": 1, "progress": progress}
+        return hybrid_icp.ray.refine(folder, results, tmp_path / "out.csv", **options)
 
     with pytest.raises(Killed):
         run(fail)
     journal = tmp_path / "out.csv.journal"
     before = journal.read_text()
     assert before.count("\n") >= 2
-    # The last line was cut off, and what it was for is done again.
+    # The last line is cut off, and its task runs again.
     journal.write_text(before + '{"place": 1, "done": {"li')
     with pytest.raises(hi.InputError, match="journal of another input"):
         run(rescore="mve")
@@ -102,7 +106,7 @@ def test_a_killed_driver_goes_on_from_its_journal(dataset, ray, tmp_path):
     assert len(done) < len(bop.read_images(results))
 
 
-def test_what_ray_takes_is_documented(ray):
+def test_every_parameter_of_ray_is_documented(ray):
     import inspect
 
     import hybrid_icp.ray
@@ -112,7 +116,7 @@ def test_what_ray_takes_is_documented(ray):
         assert f"\n{parameter} : " in text, parameter
 
 
-def test_hypotheses_may_come_as_parquet(dataset, ray, tmp_path):
+def test_hypotheses_can_be_a_parquet_file(dataset, ray, tmp_path):
     import csv
 
     import pyarrow
@@ -127,6 +131,7 @@ def test_hypotheses_may_come_as_parquet(dataset, ray, tmp_path):
         row.update({key: int(row[key]) for key in ("scene_id", "im_id", "obj_id")})
         row.update({key: [float(x) for x in row[key].split()] for key in ("R", "t")})
         row.update({key: float(row[key]) for key in ("score", "time")})
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows), tmp_path / "hypotheses.parquet")
+    table = pyarrow.Table.from_pylist(rows)
+    pyarrow.parquet.write_table(table, tmp_path / "hypotheses.parquet")
     hybrid_icp.ray.refine(folder, tmp_path / "hypotheses.parquet", tmp_path / "out.csv")
     assert (tmp_path / "out.csv").read_bytes() == expected

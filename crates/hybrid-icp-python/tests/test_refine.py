@@ -1,4 +1,4 @@
-"""Refining: results, order, threads, observers, interruption."""
+"""Tests refinement: results, order, threads, observers and interruption."""
 
 import json
 import pickle
@@ -15,7 +15,15 @@ import hybrid_icp as hi
 from conftest import ROOT, many
 
 
-def test_a_rough_pose_becomes_a_better_one(scene):
+def test_the_default_pipeline_is_auto(scene):
+    default, auto = hi.Pipeline(), hi.Pipeline.preset("auto")
+    assert (default.name, default.toml) == ("auto", auto.toml)
+    results = [p.refine(scene.model, scene.observation, scene.rough) for p in (default, auto)]
+    assert results[0].to_dict() == results[1].to_dict()
+    assert hi.Pipeline("hybrid", overrides=["times=1"]).name == "hybrid times=1"
+
+
+def test_refinement_reduces_the_error_of_a_pose(scene):
     result = hi.Pipeline.preset("hybrid").refine(scene.model, scene.observation, scene.rough)
     assert result.outcome == "refined" and result.refined
     before, after = (hi.add(T_co, scene.true, scene.model) for T_co in (scene.rough, result.T_co))
@@ -26,30 +34,32 @@ def test_a_rough_pose_becomes_a_better_one(scene):
     assert result.warnings == []
 
 
-def test_poses_five_centimetres_off_come_within_half_a_millimetre_in_a_noisy_image(scene):
+def test_errors_of_5_cm_become_less_than_half_a_millimeter_in_a_noisy_image(scene):
     random = np.random.default_rng(3)
-    # A millimetre of noise on every pixel, and a tenth of them missing.
+    # Every pixel has 1 mm of noise, and 10 % of the pixels are missing.
     noisy = (scene.depth + random.normal(0, 0.001, scene.depth.shape)).astype(np.float32)
     noisy[random.random(noisy.shape) < 0.1] = 0
     observation = hi.Observation(noisy, scene.mask, scene.camera)
     rough = many(scene, 12)
+    results = hi.Pipeline.preset("hybrid").refine_batch(scene.model, observation, rough)
     before = [hi.add(T_co, scene.true, scene.model) for T_co in rough]
-    after = [hi.add(r.T_co, scene.true, scene.model) for r in hi.Pipeline.preset("hybrid").refine_batch(scene.model, observation, rough)]
+    after = [hi.add(result.T_co, scene.true, scene.model) for result in results]
     assert max(before) > 0.04 and np.median(before) > 0.02
     assert max(after) < 0.0005
 
 
 def test_the_covariance_is_the_inverse_of_the_information_up_to_the_noise(scene):
-    result = hi.Pipeline.preset("projective-point-to-plane").refine(scene.model, scene.observation, scene.rough)
+    pipeline = hi.Pipeline.preset("projective-point-to-plane")
+    result = pipeline.refine(scene.model, scene.observation, scene.rough)
     assert result.information.shape == (6, 6)
     product = result.information @ result.covariance
     assert np.allclose(product, np.eye(6) * product[0, 0], atol=1e-6 * abs(product[0, 0]))
 
 
-def test_a_pose_that_cannot_be_refined_is_given_back_as_it_was(scene):
+def test_a_pose_that_cannot_be_refined_is_returned_unchanged(scene):
     empty = hi.Observation(scene.depth, np.zeros_like(scene.mask), scene.camera)
     rough = scene.rough.copy()
-    rough[0, 0] += 1e-9  # Orthogonal to its digits only.
+    rough[0, 0] += 1e-9  # Orthogonal only within the tolerance.
     result = hi.Pipeline.preset("hybrid").refine(scene.model, empty, rough)
     assert (result.outcome, result.termination) == ("kept_initial", "no_pairs")
     assert result.warnings == ["MVE 1.000: the pose does not explain the image, do not trust it"]
@@ -57,11 +67,11 @@ def test_a_pose_that_cannot_be_refined_is_given_back_as_it_was(scene):
     assert result.covariance is None and result.mean_loss is None and result.n_pairs == 0
 
 
-def test_everything_is_in_the_dictionary_and_json_takes_it(scene):
+def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
     result = hi.Pipeline.preset("hybrid").refine(scene.model, scene.observation, scene.rough)
     known = json.loads(json.dumps(result.to_dict()))
-    attributes = {name for name in dir(hi.Result) if not name.startswith("_")} - {"to_dict", "refined"}
-    assert set(known) == attributes
+    attributes = {name for name in dir(hi.Result) if not name.startswith("_")}
+    assert set(known) == attributes - {"to_dict", "refined"}
     assert np.array_equal(known["T_co"], result.T_co)
     assert known["stages"][0]["regime"] in ("aligned", "misaligned")
     assert repr(result).startswith("Result(refined, mve 0.")
@@ -77,11 +87,13 @@ def test_a_batch_has_the_bits_of_single_calls_in_order(scene, threads):
 
 
 def test_an_empty_batch_is_an_empty_list(scene):
-    assert hi.Pipeline.preset("hybrid").refine_batch(scene.model, scene.observation, np.zeros((0, 4, 4))) == []
+    pipeline, poses = hi.Pipeline.preset("hybrid"), np.zeros((0, 4, 4))
+    assert pipeline.refine_batch(scene.model, scene.observation, poses) == []
 
 
-def test_the_presets_are_those_of_the_program_and_documented(program):
-    listed = subprocess.run([program, "pipelines"], check=True, capture_output=True, text=True).stdout
+def test_the_presets_match_the_program_and_the_documentation(program):
+    command = [program, "pipelines"]
+    listed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     names = hi.Pipeline.presets()
     assert names[0] == "hybrid" and {"hybrid-visible", "local", "search", "auto"} < set(names)
     documented = (ROOT / "docs" / "python.md").read_text()
@@ -92,7 +104,7 @@ def test_the_presets_are_those_of_the_program_and_documented(program):
         assert f"`{name}`" in documented, name
 
 
-def test_pipelines_come_from_names_texts_files_and_pickles(scene, tmp_path):
+def test_names_texts_files_and_pickles_give_the_same_pipeline(scene, tmp_path):
     preset = hi.Pipeline.preset("hybrid", overrides=["times=1"])
     file = tmp_path / "mine.toml"
     file.write_text(hi.Pipeline.preset("hybrid").toml)
@@ -124,7 +136,7 @@ class Recorder:
         self.stages.append(event)
 
 
-def test_an_observer_sees_every_event_and_changes_nothing(scene):
+def test_an_observer_receives_every_event_and_changes_nothing(scene):
     pipeline, recorder, events = hi.Pipeline.preset("hybrid"), Recorder(), []
     plain = pipeline.refine(scene.model, scene.observation, scene.rough)
     observed = pipeline.refine(scene.model, scene.observation, scene.rough, recorder)
@@ -141,7 +153,9 @@ def test_an_observer_sees_every_event_and_changes_nothing(scene):
 
 def test_an_observer_stops_with_false_and_its_exceptions_are_raised(scene):
     pipeline = hi.Pipeline.preset("projective-point-to-plane")
-    stopped = pipeline.refine(scene.model, scene.observation, scene.rough, lambda event: event.iteration < 1)
+    stopped = pipeline.refine(
+        scene.model, scene.observation, scene.rough, lambda event: event.iteration < 1
+    )
     assert (stopped.termination, stopped.iterations) == ("stopped", 2)
 
     def fail(event):
@@ -161,9 +175,10 @@ def test_control_c_ends_a_batch(tmp_path):
             import signal
             import numpy as np
             import hybrid_icp as hi
-            # A parent in the background may have had it ignored.
+            # A background process may inherit a disabled SIGINT.
             signal.signal(signal.SIGINT, signal.default_int_handler)
-            model = hi.Model([[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, .02], [-.1, .1, 0]], [[0, 2, 1], [0, 3, 2]])
+            corners = [[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, .02], [-.1, .1, 0]]
+            model = hi.Model(corners, [[0, 2, 1], [0, 3, 2]])
             camera = hi.Camera(600, 600, 319.5, 239.5, 640, 480)
             pose = np.eye(4); pose[2, 3] = 0.5
             depth = hi.render_depth(model, camera, pose)
@@ -171,7 +186,8 @@ def test_control_c_ends_a_batch(tmp_path):
             pose[2, 3] = 0.52
             print("ready", flush=True)
             try:
-                hi.Pipeline.preset("nn-point-to-point").refine_batch(model, observation, np.repeat(pose[None], 1_000_000, 0))
+                poses = np.repeat(pose[None], 1_000_000, 0)
+                hi.Pipeline.preset("nn-point-to-point").refine_batch(model, observation, poses)
             except KeyboardInterrupt:
                 print("interrupted", flush=True)
             """
@@ -183,7 +199,7 @@ def test_control_c_ends_a_batch(tmp_path):
             with pytest.raises(subprocess.TimeoutExpired):
                 process.wait(0.5)
             process.send_signal(signal.SIGINT)
-            # A million refinements take many minutes.
+            # One million refinements would take many minutes.
             assert process.communicate(timeout=60)[0] == "interrupted\n"
             assert process.returncode == 0
         finally:

@@ -1,4 +1,4 @@
-"""Scores and errors against an implementation written from the definitions, and steps against linear algebra and Open3D."""
+"""Compares scores and errors with a reference, and steps with linear algebra and Open3D."""
 
 import bop_errors
 import numpy as np
@@ -12,37 +12,41 @@ def split(matrix):
     return matrix[:3, :3], matrix[:3, 3]
 
 
-def test_a_render_is_what_rays_hit(scene):
+def test_a_render_matches_ray_casting(scene):
     ours = hi.render_depth(scene.model, scene.camera, scene.rough)
-    rays = bop_errors.render(scene.model.vertices.astype(float), scene.model.faces, split(scene.rough), scene.camera.K, ours.shape)
+    vertices, faces = scene.model.vertices.astype(float), scene.model.faces
+    rays = bop_errors.render(vertices, faces, split(scene.rough), scene.camera.K, ours.shape)
     assert ours.dtype == np.float32
     both = (ours > 0) & (rays > 0)
     assert both.sum() > 2500 and ((ours > 0) != (rays > 0)).mean() < 1e-3
-    # Where two surfaces meet, rounding may choose either.
+    # At the edge between two surfaces, rounding decides.
     assert (np.abs(ours - rays)[both] > 1e-5).mean() < 2e-3
 
 
-def test_vsd_is_that_of_the_definition(scene):
+def test_vsd_matches_its_definition(scene):
     shape = scene.depth.shape
-    vertices, faces, K = scene.model.vertices.astype(float), scene.model.faces, scene.camera.K
+    vertices, faces = scene.model.vertices.astype(float), scene.model.faces
+    measured, K = scene.depth.astype(float), scene.camera.K
     truth = bop_errors.render(vertices, faces, split(scene.true), K, shape)
     for estimate in many(scene, 5):
         rendered = bop_errors.render(vertices, faces, split(estimate), K, shape)
         expected, union = bop_errors.vsd(
-            scene.depth.astype(float), rendered, truth, (split(estimate), split(scene.true)), K, scene.model.diameter, 0.015
+            measured, rendered, truth, (split(estimate), split(scene.true)), K,
+            scene.model.diameter, 0.015,
         )
         found = hi.vsd(scene.model, scene.observation, estimate, scene.true)
         assert found.shape == (10,) and union > 2500
         assert np.abs(found - expected).max() < 2e-3
 
 
-def test_pose_errors_are_those_of_the_definitions(scene):
-    turn = pose([0, 0, np.pi], [0.003, 0.001, 0])
-    model = hi.Model(scene.model.vertices, scene.model.faces, symmetries=[turn])
-    motions = [(np.eye(3), np.zeros(3)), split(turn)]
-    for estimate in [*many(scene, 3), scene.true @ turn]:
+def test_pose_errors_match_their_definitions(scene):
+    symmetry = pose([0, 0, np.pi], [0.003, 0.001, 0])
+    model = hi.Model(scene.model.vertices, scene.model.faces, symmetries=[symmetry])
+    motions = [(np.eye(3), np.zeros(3)), split(symmetry)]
+    for estimate in [*many(scene, 3), scene.true @ symmetry]:
         expected = bop_errors.point_errors(
-            model.vertices.astype(float), motions, split(estimate), split(scene.true), scene.camera.K
+            model.vertices.astype(float), motions, split(estimate), split(scene.true),
+            scene.camera.K,
         )
         found = (
             hi.mssd(estimate, scene.true, model),
@@ -54,22 +58,26 @@ def test_pose_errors_are_those_of_the_definitions(scene):
 
 
 def test_units_of_symmetries_follow_the_model(scene):
-    turn = pose([0, 0, np.pi], [0.003, 0.001, 0])
-    turn_mm = turn.copy()
-    turn_mm[:3, 3] *= 1000
+    symmetry = pose([0, 0, np.pi], [0.003, 0.001, 0])
+    symmetry_mm = symmetry.copy()
+    symmetry_mm[:3, 3] *= 1000
     axis = [([0, 0, 1], [0.01, 0, 0])]
-    metres = hi.Model(scene.model.vertices, scene.model.faces, symmetries=[turn], symmetry_axes=axis, diameter=0.2)
-    millimetres = hi.Model(
-        scene.model.vertices * np.float64(1000), scene.model.faces, symmetries=[turn_mm],
+    meters = hi.Model(
+        scene.model.vertices, scene.model.faces, symmetries=[symmetry], symmetry_axes=axis,
+        diameter=0.2,
+    )
+    millimeters = hi.Model(
+        scene.model.vertices * np.float64(1000), scene.model.faces, symmetries=[symmetry_mm],
         symmetry_axes=[([0, 0, 1], [10, 0, 0])], diameter=200, unit="mm",
     )
-    assert np.isclose(metres.diameter, millimetres.diameter)
-    errors = [hi.mssd(scene.rough, scene.true, model) for model in (metres, millimetres)]
-    assert np.isclose(*errors, rtol=1e-4) and errors[0] < hi.mssd(scene.rough, scene.true, scene.model)
+    assert np.isclose(meters.diameter, millimeters.diameter)
+    errors = [hi.mssd(scene.rough, scene.true, model) for model in (meters, millimeters)]
+    assert np.isclose(*errors, rtol=1e-4)
+    assert errors[0] < hi.mssd(scene.rough, scene.true, scene.model)
 
 
 def pairs(seed=3, count=200):
-    """Points with normals, and where a small motion and noise took them; representable in float32."""
+    """Returns points, their motion with noise, and normals, all representable in float32."""
     random = np.random.default_rng(seed)
     targets = random.uniform(-0.1, 0.1, (count, 3)) + [0.02, -0.05, 0.6]
     normals = random.normal(size=(count, 3))
@@ -80,11 +88,12 @@ def pairs(seed=3, count=200):
 
 
 def twist(increment):
-    """ln of a motion: [rho; phi]."""
+    """Returns the logarithm of a motion, [rho; phi]."""
     rotation, translation = split(increment)
     angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))
     hat = (rotation - rotation.T) * angle / (2 * np.sin(angle))
-    left = np.eye(3) + (1 - np.cos(angle)) / angle**2 * hat + (angle - np.sin(angle)) / angle**3 * hat @ hat
+    left = np.eye(3) + (1 - np.cos(angle)) / angle**2 * hat
+    left += (angle - np.sin(angle)) / angle**3 * hat @ hat
     return np.concatenate([np.linalg.solve(left, translation), [hat[2, 1], hat[0, 2], hat[1, 0]]])
 
 
@@ -113,7 +122,7 @@ def test_steps_that_are_not_determined_are_refused():
     one = np.ones((1, 3))
     with pytest.raises(hi.InputError, match="the 1 pairs do not determine a step"):
         hi.point_to_plane_step(one, one, one)
-    with pytest.raises(hi.InputError, match="targets has 2 rows but sources 1"):
+    with pytest.raises(hi.InputError, match="targets has 2 rows but sources has 1"):
         hi.point_to_point_step(one, np.ones((2, 3)))
     with pytest.raises(hi.InputError, match=r"normals\[0\] has no direction"):
         hi.point_to_plane_step(one, one, one * 0)
@@ -135,22 +144,27 @@ def clouds(open3d):
     make = open3d.geometry.PointCloud
     source, target = (make(open3d.utility.Vector3dVector(points)) for points in (sources, targets))
     target.normals = open3d.utility.Vector3dVector(normals)
-    same = open3d.utility.Vector2iVector(np.repeat(np.arange(len(sources), dtype=np.int32)[:, None], 2, 1))
+    indices = np.arange(len(sources), dtype=np.int32)
+    same = open3d.utility.Vector2iVector(np.repeat(indices[:, None], 2, 1))
     return (sources, targets, normals), (source, target, same)
 
 
-def test_a_point_to_point_step_is_that_of_open3d(open3d):
+def test_a_point_to_point_step_matches_open3d(open3d):
     (sources, targets, _), theirs = clouds(open3d)
     estimation = open3d.pipelines.registration.TransformationEstimationPointToPoint()
-    assert np.abs(hi.point_to_point_step(sources, targets)[0] - estimation.compute_transformation(*theirs)).max() < 1e-6
+    difference = hi.point_to_point_step(sources, targets)[0]
+    difference -= estimation.compute_transformation(*theirs)
+    assert np.abs(difference).max() < 1e-6
 
 
-def test_a_point_to_plane_step_is_that_of_open3d(open3d):
+def test_a_point_to_plane_step_matches_open3d(open3d):
     (sources, targets, normals), theirs = clouds(open3d)
     estimation = open3d.pipelines.registration.TransformationEstimationPointToPlane()
     matrix = estimation.compute_transformation(*theirs)
-    # Open3D takes the solution's rotation as angles about z, y and x, and its translation as it is; we take the exponential.
+    # Open3D uses the rotation of the solution as angles around z, y and x, and the translation
+    # unchanged. We use the exponential map.
     r = matrix[:3, :3]
     angles = [np.arctan2(r[2, 1], r[2, 2]), np.arcsin(-r[2, 0]), np.arctan2(r[1, 0], r[0, 0])]
     solution = np.concatenate([matrix[:3, 3], angles])
-    assert np.abs(twist(hi.point_to_plane_step(sources, targets, normals)[0]) - solution).max() < 1e-6
+    increment, _ = hi.point_to_plane_step(sources, targets, normals)
+    assert np.abs(twist(increment) - solution).max() < 1e-6

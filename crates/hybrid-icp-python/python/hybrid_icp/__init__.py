@@ -1,20 +1,26 @@
-"""Refine 6D object poses in depth images.
+"""Refines 6D object poses in depth images.
 
-A detector gives a segmentation mask and a rough pose. `Pipeline().refine` returns a better pose and its score. `Pipeline()` runs
-the default ``"auto"``, which also searches for the object if refinement fails. `Pipeline("hybrid")` is the method of the paper
-(Dreczkowski & Johns), which selects the registration from the image.
+A detector provides a segmentation mask and an initial pose. `Pipeline.refine` refines the pose and
+scores how well it explains the image. `Pipeline()` is the default, ``"auto"``: it refines, and
+searches for the object if the refined pose explains the image badly. `Pipeline("hybrid")` is Hybrid
+ICP as in the paper (Dreczkowski & Johns), which selects the kind of registration by that score.
 
-Conventions: metres and radians; poses are 4x4 float64 matrices ``T_co`` that take object coordinates to the camera's; cameras look
-along +z with x right and y down; images are indexed [v, u] with pixel centres at integers; depth is along the optical axis, 0 where
-nothing was measured.
+Conventions:
+
+- Lengths are in meters, angles in radians.
+- Poses are 4x4 float64 matrices. ``T_co`` maps object coordinates to camera coordinates.
+- Cameras look along +z, with x right and y down.
+- Images have the indices [v, u]. Pixel centers are at integers.
+- Depth is along the optical axis, and 0 for pixels without a measurement.
 
 Examples
 --------
-A plate half a metre in front of the camera, and a detector that is four centimetres off:
+A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
 
 >>> import numpy as np
 >>> from hybrid_icp import Camera, Model, Observation, Pipeline, render_depth
->>> model = Model([[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]], [[0, 2, 1], [0, 3, 2]])
+>>> corners = [[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]]
+>>> model = Model(corners, [[0, 2, 1], [0, 3, 2]])
 >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
 >>> true = np.eye(4)
 >>> true[2, 3] = 0.5

@@ -1,20 +1,23 @@
-"""What is raised and warned of."""
+"""Exceptions and warnings."""
 
 
 class HybridIcpError(Exception):
-    """Base of all errors of this package."""
+    """Base class of all errors of this package."""
 
 
 class InputError(HybridIcpError, ValueError):
-    """What was passed has the wrong shape, dtype, unit or value; the message says what it is and what was expected."""
+    """An argument has the wrong shape, dtype, unit or value.
+
+    The message has the value found and the value expected.
+    """
 
 
 class FileError(HybridIcpError, OSError):
-    """A file cannot be read or written; the message names it and the place in it."""
+    """A file cannot be read or written. The message names the file and the place in it."""
 
 
 class InputWarning(UserWarning):
-    """What was passed is well-formed but implausible: units or frames that do not go together."""
+    """An argument is well-formed but implausible, such as units or frames that do not match."""
 
 
 for _class in (HybridIcpError, InputError, FileError, InputWarning):

@@ -1,4 +1,4 @@
-# The types of the native module; the docstrings are there, and a test holds the two together.
+# The types of the native module. The module itself has the docstrings, and stubtest compares both.
 
 import os
 from collections.abc import Callable, Sequence

@@ -1,16 +1,16 @@
-"""Result files of the BOP benchmark, image by image: the pieces of a refinement that an engine of your own drives.
+"""Refines result files of the BOP benchmark image by image, in a custom program.
 
-Each image is a piece of work that depends on nothing else, and equal input gives equal bytes:
+Each image is an independent task, and equal input gives equal bytes:
 
     images = read_images("cosypose_ycbv-test.csv")
     refiner = DatasetRefiner("bop/ycbv", "test", Pipeline(), object_ids(images))
     lines = {}
-    for scene_id, im_id, indices, rows in images:  # On whatever machine.
+    for scene_id, im_id, indices, rows in images:  # On any machine.
         refined, statuses, faults = refiner.refine(rows)
         lines.update(zip(indices, refined))
     write_results("refined_ycbv-test.csv", (lines[i] for i in sorted(lines)))
 
-`hybrid_icp.ray.refine` is this on Ray, with retries and a journal.
+`hybrid_icp.ray.refine` does this on Ray, with retries and a journal.
 """
 
 from __future__ import annotations
@@ -26,34 +26,36 @@ __all__ = ["DatasetRefiner", "object_ids", "read_images", "result_header", "writ
 
 
 def object_ids(images: Iterable[tuple[int, int, list[int], str]]) -> list[int]:
-    """Ids of the objects that rows name.
+    """Returns the ids of the objects in the rows.
 
     Parameters
     ----------
     images : iterable of (int, int, list of int, str)
-        As `read_images` returns them.
+        The rows by image, as `read_images` returns them.
 
     Returns
     -------
     list of int
-        Ascending.
+        The ids in ascending order.
     """
     column = result_header().split(",").index("obj_id")
-    return sorted({int(line.split(",")[column]) for *_, rows in images for line in rows.split("\n")[1:]})
+    lines = (line for *_, rows in images for line in rows.split("\n")[1:])
+    return sorted({int(line.split(",")[column]) for line in lines})
 
 
 def write_results(path: str | os.PathLike[str], lines: Iterable[str]) -> None:
-    """Writes a result file, whole or not at all.
+    """Writes a result file completely or not at all.
 
     Parameters
     ----------
     path : str or os.PathLike
-        Where it goes.
+        The file to write.
     lines : iterable of str
         The rows in order, without line ends, as `DatasetRefiner.refine` returns them.
     """
     target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
+    prefix = f".{target.name}."
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=".tmp")
     try:
         with os.fdopen(handle, "w", encoding="ascii", newline="\n") as file:
             file.write(result_header() + "\n")

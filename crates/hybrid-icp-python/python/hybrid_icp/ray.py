@@ -1,10 +1,12 @@
-"""Refine a BOP result file on Ray: on the cores of a laptop or on a cluster, with the bytes of `hybrid-icp bop refine --no-time`.
+"""Refines a BOP result file on Ray, on a laptop or on a cluster.
 
-Wants the extra: ``pip install 'hybrid_icp[ray]'``. Nothing of Ray is imported by `hybrid_icp` itself.
+The output has the bytes of `hybrid-icp bop refine --no-time`. The module requires the extra
+``pip install 'hybrid_icp[ray]'``. `hybrid_icp` itself does not import Ray.
 
-Rows are grouped by image, so that an image is decoded and an observation built once, whatever the number of hypotheses. Actors read the
-models once. Each task is a few images; its result goes to a journal beside the output, which one process writes: the driver. A worker that dies
-is started again and its task repeated; a driver that dies goes on from the journal.
+Rows are grouped by image, so that each image is decoded once, for any number of hypotheses. Actors
+read the models once. Each task is a few images. The driver writes the results of tasks to a journal
+next to the output. If a worker dies, Ray starts it again and repeats its task. If the driver dies,
+the next run continues from the journal.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ _Image = tuple[int, int, list[int], str]
 
 
 class _Worker:
-    """An actor: a dataset's models in memory, one image after the other."""
+    """An actor that holds the models of a dataset and refines one image after the other."""
 
     def __init__(self, arguments: dict[str, Any]) -> None:
         self._refiner = bop.DatasetRefiner(**arguments)
@@ -68,49 +70,53 @@ def refine(
 ) -> dict[str, int]:
     """Refines every row of a result file on Ray.
 
-    `ray.init` (or the cluster's address) comes first; without it Ray starts on this machine.
+    Call `ray.init` first to use a cluster. Otherwise Ray starts on this machine.
 
     Parameters
     ----------
     dataset : str or os.PathLike
-        The dataset's folder; every worker reads it there.
+        The folder of the dataset. Every worker reads it at this path.
     results : str or os.PathLike
-        The result file: CSV, or Parquet with the same columns (R and t as lists or as texts of numbers, t in mm).
+        The result file: CSV, or Parquet with the same columns. In Parquet, R and t (mm) are lists
+        of numbers or texts.
     output : str or os.PathLike
-        Where the refined result file goes, with the rows in their order; beside it a journal while it runs.
+        The refined result file, with the rows in their order. During the run, the journal is next
+        to it.
     split : str, optional
-        The split's folder.
+        The folder of the split.
     pipeline : Pipeline, optional
-        `auto` if not given, as in the program.
+        The default is `Pipeline()`.
     detections : str or os.PathLike, optional
-        Take the masks from a detections file instead of mask_visib.
+        Use the masks of a detections file instead of mask_visib.
     rescore : {"keep", "mve"}, optional
-        What becomes the score: the row's own, or 1 - MVE.
+        The score of a refined row: its old score, or 1 - MVE.
     workers : int, optional
-        Number of actors, each of one thread; the number of the cluster's CPUs if not given.
+        Number of actors, with one thread each. The default is the number of CPUs of the cluster.
     num_cpus : float, optional
-        CPUs that an actor reserves. Less than 1, so that actors on every CPU leave room for the tasks that feed them: with 1
-        they would wait for each other for ever.
+        CPUs that an actor reserves. With 1, actors on every CPU would leave no room for the tasks
+        that feed them, and would wait forever.
     rows_per_task : int, optional
-        Rows after which a task is full; images are never split. What is lost when a worker dies.
+        Minimum number of rows of a task. Images are never split. If a worker dies, this work is
+        repeated.
     limit : int, optional
         Refine only the first rows.
     resume : bool, optional
-        Go on from the journal of a run of the same input that was killed.
+        Continue from the journal of an interrupted run with the same input.
     progress : callable, optional
-        Told the number of rows that are done and of all, after every task.
+        Receives the number of finished rows and the number of all rows, after every task.
 
     Returns
     -------
     dict of str to int
-        Number of rows by what became of them.
+        Number of rows by status.
 
     Raises
     ------
     InputError
-        When a file of the dataset is damaged; the output is written all the same, with the rows that need it unchanged.
+        If a file of the dataset is damaged. The output is written nevertheless, and rows that need
+        the file are unchanged.
     """
-    pipeline = pipeline or Pipeline.preset("auto")
+    pipeline = pipeline or Pipeline()
     path = Path(results)
     if path.suffix == ".parquet":
         path = _csv_of(path, Path(output))
@@ -134,13 +140,17 @@ def refine(
         if not ray.is_initialized():
             ray.init(log_to_driver=False, include_dashboard=False)
         workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
-        items = [{"place": place, "task": json.dumps([image[3] for image in tasks[place]])} for place in missing]
-        work = ray.data.from_items(items, override_num_blocks=min(len(items), 16 * workers)).map_batches(
+        items = [
+            {"place": place, "task": json.dumps([image[3] for image in tasks[place]])}
+            for place in missing
+        ]
+        blocks = min(len(items), 16 * workers)
+        work = ray.data.from_items(items, override_num_blocks=blocks).map_batches(
             _Worker,
             fn_constructor_args=[arguments],
             batch_size=1,
             compute=ray.data.ActorPoolStrategy(size=min(workers, len(items))),
-            # Ray Data's own defaults restart a dead actor and repeat its tasks without limit.
+            # The defaults of Ray Data restart a dead actor and repeat its tasks without limit.
             num_cpus=num_cpus,
         )
         for item in work.iter_rows():
@@ -162,12 +172,15 @@ def refine(
     bop.write_results(output, lines)
     journal.remove()
     if faults:
-        raise InputError(f"{len(faults)} files could not be used, and their rows are in {output} unchanged; the first: {faults[0]}")
+        raise InputError(
+            f"{len(faults)} files could not be used, the first: {faults[0]}; "
+            f"their rows are unchanged in {output}"
+        )
     return statuses
 
 
 def _tasks(images: list[_Image], rows_per_task: int) -> Iterator[list[_Image]]:
-    """Images in order, some to a task."""
+    """Yields the tasks, each a few images in order."""
     task: list[_Image] = []
     rows = 0
     for image in images:
@@ -181,7 +194,7 @@ def _tasks(images: list[_Image], rows_per_task: int) -> Iterator[list[_Image]]:
 
 
 def _digest(arguments: dict[str, Any], pipeline: Pipeline, tasks: list[list[_Image]]) -> str:
-    """What the results depend on: a run goes on only with the work of one that has the same."""
+    """Returns a digest of all inputs. A run continues only a journal with the same digest."""
     digest = hashlib.sha256()
     digest.update(repr([str(value) for value in arguments.values()]).encode())
     digest.update(repr(pipeline.__reduce__()[1]).encode())
@@ -192,13 +205,13 @@ def _digest(arguments: dict[str, Any], pipeline: Pipeline, tasks: list[list[_Ima
 
 
 class _Journal:
-    """The tasks that are done, one JSON object per line after a line that says what they belong to."""
+    """The finished tasks, one JSON object per line. The first line has the digest of the input."""
 
     def __init__(self, path: Path, settings: str, resume: bool) -> None:
         self.done: dict[int, dict[str, Any]] = {}
         self._path = path
         kept = list(self._read(settings)) if resume and path.is_file() else []
-        # What is kept replaces the journal whole, so that a kill now loses nothing.
+        # The kept entries replace the journal at once, so that a kill at this point loses nothing.
         temporary = path.with_name(f".{path.name}.tmp")
         self._file = open(temporary, "w", encoding="ascii", newline="\n")
         self._file.write(json.dumps({"settings": settings}) + "\n")
@@ -213,10 +226,11 @@ class _Journal:
             try:
                 if json.loads(next(lines, "")) != {"settings": settings}:
                     raise InputError(
-                        f"{self._path} is the journal of another input or of other options: delete it, or pass resume=False"
+                        f"{self._path} is the journal of another input or of other options, "
+                        "expected the same ones: delete it, or pass resume=False"
                     )
                 for line in lines:
-                    # A line that was cut off by a kill does not end, or is no JSON.
+                    # A line that a kill cut off has no line end, or is not JSON.
                     if line.endswith("\n"):
                         entry = json.loads(line)
                         yield entry["place"], entry["done"]
@@ -234,7 +248,7 @@ class _Journal:
 
 
 def _csv_of(parquet: Path, output: Path) -> Path:
-    """Writes the rows of a Parquet file as a result file beside the output."""
+    """Writes the rows of a Parquet file as a result file next to the output."""
     import pyarrow.parquet
 
     def numbers(value: Any) -> str:
@@ -245,7 +259,8 @@ def _csv_of(parquet: Path, output: Path) -> Path:
     bop.write_results(
         path,
         (
-            f"{row['scene_id']},{row['im_id']},{row['obj_id']},{row['score']!r},{numbers(row['R'])},{numbers(row['t'])},{row.get('time', -1)!r}"
+            f"{row['scene_id']},{row['im_id']},{row['obj_id']},{row['score']!r},"
+            f"{numbers(row['R'])},{numbers(row['t'])},{row.get('time', -1)!r}"
             for row in table
         ),
     )
