@@ -1,28 +1,12 @@
 //! Tests of the six methods of §V-A, by the paper's descriptions.
 
-use crate::common::{EXACT, Random, apart, estimate, fused, relative};
+use crate::common::{Random, apart, estimate, exact, fused, relative, run};
 use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
 use hicp_fusion::{
     BatchFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionMethod,
     InflatedCovariance, LastEstimate, MostConfident, MveCovariance, PoseEstimate, RecursiveFuser,
     Transport, UnitCovariance,
 };
-
-fn exact() -> FuserConfig {
-    FuserConfig {
-        limits: EXACT,
-        unit: UnitCovariance::about_object(Point3::new(0.01, 0.0, -0.02), 0.08).unwrap(),
-        ..FuserConfig::default()
-    }
-}
-
-fn run(fuser: &mut dyn Fuser, estimates: &[PoseEstimate]) -> PoseEstimate {
-    for estimate in estimates {
-        let update = fuser.update(estimate);
-        assert!(update.solution().unwrap().converged, "{update:?}");
-    }
-    fuser.estimate().unwrap()
-}
 
 #[test]
 fn names_parse_to_their_methods() {

@@ -1,27 +1,11 @@
 //! Tests of the effect of a moving camera on held estimates.
 
-use crate::common::{EXACT, Random, apart, estimate, fused, relative};
-use hicp_core::{Isometry3, Matrix6, Point3, se3};
+use crate::common::{EXACT, Random, apart, estimate, exact, fused, relative, run};
+use hicp_core::{Isometry3, Matrix6, se3};
 use hicp_fusion::{
     BatchFuser, CameraMotion, Fuser, FuserConfig, FusionError, FusionMethod, PoseEstimate,
     RecursiveFuser, UnitCovariance,
 };
-
-fn exact() -> FuserConfig {
-    FuserConfig {
-        limits: EXACT,
-        unit: UnitCovariance::about_object(Point3::new(0.01, 0.0, -0.02), 0.08).unwrap(),
-        ..FuserConfig::default()
-    }
-}
-
-fn run(fuser: &mut dyn Fuser, estimates: &[PoseEstimate]) -> PoseEstimate {
-    for estimate in estimates {
-        let update = fuser.update(estimate);
-        assert!(update.solution().unwrap().converged, "{update:?}");
-    }
-    fuser.estimate().unwrap()
-}
 
 #[test]
 fn a_moved_camera_changes_only_the_frame() {

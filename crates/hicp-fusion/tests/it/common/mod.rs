@@ -1,7 +1,7 @@
 //! Random estimates, the same in every run.
 
-use hicp_core::{Isometry3, Matrix6, Vector6, se3};
-use hicp_fusion::{Fused, Fusion, FusionLimits, PoseEstimate};
+use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
+use hicp_fusion::{Fused, Fuser, FuserConfig, Fusion, FusionLimits, PoseEstimate, UnitCovariance};
 
 /// The SplitMix64 generator.
 pub(crate) struct Random(pub(crate) u64);
@@ -84,4 +84,22 @@ pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
 /// Returns the largest difference of two matrices, relative to the largest entry.
 pub(crate) fn relative(found: &Matrix6<f64>, expected: &Matrix6<f64>) -> f64 {
     (found - expected).amax() / expected.amax()
+}
+
+/// Returns a configuration whose solutions are exact to rounding, for an object of 8 cm.
+pub(crate) fn exact() -> FuserConfig {
+    FuserConfig {
+        limits: EXACT,
+        unit: UnitCovariance::about_object(Point3::new(0.01, 0.0, -0.02), 0.08).unwrap(),
+        ..FuserConfig::default()
+    }
+}
+
+/// Passes estimates to a fuser and returns its estimate. Every update must converge.
+pub(crate) fn run(fuser: &mut dyn Fuser, estimates: &[PoseEstimate]) -> PoseEstimate {
+    for estimate in estimates {
+        let update = fuser.update(estimate);
+        assert!(update.solution().unwrap().converged, "{update:?}");
+    }
+    fuser.estimate().unwrap()
 }
