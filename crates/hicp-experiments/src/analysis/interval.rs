@@ -25,6 +25,12 @@ impl Interval {
         [self.estimate, self.low, self.high]
     }
 
+    /// Returns estimate and interval of a share in percent.
+    pub(crate) fn percent(self) -> String {
+        let [estimate, low, high] = self.ends().map(percent);
+        format!("{estimate} [{low}, {high}]")
+    }
+
     /// Returns the interval of the difference of the value and a constant.
     pub(crate) fn minus(self, constant: f64) -> Self {
         let [estimate, low, high] = self.ends().map(|x| x - constant);
@@ -57,6 +63,15 @@ impl fmt::Display for Interval {
             ),
             false => write!(f, "{estimate:.digits$} [{low:.digits$}, {high:.digits$}]"),
         }
+    }
+}
+
+/// Returns a share in percent with one digit.
+pub(crate) fn percent(share: f64) -> String {
+    let percent = format!("{:.1} %", 100.0 * share);
+    match &*percent {
+        "-0.0 %" => "0.0 %".to_owned(),
+        _ => percent,
     }
 }
 

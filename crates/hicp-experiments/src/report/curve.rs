@@ -1,7 +1,5 @@
 //! The data of figures.
 
-use std::ops::Range;
-
 use crate::analysis::{Analysis, Interval, Metric};
 
 /// Curves over the same axes.
@@ -13,10 +11,6 @@ pub struct Panel {
     pub x_title: String,
     /// Name of the y axis.
     pub y_title: String,
-    /// Ends of the x axis.
-    pub x: Range<f64>,
-    /// Approximate count of numbers along the x axis.
-    pub x_numbers: usize,
     /// The curves.
     pub curves: Vec<Curve>,
 }
@@ -26,15 +20,15 @@ pub struct Panel {
 pub struct Curve {
     /// Name in the legend.
     pub label: String,
-    /// Index of the color and marker.
-    pub style: usize,
+    /// Index of the variant in its study, which orders the legend.
+    pub variant: usize,
     /// Points (x, mean with interval), from left to right.
     pub points: Vec<(f64, Interval)>,
 }
 
 impl Curve {
     /// Returns the means of a variant over the single groups.
-    pub(crate) fn of(analysis: &Analysis, variant: usize, style: usize) -> Self {
+    pub(crate) fn of(analysis: &Analysis, variant: usize) -> Self {
         let groups = analysis.groups().iter().enumerate();
         let singles = groups.filter(|(_, g)| g.single).enumerate();
         let points = singles.filter_map(|(step, (group, described))| {
@@ -47,7 +41,7 @@ impl Curve {
         });
         Self {
             label: analysis.variants()[variant].clone(),
-            style,
+            variant,
             points: points.collect(),
         }
     }

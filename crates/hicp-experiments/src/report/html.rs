@@ -21,9 +21,20 @@ impl Table {
         }
     }
 
-    /// Creates a table without rows; `head` is the headings with `|` between them.
+    /// Creates a table without rows; `|` separates the headings in `head`.
     pub(crate) fn headed(head: &str) -> Self {
         Self::new(&head.split('|').collect::<Vec<_>>())
+    }
+
+    /// Returns the table without the columns that have no value.
+    pub(crate) fn without_empty_columns(mut self) -> Self {
+        let has_value = |column: usize| self.rows.iter().any(|row| !row[column].is_empty());
+        let kept: Vec<bool> = (0..self.head.len()).map(has_value).collect();
+        for fields in std::iter::once(&mut self.head).chain(&mut self.rows) {
+            let mut kept = kept.iter();
+            fields.retain(|_| kept.next() == Some(&true));
+        }
+        self
     }
 
     pub(crate) fn csv(&self) -> String {
@@ -43,8 +54,9 @@ impl Table {
         format!("<table>\n{}{rows}</table>\n", line(&self.head, "th"))
     }
 
-    /// Returns the table as Markdown: the first column left-aligned, the others, numbers,
-    /// right-aligned.
+    /// Returns the table as Markdown.
+    ///
+    /// The first column is left-aligned. The others contain numbers and are right-aligned.
     #[must_use]
     pub fn markdown(&self) -> String {
         let line = |fields: &[String]| {
@@ -94,10 +106,12 @@ const HEAD: &str = "<!DOCTYPE html>
 
 const STYLE: &str = "<style>
 body { font: 15px/1.45 sans-serif; margin: 2em auto; max-width: 1440px; padding: 0 1em; color: #222 }
-table { border-collapse: collapse; margin: 1em 0; font-size: 13px; font-variant-numeric: tabular-nums }
+table { border-collapse: collapse; margin: 1em 0; font-size: 13px; font-variant-numeric: tabular-nums; display: block; overflow-x: auto }
 th, td { border: 1px solid #ccc; padding: 3px 7px; text-align: left; vertical-align: top }
 th { background: #f2f2f2 }
-figure { margin: 0; overflow-x: auto }
+figure { margin: 0 }
+svg { max-width: 100%; height: auto }
+@media (max-width: 700px) { td { min-width: 6em } td:last-child { min-width: 20em } }
 </style>
 </head>
 <body>
@@ -108,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_shown_as_they_are() {
+    fn names_are_escaped_in_tables_and_pages() {
         let mut table = Table::new(&["a<b", "n"]);
         table
             .rows
@@ -128,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn names_do_not_become_tags() {
+    fn escaped_names_are_not_tags() {
         assert_eq!(escaped("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
     }
 }

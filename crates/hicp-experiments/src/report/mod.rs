@@ -4,6 +4,7 @@ mod curve;
 mod figure;
 mod html;
 mod page;
+mod panel;
 mod tables;
 
 pub use curve::{Curve, Panel};

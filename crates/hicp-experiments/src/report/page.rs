@@ -121,11 +121,10 @@ impl<D: Reported> ReportOf<D> {
         document.figures.retain(|(_, _, figure)| !figure.is_empty());
         let mut figures = String::new();
         for (name, heading, figure) in &document.figures {
-            let svg = figure.svg()?;
-            write(&format!("{name}.svg"), &svg)?;
+            write(&format!("{name}.svg"), &figure.svg()?)?;
             let (width, height, rgb) = figure.pixels()?;
             write_rgb_png(folder.join(format!("{name}.png")), width, height, &rgb)?;
-            figures += &format!("<h2>{heading}</h2>\n<figure>{svg}</figure>\n");
+            figures += &format!("<h2>{heading}</h2>\n{}", figure.html()?);
         }
         let claims = self.claims_table();
         write("claims.csv", &claims.csv())?;

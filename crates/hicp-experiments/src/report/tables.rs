@@ -3,13 +3,13 @@
 use super::html::Table;
 use crate::analysis::{Analysis, Cell, Interval, Metric};
 
-/// Returns a number with fixed digits; empty if there is none.
+/// Returns a number with a fixed number of digits, or an empty text if there is none.
 pub(crate) fn fixed(value: Option<f64>, digits: usize) -> String {
     let value = value.filter(|x| x.is_finite());
     value.map_or_else(String::new, |x| format!("{x:.digits$}"))
 }
 
-/// Returns estimate, lower and upper end with four digits; empty if there is no interval.
+/// Returns estimate, lower and upper end with four digits, or empty texts without an interval.
 pub(crate) fn ends(interval: Option<Interval>) -> [String; 3] {
     match interval {
         Some(interval) => interval.ends().map(|x| fixed(Some(x), 4)),
@@ -22,8 +22,9 @@ pub(crate) fn texts(fields: &[&str]) -> Vec<String> {
     fields.iter().map(|field| (*field).to_owned()).collect()
 }
 
-/// Returns the count, the initial VSD and some means with intervals of a variant in a group, for
-/// programs; `None` if there is no row.
+/// Returns count, initial VSD, and means with intervals of a variant in a group, for CSV files.
+///
+/// If there are no rows, returns `None`.
 pub(crate) fn figures(
     analysis: &Analysis,
     metrics: &[Metric],
@@ -39,7 +40,7 @@ pub(crate) fn figures(
     Some((cell, figures))
 }
 
-/// Returns the paired differences of two variants in a group with their intervals, for programs.
+/// Returns the paired differences of two variants in a group with intervals, for CSV files.
 pub(crate) fn differences(
     analysis: &Analysis,
     metrics: &[Metric],
@@ -53,21 +54,24 @@ pub(crate) fn differences(
     Some(found.into_iter().flat_map(|i| ends(Some(i))).collect())
 }
 
-/// Returns the mean VSD per variant and group.
+/// Returns the mean VSD per variant, and per group that has rows.
 pub(crate) fn means(analysis: &Analysis) -> Table {
     let groups = || 0..analysis.groups().len();
+    let variants = || 0..analysis.variants().len();
     let mut table = Table::new(&["variant"]);
     let labels = analysis.groups().iter().map(|group| group.label.clone());
     table.head.extend(labels);
-    let initial = |group| Some(fixed(Some(analysis.cell(group, 0)?.vsd_initial), 3));
-    if let Some(initial) = groups().map(initial).collect::<Option<Vec<_>>>() {
-        table.rows.push([texts(&["(initial)"]), initial].concat());
-    }
-    for (variant, name) in analysis.variants().iter().enumerate() {
-        let mut row = vec![name.clone()];
+    let mut initial = vec!["(initial)".to_owned()];
+    initial.extend(groups().map(|group| {
+        let cell = variants().find_map(|variant| analysis.cell(group, variant));
+        fixed(cell.map(|cell| cell.vsd_initial), 3)
+    }));
+    table.rows.push(initial);
+    for variant in variants() {
+        let mut row = vec![analysis.variants()[variant].clone()];
         let means = groups().map(|group| analysis.mean(Metric::Vsd, group, variant));
         row.extend(means.map(|i| i.map_or_else(String::new, |i| i.to_string())));
         table.rows.push(row);
     }
-    table
+    table.without_empty_columns()
 }

@@ -72,13 +72,13 @@ impl Reported for TrajectoryConfig {
              are left out. A trajectory failed whose final VSD is above {FAILURE_VSD}.</p>\n{}",
             calibration.html()
         );
-        let rows = entries.iter().map(Entry::panels).collect();
+        let rows = entries.iter().flat_map(Entry::panels).collect();
         let as_in_paper = "Mean VSD after the trajectory, as in Figure 7 of the paper";
         let is_real = |e: &Entry<Self>| e.study.config.clock == TrajectoryClock::Real;
         Document {
             title: "Sequential ICP, the study of §VI-C rerun",
             note: note(entries.iter().any(is_real)),
-            figures: vec![("figure", as_in_paper, Figure { rows })],
+            figures: vec![("figure", as_in_paper, Figure::new(rows))],
             results,
             differences: table(DIFFERENCES, Entry::differences),
             tables: vec![
@@ -153,42 +153,34 @@ impl Entry<TrajectoryConfig> {
         rows
     }
 
-    /// Lays out Figure 7: a panel per underlying pipeline with the paper's methods, and one with
-    /// `average` and the methods beyond the paper.
-    fn panels(&self) -> Vec<Panel> {
+    /// Lays out Figure 7: a panel per underlying pipeline with the paper's methods, and below it
+    /// one with `average` and the methods beyond the paper.
+    fn panels(&self) -> [Vec<Panel>; 2] {
         let config = &self.study.config;
-        let panel = |title: &str, curves: Vec<Curve>| Panel {
-            title: title.to_owned(),
-            x_title: "pre-trajectory VSD".to_owned(),
-            y_title: "mean post-trajectory VSD".to_owned(),
-            x: 0.0..1.0,
-            x_numbers: 11,
-            curves,
-        };
         let paper = config.paper_methods();
         let mut beyond: Vec<&str> = config.methods.iter().map(String::as_str).collect();
-        beyond.retain(|m| !paper.contains(m));
-        beyond.insert(0, AVERAGE);
-        let curve = |(variant, style)| Curve::of(&self.analysis, variant, style);
-        let curves = |underlying: &str, methods: &[&str], style: usize| -> Vec<Curve> {
-            let names = methods
-                .iter()
-                .map(|m| TrajectoryConfig::variant(underlying, m));
-            let found = names.filter_map(|name| self.analysis.variant(&name));
-            found.zip(style..).map(curve).collect()
-        };
-        let mut panels: Vec<Panel> = Vec::new();
-        let mut together = Vec::new();
-        for (index, u) in config.underlying.iter().enumerate() {
-            let mut alone = curves(&u.name, &paper, 0);
-            // The title of the panel names the pipeline.
-            for curve in &mut alone {
-                curve.label.drain(..=u.name.len());
-            }
-            panels.push(panel(&u.name, alone));
-            together.extend(curves(&u.name, &beyond, index * beyond.len()));
+        beyond.retain(|method| !paper.contains(method));
+        if !beyond.is_empty() {
+            beyond.insert(0, AVERAGE);
         }
-        panels.push(panel("average, and beyond the paper", together));
-        panels
+        let panel = |underlying: &str, title: String, methods: &[&str]| {
+            let curve = |method: &&str| {
+                let name = TrajectoryConfig::variant(underlying, method);
+                let curve = Curve::of(&self.analysis, self.analysis.variant(&name)?);
+                // The title of the panel names the pipeline.
+                let label = (*method).to_owned();
+                Some(Curve { label, ..curve })
+            };
+            Panel {
+                title,
+                x_title: "pre-trajectory VSD".to_owned(),
+                y_title: "mean post-trajectory VSD".to_owned(),
+                curves: methods.iter().filter_map(curve).collect(),
+            }
+        };
+        let names = || config.underlying.iter().map(|underlying| &*underlying.name);
+        let of_paper = names().map(|name| panel(name, name.to_owned(), &paper));
+        let others = names().map(|name| panel(name, format!("{name}: beyond the paper"), &beyond));
+        [of_paper.collect(), others.collect()]
     }
 }

@@ -1,6 +1,7 @@
 //! The aims of the presets beyond the paper, tested.
 
 use crate::analysis::Metric::{self, CpuMs, Failure, Vsd, Worse};
+use crate::analysis::percent;
 use crate::claims::{Claim, ClaimVerdict, Judge};
 use crate::study::{ALL, FAULTY_MASK};
 
@@ -71,14 +72,12 @@ fn test(
             )
         }
         Share(share) => {
-            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-            let [estimate, low, high] = ours.ends().map(percent);
             let hybrids = hybrids.map(|i| format!("; hybrid {}", percent(i.estimate)));
             let hybrids = hybrids.unwrap_or_default();
             judge.claim(
                 format!("{name} below {}: {figure}, {images}", percent(share)),
                 ClaimVerdict::negative(&[ours.minus(share)]),
-                format!("{estimate} [{low}, {high}]{hybrids}"),
+                format!("{}{hybrids}", ours.percent()),
             )
         }
     }

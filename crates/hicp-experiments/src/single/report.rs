@@ -4,7 +4,7 @@ use super::claims::claims;
 use super::config::Config;
 use super::experiment::Experiment;
 use super::table_one::TABLE_I;
-use crate::analysis::{Analysis, Interval, Metric};
+use crate::analysis::{Analysis, Interval, Metric, percent};
 use crate::claims::Claim;
 use crate::report::{
     Curve, Document, Entry, Figure, Panel, Reported, Table, differences, figures, fixed,
@@ -37,9 +37,7 @@ impl Reported for Config {
     fn document(entries: &[Entry<Self>]) -> Document {
         let figure = |alpha: bool| {
             let is_in = |e: &&Entry<Self>| (e.experiment() == Experiment::Alpha) == alpha;
-            let rows = entries.iter().filter(is_in).map(Entry::panels);
-            let rows = rows.filter(|row| !row.is_empty()).collect();
-            Figure { rows }
+            Figure::new(entries.iter().filter(is_in).map(Entry::panels).collect())
         };
         let paper_figure = "Mean VSD after ICP, as in Figure 6 of the paper";
         let note = format!(
@@ -106,13 +104,9 @@ impl Entry<Config> {
             let Some(cell) = analysis.cell(group, variant) else {
                 continue;
             };
-            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
             let share = |metric| {
-                let Some(mean) = analysis.mean(metric, group, variant) else {
-                    return String::new();
-                };
-                let [share, low, high] = mean.ends().map(percent);
-                format!("{share} [{low}, {high}]")
+                let mean = analysis.mean(metric, group, variant);
+                mean.map(Interval::percent).unwrap_or_default()
             };
             let [time, ratio] = self.time(group, variant);
             let deviation = cell.cpu_deviation_ms.unwrap_or(0.0);
@@ -135,18 +129,18 @@ impl Entry<Config> {
                 text(difference.filter(|_| ours != variant)),
             ]);
         }
-        table
+        table.without_empty_columns()
     }
 
     /// Lays out a study as the paper does: nearest-neighbor variants, projective variants, and the
     /// rest with the best of either. Studies of time have no panels.
     fn panels(&self) -> Vec<Panel> {
         let (analysis, experiment) = (&self.analysis, self.experiment());
-        let (x_title, x) = match experiment {
-            Experiment::InitNoise | Experiment::Beyond => ("pre-ICP VSD", 0.0..1.0),
-            Experiment::DepthNoise => ("depth noise, % of the depth", -0.2..5.2),
-            Experiment::ModelNoise => ("model noise level", -0.2..4.2),
-            Experiment::Alpha => ("α", 0.0..1.0),
+        let x_title = match experiment {
+            Experiment::InitNoise | Experiment::Beyond => "pre-ICP VSD",
+            Experiment::DepthNoise => "depth noise, % of the depth",
+            Experiment::ModelNoise => "model noise level",
+            Experiment::Alpha => "α",
             Experiment::Timing => return Vec::new(),
         };
         let all: Vec<usize> = (0..analysis.variants().len()).collect();
@@ -171,21 +165,13 @@ impl Entry<Config> {
                 ("hybrid and the best of either", last),
             ],
         };
-        let curves = |variants: Indices| {
-            let curves = variants.into_iter().zip(0..);
-            let curves = curves.map(|(v, style)| Curve::of(analysis, v, style));
-            curves.collect()
-        };
         let panel = |(title, variants): (&str, Indices)| Panel {
             title: format!("{}: {title}", experiment.name()),
             x_title: x_title.to_owned(),
             y_title: "mean post-ICP VSD".to_owned(),
-            x: x.clone(),
-            x_numbers: if x.end > 1.0 { 6 } else { 11 },
-            curves: curves(variants),
+            curves: variants.iter().map(|v| Curve::of(analysis, *v)).collect(),
         };
-        let panels = panels.into_iter().map(panel);
-        panels.filter(|panel| !panel.curves.is_empty()).collect()
+        panels.into_iter().map(panel).collect()
     }
 
     /// Returns everything per group and variant, for programs.

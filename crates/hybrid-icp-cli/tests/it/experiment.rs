@@ -91,7 +91,7 @@ fn every_study_runs_end_to_end() {
     .exits(0);
     assert!(told.out.contains("all/report.html"), "{}", told.out);
     let page = read(&folder.path().join("all"), "report.html");
-    assert_eq!(page.matches("<svg").count(), 2);
+    assert_eq!(page.matches("<figure>").count(), 2);
 }
 
 #[test]
