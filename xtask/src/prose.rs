@@ -38,6 +38,7 @@ const CLEAN: [&str; 20] = [
     "benches/",
     "crates/hicp-association/",
     "crates/hicp-core/",
+    "crates/hicp-experiments/",
     "crates/hicp-fusion/",
     "crates/hicp-icp/",
     "crates/hicp-metric/",

@@ -1,11 +1,13 @@
-//! Fits `Calibration` on the tuning objects and prints the share of single-image errors inside
-//! the 50, 90 and 99 % ellipsoids, before and after, on the tuning and on the test objects.
+//! Fits `Calibration` on the tuning objects and prints how well the covariances match the errors.
 //!
-//! Run with `cargo run --release -p hicp-experiments --example calibration [TRAJECTORIES]`: per
-//! object, 10 unless told otherwise. Trajectories are those of the sequential study (starts in ten
-//! bins, a D435's axial noise, reconstructions with 5 mm and 1.1°), with another seed. Objects that
-//! turn freely about an axis are left out, and so are estimates that the calibrated gate leaves
-//! out.
+//! It prints the share of single-image errors inside the 50, 90 and 99 % ellipsoids, before and
+//! after the fit, on the tuning and on the test objects.
+//!
+//! Run it with `cargo run --release -p hicp-experiments --example calibration [TRAJECTORIES]`. The
+//! argument is the number of trajectories per object, 10 by default. Trajectories are those of the
+//! sequential study (starts in ten bins, a D435's axial noise, reconstructions with errors of 5 mm
+//! and 1.1°), with another seed. Objects with a continuous symmetry and estimates that the
+//! calibrated gate rejects are left out.
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
 use hicp_core::{Isometry3, Matrix6, Vector6, se3};
@@ -17,12 +19,12 @@ use hybrid_icp::{Calibration, Preset};
 type Failed = Box<dyn std::error::Error>;
 
 const SEED: u64 = 5;
-/// The study's seconds per estimate, for as many images of either pipeline.
+/// Seconds per estimate. Both pipelines get the same number of images.
 const SECONDS: f64 = 0.3;
 
-/// One estimate and how far off it is.
+/// An estimate and its error.
 struct Sample {
-    /// Which trajectory of which object.
+    /// The object, and the index of the trajectory.
     trajectory: (String, u64),
     pose: Isometry3<f64>,
     error: Vector6<f64>,
@@ -74,7 +76,7 @@ fn main() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Registers images along trajectories, and keeps what the calibrated gate would.
+/// Registers images along trajectories, and keeps the estimates that pass the calibrated gate.
 fn samples(
     objects: &[Household],
     preset: Preset,
@@ -112,17 +114,18 @@ fn sample(seen: &TrajectoryStep<'_>) -> Result<Option<Sample>, Failed> {
     }))
 }
 
-/// The covariance of an estimate without and with the error that all share.
+/// Returns the covariance of an estimate without the error that all estimates share.
 fn own(model: &Calibration, s: &Sample) -> Matrix6<f64> {
     let covariance = model.covariance(s.unit);
     covariance.covariance(&s.pose, Some(s.mve), s.registration.as_ref())
 }
 
+/// Returns the covariance of an estimate with the error that all estimates share.
 fn total(model: &Calibration, s: &Sample) -> Matrix6<f64> {
     own(model, s) + s.unit.at(&s.pose) * (model.shared * model.shared)
 }
 
-/// Negative logarithm of Student's density of an error, but for a constant.
+/// Returns the negative logarithm of Student's density of an error, up to a constant.
 fn surprise(error: &Vector6<f64>, covariance: &Matrix6<f64>, nu: f64) -> f64 {
     let Some(cholesky) = covariance.cholesky() else {
         return 1e3;
@@ -138,7 +141,9 @@ fn total_loss(samples: &[Sample], model: &Calibration) -> f64 {
     each.map(|s| surprise(&s.error, &total(model, s), nu)).sum()
 }
 
-/// The same of the differences between neighbors on a trajectory, in which what they share is not.
+/// Returns the loss of the differences between neighbors on a trajectory.
+///
+/// The shared error cancels in these differences.
 fn scatter_loss(samples: &[Sample], model: &Calibration) -> f64 {
     let neighbors = samples
         .windows(2)
@@ -151,10 +156,10 @@ fn scatter_loss(samples: &[Sample], model: &Calibration) -> f64 {
     each.sum()
 }
 
-/// A factor of a calibration.
+/// Selects a factor of a calibration.
 type Factor = fn(&mut Calibration) -> &mut f64;
 
-/// Changes one factor after another, in ever smaller steps, as long as the loss falls.
+/// Changes one factor after another, in smaller and smaller steps, as long as the loss falls.
 fn fit(start: Calibration, factors: &[Factor], loss: impl Fn(&Calibration) -> f64) -> Calibration {
     let (mut best, mut least) = (start, loss(&start));
     let mut step: f64 = 2.0;

@@ -1,13 +1,13 @@
-//! Claims, and how intervals decide them.
+//! Claims, and the rules by which intervals decide them.
 
 use crate::analysis::{Analysis, Interval, Metric};
 
 /// Whether a claim holds in a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClaimVerdict {
-    /// It holds, and the intervals exclude the opposite.
+    /// The claim holds, and the intervals exclude the opposite.
     Holds,
-    /// It does not hold, and the intervals exclude that it does.
+    /// The claim does not hold, and the intervals exclude that it does.
     DoesNotHold,
     /// The study cannot decide.
     NotSignificant,
@@ -51,22 +51,22 @@ impl ClaimVerdict {
 /// A claim with its verdict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// Where the paper makes it; `aim` if it is not the paper's.
+    /// The section of the paper; `aim` if the claim is not the paper's.
     pub section: &'static str,
-    /// The claim, with what was tested.
+    /// The claim, stated as it was tested.
     pub text: String,
     /// The verdict.
     pub verdict: ClaimVerdict,
-    /// The figures that decided.
+    /// The figures behind the verdict.
     pub figures: String,
 }
 
-/// Contrasts with the texts that stand before them.
+/// Contrasts, each after its label.
 pub(crate) type Evidence = Vec<(String, Interval)>;
 
-/// Tests the claims of a section on an analysis, whose groups and variants it finds by name.
+/// Tests the claims of a section on an analysis. Groups and variants are found by name.
 ///
-/// Every test returns `None` if the study lacks a group or a variant of it.
+/// If the study lacks a group or a variant of the claim, every test returns `None`.
 #[derive(Clone, Copy)]
 pub(crate) struct Judge<'a> {
     pub(crate) analysis: &'a Analysis,
@@ -136,7 +136,7 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Decides a claim by a rule; `None` without evidence.
+    /// Decides a claim by a rule. Without evidence, returns `None`.
     pub(crate) fn decide(
         self,
         text: impl Into<String>,
@@ -160,7 +160,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Joins figures for people.
+/// Joins figures into one text.
 pub(crate) fn listed(figures: impl IntoIterator<Item = String>) -> String {
     figures.into_iter().collect::<Vec<_>>().join("; ")
 }

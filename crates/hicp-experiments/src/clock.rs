@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Returns the processor time of the calling thread, without other programs and without waiting.
+/// Returns the processor time of the calling thread. It excludes other programs and waiting.
 #[cfg(unix)]
 pub(crate) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -12,7 +12,7 @@ pub(crate) fn thread_time() -> Duration {
     Duration::new(seconds, nanoseconds)
 }
 
-/// Returns the time since the first call: there is no portable clock of a thread except on Unix.
+/// Returns the time since the first call. Only Unix has a portable clock of a thread.
 #[cfg(not(unix))]
 pub(crate) fn thread_time() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();

@@ -12,7 +12,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// A file cannot be read or written, or its content is not what a study requires.
+    /// A file cannot be read or written, or its content is not that of a study.
     #[error(transparent)]
     Io(#[from] IoError),
     /// A folder cannot be read or created.
@@ -20,7 +20,7 @@ pub enum ExperimentError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// The caller stopped the study.

@@ -1,15 +1,15 @@
 //! The studies of the Hybrid ICP paper, as code: single images (§VI-A, §VI-B, Table I and the
 //! tuning of α) and trajectories (§VI-C).
 //!
-//! **Should you use this crate?** Use it to check the paper's claims, or to compare a custom pipeline
-//! with the paper's nine variants on many objects; `hybrid-icp experiment` is its command line. To
-//! refine poses, use `hybrid-icp`.
+//! **Should you use this crate?** Use it to check the paper's claims, or to compare a custom
+//! pipeline with the paper's nine variants on many objects. Its command line is
+//! `hybrid-icp experiment`. To refine poses, use `hybrid-icp`.
 //!
-//! A study presents cases (an object, an image, an initial pose) under one or more levels of noise
-//! to every variant, so that differences between variants are paired. It writes the rows of each
-//! case as it goes, can be killed and resumed, and gives the same rows on any number of threads,
-//! except for times. [`Design`] is what distinguishes kinds of studies: [`Config`] and
-//! [`TrajectoryConfig`].
+//! A study runs every variant on the same cases: an object, an image and an initial pose, at one or
+//! more levels of noise. Differences between variants are therefore paired. The rows of a case are
+//! written as soon as the case is finished. A study can be killed and resumed. Except for times,
+//! its rows do not depend on the number of threads. There are two kinds of studies, [`Config`] and
+//! [`TrajectoryConfig`]; both implement [`Design`].
 //!
 //! ```
 //! use std::ops::ControlFlow;

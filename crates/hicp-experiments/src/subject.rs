@@ -12,9 +12,9 @@ use crate::error::ExperimentError;
 /// An object of a study.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Name in tables; it also seeds the random numbers.
+    /// Name in tables. It also seeds the random numbers.
     pub name: String,
-    /// Its origin: `household`, or the name of a file.
+    /// The origin of the model: `household`, or the name of a file.
     pub source: String,
     /// The model, meters.
     pub model: Model,
@@ -25,7 +25,7 @@ impl Subject {
     ///
     /// # Errors
     ///
-    /// None for the objects that ship.
+    /// Never for the objects that ship with `hicp-sim`.
     pub fn household(objects: &[Household]) -> Result<Vec<Self>, ExperimentError> {
         let made = objects.iter().map(|object| {
             Ok(Self {
@@ -37,8 +37,9 @@ impl Subject {
         made.collect()
     }
 
-    /// Reads every mesh file of a folder, in meters, in the order of their names, without
-    /// symmetries.
+    /// Reads every mesh file of a folder, in meters, in alphabetical order.
+    ///
+    /// The objects have no symmetries.
     ///
     /// # Errors
     ///

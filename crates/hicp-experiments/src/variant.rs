@@ -71,8 +71,9 @@ impl Variant {
         Ok(variant)
     }
 
-    /// Builds the pipeline, with another threshold α if one is given. The limits on its work were
-    /// checked when it was read.
+    /// Builds the pipeline, with another threshold α if one is given.
+    ///
+    /// The limits on its work were checked when it was read.
     ///
     /// # Errors
     ///
@@ -96,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn alpha_can_be_set_where_there_is_a_switch_only() {
+    fn alpha_can_be_set_only_in_pipelines_that_switch() {
         let hybrid = Variant::preset(Preset::Hybrid);
         assert!(hybrid.build(Some(0.25)).is_ok() && hybrid.build(Some(1.0)).is_ok());
         let fixed = Variant::preset(Preset::NnPointToPoint);

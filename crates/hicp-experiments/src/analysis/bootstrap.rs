@@ -13,23 +13,22 @@ use crate::study::{Design, Group, Measured, StudyOf};
 /// Number of bootstrap samples.
 pub const REPLICATES: usize = 2000;
 
-/// A case of an object, with what was measured at every level by every variant.
+/// A case of an object, with the figures of every variant at every level.
 #[derive(Debug)]
 struct Unit {
     object: usize,
     bin: usize,
-    /// By level, then by variant.
+    /// Ordered by level, then by variant.
     measured: Vec<Option<Measured>>,
 }
 
-/// The means of a study, per bin, level and overall, with bootstrap intervals over objects and
-/// cases.
+/// The means of a study, per bin, level and overall, with bootstrap intervals.
 ///
-/// A bootstrap sample draws objects with replacement, and for each the same number of cases in
-/// every bin with replacement. All variants and levels of a drawn case come along, so that
-/// differences are paired. The sample depends on the seed alone.
+/// A bootstrap sample draws objects with replacement. For each object it draws the same number of
+/// cases in every bin, with replacement. A drawn case contributes all its variants and levels, so
+/// that differences are paired. The samples depend on the seed alone.
 ///
-/// A case whose rows could not be made is left out. Cost: O([`REPLICATES`] · rows).
+/// Rows without figures are left out. Cost: O([`REPLICATES`] · rows).
 #[derive(Debug)]
 pub struct Analysis {
     variants: Vec<String>,
@@ -38,8 +37,8 @@ pub struct Analysis {
     n_levels: usize,
     n_bins: usize,
     units: Vec<Unit>,
-    /// Sums and weights, by [`Analysis::slot`]: first of the rows as they are, then of bootstrap
-    /// samples.
+    /// Sums and weights, indexed by [`Analysis::slot`]. The first element is of the rows as they
+    /// are, the others are of bootstrap samples.
     replicates: Vec<Vec<f64>>,
 }
 
@@ -130,7 +129,7 @@ impl Analysis {
         self.n_bins
     }
 
-    /// Returns a mean with its interval; `None` if no row has the figure.
+    /// Returns a mean with its interval. If no row has the figure, returns `None`.
     #[must_use]
     pub fn mean(&self, metric: Metric, group: usize, variant: usize) -> Option<Interval> {
         self.contrast(metric, &[(group, variant, 1.0)])
@@ -142,8 +141,9 @@ impl Analysis {
         self.contrast(metric, &[(group, a, 1.0), (group, b, -1.0)])
     }
 
-    /// Returns a sum of means times factors, with its interval. A term is a group, a variant and a
-    /// factor.
+    /// Returns a sum of means times factors, with its interval.
+    ///
+    /// A term is a group, a variant and a factor.
     #[must_use]
     pub fn contrast(&self, metric: Metric, terms: &[(usize, usize, f64)]) -> Option<Interval> {
         let value = |sums: &Vec<f64>| -> f64 {
@@ -172,7 +172,7 @@ impl Analysis {
         Some(interval)
     }
 
-    /// Returns the figures of a variant in a group; `None` if there is no row.
+    /// Returns the figures of a variant in a group. If there are no rows, returns `None`.
     #[must_use]
     pub fn cell(&self, group: usize, variant: usize) -> Option<Cell> {
         let group = self.groups.get(group)?;
@@ -184,7 +184,7 @@ impl Analysis {
         Cell::of(&rows.collect::<Vec<_>>())
     }
 
-    /// Returns the number of cases of which a variant has rows in a group.
+    /// Returns the number of cases for which a variant has rows in a group.
     ///
     /// Rows of one case under several conditions are not independent.
     fn cases(&self, group: usize, variant: usize) -> usize {
@@ -195,7 +195,7 @@ impl Analysis {
         self.units.iter().filter(is_in).count()
     }
 
-    /// Returns what a variant measured of a unit in a group, by level.
+    /// Returns the figures of a variant for a unit, one per level of a group.
     fn figures<'a>(
         &self,
         unit: &'a Unit,
@@ -208,8 +208,9 @@ impl Analysis {
         levels.filter_map(move |level| unit.measured[level * n_variants + variant].as_ref())
     }
 
-    /// Returns where the sum of a metric is among the sums of a sample; its weight comes right
-    /// after.
+    /// Returns the index of the sum of a metric among the sums of a sample.
+    ///
+    /// The next element is its weight.
     fn slot(&self, metric: Metric, level: usize, variant: usize, bin: usize) -> usize {
         let cell = (metric as usize * self.n_levels + level) * self.variants.len() + variant;
         2 * (cell * self.n_bins + bin)
@@ -234,7 +235,7 @@ impl Analysis {
         sum / weight
     }
 
-    /// Returns the sums of a weighting of the units.
+    /// Returns the sums over all units with these weights.
     fn sums(&self, weights: &[f64]) -> Vec<f64> {
         let n_variants = self.variants.len();
         let cells = self.n_levels * n_variants * self.n_bins;
@@ -256,7 +257,7 @@ impl Analysis {
     }
 
     fn bootstrap(&self, seed: u64) -> Vec<Vec<f64>> {
-        // By object, then by bin, the units.
+        // The units, by object and then by bin.
         let mut strata: BTreeMap<usize, BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
         for (index, unit) in self.units.iter().enumerate() {
             let bins = strata.entry(unit.object).or_default();
@@ -283,7 +284,7 @@ impl Analysis {
     }
 }
 
-/// Returns the indices of names.
+/// Returns the index of each name.
 fn indices<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<&'a str, usize> {
     names.zip(0..).collect()
 }

@@ -17,12 +17,14 @@ pub struct Cell {
     pub add_success: f64,
     /// Mean number of iterations, or of estimates along a trajectory.
     pub steps: f64,
-    /// Standard deviation of the processor time, milliseconds; `None` without times.
+    /// Standard deviation of the processor time, milliseconds. `None` without times.
     pub cpu_deviation_ms: Option<f64>,
 }
 
 impl Cell {
-    /// Averages rows, given with the diameters of their objects in millimeters; `None` without rows.
+    /// Averages rows, each with the diameter of its object in millimeters.
+    ///
+    /// If there are no rows, returns `None`.
     pub(super) fn of(rows: &[(f64, &Measured)]) -> Option<Self> {
         let count = rows.len() as f64;
         let mean = |value: &dyn Fn(f64, &Measured) -> f64| {

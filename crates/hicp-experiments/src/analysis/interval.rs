@@ -4,11 +4,9 @@ use std::fmt;
 
 /// An estimate with its 95 % interval: the 2.5th and 97.5th percentiles of the bootstrap.
 ///
-/// If no bootstrap sample of a share differs, the interval holds what [`never_seen`] leaves
-/// possible.
+/// If all bootstrap samples of a share are equal, the interval is the one of [`never_seen`].
 ///
-/// Displays as `estimate [low, high]` with three digits unless a precision is given; `{:+}` adds
-/// signs.
+/// Displays as `estimate [low, high]`. The default precision is three digits; `{:+}` adds signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The estimate from all rows.
@@ -31,7 +29,7 @@ impl Interval {
         format!("{estimate} [{low}, {high}]")
     }
 
-    /// Returns the interval of the difference of the value and a constant.
+    /// Returns the interval of the value minus a constant.
     pub(crate) fn minus(self, constant: f64) -> Self {
         let [estimate, low, high] = self.ends().map(|x| x - constant);
         Self {
@@ -41,7 +39,7 @@ impl Interval {
         }
     }
 
-    /// Returns the interval of the difference of a constant and the value.
+    /// Returns the interval of a constant minus the value.
     pub(crate) fn from(self, constant: f64) -> Self {
         let [estimate, high, low] = self.ends().map(|x| constant - x);
         Self {
@@ -66,7 +64,7 @@ impl fmt::Display for Interval {
     }
 }
 
-/// Returns a share in percent with one digit.
+/// Returns a share in percent with one digit. Zero has no sign.
 pub(crate) fn percent(share: f64) -> String {
     let percent = format!("{:.1} %", 100.0 * share);
     match &*percent {
@@ -75,16 +73,18 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
-/// Returns the largest share that `cases` independent cases without it leave plausible (5 %).
+/// Returns the upper 95 % bound of a share that none of `cases` independent cases shows.
 ///
-/// This is 1 − 0.05^(1/n), the exact one-sided (Clopper–Pearson) bound, about 3/n. A bootstrap over
-/// cases that are all alike has no interval.
+/// This is 1 − 0.05^(1/n), the exact one-sided (Clopper–Pearson) bound, about 3/n. The bootstrap
+/// gives no interval if all cases are equal.
 #[must_use]
 pub fn never_seen(cases: usize) -> f64 {
     1.0 - 0.05_f64.powf(1.0 / cases as f64)
 }
 
-/// Returns a quantile of sorted values, interpolated between neighbors; `None` without values.
+/// Returns a quantile of sorted values, interpolated between neighbors.
+///
+/// If there are no values, returns `None`.
 pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share * last as f64;

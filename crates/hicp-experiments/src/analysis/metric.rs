@@ -4,7 +4,7 @@ use crate::study::Measured;
 
 /// A mean VSD above this is a failure.
 pub const FAILURE_VSD: f64 = 0.3;
-/// A mean VSD that rose by more than this made the pose worse.
+/// A refined pose is worse than the initial one if its mean VSD is higher by more than this.
 pub const WORSE_VSD: f64 = 0.02;
 /// An ADD(-S) below this share of the diameter is a success, as in the literature on ADD.
 pub const ADD_SHARE: f64 = 0.1;
@@ -14,7 +14,7 @@ pub const ADD_SHARE: f64 = 0.1;
 pub enum Metric {
     /// Mean VSD of the returned pose.
     Vsd,
-    /// Whether it is above [`FAILURE_VSD`].
+    /// Whether the mean VSD is above [`FAILURE_VSD`].
     Failure,
     /// Processor time, milliseconds.
     CpuMs,

@@ -1,4 +1,4 @@
-//! Reports: figures, tables, and one page that holds everything.
+//! Reports: figures, tables, and one page that contains everything.
 
 mod curve;
 mod figure;

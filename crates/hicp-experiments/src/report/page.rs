@@ -1,4 +1,4 @@
-//! The files of a report, and the page that holds them all.
+//! The files of a report, and the page that contains them all.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::study::{Design, StudyOf};
 /// A study in a report.
 #[derive(Debug)]
 pub struct Entry<D> {
-    /// Its name, such as that of its folder.
+    /// The name of the study, usually that of its folder.
     pub name: String,
     /// The study.
     pub study: StudyOf<D>,
@@ -25,12 +25,12 @@ pub struct Entry<D> {
     pub claims: Vec<Claim>,
 }
 
-/// The content of a report of a kind of study, next to what all reports have.
+/// The parts of a report that depend on the kind of study.
 #[derive(Debug)]
 pub struct Document {
     /// Title of the page.
     pub title: &'static str,
-    /// How to read the page, as HTML.
+    /// A note that explains the page, as HTML.
     pub note: String,
     /// Figures: name of the file, heading, figure.
     pub figures: Vec<(&'static str, &'static str, Figure)>,
@@ -47,30 +47,30 @@ pub trait Reported: Design {
     /// Tests the claims about a study.
     fn claims(&self, analysis: &Analysis) -> Vec<Claim>;
 
-    /// Describes what was run, next to objects, seed and camera: names and values.
+    /// Returns names and values of the configuration, except for objects, seed and camera.
     fn described(&self) -> Vec<(&'static str, String)>;
 
     /// Describes the report of some studies.
     fn document(entries: &[Entry<Self>]) -> Document;
 }
 
-/// The part of a note that concerns every study, as HTML.
+/// Returns the part of the note that every report has, as HTML.
 pub(crate) fn note_on_intervals() -> String {
     format!(
-        "VSD is the mean over tolerances of 5 % to 50 % of the diameter, against the true pose of the original model. Brackets \
-         hold 95 % intervals: percentiles of {REPLICATES} bootstrap samples over objects and, within each, over cases (of a bin); \
-         differences are paired."
+        "VSD is the mean over tolerances of 5 % to 50 % of the diameter, against the true pose of \
+         the original model. Brackets show 95 % intervals: percentiles of {REPLICATES} bootstrap \
+         samples over objects and, within each object, over cases (of a bin). Differences are paired."
     )
 }
 
-/// A report of studies, before it is written.
+/// A report of analyzed studies.
 #[derive(Debug)]
 pub struct ReportOf<D> {
     entries: Vec<Entry<D>>,
 }
 
 impl<D: Reported> ReportOf<D> {
-    /// Analyzes studies; each has a name, such as that of its folder.
+    /// Analyzes studies, each with a name, usually that of its folder.
     #[must_use]
     pub fn of(studies: Vec<(String, StudyOf<D>)>) -> Self {
         let entry = |(name, study): (String, StudyOf<D>)| {
@@ -106,8 +106,9 @@ impl<D: Reported> ReportOf<D> {
         figures.map(|(name, _, figure)| (name, figure)).collect()
     }
 
-    /// Writes `report.html`, which holds everything, and next to it the tables as CSV files and the
-    /// figures as SVG and PNG files.
+    /// Writes `report.html`, which contains everything, and separate files.
+    ///
+    /// These are the tables as CSV files, and the figures as SVG and PNG files.
     ///
     /// # Errors
     ///
@@ -134,13 +135,13 @@ impl<D: Reported> ReportOf<D> {
         }
         let section = |heading: &str, html: &str| format!("<h2>{heading}</h2>\n{html}");
         let unmade = Some(self.unmade()).filter(|table| !table.rows.is_empty());
-        let unmade = unmade.map(|table| section("Cases that could not be made", &table.html()));
+        let unmade = unmade.map(|table| section("Cases that could not be created", &table.html()));
         let differences = format!(
             "<details><summary>All paired differences</summary>\n{}</details>\n",
             document.differences.html()
         );
         let body = [
-            section("What was run", &self.what_was_run().html()),
+            section("Configuration", &self.configurations().html()),
             format!("<p>{}</p>\n", document.note),
             section("Claims", &claims.html()),
             figures,
@@ -152,8 +153,8 @@ impl<D: Reported> ReportOf<D> {
         Ok(())
     }
 
-    /// Returns a column per study, and a line per field of its configuration.
-    fn what_was_run(&self) -> Table {
+    /// Returns the configurations: a column per study, and a line per field.
+    fn configurations(&self) -> Table {
         let mut table = Table::new(&["study"]);
         for (index, entry) in self.entries.iter().enumerate() {
             table.head.push(entry.name.clone());
@@ -176,9 +177,9 @@ impl<D: Reported> ReportOf<D> {
         table
     }
 
-    /// Returns why cases could not be made, once per case and reason.
+    /// Returns the reasons why cases could not be created, once per case and reason.
     fn unmade(&self) -> Table {
-        let mut table = Table::new(&["study", "object", "case", "why"]);
+        let mut table = Table::new(&["study", "object", "case", "reason"]);
         for entry in &self.entries {
             for row in entry.study.rows.iter().filter(|row| row.measured.is_none()) {
                 let case = row.case.to_string();

@@ -1,4 +1,4 @@
-//! The share of errors inside the ellipsoids that the stated covariances give.
+//! The share of errors inside the ellipsoids of the stated covariances.
 
 use super::config::TrajectoryConfig;
 use super::rule::FusionRule;
@@ -11,10 +11,10 @@ const LEVELS: [f64; 3] = [0.5, 0.9, 0.99];
 /// The columns of the table.
 pub(super) const HEAD: &str = "underlying|method|which|trajectories|inside_50|inside_90|inside_99";
 
-/// Returns the share of final errors inside the ellipsoids that hold 50, 90 and 99 % if the stated
-/// covariance is right.
+/// Returns the share of final errors inside the ellipsoids of 50, 90 and 99 % probability.
 ///
-/// Per pipeline and method, of all trajectories and of those that did not fail.
+/// The ellipsoids follow from the stated covariances. For each pipeline and method, there is a row
+/// for all trajectories, and one for those that did not fail.
 pub(super) fn rows(study: &StudyOf<TrajectoryConfig>) -> Vec<Vec<String>> {
     let mut table = Vec::new();
     let config = &study.config;

@@ -19,8 +19,9 @@ const BEYOND: [&str; 3] = [
 const HYBRID: &str = "hybrid";
 const CASCADE: &str = "projective-cascade-point-plane";
 
-/// Tests the findings, and what goes beyond them; those whose pipelines or methods the study lacks
-/// are left out.
+/// Tests the findings of the paper, and claims about the methods beyond it.
+///
+/// Claims about pipelines or methods that the study lacks are left out.
 pub(super) fn claims(config: &TrajectoryConfig, analysis: &Analysis) -> Vec<Claim> {
     let (section, digits, methods) = ("§VI-C", 4, config.paper_methods());
     let judge = Judge {
@@ -140,6 +141,6 @@ fn is_better(
         evidence.push((format!("{method}: "), judge.difference(group, a, b)?));
     }
     let text = format!("{better} is better than {worse} at {group} initial VSD");
-    // The mean decides.
+    // Only the mean decides.
     judge.decide(text, |all| ClaimVerdict::negative(&all[..1]), evidence)
 }

@@ -14,7 +14,7 @@ use crate::variant::Variant;
 /// The value of `experiment` in the file.
 pub(super) const SEQUENTIAL: &str = "sequential";
 
-/// The exact configuration of a sequential study. Its rows follow from it.
+/// The exact configuration of a sequential study. It determines the rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectoryConfig {
@@ -22,7 +22,7 @@ pub struct TrajectoryConfig {
     pub experiment: String,
     /// Version of this crate.
     pub version: String,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Trajectories per object and bin.
     pub trajectories: u64,
@@ -35,9 +35,9 @@ pub struct TrajectoryConfig {
     pub clock: TrajectoryClock,
     /// Distance of the object's center along the optical axis in the first image, meters.
     pub start_distance_m: f64,
-    /// How far the camera travels, meters.
+    /// Length of the path of the camera, meters.
     pub path_m: f64,
-    /// Its speed, meters per second.
+    /// Speed of the camera, meters per second.
     pub speed_m_s: f64,
     /// Largest distance of the first optical axis from the object's center, meters.
     pub axis_offset_m: f64,
@@ -57,7 +57,7 @@ pub struct TrajectoryConfig {
     pub reconstruction_max_distance_m: f64,
     /// The camera.
     pub camera: CameraRecord,
-    /// The pipelines that make the estimates.
+    /// The pipelines that compute the estimates.
     pub underlying: Vec<UnderlyingRecord>,
     /// The methods that fuse them.
     pub methods: Vec<String>,
@@ -65,8 +65,9 @@ pub struct TrajectoryConfig {
     pub objects: Vec<ObjectRecord>,
 }
 
-/// The time that an estimate takes, and with it how far the camera moves meanwhile.
-// Deviation: in §VI-C.1 the camera moves on by the time that each estimate took; by default a stored cost stands for it.
+/// The clock that times an estimate. It decides how far the camera moves between two images.
+// Deviation: in §VI-C.1 the camera moves for as long as each estimate took. By default, a stored
+// cost replaces that time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -78,8 +79,8 @@ pub enum TrajectoryClock {
     Cost,
     /// The measured processor time from depth image to fused pose.
     ///
-    /// Every method sees different images, and **no two runs are the same**. A fast pipeline takes
-    /// thousands of images.
+    /// Every method sees different images, and **no two runs are the same**. A fast pipeline
+    /// processes thousands of images.
     Real,
 }
 
@@ -96,10 +97,10 @@ pub struct UnderlyingRecord {
 }
 
 impl TrajectoryConfig {
-    /// Describes the paper's setting (§VI-C.1) for some underlying pipelines and all methods.
+    /// Creates the paper's setting (§VI-C.1) for some underlying pipelines and all methods.
     ///
     /// The camera moves from 1 m to 0.4 m at 0.1 m/s. The depth has a D435's axial noise, the
-    /// models are reconstructions with errors of 5 mm and 1.1°, and starts fall into ten bins.
+    /// models are reconstructions with pose errors of 5 mm and 1.1°. Starts fall into ten bins.
     ///
     /// # Errors
     ///
@@ -150,7 +151,8 @@ impl TrajectoryConfig {
     #[must_use]
     pub fn n_images(&self, underlying: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // Not negative, and small; a path of whole steps ends with an image in spite of rounding.
+        // The count is small and not negative. The addend keeps the last image of a path of whole
+        // steps in spite of rounding.
         let steps = (self.path_m / self.step_m(underlying) + 1e-9)
             .max(0.0)
             .floor() as usize;
@@ -194,8 +196,9 @@ impl TrajectoryConfig {
 }
 
 impl From<&Preset> for UnderlyingRecord {
-    /// Describes a preset with its cost in the paper's Table I, which has every preset of the
-    /// paper.
+    /// Creates the record of a preset, with its cost in the paper's Table I.
+    ///
+    /// A preset beyond the paper costs 0.5 s.
     fn from(preset: &Preset) -> Self {
         let cost = TABLE_I.iter().find(|(name, ..)| *name == preset.name());
         Self {
@@ -207,7 +210,7 @@ impl From<&Preset> for UnderlyingRecord {
 }
 
 impl UnderlyingRecord {
-    /// Returns the pipeline, to build from.
+    /// Returns the pipeline, ready to be built.
     pub(super) fn variant(&self) -> Variant {
         Variant {
             name: self.name.clone(),

@@ -1,4 +1,4 @@
-//! The sequential study as a kind of study.
+//! The [`Design`] of sequential studies.
 
 use hicp_io::IoError;
 
@@ -9,11 +9,11 @@ use crate::error::ExperimentError;
 use crate::study::{ALL, Column, Columns, Design, Fields, Group, Layout, Models, Worker, quoted};
 use crate::subject::Subject;
 
-/// Most trajectories per object and bin.
+/// Largest number of trajectories per object and bin.
 const MAX_TRAJECTORIES: u64 = 100_000;
-/// Most underlying pipelines: each has a panel of the figure.
+/// Largest number of underlying pipelines. Each has a column of the figure.
 const MAX_UNDERLYING: usize = 40;
-/// Most methods.
+/// Largest number of methods.
 const MAX_METHODS: usize = 100;
 
 impl Design for TrajectoryConfig {
@@ -75,7 +75,7 @@ impl Design for TrajectoryConfig {
             cases: self.trajectories.saturating_mul(self.bins as u64),
             bins: self.bins,
             is_binned: vec![true; self.underlying.len()],
-            // An interrupted study is as even over the objects as it can be.
+            // An interrupted study then has nearly the same number of trajectories of every object.
             is_interleaved: true,
         }
     }

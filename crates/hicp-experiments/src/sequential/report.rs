@@ -30,7 +30,7 @@ impl Reported for TrajectoryConfig {
                 TrajectoryClock::Cost => {
                     format!("{name}: {seconds} s per estimate, {step:.4} m, {images} images")
                 }
-                TrajectoryClock::Real => format!("{name}: as long as it took"),
+                TrajectoryClock::Real => format!("{name}: the measured time"),
             }
         };
         let costs = self.underlying.iter().enumerate().map(cost);
@@ -67,9 +67,10 @@ impl Reported for TrajectoryConfig {
         let means: String = tables.collect();
         let results = format!(
             "<h2>Mean VSD by initial VSD</h2>\n{means}\
-             <h2>Do the errors match the covariances?</h2>\n<p>Share of the final errors inside the ellipsoids that should hold \
-             50, 90 and 99 %, by χ²₆, for the calibrated methods by Student's distribution; objects that turn freely about an axis \
-             are left out. A trajectory failed whose final VSD is above {FAILURE_VSD}.</p>\n{}",
+             <h2>Do the errors match the covariances?</h2>\n<p>The table shows the share of the \
+             final errors inside the ellipsoids of 50, 90 and 99 % probability. The distribution is χ²₆, and \
+             Student's for the calibrated methods. Objects with a continuous symmetry are left out. A \
+             trajectory failed if its final VSD is above {FAILURE_VSD}.</p>\n{}",
             calibration.html()
         );
         let rows = entries.iter().flat_map(Entry::panels).collect();
@@ -92,22 +93,23 @@ impl Reported for TrajectoryConfig {
 fn note(is_real: bool) -> String {
     let clock = match is_real {
         false => {
-            "The clock is a stored cost, the mean of Table I of the paper: all methods of a pipeline see the same images."
+            "The clock is a stored cost, the mean of Table I of the paper. All methods of a pipeline see the same images."
         }
         true => {
-            "The clock was the processor's measured time: every method saw different images, and no run repeats this one."
+            "The clock was the measured processor time. Every method saw different images, and no run repeats this one."
         }
     };
     format!(
-        "{clock} Both pipelines get the same paths, starts and models. Covariances are e_MVE·U with U the unit about the object, moved \
-         by the adjoint; <i>gated</i> leaves out estimates with an MVE above 0.4 and brings symmetric poses together; \
-         <i>calibrated</i> does so with the covariance of the registration, fitted on other objects, and a stricter gate. {}",
+        "{clock} All pipelines get the same paths, starts and models. Covariances are e_MVE·U, where U \
+         is the unit covariance around the object, and are transported by the adjoint. <i>gated</i> \
+         methods leave out estimates with an MVE above 0.4, and use the symmetries of the object. <i>calibrated</i> methods also use the covariance of the \
+         registration, fitted on other objects, and a stricter gate. {}",
         note_on_intervals()
     )
 }
 
 impl Entry<TrajectoryConfig> {
-    /// Returns every pipeline with every method, and their index in the analysis.
+    /// Returns every pair of a pipeline and a method, with its index in the analysis.
     fn pairs(&self) -> impl Iterator<Item = (&str, &str, usize)> {
         let config = &self.study.config;
         let methods = || config.methods.iter().map(String::as_str);
@@ -116,7 +118,7 @@ impl Entry<TrajectoryConfig> {
         pairs.zip(0..).map(|((u, m), index)| (u, m, index))
     }
 
-    /// Returns everything per bin, pipeline and method.
+    /// Returns the rows of `summary.csv`: the figures of every pipeline and method in every group.
     fn summary(&self) -> Vec<Vec<String>> {
         let (analysis, metrics) = (&self.analysis, [Metric::Vsd, Metric::Failure]);
         let mut rows = Vec::new();
@@ -136,7 +138,7 @@ impl Entry<TrajectoryConfig> {
         rows
     }
 
-    /// Returns the paired differences of every method from `average`, per pipeline and group.
+    /// Returns the paired differences between every method and `average`, per pipeline and group.
     fn differences(&self) -> Vec<Vec<String>> {
         let (analysis, mut rows) = (&self.analysis, Vec::new());
         for (underlying, method, index) in self.pairs().filter(|pair| pair.1 != AVERAGE) {

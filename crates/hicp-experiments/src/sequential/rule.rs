@@ -8,18 +8,22 @@ use hybrid_icp::fusion::{
 use hybrid_icp::score::MeanVsd;
 use hybrid_icp::{BoxedStage, Calibration, Preset, SequentialConfig, SequentialEstimator};
 
-/// A method of §V-A as the study runs it, or one behind a gate.
+/// A fusion method of §V-A as the study runs it, with or without a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FusionRule {
-    /// The paper's method: covariances e_MVE·U with U the unit about the object (rotations count by
-    /// its radius), carried by the adjoint; no gate, no symmetries.
+    /// The paper's method, without a gate and without symmetries.
+    ///
+    /// Covariances are e_MVE·U, where U is the unit covariance around the object: rotations count
+    /// by its radius. They are transported by the adjoint.
     Plain(FusionMethod),
-    /// The same, but estimates with an MVE above 0.4 are left out and symmetric poses are brought
-    /// together: [`SequentialEstimator::for_object`].
+    /// The same with a gate and with symmetries: [`SequentialEstimator::for_object`].
+    ///
+    /// Estimates with an MVE above 0.4 are left out.
     Gated(FusionMethod),
-    /// As `Gated`, with the covariance of the registration, calibrated to the pipeline:
-    /// [`SequentialEstimator::calibrated`].
+    /// Like `Gated`, with the calibrated covariance of the registration.
+    ///
+    /// See [`SequentialEstimator::calibrated`]. The calibration depends on the pipeline.
     Calibrated(FusionMethod),
 }
 
@@ -40,9 +44,10 @@ impl FusionRule {
 
     /// The expected names, for messages.
     pub(crate) const EXPECTED: &str =
-        "a method of the paper, or one of those that gated- and calibrated- are put before";
+        "a method of the paper, with or without gated- or calibrated- before its name";
 
-    /// Name in tables; `gated-` or `calibrated-` before that of the method.
+    /// Returns the name in tables: that of the method, after `gated-` or `calibrated-` if it has a
+    /// gate.
     #[must_use]
     pub fn name(self) -> String {
         match self {
@@ -52,8 +57,9 @@ impl FusionRule {
         }
     }
 
-    /// Returns the rule of a name; any method may be gated or calibrated, not only those of
-    /// [`FusionRule::ALL`].
+    /// Returns the rule of a name.
+    ///
+    /// Any method may be gated or calibrated, not only those of [`FusionRule::ALL`].
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let of = |rule: fn(FusionMethod) -> Self, method: &str| method.parse().ok().map(rule);
@@ -70,10 +76,9 @@ impl FusionRule {
         matches!(self, Self::Plain(_))
     }
 
-    /// Returns the probability that the squared Mahalanobis distance of the final pose from the
-    /// truth is at most this large.
+    /// Returns the probability of a smaller squared Mahalanobis distance from the truth.
     ///
-    /// By the distribution that the rule assumes with an underlying pipeline.
+    /// The distribution is the one that the rule assumes for an underlying pipeline.
     pub(crate) fn probability_within(self, pipeline: &str, mahalanobis_squared: f64) -> f64 {
         match self {
             Self::Calibrated(_) => calibration(pipeline).probability_within(mahalanobis_squared),
@@ -81,8 +86,9 @@ impl FusionRule {
         }
     }
 
-    /// Creates an estimator that starts from `init` in the first camera frame; `pipeline` is the
-    /// name of the underlying pipeline.
+    /// Creates an estimator that starts from `init` in the first camera frame.
+    ///
+    /// `pipeline` is the name of the underlying pipeline.
     pub(crate) fn estimator(
         self,
         stage: BoxedStage,
@@ -116,7 +122,7 @@ impl FusionRule {
     }
 }
 
-/// Returns the calibration for a pipeline by its name; that of `hybrid` if it is not a preset.
+/// Returns the calibration of a preset by its name; other pipelines use that of `hybrid`.
 fn calibration(pipeline: &str) -> Calibration {
     Calibration::of(pipeline.parse().unwrap_or(Preset::Hybrid))
 }

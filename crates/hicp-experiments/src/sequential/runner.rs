@@ -1,4 +1,4 @@
-//! One trajectory: traveled with every underlying pipeline, its estimates fused by every method.
+//! The evaluation of a trajectory: every underlying pipeline, every fusion method.
 
 use std::error::Error;
 use std::ops::Range;
@@ -22,7 +22,7 @@ use crate::variant::Variant;
 type Failed = Box<dyn Error>;
 type Watch<'w> = &'w mut dyn FnMut(&TrajectoryStep<'_>);
 
-/// Evaluates trajectories; one per thread.
+/// Evaluates trajectories. Each thread has one.
 pub(super) struct TrajectoryRunner<'a> {
     config: &'a TrajectoryConfig,
     subjects: &'a [Subject],
@@ -42,21 +42,21 @@ struct Journey<'a> {
     believed: &'a Model,
 }
 
-/// A method on its way.
+/// The state of a method along a trajectory.
 struct Traveler {
     estimator: SequentialEstimator,
     n_estimates: usize,
 }
 
-/// Travels trajectories of every object and calls `watch` with each step of every pipeline and
-/// method.
+/// Runs trajectories of every object, and calls `watch` with each step of every method.
 ///
-/// For figures that the rows do not hold.
+/// It gives access to figures that the rows do not contain. `trajectories` are the indices per
+/// object.
 ///
 /// # Errors
 ///
 /// [`ExperimentError`] when the configuration is invalid or a pipeline cannot be built. A
-/// trajectory that cannot be made has no steps.
+/// trajectory that cannot be created has no steps.
 pub fn watch_trajectories(
     config: &TrajectoryConfig,
     subjects: &[Subject],
@@ -99,10 +99,10 @@ impl<'a> TrajectoryRunner<'a> {
         })
     }
 
-    /// Evaluates a trajectory: underlying pipelines in order, and in each the methods in order.
+    /// Evaluates a trajectory. The outcomes are ordered by underlying pipeline, then by method.
     ///
-    /// All get the same path, the same start and the same model. By the clock of costs, all methods
-    /// of a pipeline get the same images. `watch` is called with every step.
+    /// All get the same path, the same start and the same model. With the clock of costs, all
+    /// methods of a pipeline get the same images. `watch` is called with every step.
     pub(super) fn outcomes(&mut self, object: usize, index: u64, watch: Watch<'_>) -> Vec<Outcome> {
         let drawn = self.draw(object, index);
         let mut outcomes = Vec::new();
@@ -138,7 +138,7 @@ impl<'a> TrajectoryRunner<'a> {
         Ok((trajectory, believed))
     }
 
-    /// Travels a trajectory; returns the figures of each method.
+    /// Runs a trajectory with one underlying pipeline. Returns the figures of each method.
     fn travel(&mut self, journey: &Journey<'_>, watch: Watch<'_>) -> Result<Vec<Measured>, Failed> {
         let variant = &self.underlying[journey.underlying];
         let mut travelers = Vec::new();
@@ -149,7 +149,7 @@ impl<'a> TrajectoryRunner<'a> {
                 n_estimates: 0,
             });
         }
-        // By a real clock, every method is elsewhere when the next image is taken.
+        // With the real clock, every method takes its images from different places.
         let together = match self.config.clock {
             TrajectoryClock::Cost => travelers.len(),
             TrajectoryClock::Real => 1,
@@ -164,8 +164,9 @@ impl<'a> TrajectoryRunner<'a> {
         Ok(all)
     }
 
-    /// Takes some estimators along the path on the same images; returns the true pose where it
-    /// ends.
+    /// Moves some estimators along the path over the same images.
+    ///
+    /// Returns the true pose at the end of the path.
     fn go(
         &self,
         journey: &Journey<'_>,
@@ -206,7 +207,7 @@ impl<'a> TrajectoryRunner<'a> {
             motion = CameraMotion::new(trajectory.motion(meters))?;
             traveled += meters;
         }
-        // All are judged from where the path ends.
+        // All methods are judged at the end of the path.
         let rest = CameraMotion::new(trajectory.motion(config.path_m - traveled))?;
         for one in group {
             one.estimator.move_camera(&rest);
@@ -214,7 +215,7 @@ impl<'a> TrajectoryRunner<'a> {
         Ok(rest.apply(&truth))
     }
 
-    /// Returns what the camera sees, with a perfect mask.
+    /// Returns the depth image with noise, and a perfect mask.
     fn take_image(
         &self,
         journey: &Journey<'_>,

@@ -1,4 +1,4 @@
-//! A step along a trajectory, for those who watch it.
+//! A step along a trajectory, for callers that watch it.
 
 use hicp_core::{Isometry3, Model};
 use hybrid_icp::SequentialStep;
@@ -14,7 +14,8 @@ pub struct TrajectoryStep<'a> {
     pub object: &'a Subject,
     /// Index of the trajectory among those of its object.
     pub trajectory: u64,
-    /// The true pose in the frame of this image; one of them, if the object has symmetries.
+    /// The true pose in the frame of this image. If the object has symmetries, it is one of
+    /// several.
     pub camera_from_object: Isometry3<f64>,
     /// The registered model: a reconstruction.
     pub believed: &'a Model,
@@ -23,7 +24,7 @@ pub struct TrajectoryStep<'a> {
 }
 
 impl TrajectoryStep<'_> {
-    /// Returns the true pose nearest to a pose, of those that look the same.
+    /// Returns the true pose that is nearest to a pose, among all that the symmetries allow.
     ///
     /// # Errors
     ///
@@ -33,7 +34,7 @@ impl TrajectoryStep<'_> {
     }
 }
 
-/// Returns the true pose nearest to a pose, of those that look the same.
+/// Returns the true pose that is nearest to a pose, among all that the symmetries allow.
 pub(super) fn nearest_truth(
     model: &Model,
     truth: &Isometry3<f64>,

@@ -6,8 +6,9 @@ use rand::RngExt;
 
 use super::config::TrajectoryConfig;
 
-/// A straight path toward a point near the object, without rotation, and a start in a bin of the
-/// initial VSD.
+/// A straight path toward a point near the object, and an initial pose in a bin of the initial VSD.
+///
+/// The camera does not rotate.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Trajectory {
     /// The true pose in the first camera frame.
@@ -21,10 +22,10 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    /// Draws the trajectory of an index; its bin is the index modulo their number.
+    /// Draws the trajectory of an index. Its bin is the index modulo the number of bins.
     ///
-    /// Tries a number of starts around one path before it draws another path, as the single-image
-    /// studies do.
+    /// Like the single-image studies, it tries several starts around one path before it draws
+    /// another path.
     pub(crate) fn draw(
         config: &TrajectoryConfig,
         scorer: &mut CaseMaker,
@@ -71,7 +72,8 @@ impl Trajectory {
         ))
     }
 
-    /// Returns the motion of the camera over a distance: the next camera frame from the one before.
+    /// Returns the motion of the camera over a distance: the next camera frame from the previous
+    /// one.
     pub(crate) fn motion(&self, meters: f64) -> Isometry3<f64> {
         let moved = Translation3::from(-self.direction * meters);
         Isometry3::from_parts(moved, hicp_core::UnitQuaternion::identity())

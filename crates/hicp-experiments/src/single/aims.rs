@@ -6,13 +6,13 @@ use crate::claims::{Claim, ClaimVerdict, Judge};
 use crate::study::{ALL, FAULTY_MASK};
 
 const HYBRID: &str = "hybrid";
-/// The tenths of the initial VSD in which `local` is to be better: the bins below 0.8.
+/// `local` should be better than `hybrid` below this many tenths of the initial VSD.
 const BETTER_TENTHS: usize = 8;
 
 /// The limit of an aim.
 #[derive(Clone, Copy)]
 enum Limit {
-    /// This share of the figure of `hybrid`.
+    /// This factor times the figure of `hybrid`.
     Hybrid(f64),
     /// This share of the cases.
     Share(f64),
@@ -20,7 +20,7 @@ enum Limit {
 
 use Limit::{Hybrid, Share};
 
-/// The aims: a preset, a group, and the figure that is to be below a limit.
+/// The aims: a preset, a group, and a figure that should be below a limit.
 const AIMS: [(&str, &str, Metric, Limit); 9] = [
     ("local", "perfect", Vsd, Hybrid(0.6)),
     ("local", ALL, Vsd, Hybrid(0.6)),
@@ -32,10 +32,10 @@ const AIMS: [(&str, &str, Metric, Limit); 9] = [
     ("local", ALL, Worse, Share(0.01)),
     ("auto", ALL, Worse, Share(0.01)),
 ];
-/// The place of the aim for single bins among the others.
+/// The index of the aim for single bins among all aims.
 const BINS_PLACE: usize = 2;
 
-/// Tests the aims; those whose variants the study lacks are left out.
+/// Tests the aims. An aim is `None` if the study lacks its variants.
 pub(super) fn aims(judge: Judge<'_>) -> Vec<Option<Claim>> {
     let mut aims: Vec<Option<Claim>> = AIMS.iter().map(|aim| test(judge, *aim)).collect();
     aims.insert(BINS_PLACE, better_in_bins(judge));
@@ -83,7 +83,7 @@ fn test(
     }
 }
 
-/// Tests that `local` is better in every bin below 0.8.
+/// Tests whether `local` is better in every bin below 0.8.
 fn better_in_bins(judge: Judge<'_>) -> Option<Claim> {
     let end = BETTER_TENTHS * judge.analysis.n_bins();
     let groups = judge.analysis.groups().iter().filter(|group| group.single);

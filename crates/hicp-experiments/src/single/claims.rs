@@ -11,7 +11,7 @@ const HYBRID: &str = "hybrid";
 const NN: &str = "nn-point-to-point";
 const CASCADE: &str = "projective-cascade-point-plane";
 
-/// Tests the claims about a study; those whose variants it lacks are left out.
+/// Tests the claims about a study. Claims about variants that the study lacks are left out.
 #[must_use]
 pub fn claims(experiment: Experiment, analysis: &Analysis) -> Vec<Claim> {
     let digits = 3;
@@ -60,7 +60,7 @@ fn of_initial_poses(judge: Judge<'_>) -> Vec<Option<Claim>> {
         projective_best_low(judge),
         nn_best_high(judge),
         fails_high(judge, "projective-", "projective"),
-        fails_high(judge, "nn-", "nearest-neighbour"),
+        fails_high(judge, "nn-", "nearest-neighbor"),
         nn_cascades(judge),
     ]
 }
@@ -73,7 +73,8 @@ fn of_noise(judge: Judge<'_>, noise: &str, over: &str) -> Vec<Option<Claim>> {
     ]
 }
 
-/// Decides that a variant is lower than each of the others; lists the differences, worst first.
+/// Decides whether a variant is lower than each other one, and lists the differences, highest
+/// first.
 fn lower_than_each(
     judge: Judge<'_>,
     text: String,
@@ -151,7 +152,7 @@ fn fails_high(judge: Judge<'_>, prefix: &str, kind: &str) -> Option<Claim> {
     judge.claim(text, ClaimVerdict::negative(&missing), listed(figures))
 }
 
-/// Tests "no better": a significantly lower mean refutes it, means that are not lower confirm it.
+/// Tests "no better". A significantly lower mean refutes it; means that are not lower confirm it.
 fn nn_cascades(judge: Judge<'_>) -> Option<Claim> {
     let cascades = judge.family("nn-cascade-").into_iter();
     let against_nn = |v| Some((format!("{v} − {NN}: "), judge.difference(ALL, v, NN)?));
@@ -159,11 +160,11 @@ fn nn_cascades(judge: Judge<'_>) -> Option<Claim> {
         let holds = differences.iter().all(|i| i.estimate >= 0.0);
         ClaimVerdict::of(holds, differences.iter().any(|i| i.high < 0.0))
     };
-    let text = "cascading is no better than point-to-point with nearest neighbours";
+    let text = "cascading is no better than point-to-point with nearest neighbors";
     judge.decide(text, no_better, cascades.filter_map(against_nn).collect())
 }
 
-/// Compares the rise of the mean from no noise to noise, projective against nearest neighbors.
+/// Compares the rise of the mean due to noise between projective and nearest-neighbor variants.
 fn less_susceptible(judge: Judge<'_>, noise: &str) -> Option<Claim> {
     let none = judge.steps().next()?;
     let rise = |prefix: &str, factor: f64| {
@@ -179,9 +180,9 @@ fn less_susceptible(judge: Judge<'_>, noise: &str) -> Option<Claim> {
     let difference = of(&[projective.clone(), rise("nn-", -1.0)?].concat())?;
     let (projective, nearest) = (of(&projective)?, of(&nearest)?);
     judge.claim(
-        format!("projective variants are less susceptible to {noise} than those with nearest neighbours (rise of the mean VSD from none)"),
+        format!("projective variants are less susceptible to {noise} than those with nearest neighbors (rise of the mean VSD from none)"),
         ClaimVerdict::negative(&[difference]),
-        format!("projective {projective:+}, nearest neighbours {nearest:+}, difference {difference:+}"),
+        format!("projective {projective:+}, nearest neighbors {nearest:+}, difference {difference:+}"),
     )
 }
 

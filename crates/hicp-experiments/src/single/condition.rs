@@ -5,19 +5,19 @@ use hicp_sim::{Corruption, DepthNoise, RelativeGaussian};
 /// The conditions under which a case is presented.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// Whether the initial pose is drawn into bins of the initial VSD (§VI-B.1), or is 6.2 mm and
-    /// 9.5° off.
+    /// Whether initial poses are drawn into bins of the initial VSD (§VI-B.1). Otherwise they are
+    /// 6.2 mm and 9.5° off.
     pub binned: bool,
-    /// What makes the image and the mask imperfect.
+    /// The imperfections of the image and the mask.
     pub corruption: Corruption,
-    /// 0 for the original model, 1 to 4 for a reconstruction.
+    /// The model: 0 for the original, 1 to 4 for a reconstruction.
     pub model_level: u32,
-    /// The threshold α, if it is what is studied.
+    /// The threshold α, if the study varies it.
     pub alpha: Option<f64>,
 }
 
 impl Condition {
-    /// Perfect images of the original model, from initial poses that are `binned` or not.
+    /// Creates the condition of perfect images of the original model.
     pub(super) fn perfect(binned: bool) -> Self {
         let perfect = Self {
             binned,
@@ -28,7 +28,7 @@ impl Condition {
         perfect.depth(0)
     }
 
-    /// Depth noise in percent of the depth.
+    /// Sets the depth noise, percent of the depth.
     pub(super) fn depth(mut self, percent: u32) -> Self {
         let percent = f64::from(percent);
         self.corruption.sensor.noise = DepthNoise::Relative(RelativeGaussian { percent });

@@ -11,7 +11,7 @@ use crate::study::{CameraRecord, Design, Fields, ObjectRecord};
 use crate::subject::Subject;
 use crate::variant::Variant;
 
-/// The exact configuration of a study. Its rows follow from it, except for the times.
+/// The exact configuration of a study. It determines the rows, except for the times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
@@ -19,7 +19,7 @@ pub struct Config {
     pub experiment: Experiment,
     /// Version of this crate.
     pub version: String,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Cases per object.
     pub poses: u64,
@@ -48,8 +48,9 @@ pub struct Config {
 }
 
 impl Config {
-    /// Describes a study in the paper's setting, seen by a 640 × 480 camera with a focal length of
-    /// 573 pixels.
+    /// Creates the configuration of a study in the paper's setting.
+    ///
+    /// The camera has 640 × 480 pixels and a focal length of 573 pixels.
     ///
     /// # Errors
     ///
@@ -85,7 +86,7 @@ impl Config {
         Ok(config)
     }
 
-    /// Returns how cases are made, with binned initial poses or with the others.
+    /// Returns the configuration of the cases, with binned or with fixed initial poses.
     pub(super) fn cases(&self, binned: bool) -> Result<CaseConfig, ExperimentError> {
         let init = match binned {
             true => InitialPose::Binned(VsdBins {

@@ -1,4 +1,4 @@
-//! Studies of single images as a kind of study.
+//! The [`Design`] of studies of single images.
 
 use hicp_io::IoError;
 
@@ -10,7 +10,7 @@ use crate::study::{
 };
 use crate::subject::Subject;
 
-/// Most cases per object.
+/// Largest number of cases per object.
 const MAX_POSES: u64 = 1_000_000;
 
 impl Design for Config {
@@ -41,7 +41,7 @@ impl Design for Config {
         fields.above_0(&["max_distance_m"])?;
         let known = self.experiment.levels();
         fields.names("levels", known.len())?;
-        // The meaning of a level follows from its index. A study may have only the first levels.
+        // The index of a level decides its meaning. A study may have only the first levels.
         for (index, (level, known)) in self.levels.iter().zip(&known).enumerate() {
             let name = self.experiment.name();
             let expected = format_args!("{}, as in every {name} study", quoted(known));

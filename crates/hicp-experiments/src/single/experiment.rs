@@ -12,25 +12,27 @@ use crate::study::{ALL, FAULTY_MASK, Group, NOISY, NOISY_DEPTH, NOISY_MODEL};
 pub enum Experiment {
     /// Robustness to the initial pose (§VI-B.1): ten equal bins of the initial VSD, perfect images.
     InitNoise,
-    /// Robustness to depth noise (§VI-B.2): 0 to 5 % of the depth, 6.2 mm and 9.5° off.
+    /// Robustness to depth noise of 0 to 5 % (§VI-B.2), from starts 6.2 mm and 9.5° off.
     DepthNoise,
-    /// Robustness to a wrong model (§VI-B.3): the original and four reconstructions, 6.2 mm and
-    /// 9.5° off.
+    /// Robustness to a wrong model (§VI-B.3), from starts 6.2 mm and 9.5° off.
+    ///
+    /// The models are the original and four reconstructions.
     ModelNoise,
-    /// Time (§VI-B.4, Table I): a third of its rows under the conditions of each of the studies
-    /// above.
+    /// Time (§VI-B.4, Table I). Each of the studies above provides the conditions of a third of the
+    /// rows.
     Timing,
     /// The threshold α of Dynamic Switching (§IV-A), on the tuning objects.
     Alpha,
-    /// The presets beyond the paper: every start under depth noise, model noise and imperfect
+    /// The presets beyond the paper, from every start, with depth noise, model noise and imperfect
     /// masks.
     Beyond,
 }
 
 /// A name, and a change of an image.
 type Named = (&'static str, fn(&mut Corruption));
-/// The imperfect masks of [`Experiment::Beyond`], with their names. A dilated mask needs a wall
-/// behind the object, since the added pixels need a depth.
+/// The imperfect masks of [`Experiment::Beyond`], with their names.
+///
+/// A dilated mask needs a wall behind the object, because the added pixels need a depth.
 const MASKS: [Named; 4] = [
     ("eroded", |image| image.mask.erosion_pixels = 3),
     ("dilated", |image| {
@@ -39,14 +41,13 @@ const MASKS: [Named; 4] = [
     ("missing", |image| image.mask.missing_share = 0.2),
     ("occluded", |image| image.occluded_share = 0.3),
 ];
-/// The groups of imperfect images of [`Experiment::Beyond`], and how the names of their levels
-/// start.
+/// The groups of imperfect images of [`Experiment::Beyond`], with the prefixes of their levels.
 const KINDS: [(&str, &str); 3] = [
     (NOISY_DEPTH, "depth-"),
     (NOISY_MODEL, "model-"),
     (FAULTY_MASK, "mask-"),
 ];
-/// Steps of α from 0 to 1.
+/// Number of steps of α from 0 to 1.
 const ALPHA_STEPS: u32 = 20;
 /// Largest depth noise, percent.
 const DEPTH_STEPS: u32 = 5;
@@ -90,7 +91,7 @@ impl Experiment {
         }
     }
 
-    /// Returns the objects that it runs on by default (§VI-A.1).
+    /// Returns the default objects (§VI-A.1).
     #[must_use]
     pub fn household(self) -> [Household; 10] {
         match self {
@@ -99,7 +100,7 @@ impl Experiment {
         }
     }
 
-    /// Returns whether all of its cases are binned by their initial VSD.
+    /// Returns whether all cases are binned by their initial VSD.
     #[must_use]
     pub fn is_binned(self) -> bool {
         self.conditions(0).iter().all(|level| level.1.binned)
@@ -114,17 +115,17 @@ impl Experiment {
             .collect()
     }
 
-    /// Returns the conditions of a level, by its index in [`Experiment::levels`], for a case.
+    /// Returns the condition of a level for a case.
     ///
-    /// Only those of [`Experiment::Timing`] depend on the case: it cycles through the noise levels
-    /// of the other studies.
+    /// `level` is an index into [`Experiment::levels`]. Only [`Experiment::Timing`] depends on the
+    /// case: it cycles through the noise levels of the other studies.
     #[must_use]
     pub fn condition(self, level: usize, case: u64) -> Condition {
         let nth = self.conditions(case).into_iter().nth(level);
         nth.map_or_else(|| Condition::perfect(true), |(_, condition)| condition)
     }
 
-    /// Returns the thresholds α of the first `levels`; one `None` if they do not change α.
+    /// Returns the thresholds α of the first `levels`, or one `None` if they do not change α.
     pub(super) fn alphas(self, levels: usize) -> Vec<Option<f64>> {
         let levels = self.conditions(0).into_iter().take(levels);
         let alphas: Vec<Option<f64>> = levels.filter_map(|level| level.1.alpha).map(Some).collect();
@@ -152,8 +153,8 @@ impl Experiment {
                 let one = |study: Self| {
                     let mut levels = study.conditions(0);
                     #[allow(clippy::cast_possible_truncation)] // Below the number of levels.
-                    let turn = (case % levels.len() as u64) as usize;
-                    (study.name().to_owned(), levels.swap_remove(turn).1)
+                    let nth = (case % levels.len() as u64) as usize;
+                    (study.name().to_owned(), levels.swap_remove(nth).1)
                 };
                 [Self::InitNoise, Self::DepthNoise, Self::ModelNoise]
                     .map(one)
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn timing_goes_through_every_level_of_the_others() {
+    fn timing_cycles_through_every_level_of_the_other_studies() {
         let percents: Vec<f64> = (0..6)
             .map(|c| percent(Experiment::Timing.condition(1, c)))
             .collect();

@@ -41,9 +41,9 @@ impl Reported for Config {
         };
         let paper_figure = "Mean VSD after ICP, as in Figure 6 of the paper";
         let note = format!(
-            "Every variant refines the same images from the same initial poses. {} ADD(-S) is ADI where an object declares \
-             symmetries. CPU time is the processor time of one thread from depth image and mask to pose, with normals and \
-             search trees; compare its ratios.",
+            "Every variant refines the same images from the same initial poses. {} ADD(-S) is ADI if \
+             an object declares symmetries. CPU time is the processor time of one thread from depth \
+             image and mask to pose. It includes normals and search trees. Compare only its ratios.",
             note_on_intervals()
         );
         let table = |head, rows: fn(&Entry<Self>) -> Vec<Vec<String>>| Table {
@@ -69,12 +69,12 @@ impl Entry<Config> {
         self.study.config.experiment
     }
 
-    /// Returns the index of the variant that is compared with the others: hybrid, or the first.
+    /// Returns the index of the reference variant: `hybrid`, or else the first.
     fn reference(&self) -> usize {
         self.analysis.variant("hybrid").unwrap_or(0)
     }
 
-    /// Returns the mean time of a variant, milliseconds, and its ratio to that of the yardstick.
+    /// Returns the mean time of a variant in milliseconds, and its ratio to that of the yardstick.
     fn time(&self, group: usize, variant: usize) -> [Option<f64>; 2] {
         let mean = |v| Some(self.analysis.mean(Metric::CpuMs, group, v)?.estimate);
         let yardstick = self.analysis.variant(YARDSTICK).and_then(mean);
@@ -132,8 +132,10 @@ impl Entry<Config> {
         table.without_empty_columns()
     }
 
-    /// Lays out a study as the paper does: nearest-neighbor variants, projective variants, and the
-    /// rest with the best of either. Studies of time have no panels.
+    /// Lays out the panels of a study like Figure 6 of the paper.
+    ///
+    /// The panels show nearest-neighbor variants, projective variants, and the other variants with
+    /// the best of either. Studies of time have no panels.
     fn panels(&self) -> Vec<Panel> {
         let (analysis, experiment) = (&self.analysis, self.experiment());
         let x_title = match experiment {
@@ -160,7 +162,7 @@ impl Entry<Config> {
             Experiment::Alpha => vec![("mean VSD against the threshold", all)],
             Experiment::Beyond => vec![("perfect images", all)],
             _ => vec![
-                ("nearest neighbours", nearest),
+                ("nearest neighbors", nearest),
                 ("projective", projective),
                 ("hybrid and the best of either", last),
             ],
@@ -174,7 +176,7 @@ impl Entry<Config> {
         panels.into_iter().map(panel).collect()
     }
 
-    /// Returns everything per group and variant, for programs.
+    /// Returns the rows of `summary.csv`: the figures of every variant in every group.
     fn summary(&self) -> Vec<Vec<String>> {
         let (analysis, experiment) = (&self.analysis, self.experiment().name());
         let metrics = [Metric::Vsd, Metric::Failure, Metric::Worse];
@@ -195,7 +197,7 @@ impl Entry<Config> {
         analysis.grid().filter_map(row).collect()
     }
 
-    /// Returns the paired differences of the reference from each other variant, per group.
+    /// Returns the paired differences between the reference and each other variant, per group.
     fn differences(&self) -> Vec<Vec<String>> {
         let (analysis, ours) = (&self.analysis, self.reference());
         let metrics = [Metric::Vsd, Metric::Failure];

@@ -14,24 +14,24 @@ use crate::error::ExperimentError;
 use crate::study::{Measured, Models, Outcome};
 use crate::subject::Subject;
 
-/// More renders than a workspace remembers.
+/// More renders than the cache of a workspace holds.
 const FORGET: u32 = 8;
 
-/// Evaluates cases; one per thread.
+/// Evaluates cases. Each thread has one.
 pub(super) struct Runner<'a> {
     config: &'a Config,
     subjects: &'a [Subject],
     models: &'a Models,
-    /// Of initial poses that are 6.2 mm and 9.5° off, and of binned ones.
+    /// The first creates fixed initial poses, 6.2 mm and 9.5° off; the second creates binned ones.
     makers: [CaseMaker; 2],
-    /// By level, then by variant; one level for all unless levels change the pipelines.
+    /// By level, then by variant. There is only one level unless levels change the pipelines.
     stages: Vec<Vec<BoxedStage>>,
     /// By variant.
     workspaces: Vec<Workspace>,
     forgotten: u32,
 }
 
-/// A case as a condition presents it.
+/// A case under a condition.
 struct Presented<'a> {
     subject: &'a Subject,
     case: &'a Case,
@@ -62,7 +62,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Evaluates a case: levels in order, and in each the variants in order.
+    /// Evaluates a case. The outcomes are ordered by level, then by variant.
     ///
     /// All variants get the same image and the same initial pose.
     pub(super) fn outcomes(&mut self, object: usize, index: u64) -> Vec<Outcome> {
@@ -126,7 +126,7 @@ impl<'a> Runner<'a> {
         let outcome = stage.run(&problem, &case.init, &mut Session::new(workspace, &mut ()));
         let time = thread_time().saturating_sub(start);
 
-        // The next level starts from the same pose, whose render must be part of its time too.
+        // The next level starts from the same pose, and its time must include the render again.
         for _ in 0..FORGET {
             self.forgotten = self.forgotten.wrapping_add(1);
             let behind = Isometry3::translation(0.0, 0.0, -10.0 - f64::from(self.forgotten));

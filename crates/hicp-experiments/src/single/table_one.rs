@@ -19,12 +19,12 @@ pub const TABLE_I: [(&str, f64, f64); 9] = [
 
 const NN: &str = "nn-point-to-point";
 
-/// Returns the difference of the mean times of two variants.
+/// Returns the difference between the mean times of two variants, milliseconds.
 fn time(judge: Judge<'_>, a: &str, b: &str) -> Option<Interval> {
     judge.contrast(Metric::CpuMs, &[(ALL, a, 1.0), (ALL, b, -1.0)])
 }
 
-/// Tests that projective association is faster than everything else.
+/// Tests whether projective association is faster than everything else.
 pub(super) fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
     let projective = judge.family("projective-");
     let mut slow = judge.family("");
@@ -36,7 +36,7 @@ pub(super) fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
     let by_estimate = |a: &&Interval, b: &&Interval| a.estimate.total_cmp(&b.estimate);
     let nearest = contrasts.iter().max_by(by_estimate)?;
     judge.claim(
-        "every projective variant is faster than hybrid and than every variant with nearest neighbours",
+        "every projective variant is faster than hybrid and than every variant with nearest neighbors",
         ClaimVerdict::negative(&contrasts),
         format!("the nearest pair differs by {nearest:+} ms"),
     )
@@ -65,7 +65,7 @@ pub(super) fn table_order(judge: Judge<'_>) -> Option<Claim> {
         .map(|(ratio, name)| format!("{name} {ratio:.2}"));
     let ranked = ranked.collect::<Vec<_>>().join(", ");
     judge.claim(
-        "the order of Table I, every neighbouring pair of it",
+        "the order of Table I, every neighboring pair of it",
         ClaimVerdict::negative(&pairs),
         format!("{agreeing} of 36 pairs are in the paper's order; fastest first, time in units of {NN}: {ranked}"),
     )

@@ -1,4 +1,4 @@
-//! What distinguishes one kind of study from another.
+//! The trait that every kind of study implements.
 
 use std::fmt::Debug;
 
@@ -14,12 +14,12 @@ use super::row::{Columns, Outcome};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
 
-/// Evaluates a case, given the index of the object and that of the case; one per thread.
+/// Evaluates a case, given the indices of the object and of the case.
 ///
-/// Returns the outcomes by setting, and in each by variant.
+/// Returns the outcomes, ordered by setting and then by variant. Each thread has one.
 pub type Worker<'a> = Box<dyn FnMut(usize, u64) -> Vec<Outcome> + 'a>;
 
-/// A kind of study: the configuration that is stored next to the rows, and what follows from it.
+/// A kind of study, defined by the configuration that is stored next to its rows.
 pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwned {
     /// Name of the file of rows.
     const ROWS_FILE: &'static str;
@@ -30,13 +30,13 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
     ///
     /// # Errors
     ///
-    /// [`IoError`] that names the first wrong field.
+    /// [`IoError`] with the name of the first wrong field.
     fn check(&self, fields: &Fields<'_>) -> Result<(), IoError>;
 
-    /// Returns the rows that the study has, and their order.
+    /// Returns the rows of the study and their order.
     fn layout(&self) -> Layout<'_>;
 
-    /// Creates the worker of a thread; reconstructions go into `models`.
+    /// Creates the worker of a thread. It stores reconstructions in `models`.
     ///
     /// # Errors
     ///
@@ -47,13 +47,12 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
         models: &'a Models,
     ) -> Result<Worker<'a>, ExperimentError>;
 
-    /// Returns the names of what the analysis compares, one or more per case: by default the
-    /// variants.
+    /// Returns the names that the analysis compares. By default, these are the variants.
     fn compared(&self) -> Vec<String> {
         let variants = self.layout().variants.into_iter();
         variants.map(str::to_owned).collect()
     }
 
-    /// Returns the rows that are averaged together: single bins or levels first, all rows last.
+    /// Returns the groups of rows that are averaged: single bins or levels first, all rows last.
     fn groups(&self) -> Vec<Group>;
 }

@@ -11,16 +11,16 @@ use serde_json::Value;
 use super::layout::Layout;
 use super::row::quoted;
 
-/// Most bins of the initial VSD in a study; the paper has ten.
+/// Largest number of bins of the initial VSD in a study. The paper has ten.
 pub const MAX_BINS: usize = 1000;
-/// Most objects of a study.
+/// Largest number of objects of a study.
 pub const MAX_OBJECTS: usize = 10_000;
-/// Most settings × variants × bins of a study: its analysis holds about 128 kB per cell.
+/// Largest product of settings, variants and bins. The analysis uses about 128 kB per cell.
 pub const MAX_CELLS: usize = 10_000;
 
 type Checked = Result<(), IoError>;
 
-/// The fields of a configuration by their names in its file, which errors state with the path.
+/// The fields of a configuration by name. Errors state the path and the name.
 #[derive(Debug)]
 pub struct Fields<'a> {
     path: &'a Path,
@@ -28,14 +28,14 @@ pub struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// For a configuration that is not from a file.
+    /// Creates the fields of a configuration that is not in a file.
     pub(crate) fn new(config: &impl Serialize) -> Self {
         Self::of(Path::new("configuration"), config)
     }
 
-    /// `path` is the file that the configuration is from, or is written to.
+    /// Creates the fields of a configuration in the file `path`.
     pub(crate) fn of(path: &'a Path, config: &impl Serialize) -> Self {
-        // A configuration has no map whose keys are not text, so it always is JSON.
+        // The keys of all maps are text, so a configuration always serializes.
         let values = serde_json::to_value(config).unwrap_or_default();
         Self { path, values }
     }
@@ -90,7 +90,7 @@ impl<'a> Fields<'a> {
         self.require(is_valid, field, format_args!("{found:?}"), expected)
     }
 
-    /// Refuses an empty list, more than `most` elements, and a name that is there twice.
+    /// Refuses an empty list, more than `most` elements, and duplicate names.
     pub(crate) fn names(&self, field: &str, most: usize) -> Checked {
         let found = self.values[field].as_array().map_or(&[][..], Vec::as_slice);
         let n = match found.len() {
@@ -108,10 +108,11 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Checks what every configuration has: camera, objects, bins and the size of the analysis.
+    /// Checks the fields of every configuration: camera, objects, bins and the size of the
+    /// analysis.
     ///
-    /// Objects must be smaller than their distance from the camera, meters. `names` are the fields
-    /// that list the settings and the variants.
+    /// Objects must be smaller than `distance`, which is that from the camera in meters. `names`
+    /// are the fields that list the settings and the variants.
     pub(crate) fn common(&self, layout: &Layout<'_>, distance: f64, names: [&str; 2]) -> Checked {
         if let Err(error) = layout.camera.pinhole() {
             let found = format_args!("invalid numbers ({error})");

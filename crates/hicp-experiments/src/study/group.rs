@@ -26,12 +26,12 @@ pub struct Group {
     pub levels: Vec<usize>,
     /// The bins; `None` for all.
     pub bins: Option<Range<usize>>,
-    /// Whether it is one level or bin, a point of the figure, rather than a range of them.
+    /// Whether it is a single level or bin, which is a point of the figure.
     pub single: bool,
 }
 
 impl Group {
-    /// A group of all bins of some levels.
+    /// Creates the group of all bins of some levels.
     pub(crate) fn of_levels(label: &str, levels: Vec<usize>) -> Self {
         Self {
             label: label.to_owned(),
@@ -41,10 +41,9 @@ impl Group {
         }
     }
 
-    /// The groups of single bins of some levels, then the one of low and the one of high initial
-    /// VSD.
+    /// Creates the groups of single bins of some levels, then those of low and high initial VSD.
     pub(crate) fn by_bin(levels: &[usize], n_bins: usize) -> Vec<Self> {
-        // Enough digits that no two bins have the same name.
+        // Use enough digits that no two bins have the same name.
         let digits = match n_bins {
             n if 10 % n == 0 => 1,
             n if 100 % n == 0 => 2,
@@ -62,7 +61,7 @@ impl Group {
                 bin..bin + 1,
             )
         };
-        // Bins that are below 0.3 as a whole, and bins that are at 0.7 and above as a whole.
+        // Use only bins that are completely below 0.3, or completely at 0.7 and above.
         let low = group(LOW.to_owned(), 0..n_bins.saturating_mul(3) / 10);
         let first_high = n_bins.saturating_mul(7).div_ceil(10);
         let high = group(HIGH.to_owned(), first_high..n_bins);

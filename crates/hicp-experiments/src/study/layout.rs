@@ -1,4 +1,4 @@
-//! The rows that a configuration has, and the order in which a run writes them.
+//! The rows of a configuration, and the order in which a run writes them.
 
 use super::records::{CameraRecord, ObjectRecord};
 use super::row::{Outcome, Row};
@@ -8,7 +8,7 @@ use super::row::{Outcome, Row};
 /// A run writes the rows case by case. Those of a case are ordered by setting, then by variant.
 #[derive(Clone, Debug)]
 pub struct Layout<'a> {
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// The camera.
     pub camera: &'a CameraRecord,
@@ -20,12 +20,12 @@ pub struct Layout<'a> {
     pub variants: Vec<&'a str>,
     /// Number of cases of each object.
     pub cases: u64,
-    /// Number of bins of the initial VSD. Binned cases go through them in turn.
+    /// Number of bins of the initial VSD. Binned cases cycle through them.
     pub bins: usize,
-    /// Whether cases are binned, by setting.
+    /// Whether the cases of each setting are binned.
     pub is_binned: Vec<bool>,
-    /// Whether a run goes through all objects before the next case of each; otherwise it finishes
-    /// an object first.
+    /// Whether a run evaluates one case of every object before the next case of any object.
+    /// Otherwise it finishes one object after another.
     pub is_interleaved: bool,
 }
 
@@ -43,13 +43,13 @@ impl Layout<'_> {
         self.settings.len().saturating_mul(self.variants.len())
     }
 
-    /// Returns the number of bins that rows are averaged in: 1 unless all cases are binned.
+    /// Returns the number of bins of the averages: 1 unless all cases are binned.
     pub(crate) fn n_bins(&self) -> usize {
         let is_binned = self.is_binned.iter().all(|is| *is);
         if is_binned { self.bins.max(1) } else { 1 }
     }
 
-    /// Returns the object and the index among its cases of the n-th case of a run.
+    /// Returns the object of the n-th case of a run, and the index of the case within the object.
     pub(crate) fn case(&self, n: usize) -> (usize, u64) {
         let (n, cases, objects) = (n as u64, self.cases, self.objects.len() as u64);
         #[allow(clippy::cast_possible_truncation)] // An index of an object.
@@ -59,7 +59,7 @@ impl Layout<'_> {
         }
     }
 
-    /// Returns the n-th row of a run without its figures; `None` after the last one.
+    /// Returns the n-th row of a run without its figures. After the last one, returns `None`.
     pub(crate) fn row(&self, n: usize) -> Option<Row> {
         let nth = n.checked_div(self.rows_per_case())?;
         if nth >= self.n_cases() {
@@ -81,7 +81,7 @@ impl Layout<'_> {
         })
     }
 
-    /// Returns the rows of the n-th case of a run; `outcomes` are in their order.
+    /// Returns the rows of the n-th case of a run. `outcomes` have the order of the rows.
     pub(crate) fn rows(&self, n: usize, outcomes: Vec<Outcome>) -> Vec<Row> {
         let places = n * self.rows_per_case()..;
         let rows = places.map_while(|place| self.row(place)).zip(outcomes);

@@ -1,4 +1,4 @@
-//! A study of any kind: its configuration, its rows, and how they are run, stored and read.
+//! A study of any kind: its configuration, its rows, and code that runs, stores and reads it.
 
 mod design;
 mod fields;

@@ -6,10 +6,10 @@ use hicp_core::Model;
 
 use crate::error::ExperimentError;
 
-/// Most reconstructions of an object.
+/// Largest number of reconstructions of an object.
 const LEVELS: usize = 4;
 
-/// The reconstructions of every object. Each is made by the first thread that needs it.
+/// The reconstructions of every object. The first thread that needs one creates it.
 #[derive(Debug)]
 pub struct Models {
     made: Vec<[OnceLock<Result<Model, String>>; LEVELS]>,
@@ -22,7 +22,7 @@ impl Models {
         }
     }
 
-    /// Returns reconstruction `level` of an object, from 0; `make` is called if there is none yet.
+    /// Returns reconstruction `level`, from 0, of an object. If there is none yet, calls `make`.
     pub(crate) fn get(
         &self,
         object: usize,

@@ -1,4 +1,4 @@
-//! Cameras and objects as a configuration stores them.
+//! The cameras and objects in a configuration.
 
 use hicp_core::{CameraError, PinholeCamera};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! The rows of a study, and how they are written and read.
+//! The rows of a study, written to and read from CSV.
 
 use std::str::FromStr;
 
@@ -9,15 +9,15 @@ pub struct Row {
     pub object: String,
     /// Index of the case, or of the trajectory, among those of its object.
     pub case: u64,
-    /// The setting: a level of the experiment, or the pipeline underlying a sequential estimator.
+    /// The setting: a level of the experiment, or the underlying pipeline of a sequential study.
     pub setting: String,
     /// The variant: a pipeline, or a method that fuses estimates.
     pub variant: String,
     /// Bin of the initial VSD, from 0, where cases are binned.
     pub bin: Option<usize>,
-    /// The figures; `None` if the case could not be made.
+    /// The figures; `None` if the case could not be created.
     pub measured: Option<Measured>,
-    /// Why the case could not be made; empty otherwise.
+    /// The reason why the case could not be created; otherwise empty.
     pub note: String,
 }
 
@@ -26,24 +26,24 @@ pub struct Row {
 pub struct Measured {
     /// Mean VSD of the initial pose against the truth, with the original model (§VI-A.2).
     pub vsd_initial: f64,
-    /// Mean VSD of the returned pose; along a trajectory, of the fused pose where the path ends.
+    /// Mean VSD of the returned pose. For a trajectory, of the fused pose at the end of the path.
     pub vsd_final: f64,
     /// ADD of that pose, or ADI (ADD-S) if the object declares symmetries, millimeters.
     pub add_final_mm: f64,
     /// Number of iterations of all stages, or of estimates along a trajectory.
     pub steps: usize,
-    /// Why the last stage ended; empty for a trajectory.
+    /// The reason why the last stage ended; empty for a trajectory.
     pub termination: String,
     /// Processor time from depth image and mask to pose, milliseconds; `None` if not measured.
     pub cpu_ms: Option<f64>,
-    /// ξᵀΣ⁻¹ξ of the fused pose's error by the covariance that the method states.
+    /// ξᵀΣ⁻¹ξ of the error of the fused pose, with the covariance that the method states.
     ///
-    /// Distributed like χ²₆ if that covariance is right. `None` without an estimate, and for an
-    /// object with a continuous symmetry.
+    /// If that covariance is right, it is distributed like χ²₆. `None` without an estimate, and for
+    /// an object with a continuous symmetry.
     pub mahalanobis_squared: Option<f64>,
 }
 
-/// The figures of a row, or why there are none.
+/// The figures of a row, or the reason why there are none.
 pub type Outcome = Result<Measured, String>;
 
 /// The part of a row that a column holds.
@@ -68,7 +68,7 @@ pub enum Column {
 /// The columns of a file of rows, in order, with their names.
 pub type Columns = [(&'static str, Column)];
 
-/// The columns that say which row it is.
+/// The columns that identify a row.
 const PLACE: [Column; 5] = [
     Column::Object,
     Column::Case,
@@ -76,9 +76,9 @@ const PLACE: [Column; 5] = [
     Column::Variant,
     Column::Bin,
 ];
-/// The termination of a case that could not be made.
+/// The termination of a case that could not be created.
 const NOT_MADE: &str = "not_made";
-/// Most characters of a value that a message shows.
+/// Largest number of characters of a value in a message.
 const SHOWN: usize = 60;
 
 /// The value that was found in a line, and the one that was expected.
@@ -127,7 +127,7 @@ impl Row {
         }
     }
 
-    /// Reads a line as this row, of which everything but the figures is given.
+    /// Reads the figures of this row from a line, and checks the other fields.
     pub(crate) fn read(
         self,
         columns: &Columns,
@@ -177,21 +177,21 @@ where
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
-/// Returns a text in quotes, shortened so that a broken file does not fill the screen.
+/// Returns a text in quotes, shortened so that a damaged file does not fill the screen.
 pub(crate) fn quoted(text: &str) -> String {
     let shown: String = text.chars().take(SHOWN).collect();
     let more = if shown.len() < text.len() { "..." } else { "" };
     format!("{shown:?}{more}")
 }
 
-/// A line whose fields are found by their columns.
+/// A line with access to its fields by column.
 struct Line<'a> {
     columns: &'a Columns,
     line: &'a csv::StringRecord,
 }
 
 impl<'a> Line<'a> {
-    /// Returns the name and the text of a column; two empty texts if the file has no such column.
+    /// Returns the name and the text of a column. If there is no such column, both are empty.
     fn get(&self, column: Column) -> (&'static str, &'a str) {
         let mut fields = self.columns.iter().zip(self.line);
         let field = fields.find(|(c, _)| c.1 == column);

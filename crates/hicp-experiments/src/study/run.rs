@@ -16,32 +16,32 @@ use super::stored::{CONFIG_FILE, parse_rows, read_config};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
 
-/// How a study is run. The rows do not depend on it, except for the times.
+/// Options of a run. Except for the times, the rows do not depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunOptions {
     /// Number of threads; 0 counts as 1.
     pub threads: usize,
-    /// Continue with what the folder holds.
+    /// Whether to continue the study in the folder.
     pub resume: bool,
-    /// Limits on what is read from the folder.
+    /// Limits on the files that are read from the folder.
     pub limits: ReadLimits,
 }
 
-/// Runs a study into a folder: `config.json`, and the file of rows, which grows case by case.
+/// Runs a study and writes `config.json` and the file of rows into a folder.
 ///
-/// The rows of a case are written together and in order, whatever the number of threads. `progress`
-/// is called with the number of finished cases; `Break` stops the study.
+/// The file of rows grows case by case, in the same order on any number of threads. `progress` is
+/// called with the number of finished cases; `Break` stops the study.
 ///
-/// A study that was killed or stopped continues with `resume`: finished cases are kept, an
-/// incomplete one is computed again. The file ends with the same bytes as without the interruption,
-/// except for measured times.
+/// With `resume`, a study that was killed or stopped continues: finished cases are kept, and an
+/// incomplete one is computed again. Except for measured times, the file has the same bytes as
+/// without the interruption.
 ///
 /// # Errors
 ///
 /// [`ExperimentError`] when the configuration is invalid, the folder holds another study or rows
 /// that the study cannot have, a file cannot be written, or a pipeline cannot be built. A case that
-/// cannot be made (a bin that cannot be filled, an empty reconstruction) is not an error: its rows
-/// have no figures, and state the reason.
+/// cannot be created is not an error: its rows have no figures and state the reason, for example a
+/// bin that cannot be filled or an empty reconstruction.
 pub fn run<D: Design>(
     config: &D,
     subjects: &[Subject],
@@ -102,7 +102,7 @@ pub fn run<D: Design>(
     })
 }
 
-/// Opens the file of rows; returns the number of cases in it.
+/// Opens the file of rows, and returns the number of cases in it.
 fn open<D: Design>(
     config: &D,
     folder: &Path,
@@ -118,7 +118,7 @@ fn open<D: Design>(
         let (found, expected) = ("the rows of a study", "another folder, or --resume");
         return Err(IoError::new(path, None, found, expected).into());
     } else {
-        // Compare what this version would write.
+        // Compare both configurations as this version writes them.
         let theirs = text(&read_config(limits, &stored)?);
         let lines = theirs.lines().zip(ours.lines()).zip(1..);
         let mut different = lines.filter(|((theirs, ours), _)| theirs != ours);

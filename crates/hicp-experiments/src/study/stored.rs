@@ -1,4 +1,4 @@
-//! A study as it is stored, read back and checked.
+//! A stored study, read and checked.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::error::ExperimentError;
 /// Name of the file of the configuration.
 pub const CONFIG_FILE: &str = "config.json";
 
-/// A study that has been run, completely or not: its configuration and its rows.
+/// A study that was run, completely or in part: its configuration and its rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyOf<D> {
     /// The configuration.
@@ -22,12 +22,12 @@ pub struct StudyOf<D> {
 }
 
 impl<D: Design> StudyOf<D> {
-    /// Reads a study from its folder; it may be unfinished.
+    /// Reads a study, finished or not, from its folder.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError`] when a file is missing, exceeds the default limits, or is not what
-    /// [`run`](crate::run) wrote: the field of the configuration or the line of the rows is named.
+    /// [`ExperimentError`] when a file is missing, exceeds the default limits, or does not come
+    /// from [`run`](crate::run). It states the field of the configuration or the line of the rows.
     pub fn read(folder: &Path) -> Result<Self, ExperimentError> {
         Self::read_within(&ReadLimits::DEFAULT, folder)
     }
@@ -36,7 +36,7 @@ impl<D: Design> StudyOf<D> {
     ///
     /// # Errors
     ///
-    /// As [`StudyOf::read`].
+    /// The same as those of [`StudyOf::read`].
     pub fn read_within(limits: &ReadLimits, folder: &Path) -> Result<Self, ExperimentError> {
         let config: D = read_config(limits, &folder.join(CONFIG_FILE))?;
         let path = folder.join(D::ROWS_FILE);
@@ -63,7 +63,7 @@ pub(crate) fn read_config<D: Design>(limits: &ReadLimits, path: &Path) -> Result
     Ok(config)
 }
 
-/// Reads the text of a file of rows: the first rows of a run, in the order in which it writes them.
+/// Parses a file of rows, which must be the first rows of a run, in the order of the run.
 pub(crate) fn parse_rows<D: Design>(
     config: &D,
     limits: &ReadLimits,
@@ -102,7 +102,7 @@ pub(crate) fn parse_rows<D: Design>(
     Ok(rows)
 }
 
-/// Returns the number of a line, which is below that of the bytes in memory.
+/// Converts the number of a line, which is below the number of bytes in memory.
 fn number(line: u64) -> usize {
     usize::try_from(line).unwrap_or(usize::MAX)
 }

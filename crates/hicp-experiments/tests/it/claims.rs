@@ -1,4 +1,4 @@
-//! Means, intervals and claims on rows made by hand.
+//! Means, intervals and claims on handmade rows.
 
 use hicp_experiments::{
     Analysis, Claim, ClaimVerdict, Config, Experiment, HIGH, LOW, Measured, Metric, NOISY, Report,
@@ -6,7 +6,8 @@ use hicp_experiments::{
 };
 use hicp_sim::Household;
 
-/// A study whose figures are given by functions of (variant, level, case) and an offset per object.
+/// Creates a study whose figures are functions of (variant, level, case), with an offset per
+/// object.
 fn study(
     experiment: Experiment,
     poses: u64,
@@ -34,7 +35,7 @@ fn study(
                         bin,
                         measured: Some(Measured {
                             vsd_initial: bin.map_or(0.2, |b| 0.05 + b as f64 / 10.0),
-                            // Objects and cases differ, the same for all variants.
+                            // The offsets of objects and cases are the same for all variants.
                             vsd_final: vsd(&variant.name, level, case)
                                 + 0.01 * number as f64
                                 + 0.002 * (case % 3) as f64,
@@ -63,7 +64,8 @@ fn verdict(claims: &[Claim], part: &str) -> ClaimVerdict {
     found[0].verdict
 }
 
-/// Projective good while the bin is low, nearest neighbours the same everywhere, hybrid the better of both.
+/// Projective variants are good in low bins, nearest neighbors are the same everywhere, and hybrid
+/// is the better of both.
 fn as_in_the_paper(variant: &str, _: &str, case: u64) -> f64 {
     let bin = (case % 10) as f64 / 10.0;
     let metric = f64::from(u8::from(variant.ends_with("point-to-plane"))) * 0.05;
@@ -76,7 +78,7 @@ fn as_in_the_paper(variant: &str, _: &str, case: u64) -> f64 {
 }
 
 #[test]
-fn means_and_differences_are_what_was_put_in() {
+fn means_and_differences_match_the_input() {
     let analysis = Analysis::of(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 2.0));
     let (hybrid, nn) = (
         analysis.variant("hybrid").unwrap(),
@@ -91,16 +93,16 @@ fn means_and_differences_are_what_was_put_in() {
         "{mean:?}"
     );
     assert!(mean.low < mean.estimate && mean.estimate < mean.high);
-    // Objects spread by 0.03: so does the interval of the mean, and no more.
+    // The offsets of objects spread by 0.03, so the interval is at most that wide.
     assert!(mean.low >= 0.38 && mean.high <= 0.38 + 0.034, "{mean:?}");
-    // What objects and cases have in common is not in a paired difference.
+    // The offsets of objects and cases cancel in a paired difference.
     let difference = analysis
         .contrast(Metric::Vsd, &[(first, hybrid, 1.0), (first, nn, -1.0)])
         .unwrap();
     for value in [difference.estimate, difference.low, difference.high] {
         assert!((value + 0.38).abs() < 1e-12, "{difference:?}");
     }
-    // Every case is above 0.3 or none is.
+    // Either all cases are above 0.3, or none.
     let failed = |group, variant| {
         analysis
             .mean(Metric::Failure, group, variant)
@@ -132,8 +134,8 @@ fn means_and_differences_are_what_was_put_in() {
 }
 
 #[test]
-fn the_interval_covers_what_is_not_known() {
-    // One object is unlike the others: which one is drawn decides.
+fn the_interval_covers_the_choice_of_objects() {
+    // One object differs from the others, so the drawn objects decide the mean.
     let mut study = study(Experiment::InitNoise, 10, |_, _, _| 0.1, |_| 1.0);
     for row in study
         .rows
@@ -148,7 +150,8 @@ fn the_interval_covers_what_is_not_known() {
         .contrast(Metric::Vsd, &[(all, 0, 1.0), (all, 1, -1.0)])
         .unwrap();
     assert!((difference.estimate - 0.1).abs() < 1e-12);
-    // Of four objects, none is the bowl with probability 0.32, at least three are with 0.05.
+    // Among four drawn objects, none is the bowl with probability 0.32, and at least three are with
+    // probability 0.05.
     assert!(
         difference.low.abs() < 1e-12 && difference.high >= 0.2,
         "{difference:?}"
@@ -156,7 +159,7 @@ fn the_interval_covers_what_is_not_known() {
 }
 
 #[test]
-fn claims_of_the_initial_pose_are_told_from_their_opposites() {
+fn claims_about_the_initial_pose_differ_from_their_opposites() {
     let holding = tested(&study(Experiment::InitNoise, 20, as_in_the_paper, |_| 1.0));
     let opposite =
         |variant: &str, level: &str, case: u64| 0.9 - as_in_the_paper(variant, level, case);
@@ -193,7 +196,7 @@ fn claims_of_the_initial_pose_are_told_from_their_opposites() {
 }
 
 #[test]
-fn claims_of_depth_noise_are_told_from_their_opposites() {
+fn claims_about_depth_noise_differ_from_their_opposites() {
     let with = |sign: f64| {
         move |variant: &str, level: &str, case: u64| {
             let percent: f64 = level.parse().unwrap();
@@ -208,8 +211,8 @@ fn claims_of_depth_noise_are_told_from_their_opposites() {
             } else {
                 0.0
             };
-            // A variant's own luck with a case, and the same on average.
-            let luck = if plane {
+            // A random effect per case, with the same mean for all variants.
+            let effect = if plane {
                 0.001 * (case % 2) as f64
             } else {
                 0.0
@@ -219,7 +222,7 @@ fn claims_of_depth_noise_are_told_from_their_opposites() {
             } else {
                 0.0
             };
-            0.3 + little + rise * percent + luck + hybrid
+            0.3 + little + rise * percent + effect + hybrid
         }
     };
     let holding = tested(&study(Experiment::DepthNoise, 12, with(1.0), |_| 1.0));
@@ -276,7 +279,7 @@ fn the_order_of_table_one_is_checked_pair_by_pair() {
 }
 
 #[test]
-fn the_minimum_of_alpha_is_found_and_held_against_the_papers() {
+fn the_best_alpha_is_compared_with_the_papers() {
     let valley = |at: f64| {
         move |_: &str, level: &str, _: u64| 0.1 + (level.parse::<f64>().unwrap() - at).abs()
     };
@@ -298,7 +301,7 @@ fn the_minimum_of_alpha_is_found_and_held_against_the_papers() {
 }
 
 #[test]
-fn a_report_holds_figures_tables_and_what_could_not_be_made() {
+fn a_report_contains_figures_tables_and_cases_that_failed() {
     let mut study = study(Experiment::InitNoise, 10, as_in_the_paper, |_| 1.0);
     let unmade = study
         .rows
@@ -321,7 +324,9 @@ fn a_report_holds_figures_tables_and_what_could_not_be_made() {
     ] {
         assert!(page.contains(part), "no {part:?}");
     }
-    // Nothing is fetched from anywhere.
+    // No share of cases is negative, and this study has all columns.
+    assert!(!page.contains("-0.0 %") && page.contains("0.9-1.0"));
+    // The page loads nothing.
     assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("<script"));
     let claims = std::fs::read_to_string(folder.path().join("claims.csv")).unwrap();
     assert_eq!(claims.lines().count(), 1 + report.claims().count());
@@ -342,7 +347,7 @@ fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
     let (name, figure) = report.figures().remove(0);
     assert_eq!((name, figure.rows.len()), ("figure", 2));
     for row in &figure.rows {
-        // Nearest neighbours, projective, and the rest with the best of either.
+        // Nearest neighbors, projective, and the other variants with the best of either.
         assert_eq!(row.len(), 3);
         assert_eq!(row[0].curves.len(), 4);
         assert_eq!(row[1].curves.len(), 4);
@@ -353,9 +358,9 @@ fn a_figure_has_a_row_per_study_with_every_curve_of_the_paper() {
     assert!(report.figures().iter().all(|(_, figure)| figure.is_empty()));
 }
 
-/// A bootstrap over cases that are all alike is a point; what none of them shows may still happen.
+/// If all cases are equal, the bootstrap gives a point, but other cases may still differ.
 #[test]
-fn a_share_that_no_case_shows_keeps_an_interval() {
+fn a_share_that_no_case_shows_has_an_interval() {
     let wrong = |name: &str| f64::from(u8::from(name.starts_with("nn-")));
     let study = study(
         Experiment::DepthNoise,
@@ -374,7 +379,7 @@ fn a_share_that_no_case_shows_keeps_an_interval() {
         let found = analysis.contrast(Metric::Failure, &terms).unwrap();
         (found.estimate, found.low, found.high)
     };
-    // Five cases of four objects, however many conditions each was seen under.
+    // Five cases of four objects count once each, although each has several conditions.
     let unseen = never_seen(20);
     assert!((unseen - (1.0 - 0.05_f64.powf(0.05))).abs() < 1e-12);
     assert_eq!(failing(&[("hybrid", 1.0)]), (0.0, 0.0, unseen));
@@ -386,7 +391,7 @@ fn a_share_that_no_case_shows_keeps_an_interval() {
     assert_eq!(failing(&neither), (0.0, -unseen, unseen));
     let one = [("hybrid", 1.0), ("nn-point-to-point", -1.0)];
     assert_eq!(failing(&one), (-1.0, -1.0, unseen - 1.0));
-    // The rule of three; and nothing is known of nothing.
+    // The rule of three. Without cases, every share is possible.
     assert!((never_seen(1000) - 0.003).abs() < 1e-4);
     assert_eq!(never_seen(0), 1.0);
 }

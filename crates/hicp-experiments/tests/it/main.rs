@@ -1,4 +1,4 @@
-//! Integration tests of `hicp-experiments`: one program, so that it is linked once.
+//! Integration tests of `hicp-experiments`, in one program that is linked once.
 
 #![allow(clippy::panic, clippy::unwrap_used, reason = "helpers of tests")]
 

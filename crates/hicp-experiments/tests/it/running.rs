@@ -1,4 +1,4 @@
-//! Running studies: streamed, resumed, paired, and the same on any number of threads.
+//! Runs of studies: streaming, resuming, pairing, and any number of threads.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -13,7 +13,7 @@ fn subjects() -> Vec<Subject> {
     Subject::household(&[Household::Mug, Household::Book]).unwrap()
 }
 
-/// A study without times, seen by a small camera.
+/// Creates a study without times and with a small camera.
 fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
     let variants: Vec<Variant> = presets.iter().copied().map(Variant::preset).collect();
     let mut config = Config::new(experiment, &subjects(), &variants, poses, 3).unwrap();
@@ -53,7 +53,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 }
 
 #[test]
-fn a_study_cut_anywhere_goes_on_to_the_same_bytes() {
+fn a_study_cut_anywhere_resumes_to_the_same_bytes() {
     let config = config(Experiment::InitNoise, &TWO, 4);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 1, false).unwrap();
@@ -80,7 +80,7 @@ fn a_study_cut_anywhere_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn a_stopped_study_keeps_whole_cases_and_goes_on() {
+fn a_stopped_study_keeps_whole_cases_and_resumes() {
     let config = config(Experiment::DepthNoise, &TWO, 2);
     let (whole, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     go(&config, whole.path(), 1, false).unwrap();
@@ -88,7 +88,7 @@ fn a_stopped_study_keeps_whole_cases_and_goes_on() {
         threads: 2,
         ..RunOptions::default()
     };
-    let told = run(&config, &subjects(), stopped.path(), options, &mut |done| {
+    let outcome = run(&config, &subjects(), stopped.path(), options, &mut |done| {
         if done == 2 {
             ControlFlow::Break(())
         } else {
@@ -96,8 +96,8 @@ fn a_stopped_study_keeps_whole_cases_and_goes_on() {
         }
     });
     assert!(
-        matches!(told, Err(ExperimentError::Stopped { cases: 2 })),
-        "{told:?}"
+        matches!(outcome, Err(ExperimentError::Stopped { cases: 2 })),
+        "{outcome:?}"
     );
     let part = bytes(stopped.path());
     assert!(part.len() < bytes(whole.path()).len() && bytes(whole.path()).starts_with(&part));
@@ -107,7 +107,7 @@ fn a_stopped_study_keeps_whole_cases_and_goes_on() {
 }
 
 #[test]
-fn a_file_that_is_not_of_the_study_is_not_written_over() {
+fn a_foreign_file_is_not_overwritten() {
     let config = config(Experiment::InitNoise, &TWO, 1);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 1, false).unwrap();
@@ -125,14 +125,14 @@ fn a_file_that_is_not_of_the_study_is_not_written_over() {
         &[&whole[..end], b"\r\n"].concat(),
     ] {
         std::fs::write(&path, foreign).unwrap();
-        let told = go(&config, folder.path(), 1, true).unwrap_err();
-        assert!(matches!(&told, ExperimentError::Io(_)), "{told}");
-        let told = told.to_string();
+        let outcome = go(&config, folder.path(), 1, true).unwrap_err();
+        assert!(matches!(&outcome, ExperimentError::Io(_)), "{outcome}");
+        let outcome = outcome.to_string();
         assert!(
-            told.contains("cases.csv") && told.contains("line 1"),
-            "{told}"
+            outcome.contains("cases.csv") && outcome.contains("line 1"),
+            "{outcome}"
         );
-        assert_eq!(bytes(folder.path()), foreign, "{told}");
+        assert_eq!(bytes(folder.path()), foreign, "{outcome}");
     }
     for left in [&b"\0\0\0"[..], &[&whole[..end / 2], b"\0\0"].concat()] {
         std::fs::write(&path, left).unwrap();
@@ -142,7 +142,7 @@ fn a_file_that_is_not_of_the_study_is_not_written_over() {
 }
 
 #[test]
-fn rows_that_are_there_are_kept_even_their_times() {
+fn stored_rows_are_kept_with_their_times() {
     let mut config = config(Experiment::InitNoise, &TWO, 2);
     config.times = true;
     let folder = tempfile::tempdir().unwrap();
@@ -151,7 +151,7 @@ fn rows_that_are_there_are_kept_even_their_times() {
     let half = whole.len() / 2;
     std::fs::write(folder.path().join(Config::ROWS_FILE), &whole[..half]).unwrap();
     go(&config, folder.path(), 1, true).unwrap();
-    // Four cases of two rows: the first two cases are whole before the middle.
+    // Of four cases with two rows each, the first one is complete before the middle.
     let kept: usize = whole
         .split_inclusive(|b| *b == b'\n')
         .take(3)
@@ -164,7 +164,7 @@ fn rows_that_are_there_are_kept_even_their_times() {
         .rows
         .into_iter()
         .map(|r| r.measured.unwrap().cpu_ms.unwrap());
-    // Zero is what a clock of coarse ticks tells.
+    // A clock with coarse ticks can return zero.
     assert!(times.into_iter().all(|ms| (0.0..60_000.0).contains(&ms)));
 }
 
@@ -173,18 +173,18 @@ fn another_study_in_the_folder_is_refused() {
     let config = config(Experiment::InitNoise, &TWO, 1);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 1, false).unwrap();
-    let told = go(&config, folder.path(), 1, false)
+    let outcome = go(&config, folder.path(), 1, false)
         .unwrap_err()
         .to_string();
     assert!(
-        told.contains("cases.csv") && told.contains("--resume"),
-        "{told}"
+        outcome.contains("cases.csv") && outcome.contains("--resume"),
+        "{outcome}"
     );
     let other = Config { seed: 4, ..config };
-    let told = go(&other, folder.path(), 1, true).unwrap_err().to_string();
+    let outcome = go(&other, folder.path(), 1, true).unwrap_err().to_string();
     assert!(
-        told.contains("\"seed\": 3") && told.contains("\"seed\": 4"),
-        "{told}"
+        outcome.contains("\"seed\": 3") && outcome.contains("\"seed\": 4"),
+        "{outcome}"
     );
 }
 
@@ -204,10 +204,10 @@ fn every_variant_and_level_gets_the_same_start() {
             differing += usize::from(measured.vsd_final != first.vsd_final);
         }
     }
-    // The variants and levels are not one and the same.
+    // The variants and levels are different.
     assert!(differing > 100, "{differing}");
 
-    // What a variant makes of a case does not depend on who else was run, and the noise-free level is the image without noise.
+    // The result of a variant for a case does not depend on the other variants.
     let alone = config_of(&study, &[Preset::NnPointToPlane]);
     let other = tempfile::tempdir().unwrap();
     go(&alone, other.path(), 1, false).unwrap();
@@ -224,7 +224,7 @@ fn config_of(study: &Study, presets: &[Preset]) -> Config {
 }
 
 #[test]
-fn cases_go_through_the_bins_in_turn() {
+fn cases_cycle_through_the_bins() {
     let config = config(Experiment::InitNoise, &[Preset::ProjectivePointToPoint], 10);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 2, false).unwrap();
@@ -242,7 +242,7 @@ fn cases_go_through_the_bins_in_turn() {
 }
 
 #[test]
-fn a_case_that_cannot_be_made_says_why_and_the_others_go_on() {
+fn a_case_that_cannot_be_created_has_a_reason_and_the_others_are_run() {
     let mut config = config(Experiment::InitNoise, &TWO, 2);
     // Every initial pose is the true one, and falls into the first bin.
     config.max_translation_m = 0.0;
@@ -268,7 +268,7 @@ fn a_case_that_cannot_be_made_says_why_and_the_others_go_on() {
 }
 
 #[test]
-fn thresholds_decide_what_hybrid_does() {
+fn thresholds_change_the_results_of_hybrid() {
     let config = config(Experiment::Alpha, &[Preset::Hybrid], 6);
     let folder = tempfile::tempdir().unwrap();
     go(&config, folder.path(), 2, false).unwrap();
@@ -280,7 +280,8 @@ fn thresholds_decide_what_hybrid_does() {
             .collect()
     };
     assert_ne!(of("0.00"), of("1.00"));
-    // At 0 every start takes nearest neighbours first: what the first stage does there is what a threshold of 0.05 does to bad starts.
+    // With threshold 0, every start uses nearest neighbors first. With 0.05, bad starts do the
+    // same.
     let bad = |level: &str| of(level)[5];
     assert_eq!(bad("0.00"), bad("0.05"));
 }
@@ -288,8 +289,8 @@ fn thresholds_decide_what_hybrid_does() {
 #[test]
 fn folders_and_names_are_checked() {
     let folder = tempfile::tempdir().unwrap();
-    let told = Subject::read_folder(folder.path()).unwrap_err().to_string();
-    assert!(told.contains("found no mesh"), "{told}");
+    let outcome = Subject::read_folder(folder.path()).unwrap_err().to_string();
+    assert!(outcome.contains("found no mesh"), "{outcome}");
     let mug = Household::Mug.solid().to_mesh().unwrap();
     hicp_io::write_ply(
         folder.path().join("b.PLY"),
@@ -314,16 +315,19 @@ fn folders_and_names_are_checked() {
         Variant::preset(Preset::Hybrid),
         Variant::preset(Preset::Hybrid),
     ];
-    let told = Config::new(Experiment::Timing, &read, &variants, 1, 1)
-        .unwrap_err()
-        .to_string();
-    assert!(told.contains("variants: found \"hybrid\" twice"), "{told}");
-    let told = Config::new(Experiment::Timing, &read, &variants[..1], 0, 1)
+    let outcome = Config::new(Experiment::Timing, &read, &variants, 1, 1)
         .unwrap_err()
         .to_string();
     assert!(
-        told.contains("poses: found 0, expected 1 to 1000000"),
-        "{told}"
+        outcome.contains("variants: found \"hybrid\" twice"),
+        "{outcome}"
+    );
+    let outcome = Config::new(Experiment::Timing, &read, &variants[..1], 0, 1)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        outcome.contains("poses: found 0, expected 1 to 1000000"),
+        "{outcome}"
     );
     let fixed = [Variant::preset(Preset::NnPointToPoint)];
     assert!(Config::new(Experiment::Alpha, &read, &fixed, 1, 1).is_err());
@@ -335,8 +339,8 @@ fn folders_and_names_are_checked() {
         )
         .unwrap(),
     );
-    let told = Config::new(Experiment::Timing, &large, &variants[..1], 1, 1)
+    let outcome = Config::new(Experiment::Timing, &large, &variants[..1], 1, 1)
         .unwrap_err()
         .to_string();
-    assert!(told.contains("objects[0].diameter_mm"), "{told}");
+    assert!(outcome.contains("objects[0].diameter_mm"), "{outcome}");
 }

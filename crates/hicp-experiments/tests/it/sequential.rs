@@ -1,4 +1,4 @@
-//! The sequential study end to end: streamed, resumed, paired, and the same on any number of threads.
+//! The sequential study end to end: streaming, resuming, pairing, and any number of threads.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,7 +16,8 @@ fn subjects() -> Vec<Subject> {
     Subject::household(&[Household::Mug]).unwrap()
 }
 
-/// One trajectory per bin, a short one, seen by a small camera; a coarse reconstruction from few images.
+/// Creates a study of one short trajectory per bin, with a small camera and a coarse
+/// reconstruction.
 fn config() -> TrajectoryConfig {
     let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3).unwrap();
     let camera = &mut config.camera;
@@ -59,12 +60,12 @@ fn a_small_study_runs_to_its_report() {
     for row in &study.rows {
         let measured = row.measured.as_ref().unwrap();
         let (vsd_initial, vsd_final) = (measured.vsd_initial, measured.vsd_final);
-        // The bin is that of the start, and all rows of a trajectory have the same start.
+        // All rows of a trajectory have the same start, which determines the bin.
         let bin = usize::try_from(row.case).unwrap();
         assert_eq!(row.bin, Some(bin));
         assert!((vsd_initial * 10.0 - bin as f64 - 0.5).abs() <= 0.5 + 1e-4);
         assert!((0.0..=1.0).contains(&vsd_final), "{row:?}");
-        // 12 cm at 0.1 m/s and 0.542 s: images after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
+        // 12 cm at 0.1 m/s and 0.542 s per image: after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
         let images = if row.setting == "hybrid" { 3 } else { 4 };
         assert_eq!(config.n_images(usize::from(images == 4)), images);
         assert!(measured.steps <= images, "{row:?}");
@@ -73,7 +74,7 @@ fn a_small_study_runs_to_its_report() {
         assert_eq!(distance.is_some(), measured.steps > 0, "{row:?}");
         assert!(distance.is_none_or(|squared| squared >= 0.0));
     }
-    // Methods do differ, and from good starts the object is found all the same.
+    // Methods differ, and from good starts all find the object.
     let differ = study.rows.chunks(FusionRule::ALL.len());
     let vsd = |row: &Row| row.measured.as_ref().map(|m| (m.vsd_initial, m.vsd_final));
     let differ = differ.filter(|rows| rows.iter().any(|r| vsd(r) != vsd(&rows[0])));
@@ -114,7 +115,7 @@ fn a_small_study_runs_to_its_report() {
 }
 
 #[test]
-fn threads_and_interruptions_do_not_show() {
+fn threads_and_interruptions_do_not_change_the_rows() {
     let (config, one) = (config(), tempfile::tempdir().unwrap());
     go(&config, one.path(), 1, false).unwrap();
     let whole = bytes(one.path());
@@ -128,7 +129,7 @@ fn threads_and_interruptions_do_not_show() {
         go(&config, two.path(), 2, true).unwrap();
         assert_eq!(bytes(two.path()), whole, "cut at {cut}");
     }
-    // What is there is not overwritten, and another study does not go on from it.
+    // Existing rows are not overwritten, and another study does not continue them.
     let again = go(&config, two.path(), 1, false);
     assert!(again.unwrap_err().to_string().contains("or --resume"));
     let mut other = config.clone();
@@ -155,18 +156,18 @@ fn pipelines_of_one_study_share_paths_and_starts() {
 }
 
 #[test]
-fn by_a_real_clock_every_method_has_images_of_its_own() {
+fn with_the_real_clock_every_method_runs_to_the_end() {
     let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
     config.clock = TrajectoryClock::Real;
     config.methods = vec!["last-estimate".to_owned(), "average".to_owned()];
-    // So fast that a path ends after some images, whatever the machine.
+    // The camera is so fast that the path ends after a few images on any machine.
     config.speed_m_s = 20.0;
     go(&config, folder.path(), 2, false).unwrap();
     let study = TrajectoryStudy::read(folder.path()).unwrap();
     assert_eq!(study.config.clock, TrajectoryClock::Real);
     assert_eq!(study.rows.len(), 10 * 2 * 2);
     for row in &study.rows {
-        // At least the first image, from the start that both have.
+        // Every method registers at least the first image.
         assert!(
             row.measured
                 .as_ref()
@@ -187,7 +188,7 @@ fn by_a_real_clock_every_method_has_images_of_its_own() {
 }
 
 #[test]
-fn what_cannot_be_run_is_refused() {
+fn configurations_that_cannot_be_run_are_refused() {
     let refused = |subjects: &[Subject], n, presets: &[Preset]| {
         TrajectoryConfig::new(subjects, presets, n, 1)
     };

@@ -1,4 +1,4 @@
-//! How large studies are, what their parts are called, and what their figures show.
+//! Sizes of studies, and names of their parts.
 
 use std::collections::BTreeSet;
 
@@ -14,8 +14,8 @@ fn subjects() -> Vec<Subject> {
 }
 
 #[test]
-fn a_study_has_cases_per_object_and_rows_per_level_and_variant() {
-    // Both switch, which a study of the threshold asks for.
+fn cases_are_per_object_and_rows_per_level_and_variant() {
+    // Both pipelines switch, which a study of the threshold requires.
     let hybrid = Variant::preset(Preset::Hybrid);
     let other = Variant {
         name: "other".to_owned(),
@@ -37,7 +37,7 @@ fn studies_have_different_titles() {
 }
 
 #[test]
-fn trajectories_are_per_object_and_bin_and_images_as_far_apart_as_an_estimate_takes() {
+fn the_time_of_an_estimate_decides_the_distance_between_images() {
     let presets = [Preset::Hybrid, Preset::ProjectivePointToPlane];
     let mut config = TrajectoryConfig::new(&subjects(), &presets, 3, 1).unwrap();
     assert_eq!(config.layout().n_cases(), 3 * 10 * 2);
@@ -57,7 +57,7 @@ fn fusion_rules_are_found_by_their_names() {
 }
 
 #[test]
-fn a_variant_from_a_file_is_called_like_it_and_must_be_a_pipeline() {
+fn a_variant_from_a_file_has_its_name_and_is_a_pipeline() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mine.toml");
     let preset = Variant::preset(Preset::Hybrid);
@@ -72,7 +72,7 @@ fn a_variant_from_a_file_is_called_like_it_and_must_be_a_pipeline() {
 }
 
 #[test]
-fn the_papers_are_told_from_what_goes_beyond_them() {
+fn rules_and_variants_beyond_the_paper_are_separate() {
     let of_paper = FusionRule::ALL.iter().filter(|rule| rule.is_of_paper());
     assert_eq!(of_paper.count(), 6);
     let beyond = Variant::beyond();

@@ -1,4 +1,6 @@
-//! Files of studies that no run wrote: each is refused, with its name and the field or the line, and nothing panics or takes memory without end.
+//! Files that no run wrote are refused, with their path and the field or the line.
+//!
+//! Nothing panics or allocates without limit.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ struct Stored {
 }
 
 impl Stored {
-    /// A study of two objects, two cases and two variants.
+    /// Creates a study of two objects, two cases and two variants.
     fn single() -> Self {
         let presets = [Preset::Hybrid, Preset::NnPointToPoint].map(Variant::preset);
         let config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
@@ -46,7 +48,7 @@ impl Stored {
         stored
     }
 
-    /// A sequential study of two objects and one trajectory per bin.
+    /// Creates a sequential study of two objects and one trajectory per bin.
     fn sequential() -> Self {
         let presets = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
         let mut config = TrajectoryConfig::new(&subjects(), &presets, 1, 3).unwrap();
@@ -87,7 +89,7 @@ impl Stored {
         std::fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Reads the study and analyses it, as a report does.
+    /// Reads the study and analyzes it like a report.
     fn read(&self) -> Result<usize, ExperimentError> {
         let folder = self.folder.path();
         if self.rows == Config::ROWS_FILE {
@@ -106,16 +108,18 @@ impl Stored {
         Ok(rows)
     }
 
-    /// Changes the value at a JSON pointer, reads, and puts the file back; returns what was told, with the field.
+    /// Changes the value at a JSON pointer, reads the study, and restores the file.
+    ///
+    /// Returns field, found value and expectation of the error.
     #[track_caller]
     fn with(&self, pointer: &str, value: Value) -> (String, String, String) {
         let before = self.text(CONFIG_FILE);
         let mut config: Value = serde_json::from_str(&before).unwrap();
         *config.pointer_mut(pointer).unwrap() = value;
         self.write(CONFIG_FILE, config.to_string());
-        let told = self.read();
+        let outcome = self.read();
         self.write(CONFIG_FILE, before);
-        let error = content_error(told);
+        let error = content_error(outcome);
         assert_eq!(error.path, self.path(CONFIG_FILE));
         let Some(Place::Field(field)) = error.place else {
             panic!("{pointer}: {error:?}");
@@ -123,16 +127,18 @@ impl Stored {
         (field, error.found, error.expected)
     }
 
-    /// Changes the rows, reads, and puts the file back; returns the line and what was told of it.
+    /// Changes the rows, reads the study, and restores the file.
+    ///
+    /// Returns line and message of the error.
     #[track_caller]
     fn with_rows(&self, change: impl FnOnce(&str) -> String) -> (usize, String) {
         let before = self.text(self.rows);
         let after = change(&before);
         assert_ne!(before, after);
         self.write(self.rows, after);
-        let told = self.read();
+        let outcome = self.read();
         self.write(self.rows, before);
-        let error = content_error(told);
+        let error = content_error(outcome);
         assert_eq!(error.path, self.path(self.rows));
         let Some(Place::Line(line)) = error.place else {
             panic!("{error:?}");
@@ -144,7 +150,7 @@ impl Stored {
     }
 }
 
-/// Returns the error about the content of a file.
+/// Returns the error, which must be about the content of a file.
 #[track_caller]
 fn content_error<T: std::fmt::Debug>(result: Result<T, ExperimentError>) -> IoError {
     match result {
@@ -166,7 +172,7 @@ fn subjects() -> Vec<Subject> {
 }
 
 #[test]
-fn what_is_changed_here_reads_before_it_is_changed() {
+fn unchanged_studies_are_read() {
     assert_eq!(Stored::single().read().unwrap(), 8);
     assert_eq!(Stored::sequential().read().unwrap(), 24);
 }
@@ -227,19 +233,22 @@ fn fields_of_a_configuration_are_checked() {
         ("/camera/fx", json!(0.0), "camera", "a camera"),
         ("/camera/width", json!(u32::MAX), "camera", "a camera"),
     ] {
-        let told = stored.with(pointer, value);
-        assert_eq!(told.0, field);
-        assert!(told.2.contains(part), "{field}: {told:?}");
+        let outcome = stored.with(pointer, value);
+        assert_eq!(outcome.0, field);
+        assert!(outcome.2.contains(part), "{field}: {outcome:?}");
     }
-    let told = stored.with("/objects", json!([one, one]));
-    assert_eq!(told.1, "\"mug\" twice");
-    // Each of these is within its limit, together they are not.
+    let outcome = stored.with("/objects", json!([one, one]));
+    assert_eq!(outcome.1, "\"mug\" twice");
+    // Each number is within its limit, but their product is not.
     let many: Vec<Value> = (0..=MAX_CELLS / 10)
         .map(|i| json!({"name": i.to_string(), "pipeline": ""}))
         .collect();
-    let told = stored.with("/variants", json!(many));
-    assert_eq!(told.0, "levels × variants × bins");
-    assert_eq!((&*told.1, &*told.2), ("1 × 1001 × 10", "at most 10000"));
+    let outcome = stored.with("/variants", json!(many));
+    assert_eq!(outcome.0, "levels × variants × bins");
+    assert_eq!(
+        (&*outcome.1, &*outcome.2),
+        ("1 × 1001 × 10", "at most 10000")
+    );
 }
 
 #[test]
@@ -292,21 +301,24 @@ fn fields_of_a_sequential_configuration_are_checked() {
         ("/path_m", json!(-1.0), "path_m", "at least 0"),
         ("/camera/fy", json!(-1.0), "camera", "a camera"),
     ] {
-        let told = stored.with(pointer, value);
-        assert_eq!(told.0, field);
-        assert!(told.2.contains(part), "{field}: {told:?}");
+        let outcome = stored.with(pointer, value);
+        assert_eq!(outcome.0, field);
+        assert!(outcome.2.contains(part), "{field}: {outcome:?}");
     }
-    // Each of these is within its limit, together they are not.
+    // Each number is within its limit, but their product is not.
     let mut config: Value = serde_json::from_str(&stored.text(CONFIG_FILE)).unwrap();
     config["methods"] = json!(FusionRule::ALL.map(FusionRule::name));
     stored.write(CONFIG_FILE, config.to_string());
-    let told = stored.with("/bins", json!(MAX_BINS));
-    assert_eq!(told.0, "underlying × methods × bins");
-    assert_eq!((&*told.1, &*told.2), ("2 × 10 × 1000", "at most 10000"));
+    let outcome = stored.with("/bins", json!(MAX_BINS));
+    assert_eq!(outcome.0, "underlying × methods × bins");
+    assert_eq!(
+        (&*outcome.1, &*outcome.2),
+        ("2 × 10 × 1000", "at most 10000")
+    );
 }
 
 #[test]
-fn rows_that_the_configuration_does_not_have_are_refused() {
+fn rows_that_contradict_the_configuration_are_refused() {
     let stored = Stored::single();
     let first = "mug,0,hybrid,0,0,0.05,0.04";
     let instead = |row: &str| stored.with_rows(|rows| rows.replacen(first, row, 1));
@@ -343,7 +355,7 @@ fn rows_that_the_configuration_does_not_have_are_refused() {
         line == 8 && what.contains("object \"pan\", expected \"book\""),
         "{line}: {what}"
     );
-    // A run writes a row on one line, and no row after the last one or twice.
+    // A run writes every row once, on one line, and no row after the last one.
     let (line, what) = stored.with_rows(|rows| rows.replacen("2.5,\n", "2.5,\"two\nlines\"\n", 1));
     assert!(line == 4 && what.contains("each on one line"), "{what}");
     let (line, what) = stored.with_rows(|rows| format!("{rows}{}", rows.lines().last().unwrap()));
@@ -364,13 +376,13 @@ fn rows_that_the_configuration_does_not_have_are_refused() {
         line == 1 && what.contains("\"object,case,pipeline"),
         "{what}"
     );
-    // A value of a megabyte does not fill the screen.
+    // A message does not contain a whole value of a megabyte.
     let (_, what) = instead(&format!("{},0,hybrid,0,0,0.05,0.04", "x".repeat(1 << 20)));
     assert!(what.len() < 250, "{} bytes", what.len());
 }
 
 #[test]
-fn rows_that_a_sequential_configuration_does_not_have_are_refused() {
+fn rows_that_contradict_a_sequential_configuration_are_refused() {
     let stored = Stored::sequential();
     let first = "mug,0,0,hybrid,last-estimate,0.05,0.04";
     for (row, part) in [
@@ -400,7 +412,7 @@ fn rows_that_a_sequential_configuration_does_not_have_are_refused() {
 }
 
 #[test]
-fn a_study_without_rows_is_empty() {
+fn a_study_without_rows_is_refused() {
     for stored in [Stored::single(), Stored::sequential()] {
         let header = stored.text(stored.rows).lines().next().unwrap().to_owned() + "\n";
         stored.write(stored.rows, header);
@@ -411,7 +423,7 @@ fn a_study_without_rows_is_empty() {
 }
 
 #[test]
-fn encodings_and_limits_are_told() {
+fn encodings_and_limits_are_reported() {
     for stored in [Stored::single(), Stored::sequential()] {
         let folder = stored.folder.path();
         let within = |limits: &ReadLimits| match stored.rows {
@@ -445,7 +457,7 @@ fn encodings_and_limits_are_told() {
                 Err(ExperimentError::Io(error)) if error.kind == IoErrorKind::Limit => {
                     assert!(error.expected.contains(field), "{error}");
                 }
-                told => panic!("{field}: {told:?}"),
+                outcome => panic!("{field}: {outcome:?}"),
             }
         }
         for name in [CONFIG_FILE, stored.rows] {
@@ -465,7 +477,7 @@ fn encodings_and_limits_are_told() {
                         assert_eq!(path, stored.path(name));
                         assert!(found.contains("UTF-16 LE"), "{found}");
                     }
-                    told => panic!("{name}: {told:?}"),
+                    outcome => panic!("{name}: {outcome:?}"),
                 }
             }
             stored.write(name, [before.as_bytes(), b"\xff"].concat());
@@ -478,7 +490,7 @@ fn encodings_and_limits_are_told() {
     }
 }
 
-/// Nothing is computed: a break comes before the first case.
+/// Resumes a study, and stops it before the first case, so that nothing is computed.
 fn resume(stored: &Stored) -> Result<(), ExperimentError> {
     let folder = stored.folder.path();
     let config = stored.text(CONFIG_FILE);
@@ -500,17 +512,17 @@ fn resume(stored: &Stored) -> Result<(), ExperimentError> {
 }
 
 #[test]
-fn a_study_goes_on_only_from_its_own_first_rows() {
+fn a_study_resumes_only_from_its_own_first_rows() {
     for (stored, per_case) in [(Stored::single(), 2), (Stored::sequential(), 4)] {
         let whole = stored.text(stored.rows);
         let cases = (whole.lines().count() - 1) / per_case;
         let stopped = |expected: usize| match resume(&stored) {
             Err(ExperimentError::Stopped { cases }) => assert_eq!(cases, expected),
-            told => panic!("{told:?}"),
+            outcome => panic!("{outcome:?}"),
         };
         stopped(cases);
         assert_eq!(stored.text(stored.rows), whole);
-        // Cut off within the last row, and filled with zeros.
+        // The file ends within the last row, also if it is padded with zeros.
         stored.write(stored.rows, &whole[..whole.len() - 3]);
         stopped(cases - 1);
         stored.write(
@@ -538,19 +550,19 @@ fn a_study_goes_on_only_from_its_own_first_rows() {
             let error = content_error(resume(&stored));
             assert_eq!(error.path, stored.path(stored.rows));
             assert!(error.to_string().contains(part), "{error}");
-            // What is there is not written over.
+            // The file is not overwritten.
             assert_eq!(stored.text(stored.rows), rows);
         }
-        // A damaged byte makes a field that no row has.
+        // A damaged byte makes a field invalid.
         let mut foreign = whole.clone().into_bytes();
         let place = whole.rfind("0.04").unwrap();
         foreign[place] = 0xff;
         stored.write(stored.rows, &foreign);
-        let told = resume(&stored).unwrap_err().to_string();
+        let outcome = resume(&stored).unwrap_err().to_string();
         let (line, field) = (whole.lines().count(), "vsd_final \"\u{fffd}.04\"");
         assert!(
-            told.contains(&format!("line {line}")) && told.contains(field),
-            "{told}"
+            outcome.contains(&format!("line {line}")) && outcome.contains(field),
+            "{outcome}"
         );
         assert_eq!(std::fs::read(stored.path(stored.rows)).unwrap(), foreign);
         let utf16: Vec<u8> = whole.encode_utf16().flat_map(u16::to_be_bytes).collect();
@@ -563,33 +575,35 @@ fn a_study_goes_on_only_from_its_own_first_rows() {
 }
 
 #[test]
-fn what_could_not_be_read_back_is_not_run() {
+fn invalid_configurations_are_not_run() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let presets = [Variant::preset(Preset::Hybrid)];
     let mut config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
     config.bins = 0;
     let go = &mut |_| ControlFlow::Continue(());
-    let told = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
+    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
     assert!(
-        told.to_string()
+        outcome
+            .to_string()
             .ends_with("bins: found 0, expected 1 to 1000"),
-        "{told}"
+        "{outcome}"
     );
     let mut config = TrajectoryConfig::new(&subjects(), &[Preset::Hybrid], 1, 3).unwrap();
     config.bins = 0;
-    let told = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
+    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
     assert!(
-        told.to_string()
+        outcome
+            .to_string()
             .ends_with("bins: found 0, expected 1 to 1000"),
-        "{told}"
+        "{outcome}"
     );
     assert!(!out.exists());
 }
 
-/// The configurations beside the committed results are still read: rows are all that is missing.
+/// The configurations of the committed results are still valid; only their rows are not committed.
 #[test]
-fn the_committed_studies_read() {
+fn the_committed_configurations_are_read() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/study");
     for name in ["beyond", "sequential", "sequential/calibrated"] {
         let folder = tempfile::tempdir().unwrap();
@@ -605,9 +619,9 @@ fn the_committed_studies_read() {
                 Config::ROWS_FILE,
                 header::<Config>() + "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,\n",
             );
-            let told = Study::read(folder.path());
+            let outcome = Study::read(folder.path());
             assert!(
-                told.is_ok_and(|study| study.config.levels.len() == 14),
+                outcome.is_ok_and(|study| study.config.levels.len() == 14),
                 "{name}"
             );
         } else {
@@ -620,14 +634,14 @@ fn the_committed_studies_read() {
                 TrajectoryConfig::ROWS_FILE,
                 header::<TrajectoryConfig>() + &row,
             );
-            let told = TrajectoryStudy::read(folder.path());
-            assert!(told.is_ok_and(|study| study.config.bins == 10), "{name}");
+            let outcome = TrajectoryStudy::read(folder.path());
+            assert!(outcome.is_ok_and(|study| study.config.bins == 10), "{name}");
         }
     }
 }
 
 #[test]
-fn ranges_of_bins_are_of_the_initial_vsd_whatever_their_number() {
+fn ranges_of_bins_have_fixed_limits_of_the_initial_vsd() {
     for (bins, low, high, first) in [
         (10, 0..3, 7..10, "0.0-0.1"),
         (20, 0..6, 14..20, "0.00-0.05"),
@@ -646,7 +660,7 @@ fn ranges_of_bins_are_of_the_initial_vsd_whatever_their_number() {
         assert_eq!(analysis.groups()[0].label, first);
         let all = analysis.mean(Metric::Vsd, analysis.overall(), 0).unwrap();
         assert!((all.estimate - 0.04).abs() < 1e-12);
-        // Nobody is there: no group, no variant.
+        // There is no such group or variant.
         assert!(
             analysis
                 .mean(Metric::Vsd, analysis.groups().len(), 0)
@@ -663,7 +677,7 @@ fn ranges_of_bins_are_of_the_initial_vsd_whatever_their_number() {
 }
 
 #[test]
-fn studies_made_by_hand_do_not_panic() {
+fn handmade_studies_do_not_panic() {
     let stored = Stored::single();
     let study = Study::read(stored.folder.path()).unwrap();
     type Change = fn(&mut Study);

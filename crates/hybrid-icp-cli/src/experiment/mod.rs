@@ -15,24 +15,25 @@ use self::study::{StudyOptions, report};
 use crate::choice::Source;
 use crate::limits::pipeline_limits;
 
-/// Rerun the paper's studies, on its kind of objects or on any meshes.
+/// Rerun the paper's studies, on household objects or on custom meshes.
 ///
-/// A study writes into its folder: `config.json` (exactly what was run), `cases.csv` (one row per case, level and variant, as it
-/// goes), and from these a summary: `report.html`, `figure.svg`, `figure.png`, `summary.csv`, `differences.csv`, `claims.csv`. All
-/// variants see the same images and initial poses.
+/// All variants get the same images and initial poses. A study writes its exact configuration to
+/// `config.json`, and one row per case, level and variant to `cases.csv` as soon as a case is
+/// finished. At the end it summarizes them in `report.html`, `figure.svg`, `figure.png`,
+/// `summary.csv`, `differences.csv` and `claims.csv`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Robustness to the initial pose: ten equal bins of the initial VSD (§VI-B.1).
     InitNoise(Arguments),
     /// Robustness to depth noise of 0 to 5 % (§VI-B.2).
     DepthNoise(Arguments),
-    /// Robustness to reconstructed models, levels 0 to 4 (§VI-B.3).
+    /// Robustness to the errors of reconstructed models, levels 0 to 4 (§VI-B.3).
     ModelNoise(Arguments),
-    /// Time per refinement under the conditions of those three studies (Table I).
+    /// Time per refinement under the conditions of the three studies of robustness (Table I).
     Timing(Arguments),
-    /// The threshold of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
+    /// Thresholds of Dynamic Switching from 0 to 1, on the tuning objects (§IV-A).
     Alpha(Arguments),
-    /// The presets that go beyond the paper: every start under depth noise, model noise and imperfect masks.
+    /// The presets beyond the paper: all starts, with depth noise, model noise and imperfect masks.
     Beyond(Arguments),
     Sequential(sequential::Arguments),
     Report(ReportArguments),
@@ -42,29 +43,31 @@ pub(crate) enum Command {
 pub(crate) struct Arguments {
     #[command(flatten)]
     study: StudyOptions,
-    /// The household objects to run on: those that everything was chosen on, or those that results are reported on; each
-    /// study has its own by default.
+    /// The household objects: those for tuning parameters, or those for reporting results. By
+    /// default, `alpha` uses the tuning objects and every other study uses the test objects.
     #[arg(long, value_enum, conflicts_with = "objects")]
     household: Option<HouseholdSet>,
-    /// Cases per object, spread evenly over the bins where there are bins.
+    /// Cases per object. If the study has bins, cases are spread evenly over them.
     #[arg(long, value_name = "N", default_value_t = 30)]
     poses: u64,
-    /// Which pipelines: names (`hybrid-icp pipelines` lists them) and TOML files, separated by commas, or all; alpha takes those
-    /// that switch, by default hybrid; beyond takes hybrid, two baselines and what goes beyond the paper.
+    /// The pipelines, separated by commas: presets (`hybrid-icp pipelines` lists them), TOML files,
+    /// or all, the nine variants of the paper. The default is all; for `alpha`, which needs
+    /// pipelines that switch, it is hybrid; for `beyond`, it is hybrid, two baselines and the
+    /// presets beyond the paper.
     #[arg(long, value_name = "LIST|all", value_delimiter = ',')]
     variants: Vec<Choice>,
-    /// Leave the column of times empty: two runs then give the same bytes.
+    /// Leave the column of times empty, so that two runs give the same bytes.
     #[arg(long)]
     no_times: bool,
 }
 
-/// Put finished studies into one report, with a figure like the paper's Figure 6.
+/// Combine finished studies in one report, with a figure like the paper's Figure 6.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArguments {
     /// The folders of the studies.
     #[arg(required = true, value_name = "DIR")]
     studies: Vec<PathBuf>,
-    /// The folder to write to, which is created if it does not exist.
+    /// The output folder, which is created if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -76,7 +79,7 @@ enum HouseholdSet {
     Test,
 }
 
-/// What `--variants` names.
+/// A value of `--variants`.
 #[derive(Clone, Debug)]
 enum Choice {
     All,
@@ -121,7 +124,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let mut config = Config::new(experiment, &subjects, &variants, poses, seed)?;
     config.times = !arguments.no_times;
     let out = options.folder(experiment.name());
-    // Threads disturb each other's times.
+    // Several threads would disturb each other's times.
     let threads = matches!(experiment, Experiment::Timing).then_some(1);
     let names = [experiment.name(), "cases"];
     options.run(&config, &subjects, &out, names, threads)?;
@@ -149,7 +152,7 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
     Ok(variants)
 }
 
-/// Writes the report of studies that are named like their folders.
+/// Writes the report of studies, which are named after their folders.
 fn report_folders(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     let name = |folder: &PathBuf| {
         let name = folder.file_name().unwrap_or(folder.as_os_str());

@@ -6,22 +6,25 @@ use hybrid_icp::Preset;
 
 use super::study::{StudyOptions, report};
 
-/// Fusing estimates while the camera moves: trajectories toward an object, six methods and more (§VI-C).
+/// Fusion of estimates while the camera moves toward an object, by ten methods (§VI-C).
 ///
-/// Writes `config.json`, `trajectories.csv` (one row per trajectory, pipeline and method, as it goes), and from these
-/// `report.html`, `figure.svg`, `figure.png`, `summary.csv`, `differences.csv` and `claims.csv`. The time of an estimate is the
-/// mean of the paper's Table I: all methods of a pipeline see the same images, and two runs give the same bytes; see --clock.
+/// Writes `config.json`, and one row per trajectory, pipeline and method to `trajectories.csv` as
+/// soon as a trajectory is finished. At the end it summarizes them in `report.html`, `figure.svg`,
+/// `figure.png`, `summary.csv`, `differences.csv`, `calibration.csv` and `claims.csv`. By default,
+/// all methods of a pipeline get the same images, and two runs give the same bytes; see --clock.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The pipeline that makes the estimates; by default both that the paper uses.
+    /// The pipelines that compute the estimates; by default both that the paper uses.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_values = ["hybrid", "projective-cascade-point-plane"])]
     underlying: Vec<Preset>,
-    /// The methods, separated by commas: names of the paper (last-estimate, average, weighted-average, filtering-constant, filtering,
-    /// most-confident), and gated- or calibrated- before one; by default all of the study. Claims about others are left out.
+    /// The methods, separated by commas; by default all ten of the study. The methods of the paper
+    /// are last-estimate, average, weighted-average, filtering-constant, filtering and
+    /// most-confident. A name may have gated- or calibrated- before it.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Vec<String>,
-    /// What an estimate takes: cost, the mean of the paper's Table I, or real, the processor time that it took here, from depth
-    /// image to fused pose. By a real clock no two runs are the same, and a trajectory has thousands of images.
+    /// The time of an estimate: cost is the mean of the paper's Table I, and real is the measured
+    /// processor time from depth image to fused pose. With real, no two runs are the same, and a
+    /// trajectory has thousands of images.
     #[arg(long, value_enum, value_name = "CLOCK", default_value_t = Clock::Cost)]
     clock: Clock,
     #[command(flatten)]
@@ -31,7 +34,7 @@ pub(crate) struct Arguments {
     poses: u64,
 }
 
-/// What `--clock` names.
+/// A value of `--clock`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Clock {
     Cost,

@@ -16,16 +16,17 @@ use crate::terminal::{progress_bar, say};
 /// The options of every study.
 #[derive(Debug, Args)]
 pub(super) struct StudyOptions {
-    /// A folder of meshes in meters (OBJ, PLY, STL) instead of the ten household objects.
+    /// A folder of meshes in meters (OBJ, OFF, PLY or STL) instead of the ten household objects.
     #[arg(long, value_name = "DIR")]
     objects: Option<PathBuf>,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Number of threads, by default all processors, and one for timing. The results do not depend on it.
+    /// Number of threads; by default one for `timing`, otherwise one per processor. Except for
+    /// times, the results do not depend on it.
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// The folder to write to, which is created if it does not exist; study/NAME by default.
+    /// The output folder, which is created if it does not exist; by default study/NAME.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Continue a study that was interrupted.
@@ -86,7 +87,7 @@ impl StudyOptions {
     }
 }
 
-/// Writes the report of named studies, and prints their claims and the name of the page.
+/// Writes the report of named studies, and prints their claims and the path of the page.
 pub(super) fn report<D: Reported>(studies: &[(&str, &Path)], out: &Path) -> anyhow::Result<()> {
     let read = |(name, folder): &(&str, &Path)| -> anyhow::Result<_> {
         Ok((
