@@ -1,4 +1,4 @@
-//! Files written whole or not at all.
+//! Atomic writing of files: a file is written completely or not at all.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -8,18 +8,24 @@ use tempfile::NamedTempFile;
 
 use crate::error::IoError;
 
-/// Writes a file whole or not at all; `-` is the standard output.
+/// Writes a file completely or not at all; `-` is the standard output.
 ///
-/// `write` fills a temporary file in the same folder. It is flushed to the disk and then renamed to `path`. If anything
-/// fails, the temporary file is removed and the old file stays as it was. Nobody ever sees half a file.
+/// `write` fills a temporary file in the same folder. The file is flushed to the disk and then
+/// renamed to `path`. If a step fails, the temporary file is removed and the old file stays
+/// unchanged. No reader ever sees a partial file.
 ///
-/// A new file gets the permissions of any new file (0666 without the umask on Unix). A replaced file keeps its own, and a
-/// file that may not be written to is not replaced. A link to a file is followed. A pipe or a device cannot be replaced: it is
-/// written in place, as is the standard output ([`is_stream`]).
+/// Special cases:
+///
+/// - A new file gets the default permissions (0666 without the umask on Unix).
+/// - A replaced file keeps its permissions. A read-only file is not replaced.
+/// - A symbolic link is followed.
+/// - A pipe or a device cannot be replaced, so it is written in place, as is the standard output
+///   ([`is_stream`]).
 ///
 /// # Errors
 ///
-/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write), also if the parent folder does not exist.
+/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write), also if the parent folder does not
+/// exist.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -50,13 +56,13 @@ where
     written.map_err(|e| IoError::write(path, e))
 }
 
-/// Checks that [`write_atomically`] can write to a path, and changes nothing there.
+/// Checks that [`write_atomically`] can write to a path, without changing anything.
 ///
-/// This is for programs that compute for a long time before they write. It cannot promise that the disk has room then.
+/// Programs call it before a long computation. It does not check the free disk space.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As for [`write_atomically`].
 ///
 /// ```
 /// assert!(hicp_io::check_writable("no/such/folder/result.json").is_err());
@@ -71,7 +77,8 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), IoError> {
     created.map_err(|e| IoError::write(path, e))
 }
 
-/// Returns whether [`write_atomically`] writes to a path in place: `-` (the standard output), a pipe or a device.
+/// Returns whether [`write_atomically`] writes to a path in place: `-` (the standard output), a
+/// pipe or a device.
 ///
 /// ```
 /// assert!(hicp_io::is_stream("-"));
@@ -83,14 +90,17 @@ pub fn is_stream(path: impl AsRef<Path>) -> bool {
     is_stdout(path) || fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
-/// Returns the file that [`write_atomically`] writes: links to existing files and `..` are followed.
+/// Returns the file that [`write_atomically`] writes: links to existing files and `..` are
+/// followed.
 ///
-/// Paths with the same destination name the same file, so a program can tell that one of its outputs would replace another,
-/// or an input. Two names of one file (hard links) are two files here, as they are to a writer that replaces.
+/// Two paths with the same destination name the same file. With it, a program can detect that an
+/// output would replace another output or an input. Two hard links to one file have different
+/// destinations, because an atomic write replaces only one of them.
 ///
 /// # Errors
 ///
-/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if the parent folder does not exist.
+/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if the parent folder does not
+/// exist.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -126,7 +136,7 @@ fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Returns the folder of a path.
+/// Returns the parent folder of a path, `.` if the path has none.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -134,10 +144,11 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Creates a temporary file next to the file that a path leads to, and returns both.
+/// Creates a temporary file next to the file that `path` resolves to, and returns both.
 fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
     let target = resolve(path)?;
-    // The shell that redirected a stream into a file still writes to that file.
+    // Replacing the file behind a redirected stream would hide later output of the shell, which
+    // still writes to the old file.
     if path.starts_with("/dev") && !target.starts_with("/dev") || path.starts_with("/proc") {
         let text = "it names an open stream, expected a file, or - for the standard output";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
@@ -148,7 +159,7 @@ fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let file = builder.tempfile_in(folder_of(&target))?;
     if target.exists() {
-        // Renaming would replace a file that may not be written to.
+        // Renaming would replace even a read-only file.
         let old = fs::OpenOptions::new().append(true).open(&target)?;
         file.as_file()
             .set_permissions(old.metadata()?.permissions())?;
@@ -179,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+    fn a_failed_write_keeps_the_old_file_and_leaves_no_temporary_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         fs::write(&path, "old").unwrap();
@@ -203,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn an_old_file_is_replaced_whole() {
+    fn an_old_file_is_replaced_completely() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         fs::write(&path, "a longer old content").unwrap();
@@ -224,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn checking_foretells_and_changes_nothing() {
+    fn check_writable_predicts_the_result_and_changes_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let (old, new) = (dir.path().join("old"), dir.path().join("new"));
         fs::write(&old, "old").unwrap();
@@ -247,7 +258,7 @@ mod tests {
                 ..
             })
         ));
-        // A file is no folder to write into.
+        // A file cannot be used as a folder.
         assert!(check_writable(old.join("below")).is_err());
     }
 
@@ -290,7 +301,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_redirected_stream_is_refused_by_name_and_its_file_is_not_replaced() {
+    fn a_redirected_stream_is_refused_and_its_file_is_not_replaced() {
         use std::os::fd::AsRawFd;
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log");

@@ -1,4 +1,4 @@
-//! Folders written whole or not at all.
+//! Atomic creation of folders: a folder appears completely or not at all.
 
 use std::fs;
 use std::io;
@@ -9,10 +9,11 @@ use tempfile::TempDir;
 use crate::atomic::{destination, folder_of};
 use crate::error::IoError;
 
-/// A folder that is being filled: it has a temporary name next to the final one until [`NewFolder::finish`].
+/// A folder under construction, which has a temporary name until [`NewFolder::finish`].
 ///
-/// If it is dropped before that, it is removed with its content. A killed program leaves a `.hicp-*.tmp` behind, which nothing
-/// reads and which may be removed. Nobody ever sees a part of a folder under the final name.
+/// The temporary folder is next to the final path. If the value is dropped before `finish`, the
+/// folder is removed with its content. A killed program leaves a `.hicp-*.tmp` folder, which can be
+/// deleted. No reader ever sees a partial folder under the final name.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -32,12 +33,14 @@ pub struct NewFolder {
 }
 
 impl NewFolder {
-    /// Starts a folder that will be at `path`, where there must be nothing yet or an empty folder.
+    /// Starts a folder for `path`, at which there must be nothing or an empty folder.
     ///
     /// # Errors
     ///
-    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if there is something at `path`, if the parent folder does not
-    /// exist, or if it may not be written to.
+    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) in these cases:
+    ///
+    /// - There is a file or a folder with content at `path`.
+    /// - The parent folder does not exist or is not writable.
     pub fn begin(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
         let failed = |e| IoError::write(path, e);
@@ -56,24 +59,24 @@ impl NewFolder {
         Ok(Self { target, made })
     }
 
-    /// Returns the folder to fill.
+    /// Returns the temporary folder, to be filled.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.made.path()
     }
 
-    /// Gives the folder its name.
+    /// Renames the folder to its final path.
     ///
     /// # Errors
     ///
-    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if something has appeared at the path meanwhile; the new folder
-    /// is removed then.
+    /// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write) if something was created at the
+    /// path in the meantime. In that case, the new folder is removed.
     pub fn finish(self) -> Result<(), IoError> {
         // Only Unix renames a folder over an empty one.
         #[cfg(not(unix))]
         let _ = fs::remove_dir(&self.target);
         fs::rename(self.made.path(), &self.target).map_err(|e| IoError::write(&self.target, e))?;
-        // It is not temporary any more.
+        // `TempDir` would otherwise try to remove the old path.
         let _ = self.made.keep();
         Ok(())
     }
@@ -94,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_there_until_all_is() {
+    fn a_folder_appears_only_when_it_is_finished() {
         let dir = tempfile::tempdir().unwrap();
         for existing in [false, true] {
             let path = dir.path().join(format!("set-{existing}"));
@@ -113,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finished_is_gone() {
+    fn an_unfinished_folder_is_removed() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("set");
         let set = NewFolder::begin(&path).unwrap();
@@ -123,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_there_stays() {
+    fn existing_files_and_folders_are_not_replaced() {
         let dir = tempfile::tempdir().unwrap();
         let full = dir.path().join("full");
         fs::create_dir(&full).unwrap();
@@ -144,7 +147,7 @@ mod tests {
                 ..
             })
         ));
-        // Somebody else was faster.
+        // Another program creates the folder first.
         let late = NewFolder::begin(dir.path().join("late")).unwrap();
         fs::create_dir(dir.path().join("late")).unwrap();
         fs::write(dir.path().join("late/theirs"), "theirs").unwrap();

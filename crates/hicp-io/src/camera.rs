@@ -1,4 +1,4 @@
-//! Cameras in JSON files.
+//! Reading of cameras from JSON files.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,16 +14,16 @@ use crate::limits::{Limit, ReadLimits};
 use crate::pose::Rotation;
 use crate::source::text_bytes;
 
-/// A camera file: the camera, and the unit of its depth images if the file states it.
+/// The content of a camera file: the camera, and the unit of its depth images if stated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraFile {
     /// The camera.
     pub camera: PinholeCamera,
-    /// Millimeters per unit of its depth images.
+    /// Millimeters per unit of its depth images, if stated.
     pub depth_scale: Option<f64>,
 }
 
-/// The keys of all forms of a camera.
+/// The keys of all supported forms of a camera.
 #[derive(Debug, Deserialize)]
 pub(crate) struct CameraRecord {
     #[serde(rename = "cam_K")]
@@ -42,11 +42,13 @@ pub(crate) struct CameraRecord {
     pub(crate) translation_mm: Option<Numbers<3>>,
 }
 
-/// A calibration matrix in pixels, the width and height of the images if stated, and the key of the matrix after a dot.
+/// A calibration matrix in pixels, the width and height of the images, and the key of the matrix.
+///
+/// The size is optional. The key starts with a dot.
 type Calibration = (Matrix3<f64>, Option<(u32, u32)>, &'static str);
 
 impl CameraRecord {
-    /// Returns the calibration. The error is the found and the expected text.
+    /// Returns the calibration. The error consists of the found and the expected text.
     pub(crate) fn calibration(&self) -> Result<Calibration, (&'static str, &'static str)> {
         let size = self.width.zip(self.height);
         let flat = [self.fx, self.fy, self.cx, self.cy];
@@ -68,20 +70,25 @@ impl CameraRecord {
     }
 }
 
-/// Reads a camera from a JSON file, for images of `image_size` (width, height).
+/// Reads a camera from a JSON file, for images of `image_size` (width, height) in pixels.
 ///
-/// Four forms are understood; further keys are ignored:
-/// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's, which states no size (one that is there must match);
-/// - `{"cam_model": {"projection_model_type": "PinholePlane", "projection_params": [fx, fy, cx, cy]}, "depth_scale": ...}`, BOP's
-///   newer one; models with distortion are refused;
-/// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, of BOP's `camera.json`, whose size must match;
+/// Supports four forms and ignores other keys:
+///
+/// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's form without a size. A stated
+///   size must match.
+/// - `{"cam_model": {...}, "depth_scale": ...}`, BOP's newer form. The model has a
+///   `projection_model_type` such as `"PinholePlane"`, and `projection_params`
+///   `[fx, fy, cx, cy]`. Models with distortion are refused.
+/// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, the form of BOP's `camera.json`.
+///   Its size must match.
 /// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in any of these forms.
 ///
-/// `depth_scale` is optional everywhere.
+/// `depth_scale` is optional in all forms.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the key; of the kind [`IoErrorKind::CameraSize`] if the camera is for images of another size.
+/// [`IoError`] names the JSON key of the fault. It is of the kind [`IoErrorKind::CameraSize`] if
+/// the camera is for images of another size.
 pub fn read_camera_json(
     path: impl AsRef<Path>,
     image_size: (u32, u32),
@@ -94,7 +101,7 @@ impl ReadLimits {
     ///
     /// # Errors
     ///
-    /// As [`read_camera_json`].
+    /// As for [`read_camera_json`].
     pub fn read_camera_json(
         &self,
         path: impl AsRef<Path>,
@@ -234,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_is_named() {
+    fn errors_name_the_field() {
         let key = |text: &str| match read(text) {
             Err(IoError {
                 place: Some(Place::Field(key)),

@@ -1,16 +1,16 @@
-//! Camera models by name: BOP's `cam_model`, as HOT3D has it.
+//! Camera models of BOP's `cam_model`, as in the dataset HOT3D.
 
 use hicp_core::Matrix3;
 use serde::de::{Deserialize, Deserializer, Error};
 
 use crate::error::quote;
 
-/// A camera without distortion.
+/// A camera model without distortion.
 #[derive(Debug, serde::Deserialize)]
 pub(crate) struct CameraModel {
     #[serde(rename = "projection_model_type", deserialize_with = "undistorted")]
     _name: (),
-    /// fx, fy, cx, cy, pixels.
+    /// fx, fy, cx and cy, in pixels.
     #[serde(deserialize_with = "intrinsics")]
     projection_params: [f64; 4],
     image_width: Option<u32>,
@@ -24,13 +24,13 @@ impl CameraModel {
         Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
     }
 
-    /// Returns the width and height of its images, if stated.
+    /// Returns the width and height of its images in pixels, if stated.
     pub(crate) fn image_size(&self) -> Option<(u32, u32)> {
         self.image_width.zip(self.image_height)
     }
 }
 
-/// Reads the name of a model, and refuses models with distortion.
+/// Reads the name of a model and refuses models with distortion.
 fn undistorted<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
     let name = String::deserialize(deserializer)?;
     // HOT3D writes the prefix.
@@ -45,7 +45,7 @@ fn undistorted<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Erro
     )))
 }
 
-/// Reads fx, fy, cx, cy, or f, cx, cy if both focal lengths are the same.
+/// Reads fx, fy, cx, cy, or f, cx, cy if both focal lengths are equal.
 fn intrinsics<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 4], D::Error> {
     let numbers = Vec::deserialize(deserializer)?;
     match numbers[..] {

@@ -5,7 +5,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Where in a file something stands.
+/// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A line of text, from 1.
@@ -26,29 +26,31 @@ impl fmt::Display for Place {
     }
 }
 
-/// Groups errors for callers that treat some of them differently.
+/// The group of an error, for callers that handle some groups differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum IoErrorKind {
-    /// The system refused to read the file; the source says why.
+    /// The system refused to read the file; the source states the reason.
     Read,
-    /// The file cannot be written; the source says why.
+    /// The file cannot be written; the source states the reason.
     Write,
-    /// A part of a dataset is not there.
+    /// A part of a dataset does not exist.
     Missing,
     /// The text is not encoded as UTF-8.
     Encoding,
     /// The file holds more than [`ReadLimits`](crate::ReadLimits) allow.
     Limit,
-    /// A camera is for images of another size.
+    /// The camera is for images of another size.
     CameraSize,
-    /// The content is not what the format, or its use here, requires.
+    /// The content does not meet the requirements of the format or of its use here.
     Content,
 }
 
-/// A file that cannot be read or written: the file, the place in it, what was found and what was expected.
+/// The error of all readers and writers: the file, the place, the value found and the value
+/// expected.
 ///
-/// The message does not repeat that of the [source](Error::source): print the chain.
+/// The message does not repeat the message of the [source](Error::source), so print the whole
+/// chain.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct IoError {
@@ -56,11 +58,11 @@ pub struct IoError {
     pub kind: IoErrorKind,
     /// The file.
     pub path: PathBuf,
-    /// Where in the file; `None` if the error concerns the whole file.
+    /// The place in the file; `None` if the error concerns the whole file.
     pub place: Option<Place>,
-    /// What is there, shortened.
+    /// The value found, shortened.
     pub found: String,
-    /// What should be there. Empty for [`IoErrorKind::Read`] and [`IoErrorKind::Write`].
+    /// The value expected. Empty for [`IoErrorKind::Read`] and [`IoErrorKind::Write`].
     pub expected: String,
     source: Option<Box<dyn Error + Send + Sync>>,
 }
@@ -101,7 +103,7 @@ impl IoError {
         Self::read(path, source).with_kind(IoErrorKind::Write)
     }
 
-    /// An error about values that a file holds and that `hicp-core` refuses.
+    /// Creates an error about values in a file that `hicp-core` refuses.
     pub(crate) fn unusable(
         path: &Path,
         what: &str,
@@ -111,7 +113,9 @@ impl IoError {
         Self::new(path, None, found, expected).with_source(source)
     }
 
-    /// Refuses a header that promises more than the file can hold, before anything is allocated.
+    /// Returns an error if a header announces more data than the file can hold.
+    ///
+    /// Readers call this before they allocate memory for the data.
     pub(crate) fn check_promise(
         path: &Path,
         place: Place,
@@ -154,10 +158,10 @@ impl Error for IoError {
     }
 }
 
-/// What is found where a file ends too early.
+/// The text for the value found if a file ends too early.
 pub(crate) const END_OF_FILE: &str = "the end of the file";
 
-/// Returns a text in quotes, shortened so that a broken file does not fill the screen.
+/// Quotes a text and shortens it, so that a broken file does not fill the screen.
 pub(crate) fn quote(text: &str) -> String {
     const LIMIT: usize = 60;
     let text = text.trim();

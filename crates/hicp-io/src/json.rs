@@ -1,4 +1,4 @@
-//! JSON files from and to values. Every refusal names the path of keys to the value.
+//! Reading and writing of JSON files. Every error names the path of keys to the value.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,10 +16,12 @@ use crate::error::{IoError, Place, quote};
 use crate::limits::{Limit, ReadLimits};
 use crate::source::text_bytes;
 
-/// Most characters of a path of keys that a message shows.
+/// The largest number of characters of a key path that a message shows.
 const SHOWN: usize = 200;
 
-/// Reads a JSON file. Numbers keep every digit of an `f64`; keys that the type does not have are ignored.
+/// Reads a JSON file.
+///
+/// Numbers keep every digit of an `f64`. Keys that the type does not have are ignored.
 pub(crate) fn read<T: DeserializeOwned>(
     limits: &ReadLimits,
     path: &Path,
@@ -81,7 +83,7 @@ fn refusal(path: &Path, key: String, error: serde_json::Error) -> IoError {
     IoError::new(path, Place::Field(key), found, expected)
 }
 
-/// Returns what serde calls the found value in the words of JSON, shortened.
+/// Rewrites serde's description of a found value in the terms of JSON, shortened.
 fn plain(found: &str) -> String {
     if let Some(length) = found.strip_prefix("invalid length ") {
         return format!("an array of {length}");
@@ -103,7 +105,7 @@ fn plain(found: &str) -> String {
     }
 }
 
-/// N numbers.
+/// An array of N numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
 
@@ -131,7 +133,7 @@ impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
     }
 }
 
-/// Reads N numbers that may be absent.
+/// Reads an optional array of N numbers.
 pub(crate) fn optional_numbers<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<Option<[f64; N]>, D::Error> {
@@ -154,7 +156,7 @@ impl TryFrom<f64> for Positive {
     }
 }
 
-/// The members of an object whose keys are numbers, as BOP's are.
+/// The members of an object whose keys are numbers, as in BOP's files.
 #[derive(Debug)]
 pub(crate) struct ById<T>(pub(crate) BTreeMap<u32, T>);
 
@@ -179,7 +181,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for ById<T> {
                     })?;
                     if entries.insert(id, members.next_value()?).is_some() {
                         return Err(A::Error::custom(format!(
-                            "the number {id} a second time, expected each number once"
+                            "the number {id} twice, expected each number once"
                         )));
                     }
                 }
@@ -190,7 +192,10 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for ById<T> {
     }
 }
 
-/// Writes a JSON value on one line, or indented; refuses a value that contains `null`, which was not a finite number.
+/// Writes a JSON value, on one line or indented.
+///
+/// Refuses a value that contains `null`, because `serde_json` stores it for a number that is not
+/// finite.
 pub(crate) fn write(path: &Path, value: &Value, indented: bool) -> Result<(), IoError> {
     write_atomically(path, |file| {
         if let Some(key) = null_in(value) {
@@ -216,7 +221,7 @@ fn null_in(value: &Value) -> Option<String> {
     }
 }
 
-/// Returns the error for a number that no file can state.
+/// Returns the error for a number that is not finite, which no file can hold.
 pub(crate) fn not_finite(place: &str) -> io::Error {
     let text = format!("{place} is not a finite number, expected one");
     io::Error::new(io::ErrorKind::InvalidInput, text)
@@ -258,18 +263,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_there_twice_is_not_lost() {
+    fn duplicate_keys_are_refused() {
         let twice = "[{\"n\": 1, \"R\": [1, 2, 3]},\n{\"n\": 1, \"n\": 1}]";
         let error = document::<Vec<Item>>(twice).unwrap_err().to_string();
         let expected = "$[1]: found the key `n` twice in one object, expected it once";
         assert!(error.ends_with(expected), "{error}");
         let twice = "{\"2\": 1, \"1\": 0, \"000002\": 3}";
         let error = document::<ById<u32>>(twice).unwrap_err().to_string();
-        assert!(error.contains("the number 2 a second time"), "{error}");
+        assert!(error.contains("the number 2 twice"), "{error}");
     }
 
     #[test]
-    fn refusals_name_the_key_the_value_and_what_was_expected() {
+    fn errors_name_the_key_the_value_and_the_expectation() {
         let long = "x".repeat(500);
         for (item, message) in [
             (

@@ -1,11 +1,15 @@
-//! Files in and out for Hybrid ICP: meshes, depth images, masks, cameras, poses, BOP datasets and result files.
+//! Reading and writing of files for Hybrid ICP: meshes, depth images, masks, cameras, poses, BOP
+//! datasets and result files.
 //!
-//! **Should you use this crate?** Use it to read the files that robots, scanners and benchmarks write into the types of `hicp-core`,
-//! and to write them. It is not a general mesh or image library: it keeps geometry and drops colors, materials and texture
-//! coordinates. Units end here: files may be in millimeters, every returned value is in meters and seconds. Whatever a file holds,
-//! a reader returns a value or an [`IoError`] that names the file, the place in it, what was found and what was expected. It does
-//! not panic, and it does not allocate more than the size of the file justifies. Writers replace a file whole or leave it
-//! untouched ([`write_atomically`]).
+//! **Should you use this crate?** Use it to read the files of robots, scanners and benchmarks into
+//! the types of `hicp-core`, and to write them. It is not a general mesh or image library: it keeps
+//! geometry and drops colors, materials and texture coordinates.
+//!
+//! - Units: files may be in millimeters; every returned value is in meters and seconds.
+//! - Errors: for any content, a reader returns a value or an [`IoError`]. The error names the file,
+//!   the place in it, the value found and the value expected.
+//! - Safety: no reader panics or allocates more memory than the size of the file justifies.
+//! - Writers replace a file completely or leave it unchanged ([`write_atomically`]).
 //!
 //! ```
 //! use hicp_core::{DepthImage, Isometry3, Translation3};

@@ -1,17 +1,22 @@
-//! How much a reader reads before it refuses a file.
+//! Limits on the amount of data that a reader accepts.
 
 use std::path::Path;
 
 use crate::error::{IoError, IoErrorKind, Place};
 
-/// Limits above which the readers of this crate refuse a file, with an [`IoError`] of the kind [`IoErrorKind::Limit`].
+/// Limits above which the readers of this crate refuse a file.
 ///
-/// The defaults are two orders of magnitude above what 6D pose refinement needs. They are low enough that a hostile or
-/// mistaken file is refused before it exhausts the memory of a usual machine. Every reader is a method of this struct. The
-/// free functions of the same names use the defaults.
+/// The error is an [`IoError`] of the kind [`IoErrorKind::Limit`]. The defaults are two orders of
+/// magnitude above the needs of 6D pose refinement. They are low enough to refuse a malicious or
+/// damaged file before it exhausts the memory of a typical computer.
 ///
-/// Memory at most within the defaults: a mesh file is held once, next to about 60 bytes per vertex and 40 per triangle; an
-/// image takes four bytes per pixel next to its file; a JSON file a few times its size.
+/// Every reader is a method of this struct. The free functions of the same names use the defaults.
+///
+/// Memory within the defaults:
+///
+/// - A mesh needs the size of its file, plus about 60 bytes per vertex and 40 bytes per triangle.
+/// - An image needs the size of its file, plus four bytes per pixel.
+/// - A JSON file needs a few times its size.
 ///
 /// ```
 /// use hicp_io::{LengthUnit, ReadLimits};
@@ -28,23 +33,28 @@ use crate::error::{IoError, IoErrorKind, Place};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadLimits {
-    /// Bytes of any file but JSON: 1 GiB.
+    /// Maximum size in bytes of any file except JSON: 1 GiB.
     pub max_file_bytes: u64,
-    /// Bytes of a JSON file: 256 MiB.
+    /// Maximum size in bytes of a JSON file: 256 MiB.
     pub max_json_bytes: u64,
-    /// Bytes of a JSON file that states one thing, such as a pose, a camera or the configuration of a study: 16 MiB.
+    /// Maximum size in bytes of a JSON file with a single item: 16 MiB.
+    ///
+    /// Examples are a pose, a camera and the configuration of a study.
     pub max_small_json_bytes: u64,
-    /// Vertices of a mesh or a point cloud: 10 million. `hicp_core::MAX_MESH_ELEMENTS` always limits meshes, too.
+    /// Maximum number of vertices of a mesh or a point cloud: 10 million. Meshes are always limited
+    /// by `hicp_core::MAX_MESH_ELEMENTS`, too.
     pub max_vertices: u64,
-    /// Triangles of a mesh, after polygons are cut: 10 million. `hicp_core::MAX_MESH_ELEMENTS` always limits them, too.
+    /// Maximum number of triangles of a mesh, after triangulation of polygons: 10 million. They are
+    /// always limited by `hicp_core::MAX_MESH_ELEMENTS`, too.
     pub max_triangles: u64,
-    /// Pixels of an image: 2²⁵, four times those of a 4K camera. `hicp_core::MAX_IMAGE_SIDE` always limits them, too.
+    /// Maximum number of pixels of an image: 2²⁵, four times the pixels of a 4K camera. The sides
+    /// are always limited by `hicp_core::MAX_IMAGE_SIDE`, too.
     pub max_pixels: u64,
-    /// Rows of a result file or of a study: 10 million.
+    /// Maximum number of rows of a result file or of a study: 10 million.
     pub max_rows: u64,
 }
 
-/// A field of [`ReadLimits`]: its name, which ends in the things that are counted, and its value.
+/// A field of [`ReadLimits`]: its name and its value. The name ends with the unit of the count.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limit(&'static str, fn(&ReadLimits) -> u64);
 
@@ -71,7 +81,7 @@ impl ReadLimits {
         max_rows: 10_000_000,
     };
 
-    /// No limits except those of `hicp-core` and of memory.
+    /// No limits except those of `hicp-core` and the available memory.
     pub const NONE: Self = Self {
         max_file_bytes: u64::MAX,
         max_json_bytes: u64::MAX,
@@ -82,7 +92,8 @@ impl ReadLimits {
         max_rows: u64::MAX,
     };
 
-    /// Refuses the rows of a table if there are more than `max_rows`; `line` is the line of the last row.
+    /// Returns an error if a table has more than `max_rows` rows. `line` is the line of the last
+    /// row.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Point clouds from and to PLY files.
+//! Reading and writing of point clouds as PLY files.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::mesh::ply;
 use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
 
-/// Points in meters, with normals where the file has them.
+/// Points in meters, with normals if the file has them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCloud {
     /// Positions, meters.
@@ -19,13 +19,15 @@ pub struct PointCloud {
     pub normals: Option<Vec<UnitVector3<f32>>>,
 }
 
-/// Reads the vertices of a PLY file, ASCII or binary, as a point cloud; faces and other elements are skipped.
+/// Reads the vertices of an ASCII or binary PLY file as a point cloud.
 ///
-/// Normals are read where the vertices have `nx`, `ny` and `nz`, and are brought to unit length. Within [`ReadLimits::DEFAULT`].
+/// Faces and other elements are skipped. Normals are read if the vertices have `nx`, `ny` and `nz`,
+/// and are normalized. The limits are those of [`ReadLimits::DEFAULT`].
 ///
 /// # Errors
 ///
-/// As [`crate::read_mesh`] for malformed files and positions, and for a normal without a direction.
+/// As for [`crate::read_mesh`], for malformed files and invalid positions. Also if a normal has no
+/// direction.
 pub fn read_point_cloud_ply(
     path: impl AsRef<Path>,
     unit: LengthUnit,
@@ -36,7 +38,7 @@ pub fn read_point_cloud_ply(
     let raw = ply::parse_points(reading, &limits.read_bytes(path)?)?;
     let in_meters = |p: &Point3<f64>| (p / unit.units_per_meter()).cast::<f32>();
     let points = raw.vertices.iter().map(in_meters).collect();
-    // A file states normals for all vertices or for none.
+    // A file has normals for all vertices or for none.
     if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
         return Ok(PointCloud {
             points,
@@ -61,7 +63,8 @@ pub fn read_point_cloud_ply(
 ///
 /// # Errors
 ///
-/// [`IoError`] if there is not one normal per point; otherwise as [`write_atomically`](crate::write_atomically).
+/// [`IoError`] if there is not one normal per point; otherwise as for
+/// [`write_atomically`](crate::write_atomically).
 pub fn write_point_cloud_ply(
     path: impl AsRef<Path>,
     points: &[Point3<f32>],
@@ -90,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clouds_come_back() {
+    fn clouds_survive_writing_and_reading() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.ply");
         let points = [Point3::new(0.1, -0.2, 0.3), Point3::new(1.0, 2.0, 3.0)];
@@ -122,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_clouds_are_refused() {
+    fn invalid_clouds_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.ply");
         assert!(matches!(
@@ -133,7 +136,7 @@ mod tests {
         for (names, body) in [
             ("x y z", "0 nan 0"),
             ("x y z nx ny nz", "0 0 0 0 0 0"),
-            // A mesh is read without them.
+            // The same file is readable as a mesh, which has no normals.
             ("x y z nx ny nz", "0 0 0 0 0 -nan(ind)"),
         ] {
             let properties: String = names

@@ -1,4 +1,4 @@
-//! Poses in BOP's form: nine numbers of a rotation, row-major, and a translation in millimeters.
+//! Poses in BOP's form: a row-major rotation of nine numbers and a translation in millimeters.
 
 use std::path::Path;
 
@@ -11,9 +11,10 @@ use crate::error::IoError;
 use crate::json::{self, Numbers};
 use crate::limits::{Limit, ReadLimits};
 
-/// Returns the pose of a row-major rotation and a translation in millimeters; the pose is in meters.
+/// Converts a row-major rotation and a translation in millimeters to a pose in meters.
 ///
-/// The rotation returned is the one nearest to the nine numbers. A translation that is not finite is passed on.
+/// The rotation of the pose is the one nearest to the nine numbers. A translation that is not
+/// finite is returned as it is.
 ///
 /// # Errors
 ///
@@ -38,7 +39,7 @@ fn pose(rotation: UnitQuaternion<f64>, translation_mm: &[f64; 3]) -> Isometry3<f
     Isometry3::from_parts(Translation3::new(x, y, z), rotation)
 }
 
-/// Returns the rotation of a pose, row-major, and its translation in millimeters; the pose is in meters.
+/// Converts a pose in meters to a row-major rotation and a translation in millimeters.
 #[must_use]
 pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
     let matrix = pose.rotation.to_rotation_matrix().into_inner();
@@ -49,7 +50,7 @@ pub fn pose_to_bop(pose: &Isometry3<f64>) -> ([f64; 9], [f64; 3]) {
     (rotation, [t.x, t.y, t.z])
 }
 
-/// A rotation of a JSON file, and the very numbers that state it.
+/// A rotation of a JSON file, and the original numbers.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(try_from = "Numbers<9>")]
 pub(crate) struct Rotation {
@@ -58,7 +59,7 @@ pub(crate) struct Rotation {
 }
 
 impl Rotation {
-    /// Returns the pose with a translation in millimeters.
+    /// Returns a pose in meters with this rotation and a translation in millimeters.
     pub(crate) fn with_translation(&self, translation_mm: &Numbers<3>) -> Isometry3<f64> {
         pose(self.nearest, &translation_mm.0)
     }
@@ -75,10 +76,10 @@ impl TryFrom<Numbers<9>> for Rotation {
     }
 }
 
-/// A pose file: the pose, and the very numbers that state it.
+/// The content of a pose file: the pose, and the original numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseFile {
-    /// The pose, meters; its rotation is the one nearest to the file's numbers.
+    /// The pose, meters. Its rotation is the one nearest to the numbers of the file.
     pub camera_from_object: Isometry3<f64>,
     /// `cam_R_m2c`, row-major, as in the file.
     pub rotation: [f64; 9],
@@ -94,13 +95,14 @@ struct PoseRecord {
     translation_mm: Numbers<3>,
 }
 
-/// Reads a pose from a JSON file: an object with `cam_R_m2c` (9 numbers, row-major) and `cam_t_m2c` (3, millimeters).
+/// Reads a pose from a JSON file with `cam_R_m2c` and `cam_t_m2c`.
 ///
-/// Other keys are ignored. As in BOP the pose is `camera_from_object`.
+/// `cam_R_m2c` has 9 numbers, row-major; `cam_t_m2c` has 3, in millimeters. Other keys are ignored.
+/// As in BOP, the pose is `camera_from_object`.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the key.
+/// [`IoError`] names the JSON key of the fault.
 pub fn read_pose_json(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
     ReadLimits::DEFAULT.read_pose_json(path)
 }
@@ -110,7 +112,7 @@ impl ReadLimits {
     ///
     /// # Errors
     ///
-    /// As [`read_pose_json`].
+    /// As for [`read_pose_json`].
     pub fn read_pose_json(&self, path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
         let record: PoseRecord = json::read(self, path.as_ref(), Limit::SMALL_JSON_BYTES)?;
         Ok(PoseFile {
@@ -121,11 +123,12 @@ impl ReadLimits {
     }
 }
 
-/// Writes a pose (meters) as [`read_pose_json`] reads it, with every digit.
+/// Writes a pose in meters with every digit, in the form that [`read_pose_json`] reads.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically). Also if a number is not finite, which the
+/// source of the error names.
 pub fn write_pose_json(path: impl AsRef<Path>, pose: &Isometry3<f64>) -> Result<(), IoError> {
     let (rotation, translation) = pose_to_bop(pose);
     let value = serde_json::json!({ "cam_R_m2c": rotation, "cam_t_m2c": translation });
@@ -142,7 +145,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn poses_come_back(twist in prop::array::uniform6(-3.0_f64..3.0)) {
+        fn poses_survive_writing_and_reading(twist in prop::array::uniform6(-3.0_f64..3.0)) {
             let pose = se3::exp(&Vector6::from(twist));
             let dir = tempfile::tempdir().unwrap();
             let path = dir.path().join("pose.json");
@@ -161,15 +164,15 @@ mod tests {
 
     #[test]
     fn rotations_are_row_major() {
-        // A quarter turn about z takes x to y.
+        // A quarter rotation around z maps x to y.
         let pose = read(r#"{"cam_R_m2c":[0,-1,0, 1,0,0, 0,0,1],"cam_t_m2c":[1,2,3],"score":null}"#);
         let point = pose.unwrap().camera_from_object * hicp_core::Point3::new(1.0, 0.0, 0.0);
         assert!((point - hicp_core::Point3::new(0.001, 1.002, 0.003)).norm() < 1e-12);
     }
 
     #[test]
-    fn the_numbers_of_the_file_are_kept() {
-        // Orthogonal to seven digits only, as files are.
+    fn the_numbers_of_the_file_are_preserved() {
+        // Orthogonal to seven digits only, as in typical files.
         let text = "[0.768311175,-0.0665434694,0.636608126,0.311033385,0.908074697,-0.280461366,-0.559424858,0.413487982,0.718381178]";
         let pose = read(&format!(
             r#"{{"cam_R_m2c":{text},"cam_t_m2c":[0.1,-0.2,1035.65777]}}"#
@@ -179,9 +182,10 @@ mod tests {
         assert_eq!(pose.translation_mm, [0.1, -0.2, 1035.65777]);
     }
 
-    /// Guessing metres from a small number and millimetres from a large one is right until an object is near or far.
+    /// Guessing the unit from the size of the numbers would fail for objects that are very near or
+    /// far.
     #[test]
-    fn translations_are_millimetres_whatever_their_size() {
+    fn translations_of_any_size_are_in_millimeters() {
         for mm in [0.5, 1.0, 99.0, 101.0, 1035.0, 250_000.0] {
             let pose = read(&format!(
                 r#"{{"cam_R_m2c":[1,0,0,0,1,0,0,0,1],"cam_t_m2c":[0,0,{mm}]}}"#
@@ -192,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_is_named() {
+    fn errors_name_the_field() {
         let good = "[1,0,0,0,1,0,0,0,1]";
         for (r, t, key) in [
             ("[1,0,0,0,1,0,0,0]", "[0,0,0]", "$.cam_R_m2c"),

@@ -9,19 +9,22 @@ use crate::error::{IoError, Place, quote};
 use crate::limits::{Limit, ReadLimits};
 use crate::source::{check_regular, is_absent};
 
-/// A text file of rows that grows while a run works, so that a killed run can resume.
+/// A text file of rows for a long run, so that a killed run can resume.
 ///
-/// The first line is a header. It states everything that the rows depend on: the columns, the settings of the run, or a
-/// hash of them. [`RowLog::resume`] refuses a file with another header, so rows of different runs never mix.
+/// The first line is a header. It states everything that the rows depend on: the columns, and the
+/// settings of the run or a hash of them. [`RowLog::resume`] refuses a file with another header, so
+/// rows of different runs never mix.
 ///
-/// - A row is one line, or a fixed number of lines that belong together. One `write` call appends it. A kill can cut off
-///   only the last row; `resume` drops it, and the run computes it again.
+/// - A row is one line, or a fixed number of lines that belong together. One `write` call appends
+///   it. A kill can cut off only the last row; `resume` drops it, and the run computes it again.
 /// - Rows have no checksums. A damaged row is a row that the caller cannot parse.
-/// - Threads may append at the same time. Rows are in the order of the calls: a caller that needs a fixed order appends
-///   from one thread, as `hicp-experiments` does. A caller with rows in any order writes an index into each row, as
-///   `bop refine` does.
-/// - Appended rows survive the end of the process. [`RowLog::sync`] makes them survive a power failure, too.
-/// - The file is locked while it is open, if the file system supports locks: two runs never write to the same file.
+/// - Threads may append at the same time. Rows are in the order of the calls. A caller that needs a
+///   fixed order appends from one thread, as `hicp-experiments` does, or writes an index into each
+///   row, as `bop refine` does.
+/// - Appended rows survive the end of the process. [`RowLog::sync`] makes them survive a power
+///   failure, too.
+/// - The file is locked while it is open if the file system supports locks, so two runs never write
+///   to the same file.
 ///
 /// ```
 /// use hicp_io::{ReadLimits, RowLog};
@@ -45,11 +48,11 @@ pub struct RowLog {
 }
 
 impl RowLog {
-    /// Creates a log at a path where there is no file yet. The header is one line, without a line break.
+    /// Creates a log at a path without a file. The header is one line, without a line break.
     ///
     /// # Errors
     ///
-    /// [`IoError`] if there is a file already, or if the file cannot be written.
+    /// [`IoError`] if the file already exists or cannot be written.
     pub fn create(path: impl AsRef<Path>, header: &str) -> Result<Self, IoError> {
         let path = path.as_ref();
         if !is_absent(path) {
@@ -60,15 +63,19 @@ impl RowLog {
         Ok(Self::resume(path, header, 1, &ReadLimits::DEFAULT)?.0)
     }
 
-    /// Opens a log and returns its complete rows, each without its last line break; creates the log if there is no file.
+    /// Opens a log and returns its complete rows, each without its last line break.
     ///
-    /// An incomplete row at the end is removed from the file. Bytes that are not UTF-8 are replaced by U+FFFD, so that
-    /// the caller's parser reports them.
+    /// Creates the log if there is no file. An incomplete row at the end is removed from the file.
+    /// Bytes that are not UTF-8 are replaced by U+FFFD, so that the caller's parser reports them.
     ///
     /// # Errors
     ///
-    /// [`IoError`] that names both headers if they differ, and if another run has the file open, if it is not a regular
-    /// file or above [`ReadLimits::max_file_bytes`], or if it cannot be read or written. The file then stays as it is.
+    /// [`IoError`] in these cases, which leave the file unchanged:
+    ///
+    /// - The headers differ; the error names both.
+    /// - Another run has the file open.
+    /// - The file is not a regular file or is above [`ReadLimits::max_file_bytes`].
+    /// - The file cannot be read or written.
     pub fn resume(
         path: impl AsRef<Path>,
         header: &str,
@@ -88,7 +95,7 @@ impl RowLog {
         check_regular(path, &metadata)?;
         // Other errors mean that the file system does not support locks.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            let text = "another run has it open, expected one run at a time";
+            let text = "another run has the file open, expected one run at a time";
             return Err(failed(io::Error::new(io::ErrorKind::ResourceBusy, text)));
         }
         limits.check(Limit::FILE_BYTES, path, None, metadata.len())?;
@@ -98,7 +105,7 @@ impl RowLog {
 
         let head = format!("{header}\n");
         let Some(body) = content.strip_prefix(head.as_bytes()) else {
-            // A run that was killed at its start, or a failing machine, leaves a part of the header or zeros.
+            // A run killed at its start or a power failure leaves a part of the header or zeros.
             let zeros = content.iter().rev().take_while(|byte| **byte == 0).count();
             if !head
                 .as_bytes()
@@ -131,17 +138,20 @@ impl RowLog {
         Ok(Self { path, file })
     }
 
-    /// Appends a row. It has the number of lines given to [`RowLog::resume`], without a line break at its end.
+    /// Appends a row, without a line break at its end.
+    ///
+    /// The row must have the number of lines given to [`RowLog::resume`].
     ///
     /// # Errors
     ///
-    /// [`IoError`] if the row cannot be written; no part of it stays in the file then.
+    /// [`IoError`] if the row cannot be written. In that case, no part of it stays in the file.
     pub fn append(&self, row: &str) -> Result<(), IoError> {
         let mut guard = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, length) = &mut *guard;
         let line = format!("{row}\n");
         if let Err(error) = file.write_all(line.as_bytes()) {
-            // A full disk may hold a part of the row: the next row must not continue its line.
+            // A full disk may hold a part of the row; without this, the next row would continue its
+            // line.
             let _ = file.set_len(*length);
             let _ = file.seek(SeekFrom::End(0));
             return Err(IoError::write(&self.path, error));
@@ -150,7 +160,7 @@ impl RowLog {
         Ok(())
     }
 
-    /// Waits until the rows are on the disk, typically a few milliseconds.
+    /// Waits until the rows are on the disk, typically for a few milliseconds.
     ///
     /// # Errors
     ///
@@ -171,7 +181,7 @@ impl RowLog {
     }
 }
 
-/// Names both headers from the word on in which they differ.
+/// Returns an error that shows both headers from the first word in which they differ.
 fn other_header(path: &Path, content: &[u8], header: &str) -> IoError {
     let line = content.split(|byte| *byte == b'\n').next();
     let found = String::from_utf8_lossy(line.unwrap_or_default()).into_owned();
@@ -225,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn another_header_is_refused_and_both_are_named() {
+    fn another_header_is_refused_and_the_error_shows_both() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log");
         for (content, found) in [
@@ -251,7 +261,7 @@ mod tests {
         let log = RowLog::create(&path, "h").unwrap();
         let error = resume(&path, "h").unwrap_err();
         let source = std::error::Error::source(&error).unwrap().to_string();
-        assert!(source.contains("another run has it open"), "{source}");
+        assert!(source.contains("another run has the file open"), "{source}");
         log.remove().unwrap();
         assert!(!path.exists());
         std::fs::write(&path, "h\nrow\n").unwrap();

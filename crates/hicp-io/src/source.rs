@@ -1,4 +1,4 @@
-//! Whole files into memory, within limits.
+//! Reading of whole files into memory, within limits.
 
 use std::borrow::Cow;
 use std::fs::{File, Metadata};
@@ -8,10 +8,10 @@ use std::path::Path;
 use crate::error::{IoError, IoErrorKind, Place};
 use crate::limits::{Limit, ReadLimits};
 
-/// Returns whether there is nothing at a path.
+/// Returns whether nothing exists at a path.
 ///
-/// If that cannot be determined (a share that does not answer, a folder that may not be entered), returns `false`, so that
-/// the later read reports the cause.
+/// If the path cannot be checked, returns `false`; the later read reports the cause. Examples are a
+/// network share that does not respond, and a folder without access permission.
 ///
 /// # Examples
 ///
@@ -27,7 +27,9 @@ pub fn is_absent(path: impl AsRef<Path>) -> bool {
 /// The number of bytes that [`read_head`] reads.
 const HEAD_BYTES: u64 = 1 << 16;
 
-/// Opens a regular file. Refuses anything else: opening a pipe would wait for its writer, and a device has no end.
+/// Opens a regular file and refuses everything else.
+///
+/// Opening a pipe would wait for its writer, and a device has no end.
 fn open(path: &Path) -> Result<(File, Metadata), IoError> {
     let failed = |e| IoError::read(path, e);
     check_regular(path, &std::fs::metadata(path).map_err(failed)?)?;
@@ -36,7 +38,7 @@ fn open(path: &Path) -> Result<(File, Metadata), IoError> {
     Ok((file, metadata))
 }
 
-/// Refuses what is not a regular file.
+/// Returns an error for anything except a regular file.
 pub(crate) fn check_regular(path: &Path, metadata: &Metadata) -> Result<(), IoError> {
     if metadata.is_file() {
         return Ok(());
@@ -48,7 +50,9 @@ pub(crate) fn check_regular(path: &Path, metadata: &Metadata) -> Result<(), IoEr
     Err(IoError::new(path, None, found, "a regular file"))
 }
 
-/// Reads the first 64 KiB of a file, or all of a smaller one. Returns them with the size of the file in bytes.
+/// Reads the first 64 KiB of a file, or all of a smaller one.
+///
+/// Also returns the size of the file in bytes.
 pub(crate) fn read_head(path: &Path) -> Result<(Vec<u8>, u64), IoError> {
     let (file, metadata) = open(path)?;
     let mut head = Vec::new();
@@ -59,7 +63,10 @@ pub(crate) fn read_head(path: &Path) -> Result<(Vec<u8>, u64), IoError> {
 }
 
 impl ReadLimits {
-    /// Reads a whole file. Refuses a file that another program changes meanwhile: it would be neither the old nor the new one.
+    /// Reads a whole file.
+    ///
+    /// Refuses a file that another program changes during the read, because the content could be a
+    /// mix of old and new.
     pub(crate) fn read(&self, path: &Path, limit: Limit) -> Result<Vec<u8>, IoError> {
         self.read_opened(path, limit, open(path)?)
     }
@@ -74,35 +81,41 @@ impl ReadLimits {
         let size = opened.len();
         self.check(limit, path, None, size)?;
         let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
-        // One byte more than the size shows that the file grew.
+        // One byte more than the size reveals that the file has grown.
         let mut source = (&mut file).take(size.saturating_add(1));
         source.read_to_end(&mut content).map_err(failed)?;
         let now = file.metadata().map_err(failed)?;
-        // Files of /proc have any size. A change within a tick of the file system's clock keeps the time.
+        // Files of /proc state arbitrary sizes. The time shows most changes, except those within a
+        // tick of the file system's clock.
         if content.len() as u64 != size || now.modified().ok() != opened.modified().ok() {
-            let found = format!("{} bytes, or as many written anew", now.len());
+            let found = format!(
+                "a file of {} bytes that changed while it was read",
+                now.len()
+            );
             let expected = format!(
-                "the {size} bytes that it had when it was opened: a file that stays as it is while it is read"
+                "{size} bytes as when it was opened: the file must not change while it is read"
             );
             return Err(IoError::new(path, None, found, expected));
         }
         Ok(content)
     }
 
-    /// Reads a text file of at most `max_file_bytes` for a caller that parses it; drops a byte order mark.
+    /// Reads a text file of at most `max_file_bytes`, without its byte order mark.
     ///
     /// # Errors
     ///
-    /// [`IoError`] if it is not a regular file, above the limit, changed while it was read, or not UTF-8.
+    /// [`IoError`] if it is not a regular file, is above the limit, changes during the read, or is
+    /// not UTF-8.
     pub fn read_text(&self, path: impl AsRef<Path>) -> Result<String, IoError> {
         self.text(path.as_ref(), Limit::FILE_BYTES)
     }
 
-    /// Reads a JSON file of at most `max_small_json_bytes` for a caller that parses it; drops a byte order mark.
+    /// Reads the text of a JSON file of at most `max_small_json_bytes`, without its byte order
+    /// mark.
     ///
     /// # Errors
     ///
-    /// As [`ReadLimits::read_text`].
+    /// As for [`ReadLimits::read_text`].
     ///
     /// # Examples
     ///
@@ -122,11 +135,11 @@ impl ReadLimits {
         self.text(path.as_ref(), Limit::SMALL_JSON_BYTES)
     }
 
-    /// Reads a file of at most `max_file_bytes` as it is.
+    /// Reads the unmodified bytes of a file of at most `max_file_bytes`.
     ///
     /// # Errors
     ///
-    /// [`IoError`] if it is not a regular file, above the limit or changed while it was read.
+    /// [`IoError`] if it is not a regular file, is above the limit, or changes during the read.
     ///
     /// # Examples
     ///
@@ -154,12 +167,14 @@ impl ReadLimits {
     }
 }
 
-/// Returns the text after a byte order mark, if there is one. Bytes that are not UTF-8, as in comments, are replaced by U+FFFD.
+/// Returns the text after an optional byte order mark.
+///
+/// Bytes that are not UTF-8, such as in comments, are replaced by U+FFFD.
 pub(crate) fn lossy_text<'a>(path: &Path, content: &'a [u8]) -> Result<Cow<'a, str>, IoError> {
     Ok(String::from_utf8_lossy(text_bytes(path, content)?))
 }
 
-/// Returns the bytes after a UTF-8 byte order mark, if there is one; refuses UTF-16 and UTF-32.
+/// Returns the bytes after an optional UTF-8 byte order mark. Refuses UTF-16 and UTF-32.
 pub(crate) fn text_bytes<'a>(path: &Path, content: &'a [u8]) -> Result<&'a [u8], IoError> {
     let encoding = match content {
         [0xef, 0xbb, 0xbf, rest @ ..] => return Ok(rest),
@@ -167,7 +182,7 @@ pub(crate) fn text_bytes<'a>(path: &Path, content: &'a [u8]) -> Result<&'a [u8],
         [0xff, 0xfe, 0, 0, ..] => "UTF-32 LE",
         [0xfe, 0xff, ..] => "UTF-16 BE",
         [0xff, 0xfe, ..] => "UTF-16 LE",
-        // Without a mark: text of these formats starts with two ASCII characters.
+        // Without a mark, text of these formats starts with two ASCII characters.
         [0, first, 0, second, ..] if first.is_ascii_graphic() && *second != 0 => "UTF-16 BE",
         [first, 0, second, 0, ..] if first.is_ascii_graphic() && *second != 0 => "UTF-16 LE",
         _ => return Ok(content),
@@ -181,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sparse_file_above_the_limit_is_refused_unread() {
+    fn a_sparse_file_above_the_limit_is_refused_before_reading() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("huge.obj");
         let file = File::create(&path).unwrap();
@@ -214,22 +229,25 @@ mod tests {
             change(&mut file);
             let read = ReadLimits::DEFAULT.read_opened(&path, Limit::FILE_BYTES, opened);
             let error = read.unwrap_err();
-            assert!(!error.found.starts_with("8 bytes"), "{name}: {error}");
-            assert!(error.expected.starts_with("the 8 bytes"), "{name}: {error}");
+            assert!(
+                !error.found.starts_with("a file of 8 bytes"),
+                "{name}: {error}"
+            );
+            assert!(error.expected.starts_with("8 bytes as"), "{name}: {error}");
         }
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_of_another_size_than_it_states_is_refused() {
+    fn a_file_with_another_size_than_its_metadata_is_refused() {
         let error = ReadLimits::DEFAULT
             .read_bytes("/proc/self/status")
             .unwrap_err();
-        assert!(error.expected.starts_with("the 0 bytes"), "{error}");
+        assert!(error.expected.starts_with("0 bytes as"), "{error}");
     }
 
     #[test]
-    fn byte_order_marks() {
+    fn byte_order_marks_are_recognized() {
         let path = Path::new("x");
         assert_eq!(text_bytes(path, b"\xef\xbb\xbfv").unwrap(), b"v");
         for text in ["", "v", "v 0 0 0", "#\0"] {

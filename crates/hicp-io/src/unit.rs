@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// The unit in which a file states lengths. Mesh formats do not state theirs, so callers must.
+/// The unit of the lengths in a file. Mesh formats do not state it, so callers must.
 ///
 /// ```
 /// use hicp_io::LengthUnit;
@@ -23,13 +23,15 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Returns the meters in one of this unit.
+    /// Returns the length of one unit, in meters.
     #[must_use]
     pub fn meters_per_unit(self) -> f64 {
         1.0 / self.units_per_meter()
     }
 
-    /// Units in one metre: a whole number for every unit, so that converting by it rounds once.
+    /// Returns the number of units in one meter.
+    ///
+    /// It is a whole number for every unit, so a conversion rounds only once.
     pub(crate) fn units_per_meter(self) -> f64 {
         match self {
             Self::Meters => 1.0,
@@ -60,7 +62,7 @@ impl FromStr for LengthUnit {
     }
 }
 
-/// A text that is not the abbreviation of a [`LengthUnit`].
+/// The error for a text that is not the abbreviation of a [`LengthUnit`].
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("unit is {found:?}, expected m, mm or cm")]
 pub struct UnknownUnit {

@@ -1,4 +1,4 @@
-//! The content of a scene's JSON files, by image.
+//! The content of a scene's JSON files, per image.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crate::source::is_absent;
 pub struct SceneCamera {
     /// Calibration matrix K, pixels; pixel centers at integers.
     pub matrix: Matrix3<f64>,
-    /// Width and height of its images, if stated.
+    /// Width and height of its images in pixels, if stated.
     pub image_size: Option<(u32, u32)>,
     /// Millimeters per unit of the depth image, if stated.
     pub depth_scale: Option<f64>,
@@ -50,13 +50,13 @@ impl TryFrom<CameraRecord> for SceneCamera {
     }
 }
 
-/// The true pose of an object instance in an image.
+/// The true pose of an object instance in the camera frame of an image.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(from = "TruthRecord")]
 pub struct GroundTruth {
     /// The object.
     pub obj_id: u32,
-    /// Its pose, meters.
+    /// Pose of the object in the camera frame, meters.
     pub camera_from_object: Isometry3<f64>,
 }
 
@@ -78,38 +78,42 @@ impl From<TruthRecord> for GroundTruth {
     }
 }
 
-/// The visibility of an instance. Boxes are x, y, width, height in pixels, −1 if nothing is seen.
+/// The visibility of an instance.
+///
+/// Boxes are x, y, width and height in pixels. All are −1 if no pixel is visible.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]
 pub struct GroundTruthInfo {
-    /// Visible part of the silhouette, 0 to 1.
+    /// Visible fraction of the silhouette, 0 to 1.
     #[serde(rename = "visib_fract", skip_serializing_if = "Option::is_none")]
     pub visible_fraction: Option<f64>,
     /// Box of the whole silhouette.
     #[serde(rename = "bbox_obj", skip_serializing_if = "Option::is_none")]
     #[serde(deserialize_with = "optional_numbers")]
     pub bbox_object: Option<[f64; 4]>,
-    /// Box of the visible part.
+    /// Box of the visible part of the silhouette.
     #[serde(rename = "bbox_visib", skip_serializing_if = "Option::is_none")]
     #[serde(deserialize_with = "optional_numbers")]
     pub bbox_visible: Option<[f64; 4]>,
-    /// Pixels of the visible part.
+    /// Number of pixels of the visible part.
     #[serde(rename = "px_count_visib", skip_serializing_if = "Option::is_none")]
     pub visible_pixels: Option<u32>,
 }
 
 impl SceneCamera {
-    /// Returns the camera for images of a size; the files rarely state it ([`SceneCamera::image_size`]).
+    /// Returns the camera for images of a size, in pixels.
+    ///
+    /// The files rarely state the size ([`SceneCamera::image_size`]).
     ///
     /// # Errors
     ///
-    /// As [`PinholeCamera::from_matrix`].
+    /// As for [`PinholeCamera::from_matrix`].
     pub fn pinhole(&self, width: u32, height: u32) -> Result<PinholeCamera, CameraError> {
         PinholeCamera::from_matrix(&self.matrix, width, height)
     }
 }
 
-/// Reads a file of values by image, or returns `None` if there is no file.
+/// Reads a file with one value per image, or returns `None` if there is no such file.
 pub(super) fn by_image<T: DeserializeOwned>(
     limits: &ReadLimits,
     path: &Path,

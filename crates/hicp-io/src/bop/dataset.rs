@@ -1,4 +1,4 @@
-//! The folder of a dataset.
+//! A dataset folder in the layout of BOP.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,11 @@ use crate::limits::ReadLimits;
 use crate::source::is_absent;
 use crate::unit::LengthUnit;
 
-/// A dataset in BOP's layout: a folder with models, and with scenes in folders such as `test` or `test_primesense`.
+/// A dataset in BOP's layout: a folder of models, and scenes in folders such as `test` or
+/// `test_primesense`.
 ///
-/// Opening a dataset checks only that the folder exists. Each method reports the files that it misses.
+/// Opening a dataset only checks that the folder exists. Each method reports the files that are
+/// missing.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), hicp_io::IoError> {
@@ -38,7 +40,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the folder does not exist.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the folder does not exist.
     pub fn open(root: impl AsRef<Path>) -> Result<Self, IoError> {
         let root = root.as_ref().to_owned();
         if root.is_dir() {
@@ -49,7 +51,8 @@ impl Dataset {
         }
     }
 
-    /// Reads models, images and annotations within other limits than [`ReadLimits::DEFAULT`].
+    /// Sets the limits for reading models, images and annotations, instead of
+    /// [`ReadLimits::DEFAULT`].
     #[must_use]
     pub fn with_limits(mut self, limits: ReadLimits) -> Self {
         self.limits = limits;
@@ -66,16 +69,18 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if neither exists.
     pub fn models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models", "models_eval"])
     }
 
-    /// Returns the folder of the models that BOP's errors are stated over: `models_eval`, or `models` if it is the only one.
+    /// Returns the folder of the models over which BOP's errors are defined.
+    ///
+    /// It is `models_eval`, or `models` if it is the only one.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is neither.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if neither exists.
     pub fn eval_models_dir(&self) -> Result<PathBuf, IoError> {
         self.first_dir(["models_eval", "models"])
     }
@@ -88,16 +93,17 @@ impl Dataset {
             .ok_or_else(|| IoError::missing(self.root.join("models"), "folder of models"))
     }
 
-    /// Returns the path of the mesh of an object, `models/obj_000001.ply` for object 1, whether or not it exists.
+    /// Returns the path of an object's mesh: `models/obj_000001.ply` for object 1. The file may not
+    /// exist.
     ///
     /// # Errors
     ///
-    /// As [`Dataset::models_dir`].
+    /// As for [`Dataset::models_dir`].
     pub fn model_path(&self, obj_id: u32) -> Result<PathBuf, IoError> {
         Ok(Self::model_path_in(&self.models_dir()?, obj_id))
     }
 
-    /// Returns the path of the mesh of an object in a folder of models, whether or not it exists.
+    /// Returns the path of an object's mesh in a folder of models. The file may not exist.
     #[must_use]
     pub fn model_path_in(models: &Path, obj_id: u32) -> PathBuf {
         models.join(format!("obj_{obj_id:06}.ply"))
@@ -107,7 +113,7 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// As [`Dataset::models_dir`] and [`read_mesh`](crate::read_mesh).
+    /// As for [`Dataset::models_dir`] and [`read_mesh`](crate::read_mesh).
     pub fn read_model(&self, obj_id: u32) -> Result<TriMesh, IoError> {
         let path = self.model_path(obj_id)?;
         self.limits.read_mesh(path, LengthUnit::Millimeters)
@@ -117,27 +123,30 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// As [`Dataset::models_dir`] and [`read_models_info`](super::read_models_info).
+    /// As for [`Dataset::models_dir`] and [`read_models_info`](super::read_models_info).
     pub fn read_models_info(&self) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
         let path = self.models_dir()?.join("models_info.json");
         self.limits.read_models_info(path)
     }
 
-    /// Reads the targets of the benchmark from `test_targets_bop19.json`.
+    /// Reads the targets of the benchmark from the dataset's `test_targets_bop19.json`.
     ///
     /// # Errors
     ///
-    /// As [`read_targets`](super::read_targets).
+    /// As for [`read_targets`](super::read_targets).
     pub fn read_targets(&self) -> Result<Vec<Target>, IoError> {
         self.limits
             .read_targets(self.root.join("test_targets_bop19.json"))
     }
 
-    /// Returns the ids of the scenes of a split (the name of its folder, such as `test`), ascending.
+    /// Returns the ids of the scenes of a split, ascending.
+    ///
+    /// A split is named by its folder, such as `test`.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the split does not exist, [`IoErrorKind::Read`](crate::IoErrorKind::Read) when its folder cannot be listed.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the split does not exist,
+    /// [`IoErrorKind::Read`](crate::IoErrorKind::Read) if its folder cannot be listed.
     pub fn scene_ids(&self, split: &str) -> Result<Vec<u32>, IoError> {
         let dir = self.split_dir(split)?;
         let entries = std::fs::read_dir(&dir).map_err(|e| IoError::read(&dir, e))?;
@@ -155,11 +164,12 @@ impl Dataset {
         Ok(ids)
     }
 
-    /// Opens a scene of a split: its cameras and, where they are known, its ground truth.
+    /// Opens a scene of a split: its cameras and its ground truth, if any.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when the split or the scene does not exist, otherwise as [`Scene::open`].
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the split or the scene does not
+    /// exist, otherwise as for [`Scene::open`].
     pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
         let folder = self.split_dir(split)?.join(format!("{scene_id:06}"));
         Scene::open_within(self.limits, folder)
@@ -181,7 +191,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn missing_parts_are_named() {
+    fn errors_name_the_missing_part() {
         let dir = tempfile::tempdir().unwrap();
         assert!(matches!(
             Dataset::open(dir.path().join("no")),
@@ -218,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn models_fall_back_to_those_for_evaluation() {
+    fn models_fall_back_to_the_evaluation_models() {
         let dir = tempfile::tempdir().unwrap();
         let dataset = Dataset::open(dir.path()).unwrap();
         fs::create_dir(dir.path().join("models_eval")).unwrap();

@@ -1,4 +1,4 @@
-//! Objects that a detector found, in COCO's form.
+//! Detected objects, in COCO's format.
 
 use std::path::Path;
 
@@ -9,29 +9,29 @@ use crate::error::IoError;
 use crate::json::{self, optional_numbers};
 use crate::limits::{Limit, ReadLimits};
 
-/// An object instance found in an image.
+/// An object instance detected in an image.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(expecting = "an object with `scene_id`, `image_id`, `category_id` and `score`")]
 pub struct Detection {
-    /// The scene.
+    /// Id of the scene.
     pub scene_id: u32,
-    /// The image.
+    /// Id of the image.
     pub image_id: u32,
-    /// The object.
+    /// Id of the object.
     pub category_id: u32,
     /// Confidence; higher is better.
     pub score: f64,
     /// Box in pixels: x, y, width, height.
     #[serde(default, deserialize_with = "optional_numbers")]
     pub bbox: Option<[f64; 4]>,
-    /// Mask, still coded: decode it with [`Rle::to_mask`].
+    /// Run-length code of the mask, decoded by [`Rle::to_mask`].
     pub segmentation: Option<Rle>,
-    /// Seconds spent on the image, if known.
+    /// Time spent on the image in seconds, if known.
     #[serde(rename = "time", default, deserialize_with = "known_time")]
     pub time_s: Option<f64>,
 }
 
-/// BOP writes −1 for an unknown time.
+/// Reads a time in seconds. BOP writes −1 for an unknown time.
 fn known_time<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     let time = Option::deserialize(deserializer)?;
     Ok(time.filter(|seconds| *seconds >= 0.0))
@@ -39,21 +39,22 @@ fn known_time<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>,
 
 /// Reads the detections of a BOP dataset from a JSON array, in the file's order.
 ///
-/// Segmentations are run-length codes, as lists of runs or compressed. Polygons are not supported.
+/// Segmentations are run-length codes, as lists of runs or as compressed text. Polygons are not
+/// supported.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the key, also for a run-length code that does not fit its image.
+/// [`IoError`] names the JSON key of the fault, also if a run-length code does not fit its image.
 pub fn read_detections(path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
     ReadLimits::DEFAULT.read_detections(path)
 }
 
 impl ReadLimits {
-    /// As [`read_detections`], within these limits.
+    /// Reads a file as [`read_detections`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_detections`].
+    /// As for [`read_detections`].
     pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
         json::read(self, path.as_ref(), Limit::JSON_BYTES)
     }
@@ -76,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn both_forms_of_runs_give_the_same_mask() {
+    fn listed_and_compressed_runs_give_the_same_mask() {
         for counts in ["[1, 1, 1, 1, 2]", "\"11101\""] {
             let detections = read(&format!(r#"{{"size": [3, 2], "counts": {counts}}}"#)).unwrap();
             let detection = &detections[0];
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn errors_name_the_field_and_the_value() {
         let error = read(r#"{"size": [3, 2], "counts": [4, 5]}"#).unwrap_err();
         assert_eq!(
             error.place,

@@ -1,6 +1,8 @@
-//! Datasets, detections and results in the formats of the BOP benchmark for 6D object pose estimation.
+//! Datasets, detections and results in the formats of the BOP benchmark for 6D object pose
+//! estimation.
 //!
-//! Files are in millimeters. All values here are in meters, unless their names state another unit.
+//! Files are in millimeters. All values in memory are in meters, unless their names state another
+//! unit.
 
 mod annotations;
 mod dataset;

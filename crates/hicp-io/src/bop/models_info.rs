@@ -1,4 +1,4 @@
-//! Sizes and symmetries of a dataset's objects.
+//! Diameters and symmetries of a dataset's objects.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,13 +11,13 @@ use crate::json::{self, ById, Numbers, Positive};
 use crate::limits::{Limit, ReadLimits};
 use crate::pose::Rotation;
 
-/// What a dataset states about an object besides its mesh.
+/// The diameter and the symmetries of an object, as its dataset states them.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(try_from = "Record")]
 pub struct ModelInfo {
     /// Largest distance between two of its vertices, meters.
     pub diameter_m: f64,
-    /// Its symmetries, meters.
+    /// Its symmetries in the model frame, meters.
     pub symmetries: Symmetries,
 }
 
@@ -38,7 +38,7 @@ impl TryFrom<Record> for ModelInfo {
             discrete: discrete.into_iter().map(|Motion(motion)| motion).collect(),
             continuous: continuous.into_iter().map(|Axis(axis)| axis).collect(),
         };
-        // They are expanded when errors are measured: lists of ten thousand each would be terabytes.
+        // Error measures expand the symmetries: two lists of ten thousand would need terabytes.
         let motions = symmetries.n_motions();
         if motions > MAX_SYMMETRY_MOTIONS {
             return Err(format!(
@@ -55,7 +55,7 @@ impl TryFrom<Record> for ModelInfo {
     }
 }
 
-/// A rigid motion; in JSON a row-major 4×4 matrix in millimeters.
+/// A rigid motion. In JSON, it is a row-major 4×4 matrix in millimeters.
 #[derive(Deserialize)]
 #[serde(try_from = "Numbers<16>")]
 struct Motion(Isometry3<f64>);
@@ -102,17 +102,17 @@ impl TryFrom<AxisRecord> for Axis {
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the key, also for symmetries that are not rigid motions.
+/// [`IoError`] names the JSON key of the fault, also if a symmetry is not a rigid motion.
 pub fn read_models_info(path: impl AsRef<Path>) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
     ReadLimits::DEFAULT.read_models_info(path)
 }
 
 impl ReadLimits {
-    /// As [`read_models_info`], within these limits.
+    /// Reads a file as [`read_models_info`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_models_info`].
+    /// As for [`read_models_info`].
     pub fn read_models_info(
         &self,
         path: impl AsRef<Path>,
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn symmetries_are_in_metres() {
+    fn symmetries_are_in_meters() {
         let infos = read(
             r#"{"3": {"diameter": 250, "min_x": -1,
                 "symmetries_discrete": [[-1,0,0,10, 0,-1,0,0, 0,0,1,-20, 0,0,0,1]],
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn errors_name_the_field_and_the_value() {
         let model = |rest: &str| read(&format!(r#"{{"3": {{"diameter": 1{rest}}}}}"#));
         assert!(matches!(
             model(r#", "symmetries_continuous": [{"axis": [0,0,0], "offset": [0,0,0]}]"#),

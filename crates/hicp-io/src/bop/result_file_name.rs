@@ -13,7 +13,7 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ResultFileName {
-    /// The method; without underscores.
+    /// The method, without underscores.
     pub method: String,
     /// The dataset, such as `ycbv`.
     pub dataset: String,
@@ -21,7 +21,7 @@ pub struct ResultFileName {
     pub split: String,
     /// The sensor or kind of the split, such as `primesense`.
     pub split_type: Option<String>,
-    /// Distinguishes several results of one method.
+    /// An identifier that distinguishes several results of one method.
     pub id: Option<String>,
 }
 
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_other_forms_are_none() {
+    fn names_of_another_form_are_refused() {
         let name = ResultFileName::parse("cosypose-x_ycbv-test.csv").unwrap();
         assert_eq!(name.split_folder(), "test");
         assert_eq!((name.method.as_str(), name.id), ("cosypose-x", None));

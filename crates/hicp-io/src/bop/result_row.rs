@@ -6,7 +6,7 @@ use hicp_core::Isometry3;
 
 use crate::pose::pose_to_bop;
 
-/// The columns of a result file, in the order in which they are written, and what their cells must hold.
+/// The columns of a result file in the order of writing, and the expected content of their cells.
 pub(super) const COLUMNS: [(&str, &str); 7] = [
     ("scene_id", "an integer from 0 to 4294967295"),
     ("im_id", "an integer from 0 to 4294967295"),
@@ -17,21 +17,21 @@ pub(super) const COLUMNS: [(&str, &str); 7] = [
     ("time", "a finite number of seconds, -1 if unknown"),
 ];
 
-/// One estimate: an object in an image, and where it is.
+/// One estimate: an object in an image, and its pose in the camera frame.
 ///
-/// The numbers of the pose are kept as they stood in the file, so that a row whose pose is not replaced is written back
-/// with the same numbers, although its rotation may be orthogonal only up to rounding.
+/// The row stores the numbers of the pose as they are in the file. A row with an unchanged pose is
+/// therefore written back exactly, although its rotation may be orthogonal only up to rounding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResultRow {
-    /// The scene.
+    /// Id of the scene.
     pub scene_id: u32,
-    /// The image.
+    /// Id of the image.
     pub im_id: u32,
-    /// The object.
+    /// Id of the object.
     pub obj_id: u32,
     /// Confidence; higher is better.
     pub score: f64,
-    /// Seconds spent on all estimates of the image, where known.
+    /// Time spent on all estimates of the image in seconds, if known.
     pub time_s: Option<f64>,
     pub(super) rotation: [f64; 9],
     pub(super) translation_mm: [f64; 3],
@@ -39,7 +39,7 @@ pub struct ResultRow {
 }
 
 impl ResultRow {
-    /// Creates a row with score 1 and unknown time; the pose is in meters.
+    /// Creates a row with score 1 and unknown time. The pose is in meters.
     #[must_use]
     pub fn new(scene_id: u32, im_id: u32, obj_id: u32, camera_from_object: Isometry3<f64>) -> Self {
         let (rotation, translation_mm) = pose_to_bop(&camera_from_object);
@@ -55,38 +55,39 @@ impl ResultRow {
         }
     }
 
-    /// Returns the first line of a result file, without its end.
+    /// Returns the header line of a result file, without a line ending.
     #[must_use]
     pub fn header() -> String {
         COLUMNS.map(|(name, _)| name).join(",")
     }
 
-    /// The estimate, meters; its rotation is the one nearest to the file's numbers.
+    /// Returns the estimated pose, meters. Its rotation is the one nearest to the numbers of the
+    /// file.
     #[must_use]
     pub fn camera_from_object(&self) -> Isometry3<f64> {
         self.camera_from_object
     }
 
-    /// Replaces the estimate; meters.
+    /// Replaces the estimated pose, meters.
     pub fn set_camera_from_object(&mut self, camera_from_object: Isometry3<f64>) {
         (self.rotation, self.translation_mm) = pose_to_bop(&camera_from_object);
         self.camera_from_object = camera_from_object;
     }
 
-    /// The rotation as it is written, row-major.
+    /// Returns the rotation as it is written to the file, row-major.
     #[must_use]
     pub fn rotation(&self) -> &[f64; 9] {
         &self.rotation
     }
 
-    /// The translation as it is written, millimeters.
+    /// Returns the translation as it is written to the file, millimeters.
     #[must_use]
     pub fn translation_mm(&self) -> &[f64; 3] {
         &self.translation_mm
     }
 }
 
-/// The row's line in a result file, without its end.
+/// Formats the row as a line of a result file, without a line ending.
 impl fmt::Display for ResultRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let join = |numbers: &[f64]| {

@@ -13,45 +13,48 @@ use crate::limits::ReadLimits;
 use crate::pose::pose_from_bop;
 use crate::source::text_bytes;
 
-/// Reads a result file, in its order.
+/// Reads a result file, in the order of its rows.
 ///
-/// Lenient in form: columns in any order and further ones, spaces, quotes, any line ending, blank lines, a byte order
-/// mark. Strict in content: every number must be there and be finite, every rotation must be one up to rounding. A
-/// negative time is unknown.
+/// The form may vary. Columns may be in any order, and other columns are ignored. Spaces, quotes,
+/// blank lines, a byte order mark and any line ending are accepted.
+///
+/// The content must be complete. Every number must be present and finite. Every rotation must be
+/// orthogonal up to rounding. A negative time means unknown.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names line and column.
+/// [`IoError`] names the line and the column.
 pub fn read_results(path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
     ReadLimits::DEFAULT.read_results(path)
 }
 
-/// Reads the content of a result file; messages name `path`.
+/// Parses the content of a result file. Error messages name `path`.
 ///
 /// # Errors
 ///
-/// As [`read_results`].
+/// As for [`read_results`].
 pub fn results_from_csv(content: &[u8], path: &Path) -> Result<Vec<ResultRow>, IoError> {
     parse(&ReadLimits::DEFAULT, path, content)
 }
 
 impl ReadLimits {
-    /// As [`read_results`], within these limits.
+    /// Reads a file as [`read_results`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_results`].
+    /// As for [`read_results`].
     pub fn read_results(&self, path: impl AsRef<Path>) -> Result<Vec<ResultRow>, IoError> {
         let path = path.as_ref();
         parse(self, path, &self.read_bytes(path)?)
     }
 }
 
-/// Writes a result file, in the order of the rows, atomically. Every number is written so that it is read back exactly.
+/// Writes a result file atomically, in the order of `rows`. Every number is read back exactly.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`]; also if a number is not finite, which the source names.
+/// As for [`write_atomically`]; also if a number is not finite, which the source of the error
+/// names.
 pub fn write_results(path: impl AsRef<Path>, rows: &[ResultRow]) -> Result<(), IoError> {
     write_atomically(path, |writer| {
         writeln!(writer, "{}", ResultRow::header())?;
@@ -81,7 +84,8 @@ fn parse(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Vec<ResultR
         .from_reader(text);
     let (mut rows, mut header) = (Vec::new(), None);
     for record in reader.records() {
-        // Rows of any length and bytes in memory leave one possible error.
+        // Rows may have any length and reading from memory cannot fail, so only the encoding can be
+        // wrong.
         let record = record.map_err(|error| {
             let place = Place::Line(line_of(text, error.position()));
             let expected = "comma-separated values in UTF-8";
@@ -121,7 +125,7 @@ fn parse(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Vec<ResultR
     Ok(rows)
 }
 
-/// Returns the index of each of [`COLUMNS`].
+/// Returns the position of each of [`COLUMNS`] in the header.
 fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError> {
     let mut columns = [0; 7];
     for (column, (name, _)) in columns.iter_mut().zip(COLUMNS) {
@@ -138,7 +142,9 @@ fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError>
     Ok(columns)
 }
 
-/// Parses the cells of [`COLUMNS`]. The error is the column at fault, and the reason if its numbers are not a rotation.
+/// Parses the cells of [`COLUMNS`].
+///
+/// The error is the index of the invalid column, and the reason if its numbers are not a rotation.
 fn row_of(cells: &[&str; 7]) -> Result<ResultRow, (usize, Option<RotationError>)> {
     let integer = |column: usize| cells[column].parse().map_err(|_| (column, None));
     let [score] = numbers(cells[3]).ok_or((3, None))?;
@@ -158,7 +164,9 @@ fn row_of(cells: &[&str; 7]) -> Result<ResultRow, (usize, Option<RotationError>)
     })
 }
 
-/// Returns the line of a record, from 1. The position of the reader is in front of the blank lines before the record.
+/// Returns the line number of a record, from 1.
+///
+/// The reader reports a position before the blank lines that precede the record.
 fn line_of(text: &[u8], position: Option<&csv::Position>) -> usize {
     let start = position.map_or(0, |position| position.byte());
     let start = usize::try_from(start).unwrap_or_else(|_| unreachable!("the text is in memory"));

@@ -11,7 +11,9 @@ use crate::limits::ReadLimits;
 /// The largest number of pixels of a mask.
 const MAX_PIXELS: u64 = ReadLimits::DEFAULT.max_pixels;
 
-/// A mask as the lengths of its runs, column by column, alternating between background and object, background first.
+/// A mask as the lengths of its runs, column by column.
+///
+/// Runs alternate between background and object; the first is background.
 ///
 /// ```
 /// use hicp_io::bop::Rle;
@@ -29,14 +31,14 @@ pub struct Rle {
     counts: Vec<u32>,
 }
 
-/// A run-length code that does not describe a mask.
+/// The reason why a run-length code does not describe a mask.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{found}, expected {expected}")]
 #[non_exhaustive]
 pub struct RleError {
-    /// The fault.
+    /// The value found.
     pub found: String,
-    /// The requirement.
+    /// The expected value.
     pub expected: String,
 }
 
@@ -46,12 +48,12 @@ fn refuse<T>(found: String, expected: impl Into<String>) -> Result<T, RleError> 
 }
 
 impl Rle {
-    /// Creates a code from the lengths of its runs.
+    /// Creates a code from the lengths of its runs, in pixels.
     ///
     /// # Errors
     ///
-    /// [`RleError`] if they do not sum to width × height, or if the image has more than the `max_pixels` of
-    /// [`ReadLimits::DEFAULT`].
+    /// [`RleError`] if the lengths do not sum to width × height. Also if the image has more pixels
+    /// than `max_pixels` of [`ReadLimits::DEFAULT`].
     pub fn from_counts(width: u32, height: u32, counts: Vec<u32>) -> Result<Self, RleError> {
         let pixels = u64::from(width) * u64::from(height);
         if pixels > MAX_PIXELS {
@@ -70,7 +72,10 @@ impl Rle {
         })
     }
 
-    /// Creates a code from COCO's compressed text: numbers of five bits per character, from the fourth on as differences to the last but one.
+    /// Creates a code from COCO's compressed text.
+    ///
+    /// The text stores numbers with five bits per character. From the fourth run on, a number is
+    /// the difference to the run before the previous one.
     ///
     /// # Errors
     ///
@@ -117,7 +122,7 @@ impl Rle {
         Self::from_counts(width, height, counts)
     }
 
-    /// Creates the code of a mask.
+    /// Creates the run-length code of a mask.
     #[must_use]
     pub fn of_mask(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
@@ -146,7 +151,7 @@ impl Rle {
         self.height
     }
 
-    /// The lengths of the runs.
+    /// Returns the lengths of the runs, in pixels.
     #[must_use]
     pub fn counts(&self) -> &[u32] {
         &self.counts
@@ -225,7 +230,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn masks_come_back(
+        fn masks_survive_encoding_and_decoding(
             width in 1_u32..40,
             height in 1_u32..40,
             seed in prop::collection::vec(any::<bool>(), 1600),
@@ -243,21 +248,22 @@ mod tests {
         }
 
         #[test]
-        fn no_text_panics(text in "\\PC{0,40}") {
+        fn decoding_never_panics(text in "\\PC{0,40}") {
             let _ = Rle::from_compressed(4, 4, &text);
         }
     }
 
     #[test]
-    fn a_code_worked_out_by_hand() {
-        // 40 = 8 + 1·32 is "X1"; 3 and 5 are themselves; 1 follows as 1 − 3 = −2, which is 30 with its sign bit: "N".
+    fn a_code_computed_by_hand_is_decoded() {
+        // 40 = 8 + 1·32 is "X1"; 3 and 5 are themselves; 1 follows as 1 − 3 = −2, which is 30 with
+        // its sign bit: "N".
         let rle = Rle::from_compressed(7, 7, "X135N").unwrap();
         assert_eq!(rle.counts(), [40, 3, 5, 1]);
         assert_eq!(rle.to_compressed(), "X135N");
     }
 
     #[test]
-    fn runs_go_down_the_columns() {
+    fn runs_are_column_by_column() {
         let rle = Rle::from_counts(3, 2, vec![0, 2, 3, 1]).unwrap();
         assert_eq!(
             rle.to_mask().pixels(),
@@ -266,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_that_do_not_fit_are_refused() {
+    fn codes_that_do_not_fit_their_image_are_refused() {
         for counts in [vec![], vec![3], vec![5, 2], vec![u32::MAX, u32::MAX]] {
             let error = Rle::from_counts(3, 2, counts).unwrap_err();
             assert_eq!(error.expected, "6 for 3x2", "{error}");

@@ -1,4 +1,4 @@
-//! One scene: a folder of images with one camera each.
+//! One scene: a folder of images, each with a camera.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::error::{IoError, Place};
 use crate::limits::ReadLimits;
 use crate::source::is_absent;
 
-/// A scene of a dataset. Its JSON files are in memory, its images are read on demand.
+/// A scene of a dataset. Its JSON files are kept in memory; its images are read on demand.
 #[derive(Clone, Debug)]
 pub struct Scene {
     dir: PathBuf,
@@ -21,20 +21,24 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Opens the scene in a folder: reads `scene_camera.json`, and `scene_gt.json` and `scene_gt_info.json` where they are.
+    /// Opens the scene in a folder.
+    ///
+    /// Reads `scene_camera.json`. If they exist, also reads `scene_gt.json` and
+    /// `scene_gt_info.json`.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the folder or its cameras do not exist, otherwise [`IoError`] that names the key.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the folder or its camera file does
+    /// not exist, otherwise an [`IoError`] that names the JSON key of the fault.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
         Self::open_within(ReadLimits::DEFAULT, dir)
     }
 
-    /// Opens the scene in a folder as [`Scene::open`] does; its JSON files and its images are read within these limits.
+    /// Opens a scene as [`Scene::open`] does, and reads its JSON files and images within `limits`.
     ///
     /// # Errors
     ///
-    /// As [`Scene::open`].
+    /// As for [`Scene::open`].
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         if is_absent(&dir) {
@@ -51,7 +55,7 @@ impl Scene {
         })
     }
 
-    /// Reads images within other limits than [`ReadLimits::DEFAULT`].
+    /// Sets the limits for reading images, instead of [`ReadLimits::DEFAULT`].
     #[must_use]
     pub fn with_limits(mut self, limits: ReadLimits) -> Self {
         self.limits = limits;
@@ -73,7 +77,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoError`] when `scene_camera.json` does not have the image.
+    /// [`IoError`] if `scene_camera.json` does not list the image.
     pub fn camera(&self, im_id: u32) -> Result<&SceneCamera, IoError> {
         self.cameras.get(&im_id).ok_or_else(|| {
             let found = format!("{} images", self.cameras.len());
@@ -86,11 +90,13 @@ impl Scene {
         IoError::new(path, Place::Field(key.to_owned()), found, expected)
     }
 
-    /// Returns the pose of the world in the camera frame of an image, meters. The poses of two images give the camera motion.
+    /// Returns the pose of the world in the camera frame of an image, meters.
+    ///
+    /// The poses of two images give the motion of the camera between them.
     ///
     /// # Errors
     ///
-    /// As [`Scene::camera`]; [`IoError`] when the file does not state the pose.
+    /// As for [`Scene::camera`]. Also if the file does not state the pose.
     pub fn camera_from_world(&self, im_id: u32) -> Result<Isometry3<f64>, IoError> {
         let stated = self.camera(im_id)?.camera_from_world;
         stated.ok_or_else(|| {
@@ -98,18 +104,19 @@ impl Scene {
             self.camera_error(
                 &format!("$.{im_id}"),
                 found,
-                "both, to know how the camera moved",
+                "both, to compute the camera motion",
             )
         })
     }
 
-    /// Returns the true poses of an image in the file's order, or `None` if they are not known.
+    /// Returns the true poses of an image in the order of the file, or `None` if unknown.
     #[must_use]
     pub fn ground_truth(&self, im_id: u32) -> Option<&[GroundTruth]> {
         Some(self.ground_truth.as_ref()?.get(&im_id)?)
     }
 
-    /// Returns the visibility of the instances of an image in the file's order, or `None` if it is not known.
+    /// Returns the visibility of an image's instances in the order of the file, or `None` if
+    /// unknown.
     #[must_use]
     pub fn ground_truth_info(&self, im_id: u32) -> Option<&[GroundTruthInfo]> {
         Some(self.info.as_ref()?.get(&im_id)?)
@@ -119,7 +126,8 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is none, [`IoError`] when it is a TIFF file, which is not supported.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is no depth image. Another
+    /// [`IoError`] if it is a TIFF file, which is not supported.
     pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
         let png = self.dir.join(format!("depth/{im_id:06}.png"));
         if !is_absent(&png) {
@@ -139,8 +147,8 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// As [`Scene::depth_path`], [`Scene::camera`] and [`read_depth_png`](crate::read_depth_png); [`IoError`] when the camera states
-    /// no `depth_scale`.
+    /// As for [`Scene::depth_path`], [`Scene::camera`] and
+    /// [`read_depth_png`](crate::read_depth_png). Also if the camera does not state `depth_scale`.
     pub fn read_depth(&self, im_id: u32) -> Result<DepthImage, IoError> {
         let path = self.depth_path(im_id)?;
         let scale = self.camera(im_id)?.depth_scale.ok_or_else(|| {
@@ -150,7 +158,7 @@ impl Scene {
         self.limits.read_depth_png(path, scale)
     }
 
-    /// Returns the path of the color or gray image of an image, or `None` if there is neither.
+    /// Returns the path of an image's color or gray image, or `None` if neither exists.
     #[must_use]
     pub fn color_path(&self, im_id: u32) -> Option<PathBuf> {
         ["rgb", "gray"]
@@ -160,7 +168,7 @@ impl Scene {
             .find(|path| !is_absent(path))
     }
 
-    /// Returns the path of the mask of the visible part of an instance, whether or not it exists.
+    /// Returns the path of the mask of an instance's visible part. The file may not exist.
     ///
     /// `instance` counts from 0 in the order of the ground truth.
     #[must_use]
@@ -169,7 +177,9 @@ impl Scene {
             .join(format!("mask_visib/{im_id:06}_{instance:06}.png"))
     }
 
-    /// Returns the path of the mask of the whole silhouette of an instance, whether or not it exists.
+    /// Returns the path of the mask of an instance's whole silhouette. The file may not exist.
+    ///
+    /// `instance` counts from 0 in the order of the ground truth.
     #[must_use]
     pub fn full_mask_path(&self, im_id: u32, instance: usize) -> PathBuf {
         self.dir.join(format!("mask/{im_id:06}_{instance:06}.png"))
@@ -179,7 +189,8 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) when there is none, otherwise as [`read_mask_png`](crate::read_mask_png).
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the mask does not exist, otherwise
+    /// as for [`read_mask_png`](crate::read_mask_png).
     pub fn read_visible_mask(&self, im_id: u32, instance: usize) -> Result<Mask, IoError> {
         let path = self.visible_mask_path(im_id, instance);
         if is_absent(&path) {
@@ -210,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_optional_may_be_missing() {
+    fn optional_files_may_be_missing() {
         let (_dir, scene) = scene(&[("scene_camera.json", CAMERA)]);
         let scene = scene.unwrap();
         assert_eq!(scene.image_ids().collect::<Vec<_>>(), [2, 10]);
@@ -248,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_camera_pose_is_damage() {
+    fn half_a_camera_pose_is_refused() {
         let half = CAMERA.replace(r#", "cam_t_w2c": [0,0,1000]"#, "");
         let (_dir, scene) = scene(&[("scene_camera.json", &half)]);
         let error = scene.unwrap_err().to_string();
@@ -259,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn tiff_depth_and_a_missing_scale_are_named() {
+    fn errors_name_tiff_depth_images_and_a_missing_depth_scale() {
         let (_dir, scene) = scene(&[
             ("scene_camera.json", CAMERA),
             ("depth/000010.tif", ""),
@@ -278,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_not_missing() {
+    fn unreadable_files_are_not_reported_as_missing() {
         let (dir, opened) = scene(&[
             (
                 "scene_camera.json",
@@ -320,7 +331,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_that_lead_nowhere_are_missing_and_links_in_a_ring_are_not() {
+    fn dangling_links_count_as_missing_and_circular_links_do_not() {
         use std::os::unix::fs::symlink;
         let (dir, _) = scene(&[("scene_camera.json", CAMERA)]);
         let path = dir.path().join("scene_gt.json");
@@ -338,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_truth_is_in_metres_and_its_faults_are_named() {
+    fn ground_truth_is_in_meters_and_errors_name_the_field() {
         let pose = r#""cam_R_m2c": [1,0,0,0,1,0,0,0,1], "cam_t_m2c": [0, 0, 850.5]"#;
         let good = format!(r#"{{"2": [{{"obj_id": 7, {pose}}}]}}"#);
         let info = r#"{"2": [{"visib_fract": 0.5, "bbox_visib": [-1, -1, -1, -1], "extra": []}]}"#;

@@ -1,4 +1,4 @@
-//! The instances that a method has to find.
+//! The targets of a benchmark: the instances that a method must find.
 
 use std::path::Path;
 
@@ -8,35 +8,36 @@ use crate::error::IoError;
 use crate::json;
 use crate::limits::{Limit, ReadLimits};
 
-/// Instances of one object in one image.
+/// The number of instances of one object to find in one image.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
 #[serde(expecting = "an object with `scene_id`, `im_id`, `obj_id` and `inst_count`")]
 pub struct Target {
-    /// The scene.
+    /// Id of the scene.
     pub scene_id: u32,
-    /// The image.
+    /// Id of the image.
     pub im_id: u32,
-    /// The object.
+    /// Id of the object.
     pub obj_id: u32,
-    /// How many instances of the object are to be found.
+    /// Number of instances of the object to find.
     pub inst_count: u32,
 }
 
-/// Reads a `test_targets_bop19.json`, in the file's order.
+/// Reads a `test_targets_bop19.json`, in the order of the file.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the key. Targets of the later detection tasks, which state no objects, are refused.
+/// [`IoError`] names the JSON key of the fault. Targets of BOP's later detection tasks are refused,
+/// because they do not state objects.
 pub fn read_targets(path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
     ReadLimits::DEFAULT.read_targets(path)
 }
 
 impl ReadLimits {
-    /// As [`read_targets`], within these limits.
+    /// Reads a file as [`read_targets`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_targets`].
+    /// As for [`read_targets`].
     pub fn read_targets(&self, path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
         json::read(self, path.as_ref(), Limit::JSON_BYTES)
     }
@@ -48,7 +49,7 @@ mod tests {
     use crate::error::Place;
 
     #[test]
-    fn targets_are_read_and_those_without_object_refused() {
+    fn targets_are_read_and_targets_without_an_object_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("targets.json");
         std::fs::write(

@@ -1,4 +1,4 @@
-//! The JSON files of a dataset, written.
+//! Writers for the JSON files of a dataset.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,12 +13,14 @@ use crate::error::IoError;
 use crate::json;
 use crate::pose::pose_to_bop;
 
-/// Writes a `scene_camera.json`: the cameras of a scene by image. Millimeters; every number is read back exactly but for the
-/// conversion of lengths.
+/// Writes a `scene_camera.json`: the cameras of a scene per image.
+///
+/// Lengths are converted to millimeters. Apart from that, every number is read back exactly.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically). Also if a number is not finite, which the
+/// source of the error names.
 pub fn write_scene_camera(
     path: impl AsRef<Path>,
     cameras: &BTreeMap<u32, SceneCamera>,
@@ -38,11 +40,12 @@ pub fn write_scene_camera(
     })
 }
 
-/// Writes a `scene_gt.json`: the true poses of a scene's instances by image.
+/// Writes a `scene_gt.json`: the true poses of a scene's instances per image.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically). Also if a number is not finite, which the
+/// source of the error names.
 pub fn write_scene_gt(
     path: impl AsRef<Path>,
     truths: &BTreeMap<u32, Vec<GroundTruth>>,
@@ -56,11 +59,12 @@ pub fn write_scene_gt(
     })
 }
 
-/// Writes a `scene_gt_info.json`: what is known of the visibility of a scene's instances by image.
+/// Writes a `scene_gt_info.json`: the known visibility of a scene's instances per image.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically). Also if a number is not finite, which the
+/// source of the error names.
 pub fn write_scene_gt_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, Vec<GroundTruthInfo>>,
@@ -72,7 +76,8 @@ pub fn write_scene_gt_info(
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically). Also if a number is not finite, which the
+/// source of the error names.
 pub fn write_models_info(
     path: impl AsRef<Path>,
     infos: &BTreeMap<u32, ModelInfo>,
@@ -95,16 +100,16 @@ pub fn write_models_info(
     })
 }
 
-/// Writes a `test_targets_bop19.json`, in the order given.
+/// Writes a `test_targets_bop19.json`, in the order of `targets`.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically); also if a number is not finite, which the source names.
+/// As for [`write_atomically`](crate::write_atomically).
 pub fn write_targets(path: impl AsRef<Path>, targets: &[Target]) -> Result<(), IoError> {
     json::write(path.as_ref(), &json!(targets), true)
 }
 
-/// A rigid motion as a row-major 4×4 matrix in millimeters.
+/// Converts a rigid motion to a row-major 4×4 matrix in millimeters.
 fn matrix(motion: &Isometry3<f64>) -> Value {
     let (r, t) = pose_to_bop(motion);
     json!([

@@ -9,15 +9,21 @@ use super::pixels;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 
-/// Reads a depth image from a PNG file of 16-bit gray values, `millimeters_per_unit` each; 0 means missing.
+/// Reads a depth image from a 16-bit gray PNG file; 0 means missing.
 ///
-/// In BOP's words `millimeters_per_unit` is `depth_scale`. Depths beyond `hicp_core::MAX_DEPTH_METERS` become missing.
+/// `millimeters_per_unit` is the depth of one unit, which BOP calls `depth_scale`. Depths above
+/// `hicp_core::MAX_DEPTH_METERS` become missing.
 ///
 /// # Errors
 ///
-/// [`IoError`] for a scale that is not finite and positive, for anything but 16-bit gray, for a side above
-/// `hicp_core::MAX_IMAGE_SIDE` or more pixels than [`ReadLimits::DEFAULT`] allows (before allocating), for a header whose
-/// image the file is too small to hold, and for a file that cannot be read or decoded.
+/// [`IoError`] in these cases:
+///
+/// - The scale is not finite and positive.
+/// - The file cannot be read or decoded.
+/// - The pixels are not 16-bit gray.
+/// - A side is above `hicp_core::MAX_IMAGE_SIDE`, or there are more pixels than
+///   [`ReadLimits::DEFAULT`] allows. Both are checked before allocating.
+/// - The file is too small to hold the image that its header announces.
 pub fn read_depth_png(
     path: impl AsRef<Path>,
     millimeters_per_unit: f64,
@@ -26,11 +32,11 @@ pub fn read_depth_png(
 }
 
 impl ReadLimits {
-    /// As [`read_depth_png`], within these limits.
+    /// Reads a file as [`read_depth_png`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_depth_png`].
+    /// As for [`read_depth_png`].
     #[allow(clippy::cast_possible_truncation, reason = "depths are rounded to f32")]
     pub fn read_depth_png(
         &self,
@@ -50,14 +56,15 @@ impl ReadLimits {
     }
 }
 
-/// Writes a depth image as a PNG file of 16-bit gray values, `millimeters_per_unit` each; missing depths become 0.
+/// Writes a depth image as a 16-bit gray PNG file; missing depths become 0.
 ///
-/// Depths are rounded to the nearest unit; one below half a unit becomes missing.
+/// `millimeters_per_unit` is the depth of one unit. Depths are rounded to the nearest unit; a depth
+/// below half a unit becomes missing.
 ///
 /// # Errors
 ///
-/// [`IoError`] for a scale that is not finite and positive, and for a depth above 65535 units; otherwise as
-/// [`write_atomically`](crate::write_atomically).
+/// [`IoError`] if the scale is not finite and positive, or if a depth is above 65535 units.
+/// Otherwise as for [`write_atomically`](crate::write_atomically).
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -108,7 +115,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn units_come_back(
+        fn depths_survive_writing_and_reading(
             units in prop::collection::vec(any::<u16>(), 12),
             scale in prop::sample::select(vec![0.1, 1.0, 0.125, 0.05, 10.0]),
         ) {
@@ -128,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn other_pixel_types_are_named() {
+    fn errors_name_other_pixel_types() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         for (kind, bytes, name) in [
@@ -169,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn truncated_and_foreign_files_are_refused() {
+    fn truncated_files_and_other_formats_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         let meters: Vec<f32> = (0..4096_u16).map(|i| f32::from(i % 251) * 0.01).collect();

@@ -9,23 +9,25 @@ use super::pixels;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 
-/// Reads a mask from a PNG file of any pixel type: a pixel belongs to the object if a gray or color sample is not 0.
+/// Reads a mask from a PNG file of any pixel type.
 ///
-/// Palette images count by color, so that black is background whatever its index; transparency does not count.
+/// A pixel belongs to the object if a gray or color sample is not 0. In palette images, the color
+/// counts and not the index, so black is background. Transparency is ignored.
 ///
 /// # Errors
 ///
-/// As [`read_depth_png`](crate::read_depth_png), except for those about scale and pixel type.
+/// As for [`read_depth_png`](crate::read_depth_png), except for the errors about scale and pixel
+/// type.
 pub fn read_mask_png(path: impl AsRef<Path>) -> Result<Mask, IoError> {
     ReadLimits::DEFAULT.read_mask_png(path)
 }
 
 impl ReadLimits {
-    /// As [`read_mask_png`], within these limits.
+    /// Reads a file as [`read_mask_png`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_mask_png`].
+    /// As for [`read_mask_png`].
     pub fn read_mask_png(&self, path: impl AsRef<Path>) -> Result<Mask, IoError> {
         let path = path.as_ref();
         let image = pixels::read(self, path, Transformations::EXPAND, false)?;
@@ -44,7 +46,7 @@ impl ReadLimits {
 ///
 /// # Errors
 ///
-/// As [`write_atomically`](crate::write_atomically).
+/// As for [`write_atomically`](crate::write_atomically).
 pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError> {
     let bytes: Vec<u8> = mask
         .pixels()
@@ -61,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn masks_come_back() {
+    fn masks_survive_writing_and_reading() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("mask.png");
         let mask = Mask::new(5, 3, (0..15).map(|i| i % 4 == 1).collect()).unwrap();
@@ -73,7 +75,7 @@ mod tests {
     fn every_pixel_type_is_read() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("mask.png");
-        // Two pixels each: background, opaque where there is alpha, then object.
+        // Each case has two pixels: background (opaque if there is alpha), then object.
         let cases: [((ColorType, BitDepth), &[u8]); 7] = [
             ((ColorType::Grayscale, BitDepth::One), &[0b0100_0000]),
             ((ColorType::Grayscale, BitDepth::Four), &[0x01]),
@@ -103,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn palettes_count_by_colour() {
+    fn palette_pixels_are_classified_by_color() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("mask.png");
         let file = std::fs::File::create(&path).unwrap();

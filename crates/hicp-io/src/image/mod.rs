@@ -1,4 +1,4 @@
-//! Images from and to PNG files.
+//! Reading and writing of images in PNG files.
 
 mod depth;
 mod mask;

@@ -1,4 +1,4 @@
-//! Raw pixels from and to PNG files, within limits.
+//! Raw pixels of PNG files, read within limits.
 
 use std::io::{self, Cursor};
 use std::path::Path;
@@ -11,10 +11,12 @@ use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
 use crate::source::read_head;
 
-/// Deflate packs at most 1032 bytes into one: a smaller file cannot hold the image of its header.
+/// Deflate compresses at most 1032 bytes into one: a smaller file cannot hold its header's image.
 const MAX_COMPRESSION: u64 = 1032;
 
-/// The pixels of an image as the decoder returns them: rows without padding, samples of 16 bits big-endian.
+/// The pixels of an image as the decoder returns them.
+///
+/// Rows have no padding. Samples of 16 bits are big-endian.
 pub(super) struct Pixels {
     pub(super) width: u32,
     pub(super) height: u32,
@@ -23,7 +25,7 @@ pub(super) struct Pixels {
     pub(super) bytes: Vec<u8>,
 }
 
-/// Decodes a PNG file, of 16-bit gray only if `only_depth` is set.
+/// Decodes a PNG file. If `only_depth` is set, refuses all pixel types except 16-bit gray.
 pub(super) fn read(
     limits: &ReadLimits,
     path: &Path,
@@ -32,7 +34,8 @@ pub(super) fn read(
 ) -> Result<Pixels, IoError> {
     let content = limits.read_bytes(path)?;
     let available = content.len() as u64;
-    // The decoder's own limit concerns what it holds next to the image; the limit of this crate, below, concerns the image.
+    // The decoder's own limit covers only its working memory. The limit of this crate, below,
+    // covers the image.
     let mut decoder = png::Decoder::new(Cursor::new(content));
     decoder.set_transformations(transformations);
     decoder.set_ignore_text_chunk(true);
@@ -63,7 +66,8 @@ pub(super) fn read(
     IoError::check_promise(path, Place::Byte(16), (count, "pixels"), needed, available)?;
 
     let mut reader = decoder.read_info().map_err(failed)?;
-    // The decoder does not check the palette. It panics if it is cut short, or has more opacities than colors.
+    // The decoder does not check the palette. It panics if the palette is cut short or has more
+    // opacities than colors.
     if let Some(palette) = &reader.info().palette {
         let opacities = reader.info().trns.as_ref().map_or(0, |trns| trns.len());
         if palette.len() % 3 != 0 || (indexed && opacities > palette.len() / 3) {
@@ -91,11 +95,11 @@ pub(super) fn read(
     })
 }
 
-/// Reads the width and height of a PNG image from its header, and no more of the file.
+/// Reads the width and height of a PNG image, in pixels, from its header only.
 ///
 /// # Errors
 ///
-/// [`IoError`] if the file cannot be read, or does not start as a PNG image.
+/// [`IoError`] if the file cannot be read or does not start as a PNG image.
 pub fn read_png_size(path: impl AsRef<Path>) -> Result<(u32, u32), IoError> {
     let path = path.as_ref();
     let (head, _) = read_head(path)?;
@@ -106,7 +110,7 @@ pub fn read_png_size(path: impl AsRef<Path>) -> Result<(u32, u32), IoError> {
     Ok(header.size())
 }
 
-/// Encodes pixels of one kind as a PNG file, atomically. Samples of 16 bits are big-endian.
+/// Writes pixels of one kind to a PNG file, atomically. Samples of 16 bits are big-endian.
 pub(super) fn write(
     path: &Path,
     (width, height): (u32, u32),

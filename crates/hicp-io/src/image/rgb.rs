@@ -1,4 +1,4 @@
-//! Color images in PNG files: for pictures of results, nothing computes with them.
+//! Color images in PNG files, for pictures of results. No computation uses them.
 
 use std::path::Path;
 
@@ -8,13 +8,15 @@ use super::pixels;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 
-/// Reads a PNG file of any pixel type as 8-bit RGB: width, height, and 3 · width · height bytes, row-major.
+/// Reads a PNG file of any pixel type as 8-bit RGB.
 ///
-/// Gray values are repeated, 16-bit samples lose their low byte, transparency is dropped.
+/// Returns the width, the height, and 3 · width · height bytes, row-major. Gray values are
+/// repeated, 16-bit samples lose their low byte, and transparency is dropped.
 ///
 /// # Errors
 ///
-/// As [`read_depth_png`](crate::read_depth_png), except for those about scale and pixel type.
+/// As for [`read_depth_png`](crate::read_depth_png), except for the errors about scale and pixel
+/// type.
 pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
     let image = pixels::read(&ReadLimits::DEFAULT, path.as_ref(), transformations, false)?;
@@ -30,7 +32,7 @@ pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoErr
 ///
 /// # Errors
 ///
-/// [`IoError`] if the number of bytes does not fit the size, otherwise as
+/// [`IoError`] if the number of bytes does not match the size, otherwise as for
 /// [`write_atomically`](crate::write_atomically).
 pub fn write_rgb_png(
     path: impl AsRef<Path>,
@@ -56,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_come_back_and_sizes_are_checked() {
+    fn colors_survive_writing_and_reading_and_sizes_are_checked() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         let rgb: Vec<u8> = (0..36).collect();

@@ -1,11 +1,12 @@
-//! Lines of text files, with any line ending.
+//! Lines of text files with any line endings.
 
 use super::raw::Reading;
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 
-/// The lines of a text without their ends: a line feed, a carriage return, or both in this order.
+/// The lines of a text without their line endings.
 ///
-/// Files that several programs have written to mix them.
+/// A line ends with a line feed, a carriage return, or both in this order. All three may occur in
+/// one file, because several programs may have written to it.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<'a> {
     rest: &'a str,
@@ -17,28 +18,28 @@ impl<'a> Lines<'a> {
         Self::after(0, text)
     }
 
-    /// Returns the lines of a text that follows `taken` other lines of its file.
+    /// Creates the lines of a text that follows `taken` other lines of its file.
     pub(super) fn after(taken: usize, rest: &'a str) -> Self {
         Self { rest, taken }
     }
 
-    /// Returns the place of the last line taken.
+    /// Returns the place of the last line read.
     pub(super) fn place(&self) -> Place {
         Place::Line(self.taken.max(1))
     }
 
-    /// Returns the bytes that are left.
+    /// Returns the number of bytes that are not read yet.
     pub(super) fn left(&self) -> u64 {
         self.rest.len() as u64
     }
 
-    /// Returns the next line that is not blank, without its comment. At the end, the line is empty.
+    /// Returns the next line that is not blank, without its comment; empty at the end of the text.
     pub(super) fn record(&mut self) -> &'a str {
         let mut lines = self.map(without_comment);
         lines.find(|line| !line.is_empty()).unwrap_or_default()
     }
 
-    /// Returns the error for the last line taken, or for the end of the file if that line is empty.
+    /// Returns the error for the last line read, or for the end of the file if `line` is empty.
     pub(super) fn refuse(&self, reading: &Reading<'_>, line: &str, expected: String) -> IoError {
         let found = match line {
             "" => END_OF_FILE.to_owned(),
@@ -67,7 +68,7 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// Returns a line without its comment and the spaces around it.
+/// Removes the comment of a line and the surrounding spaces.
 pub(super) fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default().trim()
 }
@@ -77,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_line_has_its_own_end() {
+    fn every_line_may_have_a_different_ending() {
         for (text, lines) in [
             ("", &[][..]),
             ("a", &["a"]),

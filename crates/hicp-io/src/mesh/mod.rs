@@ -1,4 +1,4 @@
-//! Meshes from and to OBJ, OFF, PLY and STL files.
+//! Reading and writing of meshes as OBJ, OFF, PLY and STL files.
 
 use std::path::Path;
 
@@ -21,43 +21,51 @@ mod write;
 use raw::{RawMesh, Reading};
 pub use write::{write_obj, write_ply};
 
-/// Reads a triangle mesh. The format follows from the extension, in either case: `.obj`, `.off`, `.ply` or `.stl`.
+/// Reads a triangle mesh; the extension selects the format.
 ///
-/// Only geometry is read. Materials, colors, normals, texture coordinates, lines and points are skipped. All objects and
-/// groups of a file make one mesh. Polygons are triangulated, concave ones by ear clipping. Coordinates are converted from
-/// `unit` in `f64` (STL files hold `f32`) and then rounded to `f32`. In STL files, vertices at equal positions become one.
-/// In OBJ files, vertices that no face uses are dropped.
+/// The extension is `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case. Only geometry is
+/// read: materials, colors, normals, texture coordinates, lines and points are skipped. All objects
+/// and groups of a file become one mesh. Polygons are triangulated, concave ones by ear clipping.
 ///
-/// - OBJ: relative indices, continued lines, comments after a record and any line ending are read. Of a vertex, the first
-///   three numbers are read.
-/// - OFF: text with or without normals and colors, with comments, and with the counts on the first line or the second.
-/// - PLY: ASCII and binary of either byte order. Coordinates and faces may have any type of numbers. The list of a face is
-///   `vertex_indices` or `vertex_index`.
+/// Coordinates are converted from `unit` to meters in `f64` and then rounded to `f32`. STL files
+/// already hold `f32`.
+///
+/// - OBJ: relative indices, continued lines, comments after a record and any line ending are
+///   accepted. Only the first three numbers of a vertex are read. Vertices that no face uses are
+///   dropped.
+/// - OFF: text with or without normals and colors, with comments. The counts may be on the first or
+///   the second line.
+/// - PLY: ASCII and binary of either byte order. Coordinates and faces may have any type of
+///   numbers. The list of a face is `vertex_indices` or `vertex_index`.
 /// - STL: ASCII with any number of solids, and binary, also if the header starts with `solid`.
+///   Vertices at equal positions become one.
 ///
-/// Cost: the whole file is held in memory, and a small multiple of it while it is parsed, within [`ReadLimits::DEFAULT`].
+/// Cost: the whole file and a small multiple of it are in memory while it is parsed, within
+/// [`ReadLimits::DEFAULT`].
 /// [`ReadLimits::read_mesh`] reads within other limits.
 ///
 /// # Errors
 ///
-/// [`IoError`] that names the file and the place of the fault:
-/// - a file that is not a regular file, that is above a limit, or that has an unknown extension;
-/// - text that is not UTF-8;
-/// - a malformed or truncated file, or a header that promises more than the file holds;
-/// - a file without faces, or a face with a vertex that the file does not have;
-/// - a coordinate that is not finite or beyond `hicp_core::MAX_COORDINATE_METERS`;
-/// - concave polygons that take more than a second to cut, typically with more than several thousand corners;
-/// - every mesh that [`TriMesh::new`] refuses.
+/// [`IoError`] names the file and the place of the fault. The faults are:
+///
+/// - The file is not a regular file, is above a limit, or has an unknown extension.
+/// - The text is not UTF-8.
+/// - The file is malformed or truncated, or its header announces more data than the file holds.
+/// - The file has no faces, or a face refers to a vertex that does not exist.
+/// - A coordinate is not finite or exceeds `hicp_core::MAX_COORDINATE_METERS`.
+/// - Concave polygons take more than about a second to triangulate, typically with several thousand
+///   corners or more.
+/// - [`TriMesh::new`] refuses the mesh.
 pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
     ReadLimits::DEFAULT.read_mesh(path, unit)
 }
 
 impl ReadLimits {
-    /// As [`read_mesh`], within these limits.
+    /// Reads a file as [`read_mesh`] does, within these limits.
     ///
     /// # Errors
     ///
-    /// As [`read_mesh`].
+    /// As for [`read_mesh`].
     pub fn read_mesh(&self, path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
         let path = path.as_ref();
         let extension = path
@@ -80,7 +88,7 @@ impl ReadLimits {
             unit,
             limits: self,
         };
-        // Counts are refused by the first bytes, before a large file is read for nothing.
+        // Check counts from the first bytes, to refuse a large file before reading all of it.
         let (head, bytes) = read_head(path)?;
         check_head(&reading, &head, bytes)?;
         parse(reading, self.read_bytes(path)?)?.finish()
@@ -96,7 +104,7 @@ mod tests {
     use crate::error::Place;
     use hicp_core::Point3;
 
-    /// What the parsers' own tests read with.
+    /// The context that the tests of the parsers read with.
     pub(super) fn reading(name: &'static str) -> Reading<'static> {
         Reading {
             path: Path::new(name),
@@ -106,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn other_extensions_are_refused_by_name() {
+    fn errors_name_an_unknown_extension() {
         for (name, extension) in [("mesh.GLTF", "gltf"), ("mesh.ply.gz", "gz"), ("mesh", "")] {
             match read_mesh(name, LengthUnit::Meters) {
                 Err(IoError {
@@ -136,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_concave_polygon_beyond_the_budget_is_refused_where_it_stands() {
+    fn an_error_names_the_line_of_a_concave_polygon_beyond_the_budget() {
         let reading = reading("a.obj");
         let mut mesh = RawMesh::new(reading, reading.refuse(Place::Line(1), "", ""));
         let dart = [[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]];
@@ -169,20 +177,20 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_without_area_tells_what_was_expected() {
+    fn the_error_for_a_mesh_without_area_states_the_expectation() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.obj");
         std::fs::write(&path, "v 0 0 0\nv 1 0 0\nf 1 2 2\n").unwrap();
         let error = read_mesh(&path, LengthUnit::Meters).unwrap_err();
-        let told = error.to_string();
+        let message = error.to_string();
         assert!(
-            told.ends_with("mesh, expected a triangle that has an area"),
-            "{told}"
+            message.ends_with("mesh, expected a triangle that has an area"),
+            "{message}"
         );
     }
 
     #[test]
-    fn a_missing_file_is_named() {
+    fn the_error_for_a_missing_file_names_it() {
         let error = read_mesh("no/such/file.ply", LengthUnit::Meters).unwrap_err();
         assert_eq!(error.to_string(), "cannot read no/such/file.ply");
     }

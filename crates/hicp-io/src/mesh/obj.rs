@@ -1,8 +1,12 @@
-//! Wavefront OBJ, parsed by `tobj`.
+//! Wavefront OBJ files, parsed by `tobj`.
 //!
-//! Continued lines are joined first. Only positions and faces are passed on, on their own lines: `tobj` refuses files with
-//! colors on some of the vertices or without the normals that they name, divides positions by a fourth number, and splits
-//! vertices that groups share.
+//! Continued lines are joined first. Only positions and faces are passed to `tobj`, each on its
+//! original line, because `tobj` has four limitations:
+//!
+//! - It refuses files with colors on only some vertices.
+//! - It refuses files that refer to missing normals.
+//! - It divides positions by a fourth number.
+//! - It splits vertices that groups share.
 
 use hicp_core::Point3;
 use tobj::{LoadError, LoadOptions};
@@ -30,13 +34,13 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
 
     let end = Place::Line(records.text.lines().count().max(1));
     let mut mesh = RawMesh::new(reading, reading.refuse(end.clone(), END_OF_FILE, FACE));
-    // Without groups there is one model. It has the faces in their order.
+    // Without groups, there is one model, and it has the faces in the order of the file.
     for tobj::Model { mesh: part, .. } in models {
         let positions = part.positions.chunks_exact(3);
         mesh.vertices = positions.map(Point3::from_slice).collect();
         let mut rest = part.indices.as_slice();
         for (index, line) in records.faces.iter().enumerate() {
-            // If all faces are triangles, their arities are not listed.
+            // `tobj` lists the numbers of corners only if there are faces other than triangles.
             let arity = part.face_arities.get(index).copied().unwrap_or(3);
             let (corners, others) = rest.split_at(arity as usize);
             mesh.add_face(Place::Line(*line), corners)?;
@@ -48,20 +52,20 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             .check_position(end.clone(), p.coords.as_slice())
             .is_ok()
     };
-    // Vertices that no face uses are checked, too.
+    // `tobj` drops unused vertices, so their records are checked separately.
     if mesh.vertices.len() == records.vertices && mesh.vertices.iter().all(fits) {
         return Ok(mesh);
     }
     records.fault(&reading).map_or(Ok(mesh), Err)
 }
 
-/// The `v` and `f` records of a file, each on its last line, and blank lines for all others.
+/// The `v` and `f` records of a file, each on its last line. All other lines are blank.
 #[derive(Debug, Default)]
 struct Records {
     text: String,
     vertices: usize,
     triangles: usize,
-    /// The lines of the faces.
+    /// The line of each face.
     faces: Vec<usize>,
 }
 
@@ -73,7 +77,7 @@ impl Records {
         while let Some((number, line)) = lines.next() {
             let line = without_comment(line);
             joined.push_str(line.strip_suffix('\\').unwrap_or(line));
-            // A continued last line ends with the file.
+            // A backslash on the last line of the file has nothing to continue.
             if line.ends_with('\\') && lines.peek().is_some() {
                 joined.push(' ');
             } else {
@@ -93,13 +97,14 @@ impl Records {
                 self.vertices += 1;
                 reading.check(Limit::VERTICES, place, self.vertices)?;
                 self.text.push('v');
-                // Colors follow, or one number: the weight of a curve, or a confidence.
+                // More numbers may follow: colors, the weight of a curve, or a confidence.
                 for word in words.take(3) {
                     self.text.push(' ');
                     self.text.push_str(word);
                 }
             }
-            // Fewer corners do not make a face. They are dropped, because any number of such records would pass the limit.
+            // Records with fewer corners are not faces. They are dropped because the limit does not
+            // count them.
             Some("f") if words.clone().nth(2).is_some() => {
                 self.triangles += words.clone().count() - 2;
                 reading.check(Limit::TRIANGLES, place, self.triangles)?;
@@ -116,7 +121,7 @@ impl Records {
         Ok(())
     }
 
-    /// Returns the error for the first bad record with its line, which `tobj` does not report.
+    /// Returns the error for the first invalid record with its line, which `tobj` does not report.
     fn fault(&self, reading: &Reading<'_>) -> Option<IoError> {
         let mut seen = 0;
         let is_vertex = |word: &str, seen: usize| match word.parse::<isize>() {
@@ -136,7 +141,7 @@ impl Records {
                     "`v` and three numbers".to_owned()
                 }
                 Some("f") if !words.all(|word| is_vertex(word, seen)) => format!(
-                    "`f` and vertex indices from 1 to {}, or negative ones that count back no further than the first vertex",
+                    "`f` and vertex indices from 1 to {}, or negative ones that count back to the first vertex at most",
                     self.vertices
                 ),
                 _ => return None,
@@ -157,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn continuations_comments_colours_groups_and_relative_indices() {
+    fn continuations_comments_colors_groups_and_relative_indices_are_read() {
         let mesh = read(
             "# exported \\\r\nmtllib no such.mtl\r\nv 0 0 0 nan nan nan\r\nv 1 0 0 # right\r\nv 1 \\\r\n 1 0\r\no b\r\n\
              usemtl\r\nv 0 1 0 0.5\r\nl 1 2\r\np 1\r\ng c\r\nf -4/1/9 -3//2 \\\r\n -2 -1\r\nf 1/ 2/ 3/",
@@ -169,14 +174,14 @@ mod tests {
     }
 
     #[test]
-    fn old_line_endings_and_latin_comments() {
+    fn old_line_endings_and_latin_comments_are_read() {
         let text = b"# M\xfcller\rv 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r";
         let mesh = parse(reading("a.obj"), text.to_vec()).unwrap();
         assert_eq!(mesh.triangles.len(), 1);
     }
 
     #[test]
-    fn errors_name_the_line_and_what_stands_there() {
+    fn errors_name_the_line_and_its_content() {
         let head = "# c\nv 0 0 0\nv 1 0 0\nv 0 1 0\n\n";
         for (record, at) in [
             ("v 1 2", 6),
@@ -202,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn positions_that_no_mesh_can_have_are_told_by_line() {
+    fn errors_name_the_line_of_an_invalid_position() {
         for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0"] {
             let text = format!("v 0 0 0\n{record}\nv 0 1 0\nf 1 2 3\n");
             assert!(
@@ -219,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_continued_at_the_end_of_the_file_is_read() {
+    fn a_continued_line_at_the_end_of_the_file_is_read() {
         let mesh = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1 \\").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);
         assert!(read("v 0 0 0\nf 1 \\").unwrap().triangles.is_empty());
@@ -237,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_may_end_each_in_its_own_way() {
+    fn line_endings_may_be_mixed() {
         for text in [
             "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\ng a\rf 1 3 4",
             "v 0 0 0\rv 1 0 0\rv 1 1 0\rv 0 1 0\rf 1 2 3 # a\rf 1 3 4\n",
@@ -249,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_of_fewer_than_three_corners_are_not_kept() {
+    fn faces_of_fewer_than_three_corners_are_dropped() {
         let text = format!("v 0 0 0\n{}f 1 1 1\nf\n", "f 9 9\nf\n".repeat(100));
         let records = Records::of(&reading("a.obj"), &text).unwrap();
         let kept: Vec<&str> = records.text.split_whitespace().collect();
@@ -259,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn every_face_that_is_kept_counts_against_the_limit() {
+    fn every_kept_face_counts_toward_the_limit() {
         let limits = crate::ReadLimits {
             max_triangles: 3,
             ..crate::ReadLimits::DEFAULT

@@ -1,4 +1,4 @@
-//! Object File Format (Geomview): a count of vertices and faces, then a line for each.
+//! Object File Format (Geomview) files: counts of vertices and faces, then one line for each.
 
 use super::lines::Lines;
 use super::raw::{FACE, RawMesh, Reading, position};
@@ -6,7 +6,9 @@ use crate::error::{IoError, quote};
 use crate::limits::Limit;
 use crate::source::lossy_text;
 
-/// Parses an OFF file. Skips normals and colors, which follow three coordinates or the corners of a face.
+/// Parses an OFF file.
+///
+/// Skips the normals and colors that follow three coordinates or the corners of a face.
 pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
     let text = lossy_text(reading.path, &content)?;
     let mut lines = Lines::new(&text);
@@ -45,24 +47,26 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     Ok(mesh)
 }
 
-/// Parses the keyword and the line with the numbers of vertices and faces; refuses numbers that the rest of the file cannot hold.
+/// Parses the keyword and the line with the numbers of vertices and faces.
+///
+/// Refuses numbers of elements that the rest of the file cannot hold.
 fn parse_counts<'a>(
     reading: &Reading<'_>,
     lines: &mut Lines<'a>,
 ) -> Result<(&'a str, usize, usize), IoError> {
     let first = lines.record();
-    // Texture coordinates, colors and normals of the vertices, which follow their positions.
+    // The prefixes announce texture coordinates, colors and normals after the position of a vertex.
     let mut rest = first;
     for letters in ["ST", "C", "N"] {
         rest = rest.strip_prefix(letters).unwrap_or(rest);
     }
     let Some(rest) = rest.strip_prefix("OFF") else {
-        let expected = "`OFF`, with `ST`, `C` and `N` in this order before it or not";
+        let expected = "`OFF`, optionally after `ST`, `C` and `N` in this order";
         return Err(lines.refuse(reading, first, expected.to_owned()));
     };
     let line = match rest.trim() {
         "" => lines.record(),
-        // Some files have the counts behind the keyword, even without a space.
+        // Some files have the counts after the keyword, even without a space.
         counts => counts,
     };
     let words = line.split_whitespace();
@@ -71,7 +75,8 @@ fn parse_counts<'a>(
         let expected = "the numbers of vertices, faces and edges";
         return Err(lines.refuse(reading, line, expected.to_owned()));
     };
-    // The last line may have no end. A vertex takes three digits with a separator each, a face at least one.
+    // The last line may have no ending. A vertex takes at least three digits with a separator each,
+    // a face one.
     let left = lines.left() + 1;
     for (what, count, bytes) in [("vertices", vertices as u64, 6), ("faces", faces as u64, 2)] {
         let needed = count.saturating_mul(bytes);
@@ -95,7 +100,7 @@ mod tests {
         "0 0 0\n1 0 0 # right\n1 1 0\n\n0 1 0 255 0 0\n4 0 1 2 3 0.5 0.5 0.5\n2 0 1\n3 0 1 2";
 
     #[test]
-    fn headers_as_people_write_them() {
+    fn headers_of_all_common_forms_are_read() {
         for head in [
             "OFF\n4 3 0\n",
             "OFF 4 3 0\n",
@@ -122,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_may_end_each_in_its_own_way() {
+    fn line_endings_may_be_mixed() {
         let text = format!("OFF\r4 3 0\n{BODY}")
             .replace(" # right", "\r")
             .replace("0.5\n2", "0.5\r2");
@@ -132,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_faces_tells_what_says_so() {
+    fn the_error_for_a_file_without_faces_quotes_the_responsible_line() {
         for (text, at, what) in [
             ("OFF\n1 0 0\n0 0 0\n", 2, "\"1 0 0\""),
             ("OFF 1 0 0 # none\n0 0 0\n", 1, "\"1 0 0\""),

@@ -1,16 +1,20 @@
-//! Polygons into triangles.
+//! Triangulation of polygons.
 
 use hicp_core::{Point2, Point3, Vector3};
 
 /// The comparisons with corners that clipping may cost for all polygons of a file: about a second.
 ///
-/// Ear clipping takes quadratic time at best, so that a hostile file could keep a program busy for hours.
+/// Ear clipping takes quadratic time at best, so a malicious file could otherwise occupy a program
+/// for hours.
 pub(super) const CLIPPING_BUDGET: u64 = 1 << 28;
 
-/// Appends the n − 2 triangles of a polygon of n corners, with its winding; nothing for fewer than three corners.
+/// Appends the n − 2 triangles of a polygon of n corners, with its winding.
 ///
-/// A convex polygon becomes a fan, a concave one is clipped ear by ear in its mean plane. What is left of a polygon that
-/// crosses itself becomes a fan. Returns whether the budget sufficed; the triangles are of no use otherwise. Corners must be
+/// Appends nothing for fewer than three corners. A convex polygon becomes a fan. A concave polygon
+/// is clipped ear by ear in its mean plane. The rest of a polygon that crosses itself becomes a
+/// fan.
+///
+/// Returns whether the budget was sufficient; if not, the triangles are unusable. `corners` must be
 /// indices into `vertices`.
 pub(super) fn triangulate(
     vertices: &[Point3<f64>],
@@ -37,10 +41,12 @@ fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
     }
 }
 
-/// Projects the corners along the axis closest to the polygon's normal, so that they run counter-clockwise.
+/// Projects the corners along the axis closest to the polygon's normal, so that they are
+/// counter-clockwise.
 fn flatten(vertices: &[Point3<f64>], corners: &[u32]) -> Vec<Point2<f64>> {
     let positions: Vec<Point3<f64>> = corners.iter().map(|i| vertices[*i as usize]).collect();
-    // Newell's normal, about the first corner to keep the digits of polygons far from the origin.
+    // Newell's normal, relative to the first corner to keep precision for polygons far from the
+    // origin.
     let mut normal = Vector3::zeros();
     for (i, p) in positions.iter().enumerate() {
         let next = positions[(i + 1) % positions.len()];
@@ -54,7 +60,7 @@ fn flatten(vertices: &[Point3<f64>], corners: &[u32]) -> Vec<Point2<f64>> {
     positions.iter().map(|p| Point2::new(p[u], p[v])).collect()
 }
 
-/// Twice the signed area of a triangle: positive where it turns left.
+/// Returns twice the signed area of a triangle, positive if it turns left.
 fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
     (b - a).perp(&(c - a))
 }
@@ -88,17 +94,18 @@ fn clip_ears(
     true
 }
 
-/// Returns whether three neighbors make a triangle that none of the corners left is in.
+/// Returns whether three neighbors form a triangle that contains none of the remaining corners.
 fn is_ear(points: &[Point2<f64>], left: &[usize], ear: [usize; 3], budget: &mut u64) -> bool {
     let [a, b, c] = ear.map(|i| points[i]);
     *budget = budget.saturating_sub(1);
-    // A straight corner is no ear unless it is all that remains: clipped early it would hide a neighbor on the line.
+    // A straight corner counts as an ear only at the end. Clipped earlier, it would hide a neighbor
+    // on the line.
     if turn(&a, &b, &c).is_nan() || turn(&a, &b, &c) <= 0.0 {
         return false;
     }
     let blocking = left.iter().position(|i| {
         let p = points[*i];
-        // Corners are visited twice where a hole is bridged: equal positions do not block.
+        // A bridge to a hole visits corners twice, so equal positions do not block.
         let is_outside = [a, b, c].contains(&p)
             || turn(&a, &b, &p) < 0.0
             || turn(&b, &c, &p) < 0.0
@@ -173,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_polygons_still_give_all_their_triangles() {
+    fn degenerate_polygons_give_all_their_triangles() {
         let line = flat(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.5, 0.0]]);
         assert_eq!(cut(&line).len(), 3);
         let bow_tie = flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
@@ -186,13 +193,13 @@ mod tests {
     }
 
     #[test]
-    fn a_spent_budget_is_told_of_concave_polygons_only() {
+    fn an_exhausted_budget_only_stops_concave_polygons() {
         let dart = flat(&[[2.0, 1.0], [0.0, 2.0], [1.0, 1.0], [0.0, 0.0]]);
         let corners: Vec<u32> = (0..4).collect();
         let mut triangles = Vec::new();
         let mut budget = 0;
         assert!(!triangulate(&dart, &corners, &mut triangles, &mut budget));
-        // A convex polygon costs nothing, however many corners it has.
+        // A convex polygon costs nothing, regardless of its number of corners.
         let parabola: Vec<[f64; 2]> = (0..5000).map(f64::from).map(|x| [x, x * x]).collect();
         let corners: Vec<u32> = (0..5000).collect();
         triangles.clear();
@@ -204,7 +211,7 @@ mod tests {
         ));
         assert_eq!(triangles.len(), 4998);
         triangles.clear();
-        // A comb: nearly every corner between its teeth is no ear for long.
+        // A comb: most of its corners become ears only late.
         let comb: Vec<[f64; 2]> = (0..1000)
             .map(|i| [f64::from(i), f64::from(i % 2) * 100.0])
             .chain([[1000.0, -1.0], [-1.0, -1.0]])
@@ -255,7 +262,7 @@ mod tests {
     }
 
     proptest! {
-        /// A star-shaped polygon is covered exactly once, in any attitude and from any first corner.
+        /// Any orientation and any first corner must work.
         #[test]
         fn star_shaped_polygons_are_covered_once(
             radii in prop::collection::vec(0.2_f64..2.0, 4..40),

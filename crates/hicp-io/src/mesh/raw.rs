@@ -1,4 +1,4 @@
-//! A mesh while its file is parsed.
+//! The state of a mesh during parsing.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
 use crate::unit::LengthUnit;
 
-/// The file that is parsed, its unit and the limits.
+/// The file being parsed, its unit and the limits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading<'a> {
     pub(crate) path: &'a Path,
@@ -32,10 +32,10 @@ impl Reading<'_> {
         self.limits.check(limit, self.path, place, count as u64)
     }
 
-    /// Refuses a position, in the unit of the file, that no mesh can have.
+    /// Returns an error for a position, in the unit of the file, that a mesh cannot have.
     pub(super) fn check_position(&self, place: Place, position: &[f64]) -> Result<(), IoError> {
         let most = f64::from(MAX_COORDINATE_METERS) * self.unit.units_per_meter();
-        // Rounding to `f32` does not carry it over the limit, which is below 2^24 and so exact.
+        // The limit is below 2^24 and so exact in `f32`; rounding cannot exceed it.
         if position.iter().all(|x| x.abs() <= most) {
             return Ok(());
         }
@@ -55,13 +55,13 @@ pub(crate) struct RawMesh<'a> {
     pub(super) triangles: Vec<[u32; 3]>,
     /// The error if there are no triangles.
     pub(super) empty: IoError,
-    /// The welded vertices by position.
+    /// The indices of welded vertices by position.
     index_at: HashMap<[u64; 3], u32>,
-    /// The steps that cutting polygons may still cost.
+    /// The number of steps left for cutting polygons.
     pub(super) clipping_budget: u64,
 }
 
-/// The expected text of a file without triangles.
+/// The expected text for a file without triangles.
 pub(super) const FACE: &str = "a face of three corners or more";
 
 impl<'a> RawMesh<'a> {
@@ -84,11 +84,13 @@ impl<'a> RawMesh<'a> {
             .check(Limit::VERTICES, place, self.vertices.len())
     }
 
-    /// Adds a vertex if there is none at the position, and returns its index. For files that repeat vertices with every facet.
+    /// Adds a vertex unless there is one at the same position, and returns its index.
+    ///
+    /// Used for files that repeat the vertices of every facet.
     pub(super) fn weld(&mut self, place: Place, position: [f64; 3]) -> Result<u32, IoError> {
         // Adding 0 turns -0 into +0.
         let key = position.map(|value| (value + 0.0).to_bits());
-        // More vertices than that are refused by the mesh.
+        // A mesh refuses larger numbers of vertices later.
         let next = u32::try_from(self.vertices.len()).unwrap_or(u32::MAX);
         let index = *self.index_at.entry(key).or_insert(next);
         if index == next {
@@ -97,7 +99,7 @@ impl<'a> RawMesh<'a> {
         Ok(index)
     }
 
-    /// Adds the face `number` by its corners, counted from 0. Refuses a corner that is not a vertex.
+    /// Adds the face with index `number` by its corners. Refuses a corner that is not a vertex.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -123,7 +125,7 @@ impl<'a> RawMesh<'a> {
         self.add_face(place, &corners)
     }
 
-    /// Adds a face. Its corners must be vertices that are there.
+    /// Adds a face. Its corners must be indices of existing vertices.
     pub(super) fn add_face(&mut self, place: Place, corners: &[u32]) -> Result<(), IoError> {
         let count = self.triangles.len() + corners.len().saturating_sub(2);
         self.reading.check(Limit::TRIANGLES, place.clone(), count)?;
@@ -133,7 +135,7 @@ impl<'a> RawMesh<'a> {
         }
         let found = format!("a concave polygon of {} corners", corners.len());
         let expected = format!(
-            "one that is cut into triangles within {} steps, together with those before it: cut it beforehand",
+            "at most {} steps to cut all polygons of the file: triangulate the mesh beforehand",
             polygon::CLIPPING_BUDGET
         );
         Err(self.reading.refuse(place, found, expected))
@@ -154,7 +156,7 @@ impl<'a> RawMesh<'a> {
     }
 }
 
-/// Parses the three coordinates that words start with.
+/// Parses three coordinates from the first words.
 pub(super) fn position<'a>(words: impl Iterator<Item = &'a str>) -> Option<[f64; 3]> {
     let mut numbers = words.map_while(|word| word.parse().ok());
     Some([numbers.next()?, numbers.next()?, numbers.next()?])

@@ -1,8 +1,11 @@
-//! STL, ASCII and binary.
+//! STL files, ASCII and binary.
 //!
-//! Parsed here because other readers stop at the first `endsolid`, refuse `solid` without a name and facet normals that are
-//! not finite, take binary files for text by the first word of their header, and do not report where a file is broken. All of
-//! these occur in files that people have. Normals are not read: the winding of the corners gives them.
+//! This crate has its own parser because files in use often break other readers. Other readers stop
+//! at the first `endsolid`, and refuse `solid` without a name and facet normals that are not
+//! finite. They classify binary files as text by the first word of the header, and do not report
+//! the place of an error.
+//!
+//! Normals are not read: the winding of the corners defines them.
 
 use super::lines::Lines;
 use super::raw::{FACE, RawMesh, Reading};
@@ -14,10 +17,10 @@ const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 /// The place of the number of triangles in a binary file.
 const COUNT: Place = Place::Byte(80);
-/// The expected text of a file that is neither text nor binary.
+/// The expected text for a file that is neither text nor binary.
 const START: &str = "`solid`, or a binary header of 84 bytes";
 
-/// Refuses a binary file by its header, if it has the triangles that it promises and they are too many.
+/// Returns an error if the header of a complete binary file announces too many triangles.
 pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
     match triangle_count(head) {
         Some(count) if fits(count, bytes) => reading.check(Limit::TRIANGLES, COUNT, count as usize),
@@ -25,14 +28,16 @@ pub(super) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Resu
     }
 }
 
-/// Parses an STL file; vertices at the same position become one.
+/// Parses an STL file. Vertices at the same position become one.
 pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
-    // By size first: any 80 bytes may start a binary file, `solid` and bytes that look like UTF-16 among them.
+    // Check the size first: a binary file may start with any 80 bytes, such as `solid` or bytes
+    // that look like UTF-16.
     if triangle_count(&content).is_some_and(|count| fits(count, content.len() as u64)) {
         return parse_binary(reading, &content);
     }
     let text = text_bytes(reading.path, &content)?;
-    // Some programs fill the last block of a text with zeros. A binary header that has lost its triangles ends in some, too.
+    // Some programs fill the last block of a text with zeros. A truncated binary header may end
+    // with zeros, too.
     let filling = text.iter().rev().take_while(|byte| **byte == 0).count();
     let text = match &text[..text.len() - filling] {
         filled if filled.len() > HEADER_BYTES => filled,
@@ -44,7 +49,8 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     }
 }
 
-/// Tells text from a binary file that has lost its end: its count holds a 0 or another byte that no text does.
+/// Distinguishes text from a truncated binary file, whose count contains a 0 or another byte that
+/// text cannot contain.
 fn is_text(content: &[u8]) -> bool {
     let start = &content[..content.len().min(512)];
     let solid = start.trim_ascii_start().get(..5);
@@ -58,7 +64,9 @@ fn triangle_count(content: &[u8]) -> Option<u32> {
     (content.len() >= HEADER_BYTES).then_some(u32::from_le_bytes(*bytes))
 }
 
-/// Returns whether a file has the bytes of a binary one: a few bytes of padding are harmless, another triangle is not.
+/// Returns whether a file has the size of a binary one.
+///
+/// A few bytes of padding are accepted; the size of another triangle is not.
 fn fits(count: u32, bytes: u64) -> bool {
     let needed = HEADER_BYTES as u64 + u64::from(count) * TRIANGLE_BYTES as u64;
     (needed..needed + TRIANGLE_BYTES as u64).contains(&bytes)
@@ -110,7 +118,7 @@ fn parse_ascii<'a>(reading: Reading<'a>, text: &str) -> Result<RawMesh<'a>, IoEr
     let mut mesh = RawMesh::new(reading, reading.refuse(Place::Line(1), END_OF_FILE, FACE));
     words.expect("solid", START)?;
     words.skip_name();
-    // Without its last line a file may have lost any number of facets.
+    // A file without its last line may have lost any number of facets.
     let mut open = true;
     while let Some(word) = words.next() {
         if word.is("facet") {
@@ -159,7 +167,7 @@ fn parse_facet(words: &mut Words<'_>, mesh: &mut RawMesh<'_>) -> Result<[u32; 3]
         let word = words.expect(keyword, expected)?;
         match keyword {
             "normal" => {
-                // Some programs write any words for a normal without a direction.
+                // Some programs write arbitrary words for a normal without a direction.
                 for _ in 0..3 {
                     match words.next() {
                         Some(component) if !component.is("outer") => {}
@@ -182,12 +190,12 @@ fn parse_facet(words: &mut Words<'_>, mesh: &mut RawMesh<'_>) -> Result<[u32; 3]
     Ok(corners)
 }
 
-/// The words of a text. In this format a line end is a space like any other, except after a name.
+/// The words of a text. Line breaks count as spaces, except after a name.
 #[derive(Clone, Debug)]
 struct Words<'a> {
     reading: Reading<'a>,
     lines: Lines<'a>,
-    /// The rest of the last line taken.
+    /// The unread rest of the current line.
     rest: &'a str,
 }
 
@@ -209,7 +217,9 @@ impl<'a> Words<'a> {
         Some(Word { text, from, place })
     }
 
-    /// Skips the rest of the line, which is a name, up to a facet or `endsolid` that some programs write after it.
+    /// Skips the name in the rest of the line.
+    ///
+    /// Stops at a facet or `endsolid`, which some programs write on the same line.
     fn skip_name(&mut self) {
         let mut ahead = self.clone();
         while let Some(word) = ahead.next_of_line() {
@@ -240,7 +250,7 @@ impl<'a> Words<'a> {
 #[derive(Clone, Debug)]
 struct Word<'a> {
     text: &'a str,
-    /// The rest of its line, starting with it.
+    /// The rest of its line, starting with the word.
     from: &'a str,
     place: Place,
 }
@@ -283,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn binary_files_by_size_whatever_the_header_says() {
+    fn binary_files_are_recognized_by_size_for_any_header() {
         for title in [&b"solid but binary"[..], b"made by hand"] {
             let mesh = read(&binary(title, 2, 2)).unwrap();
             assert_eq!((mesh.triangles.len(), mesh.vertices.len()), (2, 6));
@@ -294,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn truncated_and_lying_binary_files_are_refused_before_reading() {
+    fn truncated_binary_files_and_wrong_counts_are_refused() {
         let mut truncated = binary(b"solid", 2, 2);
         truncated.pop();
         for content in [truncated, binary(b"x", u32::MAX, 1), binary(b"solid", 3, 2)] {
@@ -314,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn binary_files_whose_header_looks_like_another_encoding() {
+    fn binary_files_with_a_header_that_looks_like_text_are_read() {
         for title in [
             &b"\xff\xfeA\0B\0"[..],
             b"A\0B\0",
@@ -337,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_of_0_is_told_where_it_stands() {
+    fn an_error_names_the_place_of_a_count_of_0() {
         match read(&binary(b"x", 0, 0)).unwrap().finish() {
             Err(IoError {
                 found,
@@ -353,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_does_not_begin_with_solid_is_told_as_text() {
+    fn errors_quote_the_line_of_text_that_does_not_start_with_solid() {
         let html = format!("<html>{}", "x".repeat(200));
         let mesh = format!("{FACET}endsolid\n");
         let comment = format!("\n; M\u{fc}ller\nsolid\n{FACET}endsolid\n");
@@ -381,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_count_leaves_out_and_what_is_no_position_is_told_by_byte() {
+    fn errors_name_the_byte_of_a_wrong_count_or_position() {
         let mut far = binary(b"x", 2, 2);
         far[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
         for (content, at) in [
@@ -410,9 +420,8 @@ mod tests {
         assert_eq!((mesh.triangles.len(), mesh.vertices.len()), (2, 3));
     }
 
-    /// Spaces and line ends are the same, but behind a name, and no facet gets lost whichever stand where.
     #[test]
-    fn ascii_words_may_stand_on_any_line() {
+    fn ascii_words_may_be_on_any_line() {
         let line = FACET.replace('\n', " ");
         let words = FACET.replace(' ', "\n");
         for (text, count) in [

@@ -1,4 +1,4 @@
-//! Meshes into files.
+//! Writing of meshes.
 
 use std::path::Path;
 
@@ -9,21 +9,25 @@ use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::unit::LengthUnit;
 
-/// Writes a mesh as binary little-endian PLY with coordinates in `unit`; in meters they are written exactly.
+/// Writes a mesh as binary little-endian PLY with coordinates in `unit`.
+///
+/// In meters, the coordinates are written exactly.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As for [`write_atomically`].
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh, unit: LengthUnit) -> Result<(), IoError> {
     let vertices = mesh.vertices().iter().map(|v| in_unit(v, unit).into());
     ply::write::<3>(path.as_ref(), unit, vertices, Some(mesh.triangles()))
 }
 
-/// Writes a mesh as OBJ with coordinates in `unit`; in meters they are read back exactly.
+/// Writes a mesh as OBJ with coordinates in `unit`.
+///
+/// In meters, the coordinates are read back exactly.
 ///
 /// # Errors
 ///
-/// As [`write_atomically`].
+/// As for [`write_atomically`].
 pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh, unit: LengthUnit) -> Result<(), IoError> {
     write_atomically(path, |writer| {
         writeln!(writer, "# units {unit}")?;
@@ -51,7 +55,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
         #[test]
-        fn meshes_come_back(
+        fn meshes_survive_writing_and_reading(
             coordinates in prop::collection::vec(prop::array::uniform3(-2.0_f32..2.0), 3..30),
         ) {
             let vertices: Vec<_> = coordinates.iter().map(|c| Point3::from(*c)).collect();

@@ -1,4 +1,4 @@
-//! Whatever a file holds, reading it returns: no reader panics on bytes that nobody meant to write.
+//! Robustness: no reader panics, for any content of a file.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 type Reader = fn(&Path) -> Result<(), IoError>;
 
-/// Name of the file, the beginnings it may have, and who reads it.
+/// The name of a file, possible beginnings of its content, and the reader to call.
 const READERS: [(&str, &[&str], Reader); 13] = [
     ("a.obj", &["", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf "], |p| mesh(p)),
     (
@@ -65,7 +65,7 @@ proptest! {
         let (name, starts, read) = reader;
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(name);
-        // The first character of a PNG file is a byte, not two.
+        // The first character of a PNG signature is a single byte, which is not UTF-8.
         let mut content: Vec<u8> = start.get(starts).chars().map(|c| u8::try_from(c).unwrap()).collect();
         content.extend(if as_text { text.into_bytes() } else { binary });
         std::fs::write(&path, &content).unwrap();

@@ -1,11 +1,12 @@
-//! Mesh files as they come in real life: every one loads as a reference reader loads it, or is refused cleanly.
+//! Realistic mesh files: each one loads as with a reference reader, or is refused with a clear
+//! error.
 
 use std::path::Path;
 
 use hicp_io::{LengthUnit, read_mesh};
 use serde_json::Value;
 
-/// Files whose expectation here is not the reference's, and why.
+/// Files with another expectation here than with the reference reader, and the reason.
 const REFUSED: [(&str, &str); 5] = [
     ("box_UTF16BE.obj", "text must be UTF-8"),
     (

@@ -1,4 +1,4 @@
-//! Where BOP's layout puts things.
+//! Paths in BOP's dataset layout.
 
 use std::path::Path;
 

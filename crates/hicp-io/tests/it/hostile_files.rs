@@ -1,4 +1,5 @@
-//! Mesh files made to do harm, or by mistake: each is refused with its name, the place, what was found and what was expected.
+//! Malicious or damaged mesh files. Each error names the file, the place, the value found and the
+//! value expected.
 
 use std::error::Error;
 use std::fs::File;
@@ -22,8 +23,8 @@ impl Folder {
     }
 }
 
-/// All that an error says.
-fn told(error: &IoError) -> String {
+/// Returns the complete message of an error.
+fn message(error: &IoError) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {
@@ -40,7 +41,7 @@ fn refused(name: &str, content: impl AsRef<[u8]>, parts: &[&str]) {
     let path = folder.file(name, content);
     let text = match read_mesh(&path, LengthUnit::Meters) {
         Ok(mesh) => panic!("{name} was read: {} triangles", mesh.triangles().len()),
-        Err(error) => told(&error),
+        Err(error) => message(&error),
     };
     for part in [&[name], parts].concat() {
         assert!(text.contains(part), "no {part:?} in: {text}");
@@ -53,7 +54,7 @@ fn triangles(name: &str, content: impl AsRef<[u8]>) -> usize {
     let path = folder.file(name, content);
     match read_mesh(&path, LengthUnit::Meters) {
         Ok(mesh) => mesh.triangles().len(),
-        Err(error) => panic!("{}", told(&error)),
+        Err(error) => panic!("{}", message(&error)),
     }
 }
 
@@ -81,7 +82,7 @@ fn stl(header: &str, count: u32, triangles: u32) -> Vec<u8> {
 }
 
 #[test]
-fn promises_of_terabytes() {
+fn headers_that_announce_terabytes_are_refused() {
     let few = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".repeat(4);
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         for (vertices, faces) in [("3", "1000000000000"), ("1000000000000", "1")] {
@@ -106,7 +107,7 @@ fn promises_of_terabytes() {
         stl("made", u32::MAX, 1),
         &["byte 80", "4294967295 triangles"],
     );
-    // A list that promises more corners than there are bytes.
+    // A list that announces more corners than there are bytes.
     for (count, bytes) in [
         ("int", 2_000_000_000_i32.to_le_bytes()),
         ("uint", [0xff; 4]),
@@ -126,7 +127,7 @@ fn promises_of_terabytes() {
 }
 
 #[test]
-fn indices_out_of_range() {
+fn indices_out_of_range_are_refused() {
     for face in [
         "f 1 2 5",
         "f 1 2 0",
@@ -153,7 +154,7 @@ fn indices_out_of_range() {
 }
 
 #[test]
-fn coordinates_that_are_no_place() {
+fn invalid_coordinates_are_refused() {
     for value in [
         "nan",
         "-NaN",
@@ -185,7 +186,7 @@ fn coordinates_that_are_no_place() {
     let mut binary = stl("", 2, 2);
     binary[84 + 12..84 + 16].copy_from_slice(&f32::INFINITY.to_le_bytes());
     refused("a.stl", binary, &["byte 96", "finite"]);
-    // A map's coordinates are read, and denormals are numbers.
+    // The coordinates of a map are accepted, and so are denormal numbers.
     let far = "v 500000 4582345.26 0\nv 500010 4582345 0\nv 500000 4582355 0\nf 1 2 3\n";
     assert_eq!(triangles("a.obj", far), 1);
     assert_eq!(
@@ -195,7 +196,7 @@ fn coordinates_that_are_no_place() {
 }
 
 #[test]
-fn truncated_bodies() {
+fn truncated_files_are_refused() {
     let text = format!("solid a\n{}endsolid a\n", "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n".repeat(2));
     assert_eq!(triangles("a.stl", &text), 2);
     assert_eq!(triangles("a.stl", text.trim_end()), 2);
@@ -241,7 +242,7 @@ fn truncated_bodies() {
 }
 
 #[test]
-fn no_faces() {
+fn files_without_faces_are_refused() {
     refused("a.obj", "", &["line 1", "a face of three corners"]);
     refused("a.obj", "# nothing\n", &["a face of three corners"]);
     refused(
@@ -290,7 +291,7 @@ fn no_faces() {
 }
 
 #[test]
-fn odd_but_good() {
+fn unusual_but_valid_files_are_read() {
     let odd = format!(
         "\u{feff}# tabs\r\n{}\tf\t1\t2\t3\t4",
         SQUARE.replace(' ', "\t").replace('\n', "\t# c\r\n")
@@ -317,7 +318,7 @@ fn odd_but_good() {
 }
 
 #[test]
-fn other_encodings() {
+fn other_text_encodings_are_refused() {
     let text = format!("{SQUARE}f 1 2 3\n");
     let wide = |bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
     for (content, name) in [
@@ -337,13 +338,13 @@ fn other_encodings() {
     );
 }
 
-/// What a process of its own does with it would hang if anything waited here.
+/// The test would hang if a reader waited for a writer of the pipe.
 #[cfg(unix)]
 #[test]
-fn what_is_no_regular_file() {
+fn only_regular_files_are_read() {
     let folder = Folder::new();
     let refused = |path: &Path, kind: &str| {
-        let text = told(&read_mesh(path, LengthUnit::Meters).unwrap_err());
+        let text = message(&read_mesh(path, LengthUnit::Meters).unwrap_err());
         assert!(
             text.contains(kind) && text.contains("regular file"),
             "{text}"
@@ -370,16 +371,16 @@ fn what_is_no_regular_file() {
 
 #[cfg(unix)]
 #[test]
-fn missing_permissions() {
+fn files_without_read_permission_are_refused() {
     use std::os::unix::fs::PermissionsExt;
     let folder = Folder::new();
     let path = folder.file("a.obj", format!("{SQUARE}f 1 2 3\n"));
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o000)).unwrap();
     if File::open(&path).is_ok() {
-        println!("skipped: this user may read everything");
+        println!("skipped: this user has permission to read every file");
         return;
     }
-    let text = told(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
+    let text = message(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
     assert!(
         text.contains("cannot read") && text.contains("ermission denied"),
         "{text}"
@@ -387,12 +388,12 @@ fn missing_permissions() {
 }
 
 #[test]
-fn a_file_that_changes_all_the_time_is_read_as_it_was_or_refused() {
+fn a_file_that_changes_constantly_is_read_unchanged_or_refused() {
     let folder = Folder::new();
     let texts = [10, 4000].map(|faces| format!("{SQUARE}{}", "f 1 2 3\n".repeat(faces)));
     let path = folder.file("a.obj", &texts[0]);
     let done = std::sync::atomic::AtomicBool::new(false);
-    // Judged once the writer has stopped, which a panic in between would leave running for ever.
+    // Check the results after the writer has stopped; a panic before that would leave it running.
     let results: Vec<_> = std::thread::scope(|scope| {
         scope.spawn(|| {
             while !done.load(std::sync::atomic::Ordering::Relaxed) {
@@ -417,8 +418,8 @@ fn a_file_that_changes_all_the_time_is_read_as_it_was_or_refused() {
                 ..
             }) => refused += 1,
             Err(error) => {
-                let text = told(&error);
-                assert!(text.contains("stays as it is while it is read"), "{text}");
+                let text = message(&error);
+                assert!(text.contains("must not change while it is read"), "{text}");
                 refused += 1;
             }
         }
@@ -426,7 +427,7 @@ fn a_file_that_changes_all_the_time_is_read_as_it_was_or_refused() {
     println!("{refused} of 300 refused");
 }
 
-/// A file with a beginning and nothing but zeros after it, which take no room.
+/// Creates a file with a given start, followed by zeros that occupy no disk space.
 fn sparse(folder: &Folder, name: &str, start: &[u8], bytes: u64) -> PathBuf {
     let path = folder.file(name, start);
     let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
@@ -448,7 +449,7 @@ fn fifty_million_triangles_are_refused_by_their_header() {
                 ..
             },
         ) => {
-            let text = told(&error);
+            let text = message(&error);
             for part in [
                 "a.stl, byte 80",
                 "50000000 triangles",
@@ -473,9 +474,9 @@ fn fifty_million_triangles_are_refused_by_their_header() {
         Err(IoError { kind: IoErrorKind::Limit, place: Some(Place::Line(3)), found, .. })
             if found == "25000000 vertices"
     ));
-    // The text formats do not say first how much is to come, so their size is limited.
+    // The text formats do not announce their counts first, so the size of the file is limited.
     let path = sparse(&folder, "a.obj", SQUARE.as_bytes(), 2 << 30);
-    let text = told(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
+    let text = message(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
     assert!(
         text.contains("2147483648 bytes") && text.contains("--max-file-bytes"),
         "{text}"
@@ -551,7 +552,7 @@ fn limits_can_be_set() {
         ..ReadLimits::DEFAULT
     };
     assert_eq!(limits.read_results(&path).unwrap().len(), 3);
-    let text = told(
+    let text = message(
         &ReadLimits {
             max_rows: 2,
             ..limits
@@ -572,7 +573,7 @@ fn limits_can_be_set() {
 }
 
 #[test]
-fn a_ply_file_without_vertices_says_what_it_has() {
+fn the_error_for_a_ply_file_without_vertices_lists_its_elements() {
     let text = ply("ascii", "3", "1", "uchar int").replace("element vertex", "element Vertex");
     refused(
         "a.ply",

@@ -1,4 +1,4 @@
-//! PNG files as they should not be: refused by name, or read as what they are.
+//! Unusual and invalid PNG files: each is read correctly or refused with a clear error.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use hicp_io::{
 };
 use png::{BitDepth, ColorType, Compression, Encoder};
 
-fn told(error: &IoError) -> String {
+fn message(error: &IoError) -> String {
     match error.source() {
         Some(source) => format!("{error}: {source}"),
         None => error.to_string(),
@@ -33,7 +33,7 @@ fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
     .concat()
 }
 
-/// Rows as stored blocks of a zlib stream.
+/// Returns rows as stored blocks of a zlib stream.
 fn stored(rows: &[u8]) -> Vec<u8> {
     let mut data = vec![0x78, 1];
     let mut blocks = rows.chunks(65_535).peekable();
@@ -52,7 +52,7 @@ fn stored(rows: &[u8]) -> Vec<u8> {
     data
 }
 
-/// A PNG file of 16-bit gray with a header of one's own.
+/// Returns a PNG file of 16-bit gray with a custom header.
 fn gray16(width: u32, height: u32, interlaced: bool, rows: &[u8]) -> Vec<u8> {
     let mut header = [width.to_be_bytes(), height.to_be_bytes()].concat();
     header.extend([16, 0, 0, 0, u8::from(interlaced)]);
@@ -77,7 +77,7 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
     let folder = tempfile::tempdir().unwrap();
     let (width, height) = (13_u32, 11_u32);
     let value = |u: u32, v: u32| u16::try_from(1 + 1000 * v + u).unwrap();
-    // Adam7: first column, first row, column step, row step.
+    // Adam7 passes: first column, first row, column step, row step.
     let passes = [
         (0, 0, 8, 8),
         (4, 0, 8, 8),
@@ -90,7 +90,7 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
     let mut rows = Vec::new();
     for (first_u, first_v, step_u, step_v) in passes {
         for v in (first_v..height).step_by(step_v) {
-            // No filter.
+            // The filter type "none".
             rows.push(0);
             rows.extend(
                 (first_u..width)
@@ -124,9 +124,9 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
             .count(),
         143
     );
-    // Cut anywhere it is an error, never half an image.
+    // A file truncated at any position gives an error, never an incomplete image.
     let whole = std::fs::read(&path).unwrap();
-    // The last chunk and two checksums may be missing: the pixels are all there.
+    // The last chunk and two checksums may be missing, because all pixels are present.
     for length in 0..whole.len() - 12 - 8 {
         let cut = write(folder.path(), "cut.png", &whole[..length]);
         assert!(
@@ -137,7 +137,7 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
 }
 
 #[test]
-fn every_other_pixel_type_is_named() {
+fn errors_name_every_other_pixel_type() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
     use BitDepth::{Eight, Four, One, Sixteen};
@@ -161,7 +161,7 @@ fn every_other_pixel_type_is_named() {
         let mut writer = encoder.write_header().unwrap();
         writer.write_image_data(&vec![0; bytes]).unwrap();
         writer.finish().unwrap();
-        let text = told(&read_depth_png(&path, 1.0).unwrap_err());
+        let text = message(&read_depth_png(&path, 1.0).unwrap_err());
         for part in ["a.png", named, "expected 16-bit gray"] {
             assert!(text.contains(part), "no {part:?} in: {text}");
         }
@@ -172,9 +172,10 @@ fn every_other_pixel_type_is_named() {
 }
 
 #[test]
-fn a_decompression_bomb_is_refused_by_its_header() {
+fn decompression_bombs_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
-    // More than the limit; within it, but more than the file can hold; and what is really there, above a limit of one's own.
+    // Three cases: above the limit; within the limit, but more than the file can hold; and
+    // complete, but above a custom limit.
     for (width, height, parts) in [
         (
             32_768,
@@ -203,7 +204,7 @@ fn a_decompression_bomb_is_refused_by_its_header() {
             read_mask_png(&path).unwrap_err(),
             read_rgb_png(&path).unwrap_err(),
         ] {
-            let text = told(&error);
+            let text = message(&error);
             for part in parts {
                 assert!(text.contains(part), "no {part:?} in: {text}");
             }
@@ -251,7 +252,7 @@ fn data_that_do_not_fit_the_header_are_refused() {
         (4, 4, row(3).repeat(4)),
         (0, 4, Vec::new()),
         (4, 0, Vec::new()),
-        // A filter that there is not.
+        // A filter type that does not exist.
         (1, 1, vec![9, 0, 1]),
     ] {
         let path = write(folder.path(), "a.png", &gray16(width, height, false, &rows));
@@ -259,10 +260,10 @@ fn data_that_do_not_fit_the_header_are_refused() {
         assert!(
             matches!(error, IoError { ref expected, .. } if expected == "a PNG image"),
             "{width}x{height}: {}",
-            told(&error)
+            message(&error)
         );
     }
-    // Every damaged byte gives an image or an error.
+    // A file with any one damaged byte gives an image or an error.
     let depth = hicp_core::DepthImage::from_meters(5, 4, vec![0.5; 20]).unwrap();
     let path = folder.path().join("a.png");
     write_depth_png(&path, &depth, 1.0).unwrap();
@@ -274,9 +275,9 @@ fn data_that_do_not_fit_the_header_are_refused() {
             Ok(image) => assert_eq!(
                 image.pixels(),
                 depth.pixels(),
-                "byte {at}: checksums let it pass"
+                "byte {at}: the checksums do not detect the damage"
             ),
-            Err(error) => assert!(told(&error).contains("a.png")),
+            Err(error) => assert!(message(&error).contains("a.png")),
         }
     }
 }

@@ -1,11 +1,11 @@
-//! JSON files above their limits: refused by their size, before a byte of them is parsed.
+//! JSON files above their limits: each is refused by its size before it is parsed.
 
 use std::path::{Path, PathBuf};
 
 use hicp_io::bop::{Dataset, Scene};
 use hicp_io::{IoError, IoErrorKind, ReadLimits, read_camera_json, read_pose_json};
 
-/// A file of some text and nothing but zeros after it, which take no room.
+/// Creates a file with a given text, followed by zeros that occupy no disk space.
 fn sparse(folder: &Path, name: &str, text: &str, bytes: u64) -> PathBuf {
     let path = folder.join(name);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -24,10 +24,13 @@ fn above<T>(result: Result<T, IoError>, wanted_field: &str, bytes: u64, most: u6
                 ..
             },
         ) => {
-            let told = error.to_string();
+            let message = error.to_string();
             let numbers = format!("found {bytes} bytes, expected at most {most}");
             let option = format!("--{} N", wanted_field.replace('_', "-"));
-            assert!(told.contains(&numbers) && told.contains(&option), "{told}");
+            assert!(
+                message.contains(&numbers) && message.contains(&option),
+                "{message}"
+            );
         }
         other => panic!("{other:?}"),
     }
@@ -37,7 +40,7 @@ const POSE: &str = r#"{"cam_R_m2c": [1,0,0,0,1,0,0,0,1], "cam_t_m2c": [0,0,500]}
 const CAMERA: &str = r#"{"cam_K": [500,0,3,0,500,3,0,0,1]}"#;
 
 #[test]
-fn a_pose_or_a_camera_is_small() {
+fn files_of_a_pose_or_a_camera_have_a_small_limit() {
     let folder = tempfile::tempdir().unwrap();
     let most = ReadLimits::DEFAULT.max_small_json_bytes;
     let pose = sparse(folder.path(), "pose.json", POSE, most + 1);
@@ -50,7 +53,7 @@ fn a_pose_or_a_camera_is_small() {
     let camera = sparse(folder.path(), "camera.json", CAMERA, 1 << 40);
     let read = read_camera_json(&camera, (8, 6));
     above(read, "max_small_json_bytes", 1 << 40, most);
-    // At the limit, and with one of one's own.
+    // At the default limit, and at a custom one.
     for (text, bytes) in [(POSE, POSE.len()), (CAMERA, CAMERA.len())] {
         let path = folder.path().join("exact.json");
         std::fs::write(&path, text).unwrap();
@@ -74,7 +77,7 @@ fn a_pose_or_a_camera_is_small() {
 }
 
 #[test]
-fn every_annotation_of_a_dataset_is_limited() {
+fn every_annotation_file_of_a_dataset_is_limited() {
     const FILES: [(&str, &str); 5] = [
         (
             "test/000001/scene_camera.json",

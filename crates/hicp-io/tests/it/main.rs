@@ -1,4 +1,4 @@
-//! Integration tests of `hicp-io`: one program, so that it is linked once.
+//! Integration tests of `hicp-io`, in one program to link only once.
 
 #![allow(
     clippy::panic,

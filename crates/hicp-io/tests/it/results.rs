@@ -1,4 +1,4 @@
-//! Result files: what is read, what is refused, and that unchanged rows keep their numbers.
+//! Result files: accepted forms, refused content, and exact numbers of unchanged rows.
 
 use std::error::Error;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn read(text: impl AsRef<[u8]>) -> Result<Vec<ResultRow>, IoError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn rows_come_back_exactly(
+    fn rows_are_read_back_exactly(
         twists in prop::collection::vec(prop::array::uniform6(-3.0_f64..3.0), 0..5),
         score in -1e30_f64..1e30,
         time in prop::option::of(0.0_f64..1e3),
@@ -48,8 +48,8 @@ proptest! {
 }
 
 #[test]
-fn a_row_that_is_not_touched_keeps_its_numbers_and_a_new_pose_replaces_them() {
-    // Orthogonal to 5e-4 only.
+fn an_unchanged_row_keeps_its_numbers_and_a_new_pose_replaces_them() {
+    // Orthogonal only to 5e-4.
     let rotation = "1.0002 0 0 0 0.9998 0 0 0 1";
     let mut rows = read(format!(
         "{HEADER}\n50,1,2,0.5,{rotation},0.1 0.2 1035.65777,-1\n"
@@ -73,7 +73,7 @@ fn a_row_that_is_not_touched_keeps_its_numbers_and_a_new_pose_replaces_them() {
 }
 
 #[test]
-fn form_is_lenient() {
+fn files_of_any_form_are_read() {
     let text = format!(
         "\u{feff}im_id, scene_id ,obj_id,t,R,score,time,note\r\n\r\n 1 , 50,2, 1  2 3 ,\"{EYE}\",1e0,0.25,x\r\n  \r\n2,50,2,1 2 3,{EYE},0,-1,"
     );
@@ -86,7 +86,7 @@ fn form_is_lenient() {
 }
 
 #[test]
-fn content_is_strict_and_faults_name_line_and_column() {
+fn errors_name_the_line_and_the_column_of_invalid_content() {
     let good = ["50", "1", "2", "0.5", EYE, "0 0 500", "-1"];
     for (index, bad, name) in [
         (0, "-1", "scene_id"),
@@ -157,7 +157,7 @@ fn tables_that_are_not_results_are_refused() {
 }
 
 #[test]
-fn the_content_of_a_file_is_read_like_the_file() {
+fn content_in_memory_is_read_like_a_file() {
     let row = ResultRow::new(1, 2, 3, Isometry3::identity());
     let text = format!("{}\n{row}\n", ResultRow::header());
     assert_eq!(ResultRow::header(), HEADER);

@@ -1,4 +1,4 @@
-//! Numbers that no file can state are refused by those who write, not left for those who read.
+//! Writers refuse numbers that no file can hold, instead of leaving the fault to readers.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -23,10 +23,10 @@ fn refused(path: &Path, written: Result<(), IoError>, place: &str) {
 }
 
 #[test]
-fn nothing_is_written_that_could_not_be_read() {
+fn writers_refuse_numbers_that_readers_would_refuse() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file");
-    // Finite in metres, beyond all numbers in millimetres.
+    // Finite in meters, but above the range of numbers in millimeters.
     let far = Isometry3::translation(1e306, 0.0, 0.0);
     refused(&path, write_pose_json(&path, &far), "$.cam_t_m2c[0]");
 

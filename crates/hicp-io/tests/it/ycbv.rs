@@ -1,4 +1,4 @@
-//! A real dataset in BOP's layout, read whole.
+//! A real dataset in BOP's layout, read completely.
 
 use hicp_core::se3;
 use hicp_io::bop::{Dataset, ResultFileName, Rle, read_results, write_results};
@@ -48,7 +48,7 @@ fn scenes_models_and_targets_agree() {
                 let set = mask.pixels().iter().filter(|set| **set).count();
                 assert_eq!(set, info.visible_pixels.unwrap() as usize);
                 assert_eq!(Rle::of_mask(&mask).to_mask(), mask);
-                // The median depth in the mask is near the object: all units are metres.
+                // The median depth in the mask is near the object: all units are meters.
                 let mut depths: Vec<f32> = depth
                     .pixels()
                     .iter()

@@ -1,11 +1,14 @@
-//! PLY headers. Element counts are checked against the size of the file before anything is allocated.
+//! Parses PLY headers and checks element counts against the file size before allocating.
 
 use std::path::Path;
 
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::source::text_bytes;
 
-/// The longest header that is read. Its elements take a multiple of its size, so the size of the file is not a bound.
+/// The largest accepted size of a header, in bytes.
+///
+/// The memory for its elements is a multiple of its size, so the size of the file is not a
+/// sufficient bound.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
 /// The properties of a vertex that are read: its position and its normal.
@@ -18,13 +21,13 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// A type of numbers.
+/// A type of number in a PLY file.
 #[derive(Debug)]
 pub(super) struct Scalar {
-    /// Its two names, with a space between them.
+    /// The two names of the type, separated by a space.
     names: &'static str,
     pub(super) bytes: usize,
-    /// Returns the number that the first bytes state, in little-endian order.
+    /// Converts the first bytes, in little-endian order, to a number.
     pub(super) number: fn([u8; 8]) -> f64,
 }
 
@@ -59,14 +62,17 @@ impl Scalar {
     }
 }
 
-/// A value of each element of a kind: a number, or a list of numbers.
+/// A value that each element of a kind has: a number or a list of numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Property {
     pub(super) name: String,
-    /// The type of the length of a list.
+    /// The type of the length of a list; `None` if the property is a single number.
     pub(super) count: Option<&'static Scalar>,
     pub(super) scalar: &'static Scalar,
-    /// Where a reader stores its values: 0 to 5 for [`VERTEX_NAMES`], 0 for the corners of a face, `None` if nothing reads them.
+    /// The position at which a reader stores the values.
+    ///
+    /// It is 0 to 5 for [`VERTEX_NAMES`], 0 for the corners of a face, and `None` if the property
+    /// is skipped.
     pub(super) slot: Option<usize>,
     line: usize,
 }
@@ -77,12 +83,12 @@ pub(super) struct Element {
     pub(super) name: String,
     pub(super) count: usize,
     pub(super) properties: Vec<Property>,
-    /// The line that declares it.
+    /// The line of its declaration.
     pub(super) line: usize,
 }
 
 impl Element {
-    /// Refuses elements without the properties of the first slots.
+    /// Returns an error if the properties of the first `slots` slots are not all declared.
     pub(super) fn require(&self, path: &Path, slots: usize, expected: &str) -> Result<(), IoError> {
         let properties = &self.properties;
         let has = |slot| properties.iter().any(|p| p.slot == Some(slot));
@@ -94,7 +100,7 @@ impl Element {
         Err(IoError::new(path, Place::Line(self.line), found, expected))
     }
 
-    /// Returns the bytes that an element takes at least.
+    /// Returns the smallest possible size of an element, in bytes.
     fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |p: &Property| match encoding {
             Encoding::Ascii => 2,
@@ -104,7 +110,7 @@ impl Element {
     }
 }
 
-/// A header and its size.
+/// A parsed header and its size.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -114,7 +120,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Parses the header that `content` starts with, and checks its counts against the size of the whole file.
+    /// Parses the header at the start of `content` and checks its counts against `file_bytes`.
     pub(super) fn parse(path: &Path, content: &[u8], file_bytes: u64) -> Result<Self, IoError> {
         let text = text_bytes(path, content)?;
         // Old files end lines with a carriage return only.
@@ -126,7 +132,7 @@ impl Header {
         let (mut bytes, mut lines) = (content.len() - text.len(), 0);
         for line in text.split_inclusive(|byte| *byte == end) {
             (bytes, lines) = (bytes + line.len(), lines + 1);
-            // Other files need not have lines.
+            // A file of another format may be a single long line.
             let shown = quote(&String::from_utf8_lossy(&line[..line.len().min(256)]));
             let refuse = |expected| IoError::new(path, Place::Line(lines), &*shown, expected);
             if lines == 1 && line.trim_ascii() != b"ply" {
@@ -156,9 +162,9 @@ impl Header {
         Err(IoError::new(path, place, END_OF_FILE, "`end_header`"))
     }
 
-    /// Refuses counts that the rest of the file cannot hold.
+    /// Returns an error for counts that the rest of the file cannot hold.
     fn check_promises(&self, path: &Path, available: u64) -> Result<(), IoError> {
-        // The last word of a text need not be followed by a separator.
+        // The last word of a text may have no separator after it.
         let mut left = available + u64::from(self.encoding == Encoding::Ascii);
         for element in &self.elements {
             let (place, count) = (Place::Line(element.line), element.count as u64);
@@ -249,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn terabytes_are_refused_before_allocating() {
+    fn headers_that_announce_terabytes_are_refused_before_allocating() {
         for (format, what) in [
             ("ascii", "element vertex 1000000000000\nproperty float x\n"),
             (
@@ -271,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_that_a_file_can_hold_is_accepted() {
+    fn a_file_of_the_smallest_possible_size_is_accepted() {
         let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nend_header\n";
         assert!(parse(&format!("{head}1 2\n3 4")).is_ok());
         assert!(matches!(
@@ -281,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_headers_name_the_line() {
+    fn errors_name_the_line_of_the_header() {
         for (text, at) in [
             ("", 1),
             ("plx\n", 1),
@@ -317,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn properties_that_nobody_reads_may_have_any_names() {
+    fn skipped_properties_may_have_any_names() {
         let names = [
             "w#1",
             "w%1",
@@ -338,7 +344,7 @@ mod tests {
         let vertex = header.element("vertex").unwrap();
         let found: Vec<&str> = vertex.properties.iter().map(|p| p.name.as_str()).collect();
         assert_eq!(found, names);
-        // A byte too few for nine properties.
+        // One byte too few for nine properties.
         assert!(matches!(
             parse(&format!("{head}end_header\n1 2 3 4 5 6 7 8")),
             Err(IoError { found, .. }) if found.contains("promises")
@@ -360,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_may_be_there_once() {
+    fn properties_that_are_read_must_be_unique() {
         let list = "property list uchar int";
         for (lines, second, first) in [
             (
@@ -409,7 +415,7 @@ mod tests {
                 other => panic!("{lines}: {other:?}"),
             }
         }
-        // Other elements may have properties of these names.
+        // Other elements may repeat properties of these names.
         let elsewhere = format!(
             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nelement face 1\nproperty float x\n\
              property float x\n{list} vertex_index\nend_header\n1\n1 1 0\n"
@@ -418,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_has_an_end() {
+    fn a_header_without_end_is_refused() {
         let head = "ply\nformat ascii 1.0\n";
         let tail = "end_header\n";
         let blank = "\n".repeat(MAX_HEADER_BYTES - head.len() - tail.len());
@@ -440,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_counts_as_bytes_and_nothing_else() {
+    fn a_byte_order_mark_counts_as_bytes_only() {
         let text = "ply\rformat ascii 1.0\rend_header\r";
         let header = parse(&format!("\u{feff}{text}")).unwrap();
         assert_eq!((header.bytes, header.lines), (text.len() + 3, 3));

@@ -1,4 +1,4 @@
-//! PLY files into meshes and point clouds.
+//! Parses PLY files into meshes and point clouds.
 
 use hicp_core::Vector3;
 
@@ -8,9 +8,9 @@ use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::{FACE, RawMesh, Reading};
 
-/// Refuses a file by its header, if it may have the elements that it promises and they are too many.
+/// Returns an error if the header alone shows that the file has too many elements.
 ///
-/// A header that is longer than the head, or broken, is left to the parser.
+/// A header that is longer than `head` or invalid is left to the parser.
 pub(crate) fn check_head(reading: &Reading<'_>, head: &[u8], bytes: u64) -> Result<(), IoError> {
     match Header::parse(reading.path, head, bytes) {
         Ok(header) => check_counts(reading, &header),
@@ -54,7 +54,7 @@ fn parse<'a>(
     {
         return Err(reading.refuse(Place::Line(*line), "triangle strips", "an element `face`"));
     }
-    // The names of elements are case-sensitive.
+    // Element names are case-sensitive, so the message lists them as they are.
     let names: Vec<&str> = header.elements.iter().map(|e| &*e.name).collect();
     let names = format!("the elements {names:?}");
     let end = Place::Line(header.lines);
@@ -63,7 +63,7 @@ fn parse<'a>(
     };
     vertex.require(reading.path, 3, "properties `x`, `y` and `z`")?;
 
-    const POINTS: &str = "an element `face` with a face of three corners or more: vertices alone are a point cloud, no mesh";
+    const POINTS: &str = "an element `face` with a face of three corners or more: vertices alone are a point cloud, not a mesh";
     let mut mesh = RawMesh::new(
         reading,
         match header.element("face") {
@@ -80,7 +80,7 @@ fn parse<'a>(
         _ => "".into(),
     };
     let mut rows = Rows::new(content, &text, &header);
-    // Faces may come before the vertices that they name.
+    // Faces may precede the vertices that they refer to.
     let mut early = None;
     for element in &header.elements {
         match &*element.name {
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_negative_list_count_and_a_huge_one_are_refused() {
+    fn a_negative_and_a_huge_list_count_are_refused() {
         for count in [-1_i32, i32::MAX] {
             let mut content = b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\n\
                 property float y\nproperty float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n"
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_face_that_names_a_missing_vertex_is_named() {
+    fn an_error_names_a_face_with_a_missing_vertex() {
         for index in ["4", "-1"] {
             let content = format!(
                 "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
@@ -256,13 +256,13 @@ mod tests {
     }
 
     #[test]
-    fn strips_are_refused_by_name() {
+    fn the_error_for_triangle_strips_names_them() {
         let content = b"ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n3 0 1 2\n";
         assert_eq!(mesh(content).unwrap_err().found, "triangle strips");
     }
 
     #[test]
-    fn names_that_are_there_twice_shift_nothing() {
+    fn duplicate_property_names_do_not_shift_values() {
         for names in [
             ["quality", "quality"],
             ["s(1)", "s[1]"],
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_counted_from_the_mark() {
+    fn byte_offsets_include_the_byte_order_mark() {
         let text = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n\
             property uchar z\nelement face 2\nproperty list uchar uchar vertex_index\nend_header\n";
         for mark in ["", "\u{feff}"] {
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_triangles_is_told_so_by_its_header() {
+    fn the_error_for_a_file_without_triangles_quotes_its_header() {
         for (elements, rows, at, found) in [
             ("", "", 7, "the elements [\"vertex\"]"),
             (
@@ -337,7 +337,7 @@ mod tests {
                 "{error}"
             );
             assert_eq!(
-                error.contains("a point cloud, no mesh"),
+                error.contains("a point cloud, not a mesh"),
                 rows.is_empty(),
                 "{error}"
             );

@@ -7,10 +7,10 @@ use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::mesh::lines::Lines;
 use crate::mesh::raw::Reading;
 
-/// The rest of a file.
+/// The part of a file that is not read yet.
 #[derive(Clone)]
 pub(super) enum Rows<'a> {
-    /// A line per element: the current line, and its words that are not read yet.
+    /// Text with one line per element: the current line, and its unread words.
     Ascii {
         lines: Lines<'a>,
         line: &'a str,
@@ -24,7 +24,7 @@ pub(super) enum Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Starts at the end of a header; `text` is the rest of the file if it is text.
+    /// Starts at the end of a header. `text` is the rest of the file if it is text.
     pub(super) fn new(content: &'a [u8], text: &'a str, header: &Header) -> Self {
         match header.encoding {
             Encoding::Ascii => Self::Ascii {
@@ -40,7 +40,10 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Reads all elements of a kind. Calls `take` with the place of each and the numbers of the properties in the first slots.
+    /// Reads all elements of a kind.
+    ///
+    /// Calls `take` for each element with its place and the numbers of the properties in the first
+    /// `slots` slots.
     pub(super) fn read(
         &mut self,
         reading: &Reading<'_>,
@@ -75,7 +78,7 @@ impl<'a> Rows<'a> {
         Ok(())
     }
 
-    /// Starts the next element, and returns its place. At the end of a text, the line is empty.
+    /// Starts the next element and returns its place. At the end of a text, the line is empty.
     fn start(&mut self) -> Place {
         match self {
             Self::Ascii { lines, line, words } => {
@@ -90,7 +93,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Reads a property of the current element.
+    /// Reads a property of the current element; returns `None` if it is invalid.
     fn property(&mut self, property: &Property, kept: bool, numbers: &mut Vec<f64>) -> Option<()> {
         let mut left = match property.count {
             Some(count) => self.number(count, true).filter(|count| *count >= 0.0)?,
@@ -110,7 +113,8 @@ impl<'a> Rows<'a> {
         match self {
             Self::Ascii { words, .. } => {
                 let word = words.next()?;
-                // A number that is not kept may be any word: exporters write what does not fit the type.
+                // A skipped number may be any word: exporters write values that do not fit the
+                // type.
                 if kept { word.parse().ok() } else { Some(0.0) }
             }
             Self::Binary {
@@ -150,7 +154,7 @@ mod tests {
         property double z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nend_header\n";
 
     #[test]
-    fn numbers_as_people_write_them() {
+    fn numbers_of_all_common_forms_are_read() {
         let text = format!("{HEAD}.5 1. +1e0\r\n\n  -.5\t0 0 99\n1 1 1E-3\n\n3 0 1 2 255");
         let mesh = parse_mesh(reading("a.ply"), text.into_bytes()).unwrap();
         assert_eq!(mesh.vertices[0].coords.as_slice(), [0.5, 1.0, 1.0]);
@@ -185,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_may_end_in_its_own_way() {
+    fn line_endings_may_be_mixed() {
         for body in [
             "0 0 0\r1 0 0\r0 1 0\r3 0 1 2 0\r",
             "0 0 0\r\n1 0 0\r0 1 0\n\r\n3 0 1 2 0",
@@ -200,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_nobody_reads_are_counted_only() {
+    fn skipped_words_are_only_counted() {
         let head = "ply\nformat ascii 1.0\nelement odd 1\nproperty list uchar int ids\nelement vertex 3\n\
             property float nx\nproperty uchar red\nproperty float x\nproperty float y\nproperty float z\n\
             element face 1\nproperty list uchar uint rgba\nproperty list uchar int vertex_indices\n\

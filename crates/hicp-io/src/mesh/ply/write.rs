@@ -1,4 +1,4 @@
-//! Writes PLY files.
+//! Writing of PLY files.
 
 use std::path::Path;
 
@@ -7,7 +7,9 @@ use crate::atomic::write_atomically;
 use crate::error::IoError;
 use crate::unit::LengthUnit;
 
-/// Writes a binary little-endian file. The properties of a vertex are the first N of [`VERTEX_NAMES`].
+/// Writes a binary little-endian file.
+///
+/// The properties of a vertex are the first N of [`VERTEX_NAMES`].
 pub(crate) fn write<const N: usize>(
     path: &Path,
     unit: LengthUnit,

@@ -1,16 +1,18 @@
-//! Where the data folder is that some tests read.
+//! The location of the data folder that some tests need.
 
 use std::path::PathBuf;
 
-/// Returns a part of the data folder (`HICP_DATA`, or `shared/data` beside the workspace), or says aloud that a test is skipped.
+/// Returns the path of a part of the data folder, or prints that a test is skipped.
+///
+/// The folder is `HICP_DATA`, or `shared/data` next to the workspace.
 pub(crate) fn data(part: &str) -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
-    let root = std::env::var_os("HICP_DATA").map_or_else(|| PathBuf::from(beside), PathBuf::from);
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let root = std::env::var_os("HICP_DATA").map_or_else(|| PathBuf::from(default), PathBuf::from);
     let path = root.join(part);
     if path.exists() {
         Some(path)
     } else {
-        println!("skipped: {} is not there (set HICP_DATA)", path.display());
+        println!("skipped: {} does not exist (set HICP_DATA)", path.display());
         None
     }
 }
