@@ -1,4 +1,5 @@
-//! Reconstructs every household object at the four noise levels of §VI-B.3 and prints how far the surfaces are apart.
+//! Reconstructs every household object at the four noise levels of §VI-B.3 and prints the surface
+//! errors.
 //!
 //! `cargo run --release -p hicp-sim --example reconstruct_all`
 #![allow(clippy::print_stdout, reason = "a report")]
@@ -34,7 +35,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Mean distance from samples of one model to the nearest of dense samples of another, metres; never quite 0.
+/// Returns the mean distance from samples of one model to the nearest of dense samples of another,
+/// meters.
+///
+/// It is never exactly 0.
 fn mean_distance(from: &Model, to: &Model) -> f64 {
     let dense = sample_surface(to.mesh(), 30_000);
     let nearest = |p: &Point3<f32>| {

@@ -1,4 +1,4 @@
-//! Cases of the single-image studies: an object, its true pose, an image, and a pose to start from.
+//! Cases of the single-image studies: an object, its true pose, an image, and an initial pose.
 
 use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
@@ -15,22 +15,24 @@ use crate::sampling::{
 };
 use crate::stream::stream;
 
-/// How initial poses are put off the truth (§VI-A.4).
+/// The rule by which initial poses deviate from the true pose (§VI-A.4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InitialPose {
-    /// By a fixed amount in random directions (§VI-B.2 and §VI-B.3).
+    /// A fixed deviation in random directions (§VI-B.2 and §VI-B.3).
     Fixed {
-        /// Distance, metres.
+        /// Translation error, meters.
         translation_meters: f64,
-        /// Angle, degrees.
+        /// Rotation error, degrees.
         rotation_degrees: f64,
     },
-    /// By random amounts, so that the initial VSD of every tenth case (with ten bins) lies in the same bin (§VI-B.1).
+    /// Random deviations, drawn so that the initial VSD falls into the bin of the case (§VI-B.1).
+    ///
+    /// With ten bins, every tenth case has the same bin.
     Binned(VsdBins),
 }
 
 impl InitialPose {
-    /// The mean error of a sampling-based estimator: 6.2 mm and 9.5° (§VI-A.5).
+    /// Returns the mean error of a sampling-based pose estimator: 6.2 mm and 9.5° (§VI-A.5).
     #[must_use]
     pub fn mean_error() -> Self {
         Self::Fixed {
@@ -42,21 +44,22 @@ impl InitialPose {
 
 /// Rejection sampling to equal counts in equally wide bins of the initial VSD (§VI-B.1).
 ///
-/// δ_t is uniform in [0, `max_translation_meters`] and δ_θ is 1.92° per millimetre of it.
+/// δ_t is uniform in [0, `max_translation_meters`]. δ_θ is 1.92° per millimeter of δ_t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VsdBins {
     /// Number of bins over [0, 1]; the last one holds 1.
     pub count: usize,
-    /// Largest translation error, metres.
+    /// Largest translation error, meters.
     pub max_translation_meters: f64,
-    /// Initial poses tried around one object pose before another object pose is drawn.
+    /// Number of initial poses tried around one object pose before another object pose is drawn.
     pub tries_per_pose: u32,
-    /// Object poses tried before the bin counts as impossible to fill.
+    /// Number of object poses tried before the bin counts as impossible to fill.
     pub max_poses: u32,
 }
 
 impl Default for VsdBins {
-    /// Ten bins and 0.15 m, as in the paper; 500 tries around each of at most 40 poses.
+    /// Returns ten bins and 0.15 m, as in the paper, with 500 tries around each of at most 40
+    /// poses.
     fn default() -> Self {
         Self {
             count: 10,
@@ -67,22 +70,25 @@ impl Default for VsdBins {
     }
 }
 
-/// How cases are made.
+/// The configuration for the generation of cases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CaseConfig {
     /// The camera.
     pub camera: PinholeCamera,
-    /// Largest distance of the object's centre along the optical axis, metres; the smallest is the object's diameter (§VI-A.3).
+    /// Largest distance of the object's center along the optical axis, meters.
+    ///
+    /// The smallest distance is the object's diameter (§VI-A.3).
     pub max_distance_meters: f64,
-    /// How far from the object's centre the optical axis may pass, metres.
+    /// Largest distance between the object's center and the optical axis, meters.
     pub axis_offset_meters: f64,
-    /// How initial poses are drawn.
+    /// The rule for initial poses.
     pub init: InitialPose,
 }
 
 impl CaseConfig {
-    /// The paper's single-image setting: distances up to 0.6 m. The axis passes within 0.02 m of the centre, which the paper
-    /// calls "in the proximity".
+    /// Returns the single-image setting of the paper: distances up to 0.6 m.
+    ///
+    /// The axis passes within 0.02 m of the center, which the paper calls "in the proximity".
     #[must_use]
     pub fn new(camera: PinholeCamera, init: InitialPose) -> Self {
         Self {
@@ -94,38 +100,40 @@ impl CaseConfig {
     }
 }
 
-/// An object seen once, perfectly, and a pose to refine. All variants of a study get the same.
+/// A perfect image of one object, and a pose to refine. All variants of a study get the same case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// Name of the object; part of what the random numbers follow from.
+    /// Name of the object. It contributes to the seed of the random numbers.
     pub object: String,
     /// Seed of the study.
     pub seed: u64,
-    /// Index of the case among those of its object.
+    /// Index of the case among the cases of its object.
     pub index: u64,
     /// The camera.
     pub camera: PinholeCamera,
-    /// The true pose.
+    /// The true pose, meters.
     pub camera_from_object: Isometry3<f64>,
-    /// The pose to start from.
+    /// The initial pose, meters.
     pub init: Isometry3<f64>,
-    /// The bin of `vsd_initial`, from 0, where there are bins.
+    /// The bin of `vsd_initial`, from 0, if there are bins.
     pub bin: Option<usize>,
     /// Mean VSD of `init` against the truth (§VI-A.2).
     pub vsd_initial: f64,
-    /// Number of initial poses drawn to get this one.
+    /// Number of initial poses that were drawn to get this one.
     pub tries: u32,
-    /// The rendered depth, without noise and without anything else in sight.
+    /// The rendered depth, without noise and without other objects, meters.
     pub depth: DepthImage,
-    /// The pixels where the object is seen.
+    /// The pixels at which the object is visible.
     pub mask: Mask,
 }
 
-/// Makes cases; keeps the renderer's memory between them. One per thread.
+/// Generates cases and keeps the renderer's memory between them. Use one per thread.
 ///
-/// A case follows from the configuration, the model, its name, the seed and the index alone: in whatever order and on however
-/// many threads cases are made, they are the same. Cost: a render per initial pose tried ([`Case::tries`]), a render per
-/// object pose tried, and one into a whole image.
+/// A case depends only on the configuration, the model, its name, the seed and the index. The order
+/// of generation and the number of threads do not change it.
+///
+/// Cost: one render per tried initial pose ([`Case::tries`]), one per tried object pose, and one
+/// for the whole image.
 ///
 /// ```
 /// use hicp_core::PinholeCamera;
@@ -145,16 +153,17 @@ pub struct Case {
 pub struct CaseMaker {
     config: CaseConfig,
     renders: RenderCache,
-    /// Scores look at an observation's camera; this one shows nothing.
+    /// Scores read only the camera of the observation, so this one has no depth.
     nothing: Observation,
 }
 
 impl CaseMaker {
-    /// Makes a maker of cases.
+    /// Creates a generator of cases.
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] when a length, an angle or a count of the configuration is out of its range.
+    /// [`SimError::Parameter`] if a length, an angle or a count of the configuration is out of its
+    /// range.
     pub fn new(config: CaseConfig) -> Result<Self, SimError> {
         let length = |what, value| check_range(what, value, 0.0..=100.0);
         length("largest distance in meters", config.max_distance_meters)?;
@@ -190,19 +199,21 @@ impl CaseMaker {
         })
     }
 
-    /// The configuration.
+    /// Returns the configuration.
     #[must_use]
     pub fn config(&self) -> &CaseConfig {
         &self.config
     }
 
-    /// Makes a case. With bins, case i is of bin i modulo their number.
+    /// Generates a case. With bins, case i has bin i modulo the number of bins.
     ///
-    /// The object pose of a case is the same for every [`InitialPose`], unless all tries around it missed the bin.
+    /// The object pose of a case is the same for every [`InitialPose`], unless all tries around it
+    /// missed the bin.
     ///
     /// # Errors
     ///
-    /// [`SimError::TooLarge`] when the object's diameter leaves no distance to draw, and [`SimError::UnfilledBin`].
+    /// [`SimError::TooLarge`] if the object's diameter leaves no distance to draw.
+    /// [`SimError::UnfilledBin`] if no initial pose falls into the bin.
     pub fn case(
         &mut self,
         model: &Model,
@@ -283,9 +294,9 @@ impl CaseMaker {
         )
     }
 
-    /// Draws initial poses, and now and then another object pose, until one falls into the bin.
+    /// Draws initial poses, and occasionally another object pose, until one falls into the bin.
     ///
-    /// Drawing both anew at every try would favour object poses from which the bin is easy to hit.
+    /// Drawing both for every try would favor object poses for which the bin is easy to hit.
     fn start_in_bin(
         &mut self,
         model: &Model,
@@ -318,7 +329,7 @@ impl CaseMaker {
         None
     }
 
-    /// Returns the mean VSD of a pose against the true one, both rendered in the configured camera (§VI-A.2).
+    /// Returns the mean VSD of a pose, with both poses rendered in the configured camera (§VI-A.2).
     pub fn vsd(
         &mut self,
         model: &Model,
@@ -331,7 +342,7 @@ impl CaseMaker {
     }
 }
 
-/// An initial pose and how it was found.
+/// An initial pose, its VSD and the number of tries.
 struct Start {
     init: Isometry3<f64>,
     vsd: f64,
@@ -350,7 +361,9 @@ impl VsdBins {
     }
 }
 
-/// Returns the rotation error that goes with a translation error in metres: 1.92° per millimetre (§VI-A.5), radians.
+/// Returns the rotation error in radians for a translation error in meters (§VI-A.5).
+///
+/// The ratio is 1.92° per millimeter.
 #[must_use]
 pub fn rotation_of(translation_meters: f64) -> f64 {
     (translation_meters * 1e3 * DEGREES_PER_MILLIMETER).to_radians()

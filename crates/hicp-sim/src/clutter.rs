@@ -1,4 +1,4 @@
-//! Cluttered scenes: several objects on a table, seen from around it by a depth sensor.
+//! Cluttered scenes: several objects on a table, observed by a depth sensor.
 
 use hicp_core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, TriMesh, UnitQuaternion, Vector3,
@@ -9,46 +9,49 @@ use rand::{Rng, RngExt};
 use crate::error::{SimError, check_range};
 use crate::sensor::DepthSensor;
 
-/// Half the side of the square table, metres.
+/// Half the side of the square table, meters.
 const TABLE_HALF_METERS: f64 = 0.8;
-/// How far beyond the last try's disc an object may lie, metres: more tries, more room.
+/// Growth of the placement disc after each failed try, meters. More tries give more room.
 const DISC_GROWTH_METERS: f64 = 0.005;
-/// Height of the camera above the table as seen from its middle, degrees: low enough that objects hide each other.
+/// Elevation of the camera above the table, seen from its center, degrees. It is low enough that
+/// objects hide each other.
 const ELEVATION_DEGREES: std::ops::Range<f64> = 25.0..60.0;
-/// Distance of the camera against the one at which everything just fits.
+/// Distance of the camera relative to the distance at which all objects just fit the image.
 const DISTANCE_FACTOR: std::ops::Range<f64> = 0.85..1.05;
-/// The same at the beginning and at the end of a path.
+/// The same factor at the start and at the end of a path.
 const PATH_FACTOR: [f64; 2] = [1.5, 0.9];
-/// How far a path goes round the scene, degrees.
+/// Change of the azimuth along a path, degrees.
 const PATH_TURN_DEGREES: f64 = 40.0;
 
-/// An object of a scene.
+/// An object in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedObject {
-    /// Index into the models that the scene was drawn from.
+    /// Index into the models from which the scene was drawn.
     pub model: usize,
-    /// Where it stands: world z is up, the table's surface is z = 0, metres.
+    /// Pose of the object in the world frame, meters. World z is up, and the table's surface is z =
+    /// 0.
     pub world_from_object: Isometry3<f64>,
 }
 
 /// Objects on a table that do not touch each other.
 ///
-/// Each stands on one of six sides of its axes' box, turned at random about the vertical. An object may be there several times.
+/// Each object stands on one of the six sides of its axis-aligned box, with a random rotation
+/// around the vertical. An object may appear several times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clutter {
-    /// The objects, in the order in which they were placed, from the middle outwards.
+    /// The objects in the order of placement, from the center outward.
     pub objects: Vec<PlacedObject>,
     extent: f64,
 }
 
-/// What a camera sees of a [`Clutter`].
+/// The image of a [`Clutter`] from one camera pose.
 #[derive(Clone, Debug)]
 pub struct ClutterView {
-    /// Pose of the world in the camera frame, metres.
+    /// Pose of the world in the camera frame, meters.
     pub camera_from_world: Isometry3<f64>,
-    /// What the sensor measured.
+    /// The measured depth, meters.
     pub depth: DepthImage,
-    /// The objects in the scene's order.
+    /// The objects in the order of the scene.
     pub instances: Vec<SeenObject>,
 }
 
@@ -57,22 +60,22 @@ pub struct ClutterView {
 pub struct SeenObject {
     /// Index into the models.
     pub model: usize,
-    /// Its pose, metres.
+    /// Pose of the object in the camera frame, meters.
     pub camera_from_object: Isometry3<f64>,
-    /// Pixels that it would cover if it were alone.
+    /// Pixels that the object would cover if it were alone.
     pub silhouette: Mask,
     /// Pixels at which it is the nearest surface.
     pub visible: Mask,
 }
 
 impl Clutter {
-    /// Draws a scene of `count` objects from some models, with replacement.
+    /// Draws a scene of `count` objects from `models`, with replacement.
     ///
     /// Cost: O(vertices + count² tries).
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] when there is no model, or `count` is not in 1 to 100.
+    /// [`SimError::Parameter`] if there is no model, or if `count` is not in 1 to 100.
     pub fn draw<R: Rng + ?Sized>(
         rng: &mut R,
         models: &[Model],
@@ -91,7 +94,7 @@ impl Clutter {
                 let angle = std::f64::consts::TAU * rng.random::<f64>();
                 let distance = reach * rng.random::<f64>().sqrt();
                 let (x, y) = (distance * angle.cos(), distance * angle.sin());
-                // Ends, since the disc outgrows the others.
+                // Terminates, because the disc outgrows all placed objects.
                 if discs
                     .iter()
                     .all(|(a, b, r)| (x - a).hypot(y - b) >= r + radius)
@@ -112,13 +115,15 @@ impl Clutter {
         Ok(Self { objects, extent })
     }
 
-    /// Looks at the scene's middle from a random side, near enough that the objects fill the image.
+    /// Observes the center of the scene from a random direction, near enough that the objects fill
+    /// the image.
     ///
-    /// `models` are those that the scene was drawn from. Cost: a render per object, and what the sensor costs.
+    /// `models` must be those from which the scene was drawn. Cost: one render per object, and the
+    /// cost of the sensor.
     ///
     /// # Errors
     ///
-    /// As [`DepthSensor::measure`].
+    /// As for [`DepthSensor::measure`].
     pub fn view<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -130,8 +135,11 @@ impl Clutter {
         self.view_from(rng, camera_from_world, models, camera, sensor)
     }
 
-    /// Returns camera poses along a path, the world in the camera frame: from a random side and 1.5 times as far as everything
-    /// needs to fit the camera comes nearer and goes round the scene by 40°, in equal steps, looking at its middle.
+    /// Returns camera poses along a path, as poses of the world in the camera frame, meters.
+    ///
+    /// The path starts at a random direction, at 1.5 times the distance at which all objects just
+    /// fit. In equal steps, the camera approaches and moves around the scene by 40°. It always
+    /// looks at the center.
     pub fn path<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -151,11 +159,13 @@ impl Clutter {
         (0..images).map(along).collect()
     }
 
-    /// Looks at the scene from a pose of the world in the camera frame; otherwise as [`Clutter::view`].
+    /// Observes the scene from a given pose of the world in the camera frame.
+    ///
+    /// Otherwise the same as [`Clutter::view`].
     ///
     /// # Errors
     ///
-    /// As [`DepthSensor::measure`].
+    /// As for [`DepthSensor::measure`].
     pub fn view_from<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -209,7 +219,9 @@ impl Clutter {
         self.look_from(elevation, azimuth, factor, camera)
     }
 
-    /// Looks at the scene's middle; `factor` is the distance against the one at which everything just fits.
+    /// Returns a camera pose that looks at the center of the scene.
+    ///
+    /// `factor` is the distance relative to the one at which all objects just fit.
     fn look_from(
         &self,
         elevation: f64,
@@ -217,7 +229,7 @@ impl Clutter {
         factor: f64,
         camera: &PinholeCamera,
     ) -> Isometry3<f64> {
-        // Half the width of the image at a distance of one.
+        // Half the width of the image at a distance of 1 m.
         let half_width = 0.5 * f64::from(camera.width()) / camera.fx();
         let distance = self.extent * (1.0 + 1.0 / half_width) * factor;
         let toward = Vector3::new(
@@ -226,7 +238,7 @@ impl Clutter {
             elevation.sin(),
         );
         let eye = Point3::from(toward * distance);
-        // From a frame that looks along -z with y up to one that looks along z with y down.
+        // Converts a camera that looks along -z with y up to one that looks along z with y down.
         let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         half_turn * Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z())
     }
@@ -236,7 +248,7 @@ fn within<R: Rng + ?Sized>(rng: &mut R, range: &std::ops::Range<f64>) -> f64 {
     range.start + (range.end - range.start) * rng.random::<f64>()
 }
 
-/// A rotation that puts one of six sides down and then turns about the vertical.
+/// Draws a rotation that puts one of six sides down, followed by a rotation around the vertical.
 fn resting<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
     let (axis, angle) = match rng.random_range(0..6) {
@@ -251,7 +263,7 @@ fn resting<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
     turn * UnitQuaternion::from_axis_angle(&axis, angle)
 }
 
-/// Middle and radius of the disc over which a turned mesh stands, and its lowest height.
+/// Returns the center and the radius of the disc below a rotated mesh, and its lowest height.
 fn footprint(mesh: &TriMesh, rotation: &UnitQuaternion<f64>) -> ((f64, f64), f64, f64) {
     let turned = || mesh.vertices().iter().map(|v| rotation * v.cast::<f64>());
     let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
@@ -286,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_stand_on_the_table_apart_from_each_other() {
+    fn objects_stand_on_the_table_without_touching() {
         let models = models();
         for scene in 0..5 {
             let clutter = Clutter::draw(&mut stream(3, &["scene"], scene), &models, 7).unwrap();
@@ -365,13 +377,13 @@ mod tests {
     }
 
     #[test]
-    fn a_path_comes_nearer_in_equal_steps() {
+    fn a_path_approaches_in_equal_steps() {
         let models = models();
         let camera = PinholeCamera::new(300.0, 300.0, 159.5, 119.5, 320, 240).unwrap();
         let clutter = Clutter::draw(&mut stream(5, &["scene"], 1), &models, 4).unwrap();
         let path = clutter.path(&mut stream(5, &["path"], 1), &camera, 9);
         assert_eq!(path.len(), 9);
-        // The middle is in front of every camera, ever nearer.
+        // The center is in front of every camera, at decreasing distances.
         let ranges: Vec<f64> = path.iter().map(|pose| pose.translation.z).collect();
         assert!(ranges.is_sorted_by(|a, b| a > b), "{ranges:?}");
         assert!((ranges[8] / ranges[0] - 0.6).abs() < 1e-9, "{ranges:?}");
@@ -412,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_place_is_refused() {
+    fn a_scene_without_models_or_objects_is_refused() {
         let mut rng = stream(1, &[], 0);
         assert!(Clutter::draw(&mut rng, &[], 3).is_err());
         assert!(Clutter::draw(&mut rng, &models(), 0).is_err());

@@ -1,27 +1,31 @@
-//! Connected parts of a mesh.
+//! Connected components of a mesh.
 
 use hicp_core::internal::index;
 use hicp_core::{MeshError, Point3, TriMesh};
 
-/// A connected part of a mesh.
+/// A connected component of a mesh.
 #[derive(Clone, Debug)]
 pub struct Component {
-    /// The part by itself.
+    /// The component as a mesh of its own triangles.
     pub mesh: TriMesh,
     /// Its area, m².
     pub area: f64,
-    /// The volume that it encloses when it is closed, m³; negative when it faces inward, around a cavity.
+    /// The enclosed volume if the component is closed, m³.
+    ///
+    /// It is negative if the component faces inward, such as around a cavity.
     pub volume: f64,
 }
 
-/// Returns the parts of a mesh that hang together by shared vertices, the largest area first. Cost: O(triangles).
+/// Returns the components connected by shared vertices, the largest area first.
+///
+/// Cost: O(triangles).
 ///
 /// # Errors
 ///
-/// [`MeshError`] when a part has no area.
+/// [`MeshError`] if a component has no area.
 pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
     let part_of = parts(mesh);
-    // Parts are numbered by their first triangle.
+    // Components are numbered by their first triangle.
     let mut number: Vec<Option<usize>> = vec![None; mesh.vertices().len()];
     let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
     for corners in mesh.triangles() {
@@ -54,11 +58,11 @@ pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
     Ok(components)
 }
 
-/// Puts meshes together into one.
+/// Joins meshes into one.
 ///
 /// # Errors
 ///
-/// [`MeshError`] when there is none.
+/// [`MeshError`] if there is no mesh.
 pub fn join<'a>(meshes: impl IntoIterator<Item = &'a TriMesh>) -> Result<TriMesh, MeshError> {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for mesh in meshes {
@@ -70,7 +74,8 @@ pub fn join<'a>(meshes: impl IntoIterator<Item = &'a TriMesh>) -> Result<TriMesh
     TriMesh::new(vertices, triangles)
 }
 
-/// Returns the signed volume of a closed mesh, m³: the sum over tetrahedra to one of its vertices.
+/// Returns the signed volume of a closed mesh, m³, as the sum over tetrahedra to one of its
+/// vertices.
 fn volume(mesh: &TriMesh) -> f64 {
     let origin = mesh.corners(0)[0].cast::<f64>();
     let tetrahedra = (0..mesh.triangles().len()).map(|t| {
@@ -80,7 +85,7 @@ fn volume(mesh: &TriMesh) -> f64 {
     tetrahedra.sum()
 }
 
-/// Returns for every vertex the smallest vertex of its part.
+/// Returns for every vertex the smallest vertex index of its component.
 fn parts(mesh: &TriMesh) -> Vec<u32> {
     let mut parent: Vec<u32> = (0_u32..).take(mesh.vertices().len()).collect();
     for &[a, b, c] in mesh.triangles() {
@@ -111,7 +116,7 @@ mod tests {
     use hicp_core::{Isometry3, Vector3};
 
     #[test]
-    fn parts_come_apart_and_together() {
+    fn components_are_separated_and_joined_again() {
         let (small, large) = (
             Solid::cuboid(Vector3::new(0.1, 0.1, 0.1), 2),
             Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 2),

@@ -1,4 +1,4 @@
-//! Everything that makes an image of a case imperfect, in one value.
+//! Corruptions of a case: all imperfections of its image in one value.
 
 use hicp_core::{DepthImage, Mask, Observation, PixelRegion};
 
@@ -8,20 +8,29 @@ use crate::mask::{Cut, MaskDefects, map_mask, pixels};
 use crate::sensor::DepthSensor;
 use crate::stream::stream;
 
-/// How far the board of [`Corruption::occluded_share`] stands in front of the object's nearest point, metres.
+/// Distance of the board of [`Corruption::occluded_share`] in front of the object's nearest point,
+/// meters.
 pub const OCCLUDER_GAP_METERS: f64 = 0.05;
 
-/// What lies between a perfect image of an object and what a pipeline is given. The default changes nothing.
+/// The imperfections between a perfect image of an object and the input of a pipeline.
 ///
-/// First the scene (a wall behind, a board in front), then the sensor, then the segmentation. Every step has its own stream
-/// of random numbers, of the case and not of the step's parameters: levels of one step are paired, and no step changes another.
+/// The default changes nothing. The order is: the scene (a wall behind, a board in front), the
+/// sensor, the segmentation.
+///
+/// Each step has its own stream of random numbers, which depends on the case and not on the
+/// parameters of the step. Different levels of one step are therefore paired, and no step changes
+/// another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Corruption {
-    /// A wall across the optical axis, so many metres behind the farthest visible point of the object; `None` for nothing.
-    /// Without one, pixels that a dilated mask adds have no depth.
+    /// Distance of a wall across the optical axis behind the farthest visible point of the object,
+    /// meters.
+    ///
+    /// If `None`, there is no wall, and pixels that a dilated mask adds have no depth.
     pub wall_behind_meters: Option<f64>,
-    /// Share of the object's visible pixels that a board in front of it hides, beyond a straight edge in a random direction.
-    /// They leave the mask, and their depth is the board's.
+    /// Share of the object's visible pixels that a board in front of it hides, 0 to 1.
+    ///
+    /// The board has a straight edge in a random direction. Hidden pixels leave the mask, and their
+    /// depth is that of the board.
     pub occluded_share: f64,
     /// The depth sensor.
     pub sensor: DepthSensor,
@@ -30,11 +39,12 @@ pub struct Corruption {
 }
 
 impl Corruption {
-    /// Returns the imperfect depth image and mask of a case. A function of the case and of this value alone.
+    /// Returns the imperfect depth image and mask of a case. They depend only on the case and on
+    /// `self`.
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] when a parameter is out of its range.
+    /// [`SimError::Parameter`] if a parameter is out of its range.
     pub fn apply(&self, case: &Case) -> Result<(DepthImage, Mask), SimError> {
         check_range("occluded share", self.occluded_share, 0.0..=1.0)?;
         let wall = self.wall_behind_meters.unwrap_or(0.0);
@@ -56,17 +66,17 @@ impl Corruption {
         Ok((depth, mask))
     }
 
-    /// Returns what a pipeline is given of a case: [`Corruption::apply`], observed.
+    /// Returns the observation of a case after [`Corruption::apply`].
     ///
     /// # Errors
     ///
-    /// As [`Corruption::apply`].
+    /// As for [`Corruption::apply`].
     pub fn observe(&self, case: &Case) -> Result<Observation, SimError> {
         let (depth, mask) = self.apply(case)?;
         Ok(Observation::new(depth, mask, case.camera)?)
     }
 
-    /// Puts the wall and the board into a perfect depth image.
+    /// Adds the wall and the board to a perfect depth image.
     fn scene(
         &self,
         depth: &DepthImage,

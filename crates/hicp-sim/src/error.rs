@@ -1,34 +1,34 @@
-//! What can go wrong in a simulation.
+//! Errors of simulations.
 
 use std::ops::RangeInclusive;
 
 use hicp_core::{ImageError, MeshError};
 use thiserror::Error;
 
-/// Why a simulation could not be made.
+/// The reason why a simulation is impossible.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SimError {
     /// A parameter is out of its range.
     #[error("{what} is {value}, expected {expected}")]
     Parameter {
-        /// The parameter.
+        /// Name of the parameter.
         what: &'static str,
         /// The value given.
         value: f64,
-        /// What was expected.
+        /// The expected values.
         expected: String,
     },
-    /// The object is as large as the largest distance to the camera, so that no distance is left to draw.
+    /// The diameter of an object leaves no distance to the camera to draw.
     #[error(
         "{object} has a diameter of {diameter} m, expected less than the largest distance to the camera, {max_distance} m"
     )]
     TooLarge {
         /// Name of the object.
         object: String,
-        /// Its diameter, metres.
+        /// Its diameter, meters.
         diameter: f64,
-        /// The largest distance configured, metres.
+        /// The configured largest distance, meters.
         max_distance: f64,
     },
     /// No initial pose fell into the bin of a case.
@@ -44,26 +44,26 @@ pub enum SimError {
         bin: usize,
         /// Number of bins.
         bins: usize,
-        /// Where the bin begins.
+        /// Lower end of the bin.
         low: f64,
-        /// Where the bin ends.
+        /// Upper end of the bin.
         high: f64,
         /// Number of initial poses tried.
         tried: u32,
-        /// Number of object poses they were tried around.
+        /// Number of object poses around which they were tried.
         poses: u32,
     },
-    /// The words do not name a noise model.
+    /// The text is not the name of a noise model.
     #[error(
-        "{text:?} is no depth noise, expected none, relative:PERCENT, axial:C0,C1,C2, d435-ahn2019-axial, stereo:FOCAL_PIXELS,BASELINE_METERS,SUBPIXEL,QUANTIZATION_PIXELS or d435-nominal-stereo"
+        "{text:?} is not a depth noise, expected none, relative:PERCENT, axial:C0,C1,C2, d435-ahn2019-axial, stereo:FOCAL_PIXELS,BASELINE_METERS,SUBPIXEL,QUANTIZATION_PIXELS or d435-nominal-stereo"
     )]
     NoiseName {
-        /// What was given.
+        /// The text given.
         text: String,
     },
-    /// A volume would hold more voxels than are allowed.
+    /// A volume would have too many voxels, or too few along an axis.
     #[error(
-        "a volume of {x}x{y}x{z} voxels was asked for, expected at most {limit} voxels and at least 2 along each axis"
+        "the volume has {x}x{y}x{z} voxels, expected at most {limit} voxels and at least 2 along each axis"
     )]
     VolumeSize {
         /// Voxels along x.
@@ -72,26 +72,26 @@ pub enum SimError {
         y: usize,
         /// Voxels along z.
         z: usize,
-        /// The largest number.
+        /// The largest number of voxels.
         limit: usize,
     },
-    /// A volume holds no surface.
+    /// A volume does not contain a surface.
     #[error(
-        "the volume holds no surface: no two neighbouring voxels differ in sign after {images} images"
+        "the volume contains no surface: no two neighboring voxels differ in sign after {images} images"
     )]
     NoSurface {
-        /// Images integrated.
+        /// Number of integrated images.
         images: u32,
     },
-    /// Images do not fit together.
+    /// The sizes of images do not match.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A mesh could not be made.
+    /// A mesh is invalid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// Returns an error unless a value lies in a closed range.
+/// Returns an error if a value is not in a closed range.
 pub(crate) fn check_range(
     what: &'static str,
     value: f64,

@@ -9,31 +9,32 @@ use crate::shapes::{boxes, tools, vessels};
 use crate::solid::Solid;
 use crate::stream::stream;
 
-/// A household object made from code: 0.08 to 0.3 m, 2,000 to 10,000 triangles, every part of it closed, with its
-/// symmetries declared.
+/// A procedural household object with declared symmetries.
 ///
-/// The shapes are those on which ICP variants differ: thin walls, handles, near-symmetric bodies, flat boxes, concave
-/// bowls, thin plates. Twenty categories, like the twenty `ShapeNet` categories of §VI-A.1: ten to tune thresholds on
-/// ([`Household::TUNING`]) and ten to report on ([`Household::TEST`]), each with bodies of revolution, discrete symmetries,
-/// thin plates, handles and asymmetric objects.
+/// Objects have 0.08 to 0.3 m and 2,000 to 10,000 triangles. Each part of an object is closed.
+/// Parts (a mug's wall and its handle) overlap instead of being joined.
 ///
-/// Parts of one object (a mug's wall and its handle) overlap instead of being joined.
+/// The shapes are those on which ICP variants differ: thin walls, handles, near-symmetric bodies,
+/// flat boxes, concave bowls, thin plates. There are twenty categories, like the twenty `ShapeNet`
+/// categories of §VI-A.1. Ten serve to tune thresholds ([`Household::TUNING`]), and ten to report
+/// results ([`Household::TEST`]). Both sets have bodies of revolution, discrete symmetries, thin
+/// plates, handles and asymmetric objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Household {
     /// A cup with a thin wall and a handle.
     Mug,
-    /// A bottle with a neck; any turn about its axis looks the same.
+    /// A bottle with a neck. It is symmetric under any rotation around its axis.
     Bottle,
-    /// A thin-walled bowl; any turn about its axis looks the same.
+    /// A thin-walled bowl. It is symmetric under any rotation around its axis.
     Bowl,
-    /// A flat carton; half turns about its axes look the same.
+    /// A flat carton. It is symmetric under half rotations around its axes.
     Carton,
     /// An angle bracket of two thin plates.
     Bracket,
     /// A hammer: a handle and an asymmetric head.
     Hammer,
-    /// A dinner plate; any turn about its axis looks the same.
+    /// A dinner plate. It is symmetric under any rotation around its axis.
     Plate,
     /// A clothes iron: a wedge with a handle.
     Iron,
@@ -41,7 +42,7 @@ pub enum Household {
     Car,
     /// A pan with a long handle.
     Pan,
-    /// A can; any turn about its axis looks the same, and so does upside down.
+    /// A can. It is symmetric under any rotation around its axis and when turned upside down.
     Can,
     /// An open laptop: two thin plates at an angle, one slightly thicker.
     Laptop,
@@ -49,13 +50,14 @@ pub enum Household {
     Teapot,
     /// A kitchen knife: a thin blade and a handle.
     Knife,
-    /// A closed book; turned over end for end, it looks the same.
+    /// A closed book. It is symmetric when turned end over end.
     Book,
-    /// A hexagonal planter with a thin wall; six turns about its axis look the same.
+    /// A hexagonal planter with a thin wall. It is symmetric under six rotations around its axis.
     Pot,
-    /// A roll of tape; any turn about its axis looks the same, and so does upside down.
+    /// A roll of tape. It is symmetric under any rotation around its axis and when turned upside
+    /// down.
     Tape,
-    /// Headphones; half a turn looks the same.
+    /// Headphones. They are symmetric under a half rotation.
     Headphones,
     /// A camera: a box with a lens.
     Camera,
@@ -64,7 +66,7 @@ pub enum Household {
 }
 
 impl Household {
-    /// Every object. The order is fixed; new objects come last.
+    /// Every object. The order is fixed; new objects are appended.
     pub const ALL: [Self; 20] = [
         Self::Mug,
         Self::Bottle,
@@ -88,7 +90,8 @@ impl Household {
         Self::Ladle,
     ];
 
-    /// The ten objects on which thresholds are tuned (supplementary material, III); none of them is in [`Household::TEST`].
+    /// The ten objects for tuning thresholds (supplementary material, III). None is in
+    /// [`Household::TEST`].
     pub const TUNING: [Self; 10] = [
         Self::Bottle,
         Self::Plate,
@@ -102,7 +105,7 @@ impl Household {
         Self::Knife,
     ];
 
-    /// The ten objects on which results are reported (§VI-A.1).
+    /// The ten objects for reporting results (§VI-A.1).
     pub const TEST: [Self; 10] = [
         Self::Bowl,
         Self::Can,
@@ -116,7 +119,7 @@ impl Household {
         Self::Camera,
     ];
 
-    /// The name, and the function that builds the solid.
+    /// Returns the name, and the function that builds the solid.
     fn shape(self) -> (&'static str, fn() -> Solid) {
         match self {
             Self::Mug => ("mug", vessels::mug),
@@ -142,26 +145,26 @@ impl Household {
         }
     }
 
-    /// Returns the name in tables and files: lower case, one word.
+    /// Returns the name in tables and files: one word in lower case.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.shape().0
     }
 
-    /// Makes the object's model in its nominal proportions, with its symmetries.
+    /// Builds the object's model in its nominal proportions, with its symmetries. Meters, z up.
     ///
     /// # Errors
     ///
-    /// None for the objects that ship; the signature is that of the mesh it is made from.
+    /// Never fails for the objects that ship; the error is that of the mesh.
     pub fn model(self) -> Result<Model, MeshError> {
         self.model_with(Proportions::default())
     }
 
-    /// Makes the object's model in other proportions, with its symmetries.
+    /// Builds the object's model in other proportions, with its symmetries. Meters, z up.
     ///
     /// # Errors
     ///
-    /// [`MeshError`] when the proportions leave no mesh, for instance because one is zero.
+    /// [`MeshError`] if the proportions leave no mesh, for example because one is zero.
     pub fn model_with(self, proportions: Proportions) -> Result<Model, MeshError> {
         Ok(Model::with_config(
             self.solid_with(proportions).to_mesh()?,
@@ -185,7 +188,7 @@ impl Household {
         self.solid().scaled(&Vector3::new(width, width, height))
     }
 
-    /// Returns the declared symmetries; they hold in any [`Proportions`].
+    /// Returns the declared symmetries, which hold in any [`Proportions`].
     #[must_use]
     pub fn symmetries(self) -> Symmetries {
         let turn = |axis: Vector3<f64>, share: f64| {
@@ -212,9 +215,10 @@ impl Household {
     }
 }
 
-/// How an object is stretched against its nominal shape: factors, 1 for as it is.
+/// Factors that stretch an object relative to its nominal shape; 1 leaves it unchanged.
 ///
-/// One factor across and one along z, so that every declared symmetry survives. Walls become thinner and thicker with it.
+/// There is one factor for x and y and one for z, so every declared symmetry is preserved. The
+/// thickness of walls scales with them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proportions {
     /// Factor in x and y.
@@ -224,7 +228,9 @@ pub struct Proportions {
 }
 
 impl Proportions {
-    /// Draws proportions from a seed, each uniform in [0.8, 1]: another specimen of the category, within the sizes of [`Household`].
+    /// Draws proportions from a seed, each uniform in [0.8, 1].
+    ///
+    /// They give another specimen of the category, within the sizes of [`Household`].
     #[must_use]
     pub fn from_seed(seed: u64) -> Self {
         let mut rng = stream(seed, &["proportions"], 0);

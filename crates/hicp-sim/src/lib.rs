@@ -1,6 +1,8 @@
-//! Synthetic scenes: procedural household objects, object poses, perturbed initial poses and depth noise, all from a seed.
+//! Synthetic scenes from a seed: procedural household objects, object poses, perturbed initial
+//! poses and depth noise.
 //!
-//! **Should you use this crate?** To try a pipeline without a dataset, or to test a component against known truth, yes.
+//! **Should you use this crate?** Use it to try a pipeline without a dataset, or to test a
+//! component against known ground truth.
 //!
 //! ```
 //! use hicp_sim::{Household, perturb, rng};
@@ -15,7 +17,7 @@
 //! # Ok(()) }
 //! ```
 
-// Counts of profile points become floating point numbers.
+// Counts of profile points are converted to floating-point numbers.
 #![allow(clippy::cast_precision_loss)]
 
 mod case;
@@ -55,10 +57,11 @@ pub use solid::Solid;
 pub use stream::stream;
 pub use tsdf::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
 
-/// The generator that all simulations use: small, fast, and the same on every machine and in every version.
+/// The random generator of all simulations: small, fast, and the same on every machine and in every
+/// version.
 pub type SimRng = rand_pcg::Pcg64Mcg;
 
-/// Returns the generator of a seed.
+/// Creates the generator for a seed.
 #[must_use]
 pub fn rng(seed: u64) -> SimRng {
     rand::SeedableRng::seed_from_u64(seed)

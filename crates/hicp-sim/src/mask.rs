@@ -1,16 +1,17 @@
-//! What segmentations get wrong: masks too small, too large, or with a part missing.
+//! Defects of segmentations: masks that are too small, too large, or incomplete.
 
 use hicp_core::{Mask, PixelRegion};
 use rand::{Rng, RngExt};
 
 use crate::error::{SimError, check_range};
 
-/// Imperfections of a segmentation mask, applied in the order of the fields. The default changes nothing.
+/// Defects of a segmentation mask, applied in the order of the fields. The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskDefects {
     /// Share of the mask's pixels that a straight cut in a random direction removes, 0 to 1.
     pub missing_share: f64,
-    /// Radius of the disc by which the mask is eroded, pixels; beyond the image counts as inside.
+    /// Radius of the disc by which the mask is eroded, pixels. Pixels outside the image count as
+    /// inside the mask.
     pub erosion_pixels: u32,
     /// Radius of the disc by which the mask is dilated, pixels.
     pub dilation_pixels: u32,
@@ -20,11 +21,11 @@ pub struct MaskDefects {
 const MAX_RADIUS: u32 = 256;
 
 impl MaskDefects {
-    /// Returns the mask as an imperfect segmentation would give it. Cost: O(pixels of the mask's box · radius).
+    /// Returns the mask with these defects. Cost: O(pixels of the mask's box · radius).
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] when the share is not in [0, 1] or a radius is above 256 pixels.
+    /// [`SimError::Parameter`] if the share is not in [0, 1] or a radius is above 256 pixels.
     pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, mask: &Mask) -> Result<Mask, SimError> {
         check_range("missing share of the mask", self.missing_share, 0.0..=1.0)?;
         for (what, radius) in [
@@ -34,7 +35,7 @@ impl MaskDefects {
             check_range(what, f64::from(radius), 0.0..=f64::from(MAX_RADIUS))?;
         }
         let mut mask = mask.clone();
-        // Drawn in any case, so that shares of one stream cut in one direction.
+        // Always draw the cut, so that different shares of one stream cut in the same direction.
         let cut = Cut::new(rng, &mask, self.missing_share);
         if let Some(cut) = cut {
             mask = map_mask(&mask, |u, v, set| set && !cut.removes(u, v))?;
@@ -49,7 +50,7 @@ impl MaskDefects {
     }
 }
 
-/// A straight line that has a given share of a mask's pixels on its far side.
+/// A straight line with a given share of a mask's pixels on its far side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cut {
     direction: (f64, f64),
@@ -57,7 +58,9 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
-    /// Draws a direction and places the line; `None` when the share cuts nothing. Always draws one number.
+    /// Draws a direction and places the line. Returns `None` if the share cuts nothing.
+    ///
+    /// Always draws exactly one number.
     pub(crate) fn new<R: Rng + ?Sized>(rng: &mut R, mask: &Mask, share: f64) -> Option<Self> {
         let (sine, cosine) = (std::f64::consts::TAU * rng.random::<f64>()).sin_cos();
         let mut cut = Self {
@@ -81,13 +84,13 @@ impl Cut {
         self.direction.0 * f64::from(u) + self.direction.1 * f64::from(v)
     }
 
-    /// Returns whether a pixel, of the mask or not, lies on the far side.
+    /// Returns whether a pixel, inside or outside the mask, lies on the far side.
     pub(crate) fn removes(&self, u: u32, v: u32) -> bool {
         self.position(u, v) >= self.offset
     }
 }
 
-/// Returns the mask with `new(u, v, set)` at every pixel.
+/// Returns a mask with `new(u, v, set)` at every pixel.
 pub(crate) fn map_mask(
     mask: &Mask,
     mut new: impl FnMut(u32, u32, bool) -> bool,
@@ -99,7 +102,7 @@ pub(crate) fn map_mask(
     Ok(Mask::new(mask.width(), mask.height(), set.collect())?)
 }
 
-/// The pixels of a region, row by row.
+/// Returns the pixels of a region, row by row.
 pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> + use<> {
     let PixelRegion {
         u_min,
@@ -110,12 +113,12 @@ pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> +
     (v_min..v_max).flat_map(move |v| (u_min..u_max).map(move |u| (u, v)))
 }
 
-/// Spreads the pixels of one value over a disc: set ones to dilate, unset ones to erode.
+/// Spreads the pixels of one value over a disc: set pixels to dilate, unset pixels to erode.
 fn grow(mask: &Mask, radius: u32, value: bool) -> Result<Mask, SimError> {
     let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
     let mut grown = mask.pixels().to_vec();
     let r = i64::from(radius);
-    // Half the width of the disc in the row `dy` away from its middle.
+    // Half the width of the disc in the row at a distance of `dy` from its center.
     let half_width = |dy: i64| {
         #[allow(clippy::cast_possible_truncation)]
         // At most the radius.
@@ -131,7 +134,7 @@ fn grow(mask: &Mask, radius: u32, value: bool) -> Result<Mask, SimError> {
     };
     for v in 0..height {
         for u in 0..width {
-            // Only from the border of what spreads: its inside adds nothing.
+            // Only the border needs to spread; the inside adds nothing.
             let border = [(1, 0), (-1, 0), (0, 1), (0, -1)];
             if !is(u, v) || border.iter().all(|(dx, dy)| is(u + dx, v + dy)) {
                 continue;
@@ -174,13 +177,14 @@ mod tests {
     }
 
     #[test]
-    fn no_defect_leaves_the_mask() {
+    fn a_mask_without_defects_is_unchanged() {
         assert_eq!(apply(0.0, 0, 0, &disc(20.0)), disc(20.0));
     }
 
     #[test]
-    fn erosion_and_dilation_are_those_of_the_definition() {
-        // By definition: a pixel survives erosion when the whole disc around it is set, and is set by dilation when any is.
+    fn erosion_and_dilation_match_their_definitions() {
+        // By definition, erosion keeps a pixel if the whole disc around it is set, and dilation
+        // sets a pixel if any pixel of the disc is set.
         let mask = apply(0.3, 0, 0, &disc(23.0));
         for radius in [1_u32, 2, 5] {
             let (eroded, dilated) = (apply(0.0, radius, 0, &mask), apply(0.0, 0, radius, &mask));
@@ -205,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_missing_part_has_its_share_and_is_connected_to_the_rim() {
+    fn the_missing_part_has_its_share_and_grows_with_it() {
         let full = disc(30.0);
         for share in [0.1, 0.25, 0.5] {
             let cut = apply(share, 0, 0, &full);
@@ -225,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_mask_stays_empty_and_wrong_shares_are_named() {
+    fn an_empty_mask_stays_empty_and_invalid_shares_are_refused() {
         let empty = Mask::new(10, 10, vec![false; 100]).unwrap();
         assert_eq!(count(&apply(0.5, 3, 3, &empty)), 0);
         let wrong = MaskDefects {

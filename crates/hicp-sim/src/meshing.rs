@@ -1,9 +1,11 @@
-//! Closed meshes from sampled scalar fields: marching cubes with a table that is generated, not copied.
+//! Closed meshes from sampled scalar fields, by marching cubes with a generated table.
 //!
-//! Lorensen & Cline 1987 leave faces with two diagonal corners inside to the table; neighbours must decide alike, or the
-//! surface has holes. Here every run of inside corners around a face is cut off by one segment, which depends on the face
-//! alone. Segments form loops; each is filled by a fan whose diagonals do not lie in a face, or else around its centre. So
-//! every edge is shared by exactly two triangles, and every vertex has one disc of triangles around it.
+//! Lorensen & Cline 1987 do not define how to treat faces with two diagonal corners inside.
+//! Neighboring cells must decide alike, or the surface has holes. Here, one segment cuts off each
+//! run of inside corners around a face, which depends only on the face. The segments form loops.
+//! Each loop is filled by a fan whose diagonals do not lie in a face, or otherwise by triangles
+//! around its center. As a result, every edge belongs to exactly two triangles, and the triangles
+//! around every vertex form one disc.
 
 use std::collections::HashMap;
 
@@ -12,33 +14,38 @@ use hicp_core::{Point3, TriMesh, Vector3};
 
 use crate::error::SimError;
 
-/// Samples of a scalar field on a regular grid: negative inside, not a number where unknown.
+/// Samples of a scalar field on a regular grid: negative inside, NaN if unknown.
 #[derive(Clone, Debug)]
 pub struct ScalarGrid {
-    /// Position of sample (0, 0, 0), metres.
+    /// Position of sample (0, 0, 0), meters.
     pub origin: Point3<f64>,
-    /// Distance between neighbouring samples, metres.
+    /// Distance between neighboring samples, meters.
     pub spacing: f64,
     /// Number of samples along x, y and z.
     pub size: [usize; 3],
-    /// The samples, x fastest: index (k · `size[1]` + j) · `size[0]` + i.
+    /// The samples, with x varying fastest: index (k · `size[1]` + j) · `size[0]` + i.
     pub values: Vec<f32>,
 }
 
-/// How near to a sample, as a share of the spacing, a vertex may come: vertices of different edges then never meet.
+/// Smallest distance of a vertex from a sample, as a share of the spacing.
+///
+/// It ensures that vertices of different edges never coincide.
 const VERTEX_MARGIN: f32 = 0.01;
 
 impl ScalarGrid {
-    /// Returns the surface where the field changes its sign, facing the positive side.
+    /// Returns the surface at which the field changes its sign, facing the positive side.
     ///
-    /// Manifold and consistently wound. Closed when no sample is unknown and the samples at the border of the grid are
-    /// positive; cells with an unknown sample are left out, and the surface ends there. Vertices are interpolated
-    /// linearly. Cost: O(samples).
+    /// The surface is manifold and consistently wound. It is closed if every sample is known and
+    /// the samples at the border of the grid are positive. Cells with an unknown sample are
+    /// skipped, and the surface ends there. Vertices are interpolated linearly.
+    ///
+    /// Cost: O(samples).
     ///
     /// # Errors
     ///
-    /// [`SimError::VolumeSize`] when `values` does not hold a sample for every point, or there are fewer than two along an
-    /// axis; [`SimError::Mesh`] when there is no surface.
+    /// - [`SimError::VolumeSize`] if `values` does not have one sample per grid point, or if there
+    ///   are fewer than two samples along an axis.
+    /// - [`SimError::Mesh`] if there is no surface.
     pub fn surface(&self) -> Result<TriMesh, SimError> {
         let [nx, ny, nz] = self.size;
         if self.values.len() != nx * ny * nz || self.size.iter().any(|n| *n < 2) {
@@ -81,10 +88,11 @@ impl ScalarGrid {
     }
 }
 
-/// The mesh while it grows.
+/// A mesh under construction.
 struct Surface<'a> {
     grid: &'a ScalarGrid,
-    /// The vertex of a grid edge, by three times its first sample plus its axis.
+    /// The vertex on a grid edge. The key is three times the index of the edge's first sample plus
+    /// its axis.
     vertex_on: HashMap<usize, u32>,
     vertices: Vec<Point3<f32>>,
     triangles: Vec<[u32; 3]>,
@@ -175,16 +183,17 @@ impl Edge {
     }
 }
 
-/// A polygon of a cell's surface, counter-clockwise seen from outside the object.
+/// A polygon of the surface within a cell, counter-clockwise when seen from outside the object.
 #[derive(Clone, Debug)]
 struct Polygon {
-    /// The edges that its corners lie on; a fan starts at the first.
+    /// The edges on which its corners lie. A fan starts at the first.
     edges: Vec<Edge>,
-    /// Whether a fan would lay a diagonal into a face, where the neighbour might lay one too.
+    /// Whether every fan would have a diagonal in a face, in which the neighbor might have one,
+    /// too.
     around_center: bool,
 }
 
-/// Corners of the six faces, counter-clockwise seen from outside the cell.
+/// Corners of the six faces, counter-clockwise when seen from outside the cell.
 const FACES: [[usize; 4]; 6] = [
     [0, 4, 6, 2],
     [1, 3, 7, 5],
@@ -201,7 +210,8 @@ fn table() -> Vec<Vec<Polygon>> {
 
 fn polygons(inside: usize) -> Vec<Polygon> {
     let is_inside = |corner: usize| inside >> corner & 1 == 1;
-    // Around every face, each run of inside corners is cut off by a segment from where it is entered to where it is left.
+    // On every face, a segment cuts off each run of inside corners, from the edge that enters the
+    // run to the edge that leaves it.
     let mut next: [Option<Edge>; 24] = [None; 24];
     for face in FACES {
         for start in 0..4 {
@@ -217,7 +227,7 @@ fn polygons(inside: usize) -> Vec<Polygon> {
             next[Edge::between(before, first).number()] = Some(left);
         }
     }
-    // An edge that one face enters by is where the other leaves, so the segments close to loops.
+    // An edge that enters on one face leaves on the other, so the segments form closed loops.
     let mut polygons = Vec::new();
     for corner in 0..8 {
         for axis in 0..3 {
@@ -299,7 +309,7 @@ mod tests {
 
     #[test]
     fn any_field_gives_a_closed_manifold() {
-        // Random signs hold every one of the 256 cells next to every kind of neighbour.
+        // Random signs produce all 256 cells next to every kind of neighbor.
         let mut rng = rng(8);
         let mut seen = HashSet::new();
         for size in [5, 6, 12, 24] {
@@ -361,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn no_surface_and_wrong_counts_are_said() {
+    fn a_field_without_surface_and_wrong_counts_are_refused() {
         assert!(matches!(
             grid(4, |_, _, _| 1.0).surface(),
             Err(SimError::Mesh(_))

@@ -1,6 +1,6 @@
-//! Depth-sensor noise, independent per pixel.
+//! Noise of depth sensors, independent per pixel.
 //!
-//! Real stereo noise is correlated between neighbouring pixels, which none of these models.
+//! Real stereo noise is correlated between neighboring pixels; none of these models includes that.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,15 +11,19 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::SimError;
 
-/// Gaussian noise whose standard deviation is a share of the depth, independent per pixel (§VI-B.2).
+/// Gaussian noise with a standard deviation proportional to the depth, independent per pixel
+/// (§VI-B.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativeGaussian {
-    /// Standard deviation as a percentage of the depth; 0 changes nothing.
+    /// Standard deviation in percent of the depth; 0 changes nothing.
     pub percent: f64,
 }
 
 impl RelativeGaussian {
-    /// Returns a noisy copy of an image. Pixels without depth stay without; noise that would turn a depth negative removes it.
+    /// Returns a noisy copy of an image.
+    ///
+    /// Pixels without depth stay without. If noise would make a depth negative, the depth is
+    /// removed.
     #[must_use]
     pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
         let sigma = self.percent / 100.0;
@@ -27,7 +31,7 @@ impl RelativeGaussian {
     }
 }
 
-/// Gaussian noise whose standard deviation is c₀ + c₁ z + c₂ z² metres at a depth of z metres.
+/// Gaussian noise with a standard deviation of c₀ + c₁ z + c₂ z² at depth z, both in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxialPolynomial {
     /// Constant, m.
@@ -39,10 +43,14 @@ pub struct AxialPolynomial {
 }
 
 impl AxialPolynomial {
-    /// The axial term for the Intel `RealSense` D435: σ = 0.001063 + 0.0007278 z + 0.003949 z², about 0.5 % of z from 0.4 to 1 m.
+    /// Returns the axial term for the Intel `RealSense` D435: σ = 0.001063 + 0.0007278 z + 0.003949
+    /// z².
     ///
-    /// Coefficients as transcribed in public implementations of Ahn, Chae, Noh, Nam & Hong, "Analysis and Noise Modeling of
-    /// the Intel `RealSense` D435 for Mobile Robots", UR 2019; original paper not consulted; axial term only, near-frontal
+    /// That is about 0.5 % of z from 0.4 to 1 m.
+    ///
+    /// The coefficients are from public implementations of Ahn, Chae, Noh, Nam & Hong, "Analysis
+    /// and Noise Modeling of the Intel `RealSense` D435 for Mobile Robots", UR 2019. The original
+    /// paper was not consulted. Only the axial term is used, which holds for nearly frontal
     /// surfaces. One paper that cites it reports up to 4 cm at 2 m, twice this polynomial.
     #[must_use]
     pub fn d435_ahn2019_axial() -> Self {
@@ -53,7 +61,7 @@ impl AxialPolynomial {
         }
     }
 
-    /// Returns the standard deviation at a depth, both metres.
+    /// Returns the standard deviation at a depth, both in meters.
     #[must_use]
     pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
         self.c0 + depth_meters * (self.c1 + depth_meters * self.c2)
@@ -66,24 +74,30 @@ impl AxialPolynomial {
     }
 }
 
-/// Gaussian noise of a stereo camera's disparity d = f B / z, so that the depth's RMS is z² s / (f B) to first order.
+/// Gaussian noise of a stereo camera's disparity d = f B / z.
+///
+/// To first order, the RMS error of the depth is z² s / (f B).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoDisparity {
-    /// Focal length f of the stereo pair, pixels; need not be the camera that the image was rendered with.
+    /// Focal length f of the stereo pair, pixels. It may differ from that of the rendering camera.
     pub focal_pixels: f64,
-    /// Baseline B, metres.
+    /// Baseline B, meters.
     pub baseline_meters: f64,
-    /// RMS s of the disparity, pixels.
+    /// RMS error s of the disparity, pixels.
     pub subpixel: f64,
-    /// Step to which the disparity is rounded after the noise, pixels; 0 for none.
+    /// Step to which the disparity is rounded after adding noise, pixels; 0 for no rounding.
     pub quantization_pixels: f64,
 }
 
 impl StereoDisparity {
-    /// Intel's formula with nominal figures of the D435: 848 pixels over 87°, a baseline of 50 mm, and 0.08 pixels RMS, the
-    /// value that Intel's depth CTO advises (librealsense issue 3904; 1/32 is the ideal limit). No rounding.
+    /// Returns Intel's formula with nominal values of the D435, without rounding.
     ///
-    /// 0.9 mm at 0.5 m and 3.6 mm at 1 m. Measured active stereo grows faster than z² (Huber et al. 2018).
+    /// The values are 848 pixels over 87°, a baseline of 50 mm, and 0.08 pixels RMS. The last one
+    /// is the value that Intel's depth CTO recommends (librealsense issue 3904; 1/32 is the ideal
+    /// limit).
+    ///
+    /// The noise is 0.9 mm at 0.5 m and 3.6 mm at 1 m. Measured noise of active stereo grows faster
+    /// than z² (Huber et al. 2018).
     #[must_use]
     pub fn d435_nominal() -> Self {
         Self {
@@ -94,7 +108,8 @@ impl StereoDisparity {
         }
     }
 
-    /// Returns the standard deviation at a depth to first order, without rounding, both metres.
+    /// Returns the standard deviation at a depth to first order and without rounding, both in
+    /// meters.
     #[must_use]
     pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
         depth_meters * depth_meters * self.subpixel / (self.focal_pixels * self.baseline_meters)
@@ -116,10 +131,10 @@ impl StereoDisparity {
     }
 }
 
-/// A noise model by name, so that studies, files and command lines can choose one.
+/// A noise model by name, for studies, files and command lines.
 ///
-/// All of them draw one number per measured pixel, in row-major order: with the same stream, images of different models and
-/// levels differ by how the same deviates are scaled and by nothing else.
+/// All models draw one number per measured pixel, in row-major order. With the same stream, images
+/// of different models and levels therefore use the same deviates and differ only in their scale.
 ///
 /// ```
 /// use hicp_sim::DepthNoise;
@@ -131,19 +146,22 @@ impl StereoDisparity {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum DepthNoise {
-    /// None: the image as it is.
+    /// No noise; the image is unchanged.
     #[default]
     None,
-    /// A share of the depth.
+    /// Noise proportional to the depth.
     Relative(RelativeGaussian),
-    /// A polynomial of the depth.
+    /// Noise with a polynomial of the depth.
     Axial(AxialPolynomial),
-    /// Noise of a disparity.
+    /// Noise of the disparity.
     Stereo(StereoDisparity),
 }
 
 impl DepthNoise {
-    /// Returns a noisy copy of an image. Pixels without depth stay without; noise that would turn a depth negative removes it.
+    /// Returns a noisy copy of an image.
+    ///
+    /// Pixels without depth stay without. If noise would make a depth negative, the depth is
+    /// removed.
     #[must_use]
     pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
         match self {
@@ -154,7 +172,7 @@ impl DepthNoise {
         }
     }
 
-    /// Returns the standard deviation at a depth, both metres; for disparities to first order.
+    /// Returns the standard deviation at a depth, both in meters; to first order for disparities.
     #[must_use]
     pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
         match self {
@@ -194,11 +212,12 @@ impl fmt::Display for DepthNoise {
 impl FromStr for DepthNoise {
     type Err = SimError;
 
-    /// Reads what [`fmt::Display`] writes.
+    /// Parses the form that [`fmt::Display`] writes.
     ///
     /// # Errors
     ///
-    /// [`SimError::NoiseName`] for other words, missing numbers, and numbers that are negative or not finite.
+    /// [`SimError::NoiseName`] if the name is unknown, or if numbers are missing, negative or not
+    /// finite.
     fn from_str(text: &str) -> Result<Self, SimError> {
         let unknown = || SimError::NoiseName {
             text: text.to_owned(),
@@ -234,7 +253,9 @@ impl FromStr for DepthNoise {
     }
 }
 
-/// Replaces every measured depth by `measure(depth, deviate)`, both metres but the standard normal deviate.
+/// Replaces every measured depth by `measure(depth, deviate)`, with depths in meters.
+///
+/// The deviate is standard normal.
 fn disturb<R: Rng + ?Sized>(
     rng: &mut R,
     depth: &DepthImage,
@@ -246,7 +267,7 @@ fn disturb<R: Rng + ?Sized>(
     })
 }
 
-/// Replaces every measured depth, metres; what is not a valid depth is missing.
+/// Replaces every measured depth, in meters. Results that are not a valid depth become missing.
 pub(crate) fn map_depths(depth: &DepthImage, mut new: impl FnMut(f64) -> f64) -> DepthImage {
     let pixels = depth
         .pixels()
@@ -270,7 +291,7 @@ mod tests {
     use super::*;
     use crate::rng;
 
-    /// Mean and standard deviation of what a wall at `z` metres is measured at.
+    /// Returns the mean and the standard deviation of the measured depths of a wall at `z` meters.
     fn moments(noise: DepthNoise, z: f32) -> (f64, f64) {
         let wall = DepthImage::from_meters(200, 200, vec![z; 40_000]).unwrap();
         let noisy = noise.apply(&mut rng(3), &wall);
@@ -281,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn every_model_has_the_deviation_it_says() {
+    fn every_model_has_its_stated_standard_deviation() {
         for text in [
             "relative:2",
             "axial:0.001,0.002,0.003",
@@ -292,7 +313,8 @@ mod tests {
             for z in [0.3_f32, 0.6, 1.2] {
                 let (mean, sigma) = moments(noise, z);
                 let expected = noise.sigma_meters(f64::from(z));
-                // 40,000 samples: 0.35 % standard error of σ, and σ/200 of the mean; stereo has a bias of second order.
+                // With 40,000 samples, the standard error of σ is 0.35 %, and that of the mean is
+                // σ/200. Stereo has a bias of second order.
                 assert!(
                     (sigma / expected - 1.0).abs() < 0.015,
                     "{text} at {z}: {sigma}, {expected}"
@@ -348,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn names_come_back_and_others_are_refused() {
+    fn names_are_parsed_back_and_other_texts_are_refused() {
         for text in [
             "none",
             "relative:2.5",

@@ -1,11 +1,12 @@
-//! Profiles and polygons that solids are turned and extruded from: points in the plane, metres.
+//! Profiles and polygons for lathes and extrusions: points in the plane, meters.
 
 /// Returns the points of a curve at 0, 1, …, `last`.
 pub(crate) fn curve<P>(last: u32, point: impl Fn(f64) -> P) -> Vec<P> {
     (0..=last).map(f64::from).map(point).collect()
 }
 
-/// Returns the profile of a spherical bowl: from the foot at its axis up to the rim, and back inside.
+/// Returns the profile of a spherical bowl, from the foot on its axis up to the rim and back
+/// inside.
 pub(crate) fn bowl_profile(outer_radius: f64, inner_radius: f64) -> Vec<(f64, f64)> {
     let side = |radius: f64| {
         curve(14, |i| {
@@ -18,10 +19,12 @@ pub(crate) fn bowl_profile(outer_radius: f64, inner_radius: f64) -> Vec<(f64, f6
     profile
 }
 
-/// Inserts points so that no segment of an open profile is longer than `longest`; the closing segment runs along the axis.
+/// Inserts points so that no segment of an open profile is longer than `longest`.
+///
+/// The closing segment runs along the axis.
 pub(crate) fn refine(profile: &[(f64, f64)], longest: f64) -> Vec<(f64, f64)> {
     let mut points = subdivide(profile, longest);
-    // The closing segment lies on the axis and makes no surface.
+    // The closing segment lies on the axis and forms no surface.
     while points.len() > 1
         && points.last().is_some_and(|p| p.0 == 0.0)
         && points[points.len() - 2].0 == 0.0

@@ -1,4 +1,4 @@
-//! Noisy models: an object reconstructed from images of itself (§VI-B.3).
+//! Noisy models: objects reconstructed from noisy images (§VI-B.3).
 
 use hicp_core::{Model, ModelConfig, PinholeCamera, Vector3};
 use hicp_raster::render_depth_image;
@@ -10,26 +10,29 @@ use crate::sampling::{object_pose, perturb};
 use crate::stream::stream;
 use crate::tsdf::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen};
 
-/// What is wrong with the images that a model is reconstructed from.
+/// The errors of the images from which a model is reconstructed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReconstructionNoise {
-    /// Added to all four camera parameters, pixels.
+    /// Error added to all four camera parameters, pixels.
     pub intrinsics_pixels: f64,
-    /// Standard deviation of the depth noise, percent of the depth.
+    /// Standard deviation of the depth noise, in percent of the depth.
     pub depth_percent: f64,
-    /// Error of every pose, metres.
+    /// Translation error of every pose, meters.
     pub translation_meters: f64,
-    /// Error of every pose, degrees.
+    /// Rotation error of every pose, degrees.
     pub rotation_degrees: f64,
 }
 
 impl ReconstructionNoise {
-    /// Noise level i of §VI-B.3: (i − 1)/2 pixels, (i − 1) % of the depth, (i − 1) mm and (i − 1)°. The paper has levels 1
-    /// (a perfect sensor; what is left is the volume's resolution) to 4.
+    /// Returns noise level i of §VI-B.3.
+    ///
+    /// The errors are (i − 1)/2 pixels, (i − 1) % of the depth, (i − 1) mm and (i − 1)°.
+    /// The paper has levels 1 to 4. Level 1 is a perfect sensor; its only error is the resolution
+    /// of the volume.
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] when the level is not 1 to 4.
+    /// [`SimError::Parameter`] if the level is not in 1 to 4.
     pub fn level(level: u32) -> Result<Self, SimError> {
         check_range("reconstruction level", f64::from(level), 1.0..=4.0)?;
         let steps = f64::from(level - 1);
@@ -42,28 +45,34 @@ impl ReconstructionNoise {
     }
 }
 
-/// How an object is reconstructed.
+/// The settings of a reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reconstruction {
-    /// The camera that took the images.
+    /// The camera of the images.
     pub camera: PinholeCamera,
-    /// Number of images; 100 in the paper.
+    /// Number of images; the paper uses 100.
     pub images: u32,
-    /// Largest distance of the object's centre, metres; the smallest is its diameter (§VI-A.3).
+    /// Largest distance of the object's center, meters.
+    ///
+    /// The smallest distance is the object's diameter (§VI-A.3).
     pub max_distance_meters: f64,
-    /// How far from the object's centre the optical axis may pass, metres.
+    /// Largest distance between the object's center and the optical axis, meters.
     pub axis_offset_meters: f64,
-    /// Distance between voxels, metres.
+    /// Distance between voxels, meters.
     pub voxel_meters: f64,
-    /// What is wrong with the images.
+    /// The errors of the images.
     pub noise: ReconstructionNoise,
 }
 
-/// Parts of a reconstruction below this share of its largest part's area are dropped: specks that noise left in the air.
+/// Smallest area of a component to keep, as a share of the largest component's area. Noise leaves
+/// smaller specks in the air.
 pub const MIN_COMPONENT_SHARE: f64 = 0.05;
 
 impl Reconstruction {
-    /// The setting of §VI-B.3: 100 images from as far as in the studies, and voxels of 2.5 mm, which the paper leaves open.
+    /// Returns the setting of §VI-B.3: 100 images, the distances of the studies, and voxels of 2.5
+    /// mm.
+    ///
+    /// The paper does not state the voxel size.
     #[must_use]
     pub fn new(camera: PinholeCamera, noise: ReconstructionNoise) -> Self {
         Self {
@@ -76,16 +85,22 @@ impl Reconstruction {
         }
     }
 
-    /// Returns the object's model as reconstructed: closed, outward, with the diameter and the symmetries of the original.
+    /// Returns the reconstructed model: closed, facing outward, with the original's diameter and
+    /// symmetries.
     ///
-    /// The truncation is three voxels and two and a half times the depth noise. Cavities and specks are dropped; so may be
-    /// parts of an object that noise cut off: a knife's blade of 2 mm does not survive 2 % of the depth. A function of the
-    /// configuration, the model, its name and the seed; the images of all noise levels are taken from the same poses, with
-    /// the same deviates. Cost: O(images · voxels), a second or two.
+    /// The truncation is three voxels plus two and a half times the depth noise. Cavities and
+    /// specks are dropped. Parts that noise cut off may be dropped, too: a knife's blade of 2 mm
+    /// does not survive noise of 2 % of the depth.
+    ///
+    /// The result depends only on the configuration, the model, its name and the seed. All noise
+    /// levels use the same poses and the same deviates.
+    ///
+    /// Cost: O(images · voxels), one or two seconds.
     ///
     /// # Errors
     ///
-    /// [`SimError`] when a parameter is out of its range, the object is too large for the distances, or noise has left nothing.
+    /// [`SimError`] if a parameter is out of its range, if the object is too large for the
+    /// distances, or if no surface is left.
     pub fn reconstruct(&self, model: &Model, object: &str, seed: u64) -> Result<Model, SimError> {
         let noise = &self.noise;
         check_range("number of images", f64::from(self.images), 1.0..=1e6)?;
@@ -127,7 +142,7 @@ impl Reconstruction {
             volume.integrate(&depth, &believed, &pose, EmptyPixels::Free)?;
         }
         let parts = components(&volume.surface(Unseen::Solid)?)?;
-        // Among the parts that face outward: what faces inward is the wall of a cavity.
+        // Only parts that face outward count; a part that faces inward is the wall of a cavity.
         let largest = parts
             .iter()
             .filter(|part| part.volume > 0.0)
@@ -146,7 +161,7 @@ impl Reconstruction {
     }
 }
 
-/// Half the sides of the model's bounding box, metres.
+/// Returns half the sides of the model's bounding box, meters.
 fn half_extent(model: &Model) -> Vector3<f64> {
     let center = model.center();
     let vertices = model.mesh().vertices().iter();

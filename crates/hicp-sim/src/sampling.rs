@@ -4,10 +4,11 @@ use hicp_core::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, UnitSphere};
 
-/// Degrees of rotation error per millimetre of translation error of a sampling-based pose estimator (§VI-A.5).
+/// Rotation error per translation error of a sampling-based pose estimator, degrees per millimeter
+/// (§VI-A.5).
 pub const DEGREES_PER_MILLIMETER: f64 = 1.92;
 
-/// Mean translation error of that estimator, metres (§VI-A.5).
+/// Mean translation error of that estimator, meters (§VI-A.5).
 pub const MEAN_TRANSLATION_ERROR_METERS: f64 = 0.0062;
 
 /// Mean rotation error of that estimator, degrees (§VI-A.5).
@@ -30,10 +31,10 @@ pub fn rotation<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(hicp_core::Quaternion::new(q * cb, p * sa, p * ca, q * sb))
 }
 
-/// Returns an object pose (`camera_from_object`) at a distance uniform in `distances` metres, in any orientation, with
-/// the optical axis passing within `offset` metres of the object's centre (§VI-A.3).
+/// Draws an object pose (`camera_from_object`), in meters, in any orientation (§VI-A.3).
 ///
-/// The object is then never exactly in the middle of the image.
+/// The distance is uniform in `distances` meters. The optical axis passes within `offset` meters of
+/// the object's center, so the object is never exactly in the center of the image.
 pub fn object_pose<R: Rng + ?Sized>(
     rng: &mut R,
     center: &Point3<f64>,
@@ -52,8 +53,10 @@ pub fn object_pose<R: Rng + ?Sized>(
     )
 }
 
-/// Returns a perturbed pose [R_CO R_δ | t_CO + t_δ] with |t_δ| = `translation` metres and R_δ a turn by `angle` radians,
-/// both in uniformly random directions (§VI-A.4).
+/// Returns the perturbed pose [R_CO R_δ | t_CO + t_δ] with errors of a given size (§VI-A.4).
+///
+/// |t_δ| is `translation` meters, and R_δ is a rotation by `angle` radians. Both have uniformly
+/// random directions.
 pub fn perturb<R: Rng + ?Sized>(
     rng: &mut R,
     camera_from_object: &Isometry3<f64>,

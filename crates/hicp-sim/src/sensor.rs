@@ -1,4 +1,4 @@
-//! A depth sensor: what it fails to measure, its noise, and its steps.
+//! A simulated depth sensor: missing pixels, noise and quantization.
 
 use hicp_core::{DepthImage, PinholeCamera};
 use rand::Rng;
@@ -6,37 +6,48 @@ use rand::Rng;
 use crate::error::{SimError, check_range};
 use crate::noise::{DepthNoise, map_depths};
 
-/// What a sensor makes of a perfect depth image: missing pixels, then noise, then rounding. The default changes nothing.
+/// The error model of a depth sensor: missing pixels, then noise, then rounding.
+///
+/// The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DepthSensor {
-    /// Noise.
+    /// Noise of the measured depths.
     pub noise: DepthNoise,
-    /// Step to which depths are rounded, metres (a D435 counts in 0.001 by default); `None` or 0 for none.
+    /// Step to which depths are rounded, meters; `None` or 0 for no rounding. A D435 uses 0.001 by
+    /// default.
     pub quantization_meters: Option<f64>,
-    /// Pixels that stay without depth.
+    /// Rules for pixels without depth.
     pub dropout: Dropout,
 }
 
-/// Where a sensor measures nothing. Decided on the perfect image; the default loses nothing.
+/// Rules for pixels that the sensor does not measure. The default loses none.
+///
+/// They are applied to the perfect image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dropout {
-    /// Largest angle between a surface's normal and the ray to the camera at which it is still measured, degrees; `None` for all.
+    /// Largest angle between a surface's normal and the ray to the camera, degrees; `None` for no
+    /// limit.
+    ///
+    /// Pixels with a larger angle are lost.
     pub max_incidence_degrees: Option<f64>,
-    /// How many pixels on both sides of a depth edge are lost; 0 for none. Missing depth next to a surface is an edge.
+    /// Number of pixels lost on both sides of a depth edge; 0 for none.
+    ///
+    /// Missing depth next to a surface counts as an edge.
     pub edge_pixels: u32,
 }
 
-/// Depth difference between neighbouring pixels that makes a depth edge, metres.
+/// Depth difference between neighboring pixels that counts as a depth edge, meters.
 pub const DEPTH_EDGE_METERS: f64 = 0.02;
 
 impl DepthSensor {
-    /// Returns what the sensor measures of a perfect depth image. Missing pixels do not change the noise of the others.
+    /// Returns the measurement of a perfect depth image.
     ///
-    /// Cost: O(pixels), times the square of the edge width where edges are lost.
+    /// Missing pixels do not change the noise of other pixels. Cost: O(pixels), times the square of
+    /// the edge width if edges are lost.
     ///
     /// # Errors
     ///
-    /// [`SimError`] when image and camera are not of one size, or a parameter is out of its range.
+    /// [`SimError`] if the sizes of image and camera differ, or if a parameter is out of its range.
     pub fn measure<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -66,7 +77,7 @@ impl DepthSensor {
 }
 
 impl Dropout {
-    /// Returns for every pixel whether it is lost, row-major.
+    /// Returns whether each pixel is lost, row-major.
     fn lost(&self, depth: &DepthImage, camera: &PinholeCamera) -> Result<Vec<bool>, SimError> {
         let (width, height) = (depth.width(), depth.height());
         if (width, height) != (camera.width(), camera.height()) {
@@ -111,10 +122,11 @@ impl Dropout {
     }
 }
 
-/// Returns the cosine of the angle between the surface's normal and the ray at a pixel, `None` where nothing is seen.
+/// Returns the cosine of the angle between the surface's normal and the ray at a pixel.
 ///
-/// The inverse depth of a plane is affine in the pixel, w = a x + b y + c with (a, b, c) along the normal, so the slopes of
-/// w are all that is needed. Of the two one-sided slopes the smaller is taken, which does not look across an edge.
+/// Returns `None` if the pixel has no depth. The inverse depth of a plane is affine in the pixel: w
+/// = a x + b y + c with (a, b, c) along the normal. The slopes of w are therefore sufficient. The
+/// smaller of the two one-sided slopes is used, because it does not cross an edge.
 fn incidence_cosine(depth: &DepthImage, camera: &PinholeCamera, u: u32, v: u32) -> Option<f64> {
     let inverse = |u: Option<u32>, v: Option<u32>| {
         let z = depth.get(u?, v?).filter(|z| *z > 0.0)?;
@@ -155,7 +167,8 @@ mod tests {
         PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64).unwrap()
     }
 
-    /// A plane through the optical axis at 1 m whose normal is turned by `degrees` about y.
+    /// Returns a plane through the optical axis at 1 m whose normal is rotated by `degrees` around
+    /// y.
     fn tilted(degrees: f64) -> DepthImage {
         let (s, c) = degrees.to_radians().sin_cos();
         #[allow(clippy::cast_possible_truncation)]
@@ -175,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn grazing_surfaces_and_edges_are_lost_and_the_rest_is_untouched() {
+    fn grazing_surfaces_and_edges_are_lost_and_other_pixels_are_unchanged() {
         let sensor = |max_incidence_degrees, edge_pixels| DepthSensor {
             dropout: Dropout {
                 max_incidence_degrees,
@@ -192,7 +205,7 @@ mod tests {
         assert_eq!(count(&measure(sensor(Some(40.0), 0), &plane)), 0);
         assert_eq!(count(&measure(sensor(Some(89.0), 0), &plane)), 64 * 64);
 
-        // A square of 20 pixels, 0.1 m in front of a wall, on an image that is empty below.
+        // A square of 20 pixels, 0.1 m in front of a wall. The image is empty below.
         let pixels = (0..64 * 64).map(|i| {
             let (u, v) = (i % 64, i / 64);
             let square = (20..40).contains(&u) && (10..30).contains(&v);
@@ -206,12 +219,13 @@ mod tests {
         });
         let scene = DepthImage::from_meters(64, 64, pixels.collect()).unwrap();
         let lost = count(&scene) - count(&measure(sensor(None, 1), &scene));
-        // One pixel inside and one outside (with corners) of the square's outline, and the row above the empty part.
+        // One pixel inside and one outside (with corners) of the square's outline, and the row
+        // above the empty part.
         assert_eq!(lost, (20 * 20 - 18 * 18) + (22 * 22 - 20 * 20) + 64);
     }
 
     #[test]
-    fn depths_are_rounded_and_lost_pixels_leave_the_noise_of_the_others() {
+    fn depths_are_rounded_and_lost_pixels_do_not_change_the_noise_of_others() {
         let mut sensor = DepthSensor {
             noise: DepthNoise::Relative(crate::RelativeGaussian { percent: 1.0 }),
             quantization_meters: Some(0.001),
@@ -237,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_out_of_range_are_named() {
+    fn errors_name_parameters_out_of_range() {
         let wrong = DepthSensor {
             quantization_meters: Some(-1.0),
             ..DepthSensor::default()

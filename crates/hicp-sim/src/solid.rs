@@ -1,13 +1,14 @@
 //! Closed triangle meshes from profiles and polygons.
 //!
-//! Every builder makes a closed, outward-facing part in metres; a [`Solid`] collects parts, which may overlap.
+//! Every builder creates a closed, outward-facing part in meters. A [`Solid`] is a collection of
+//! parts, which may overlap.
 
 use std::collections::HashMap;
 
 use hicp_core::internal::index;
 use hicp_core::{Isometry3, MeshError, Point3, TriMesh, Vector3};
 
-/// A collection of closed parts.
+/// A collection of closed parts, in meters.
 #[derive(Clone, Debug, Default)]
 pub struct Solid {
     vertices: Vec<Point3<f64>>,
@@ -15,7 +16,7 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// Makes a solid without parts.
+    /// Creates a solid without parts.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -41,7 +42,7 @@ impl Solid {
         self
     }
 
-    /// Returns the solid stretched along the axes by positive factors.
+    /// Returns the solid scaled along the axes by positive factors.
     #[must_use]
     pub fn scaled(mut self, factors: &Vector3<f64>) -> Self {
         for p in &mut self.vertices {
@@ -50,11 +51,11 @@ impl Solid {
         self
     }
 
-    /// Makes the mesh. Corners at the same position become one vertex.
+    /// Converts the solid to a mesh. Corners at the same position become one vertex.
     ///
     /// # Errors
     ///
-    /// [`MeshError`] when there is no part, or its sizes are not finite.
+    /// [`MeshError`] if there is no part, or if its sizes are not finite.
     pub fn to_mesh(&self) -> Result<TriMesh, MeshError> {
         let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.vertices.len());
         let mut vertices: Vec<Point3<f32>> = Vec::new();
@@ -79,12 +80,14 @@ impl Solid {
         TriMesh::new(vertices, triangles)
     }
 
-    /// Makes a cuboid about the origin with the given side lengths, each face divided into `divisions`² cells.
+    /// Creates a cuboid centered at the origin with the given side lengths in meters.
+    ///
+    /// Each face is divided into `divisions`² cells.
     #[must_use]
     pub fn cuboid(sides: Vector3<f64>, divisions: usize) -> Self {
         let mut solid = Self::new();
         let half = sides / 2.0;
-        // Every face: its outward axis and two in-plane axes with axis = first × second.
+        // Each face has an outward axis and two in-plane axes with axis = first × second.
         for (axis, first, second) in [
             (Vector3::x(), Vector3::y(), Vector3::z()),
             (Vector3::y(), Vector3::z(), Vector3::x()),
@@ -102,17 +105,20 @@ impl Solid {
         solid
     }
 
-    /// Turns a closed profile of (radius, height) points about the z axis.
+    /// Rotates a closed profile of (radius, height) points around the z axis.
     ///
-    /// The profile runs so that the material lies to its left seen with the radius to the right and the height up (counter-clockwise around the
-    /// material); points of radius 0 lie on the axis. `steps` is the number of segments around.
+    /// With the radius to the right and the height up, the profile is counter-clockwise around the
+    /// material. Points of radius 0 lie on the axis. `steps` is the number of segments around the
+    /// axis.
     #[must_use]
     pub fn lathe(profile: &[(f64, f64)], steps: usize) -> Self {
         Self::lathe_shaped(profile, steps, |_| 1.0)
     }
 
-    /// Turns a closed profile about the z axis as [`Solid::lathe`] does, with every radius multiplied by `shape(angle)`,
-    /// a positive function of the angle in radians, 0 to 2π: a hexagon's, for instance.
+    /// Rotates a closed profile around the z axis, with every radius multiplied by `shape(angle)`.
+    ///
+    /// Apart from the factor, it does the same as [`Solid::lathe`]. `shape` is a positive function
+    /// of the angle in radians, 0 to 2π, such as that of a hexagon.
     #[must_use]
     pub fn lathe_shaped(profile: &[(f64, f64)], steps: usize, shape: impl Fn(f64) -> f64) -> Self {
         let mut solid = Self::new();
@@ -133,7 +139,10 @@ impl Solid {
         solid
     }
 
-    /// Extrudes a simple polygon, counter-clockwise in x and y and star-shaped about its centroid or `kernel`, from z = −height/2 to height/2.
+    /// Extrudes a simple polygon from z = −height/2 to height/2.
+    ///
+    /// The polygon is counter-clockwise in x and y and star-shaped around `kernel`. `layers` is the
+    /// number of segments along z.
     #[must_use]
     pub fn prism(polygon: &[(f64, f64)], kernel: (f64, f64), height: f64, layers: usize) -> Self {
         let mut solid = Self::new();
@@ -155,14 +164,14 @@ impl Solid {
         solid
     }
 
-    /// Sweeps a circle of radius `tube` along a path and closes its ends with flat caps.
+    /// Sweeps a circle of radius `tube` along a path and closes both ends with flat caps.
     #[must_use]
     pub fn sweep(path: &[Point3<f64>], tube: f64, steps: usize) -> Self {
         let mut solid = Self::new();
         let last = path.len() - 1;
         let ring = |i: usize, j: usize| {
             let tangent = (path[(i + 1).min(last)] - path[i.saturating_sub(1)]).normalize();
-            // The paths used here never run along this axis.
+            // No path in this crate runs along this axis.
             let side = tangent.cross(&Vector3::y()).normalize();
             let up = side.cross(&tangent);
             let (s, c) = (std::f64::consts::TAU * (j % steps) as f64 / steps as f64).sin_cos();
@@ -176,7 +185,7 @@ impl Solid {
         solid
     }
 
-    /// Adds a grid of quads; with i to the right and j up the outside is toward the viewer.
+    /// Adds a grid of quads. With i to the right and j up, the outside faces the viewer.
     fn grid(&mut self, n_i: usize, n_j: usize, point: impl Fn(usize, usize) -> Point3<f64>) {
         for i in 0..n_i {
             for j in 0..n_j {
@@ -192,7 +201,7 @@ impl Solid {
         }
     }
 
-    /// Adds a triangle unless two of its corners coincide (at the axis of a lathe).
+    /// Adds a triangle unless two of its corners coincide, as on the axis of a lathe.
     fn triangle(&mut self, corners: [Point3<f64>; 3]) {
         let [a, b, c] = corners.map(|p| p.cast::<f32>());
         if a == b || b == c || c == a {
@@ -214,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn every_builder_makes_a_closed_outward_part() {
+    fn every_builder_creates_a_closed_outward_part() {
         let cuboid = Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 3);
         assert_eq!(facing(&cuboid), Facing::Outward, "cuboid");
         let cylinder = Solid::lathe(&[(0.0, 0.0), (0.1, 0.0), (0.1, 0.2), (0.0, 0.2)], 12);
@@ -230,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn volumes_are_those_of_the_shapes() {
+    fn areas_match_those_of_the_shapes() {
         let mesh = Solid::cuboid(Vector3::new(0.1, 0.2, 0.3), 4)
             .to_mesh()
             .unwrap();

@@ -4,11 +4,12 @@ use rand::SeedableRng;
 
 use crate::SimRng;
 
-/// Returns the generator for one purpose: of a seed, some labels, and an index.
+/// Creates the random generator for one purpose, identified by a seed, labels and an index.
 ///
-/// What is drawn from one stream says nothing about another, so a step (the pose, the perturbation, the noise) can be
-/// changed, repeated or left out, and cases can be made in any order and on any number of threads, without any other
-/// number changing. The same on every machine and in every version.
+/// Streams are independent of each other. A step (the pose, the perturbation, the noise) can be
+/// changed, repeated or left out without changing the numbers of other steps. Cases can be
+/// generated in any order and on any number of threads. The numbers are the same on every machine
+/// and in every version.
 ///
 /// ```
 /// use rand::Rng;
@@ -21,7 +22,7 @@ use crate::SimRng;
 pub fn stream(seed: u64, labels: &[&str], index: u64) -> SimRng {
     let mut state = mix(seed);
     for label in labels {
-        // FNV-1a of the bytes; its length tells ("ab", "c") from ("a", "bc").
+        // FNV-1a of the bytes. Adding the length distinguishes ("ab", "c") from ("a", "bc").
         let hash = label.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });
@@ -30,7 +31,9 @@ pub fn stream(seed: u64, labels: &[&str], index: u64) -> SimRng {
     SimRng::seed_from_u64(mix(state ^ mix(index)))
 }
 
-/// The finalizer of `SplitMix64` (Steele, Lea & Flood 2014): every input bit changes half of the output bits.
+/// Mixes bits with the finalizer of `SplitMix64` (Steele, Lea & Flood 2014).
+///
+/// On average, every input bit changes half of the output bits.
 fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

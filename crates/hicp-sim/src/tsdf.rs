@@ -1,67 +1,75 @@
-//! Truncated signed distance fields (Curless & Levoy, "A Volumetric Method for Building Complex Models from Range Images", 1996).
+//! Truncated signed distance fields (TSDF).
+//!
+//! Source: Curless & Levoy, "A Volumetric Method for Building Complex Models from Range Images",
+//! 1996.
 
 use hicp_core::{DepthImage, ImageError, Isometry3, PinholeCamera, Point3, TriMesh, Vector3};
 
 use crate::error::{SimError, check_range};
 use crate::meshing::ScalarGrid;
 
-/// Largest number of voxels: two numbers of 4 bytes each.
+/// Largest number of voxels. A voxel has two numbers of 4 bytes each.
 pub const MAX_VOXELS: usize = 400_000_000;
 
-/// Where a volume is and how fine.
+/// The position and the resolution of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TsdfConfig {
-    /// Lowest corner, metres, in the volume's frame: the object's, or the world's.
+    /// Lowest corner in the volume's frame, meters. The frame is that of the object or of the
+    /// world.
     pub min: Point3<f64>,
-    /// Highest corner, metres.
+    /// Highest corner, meters.
     pub max: Point3<f64>,
-    /// Distance between voxels, metres.
+    /// Distance between voxels, meters.
     pub voxel_meters: f64,
-    /// Distance from the surface up to which signed distances are kept, metres; a few voxels, and more than twice the noise.
+    /// Largest stored distance from the surface, meters: a few voxels, and more than twice the
+    /// noise.
     pub truncation_meters: f64,
 }
 
-/// What a pixel without depth says.
+/// The meaning of a pixel without depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EmptyPixels {
-    /// Nothing: a sensor that failed to measure.
+    /// The sensor did not measure: nothing is known along the ray.
     Unknown,
-    /// There is nothing along its ray: a render of an object alone.
+    /// The ray hits nothing, as in the render of a single object.
     Free,
 }
 
-/// What a voxel that no image reached stands for when the surface is extracted.
+/// The meaning of a voxel that no image reached, for extracting the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unseen {
-    /// The inside of the object, so that the surface is closed, also along the border of the volume.
+    /// The inside of the object. The surface is then closed, also along the border of the volume.
     Solid,
-    /// Nothing is known: the surface ends there.
+    /// Unknown. The surface ends there.
     Open,
 }
 
-/// A volume that depth images are integrated into.
+/// A volume into which depth images are integrated.
 ///
-/// Every voxel holds the weighted mean of its signed distances to the surfaces seen, along the rays, in front positive. An
-/// image says nothing about voxels that lie farther behind its surface than the truncation, and farther in front counts as
-/// the truncation. Weights are 1 in front of the surface and to half the truncation behind it, and fall linearly to 0 from
-/// there on, so that the far side of a thin wall is not overruled by what is seen of its near side. (Falling from the
-/// surface on keeps thin walls thinner, but noise then eats plates of a few millimetres.)
+/// Every voxel stores the weighted mean of its signed distances to the observed surfaces along the
+/// rays, positive in front. An image does not affect voxels farther behind its surface than the
+/// truncation. Larger distances in front count as the truncation.
+///
+/// The weight is 1 in front of the surface and up to half the truncation behind it. From there, it
+/// falls linearly to 0, so that observations of the near side of a thin wall do not overrule the
+/// far side. A weight that falls from the surface on keeps thin walls thinner, but noise then
+/// removes plates of a few millimeters.
 #[derive(Clone, Debug)]
 pub struct TsdfVolume {
     config: TsdfConfig,
     size: [usize; 3],
-    /// Per voxel the mean signed distance in metres and the sum of the weights, x fastest.
+    /// Mean signed distance in meters and sum of the weights per voxel, with x varying fastest.
     voxels: Vec<(f32, f32)>,
     images: u32,
 }
 
 impl TsdfVolume {
-    /// Makes an empty volume.
+    /// Creates an empty volume.
     ///
     /// # Errors
     ///
-    /// [`SimError`] when a length is not positive and finite, the corners are in the wrong order, or there would be more
-    /// than [`MAX_VOXELS`] voxels.
+    /// [`SimError`] if a length is not positive and finite, if the corners are in the wrong order,
+    /// or if there would be more than [`MAX_VOXELS`] voxels.
     pub fn new(config: TsdfConfig) -> Result<Self, SimError> {
         let extent = config.max - config.min;
         for (what, value, largest) in [
@@ -97,29 +105,31 @@ impl TsdfVolume {
         })
     }
 
-    /// The configuration.
+    /// Returns the configuration.
     #[must_use]
     pub fn config(&self) -> &TsdfConfig {
         &self.config
     }
 
-    /// Number of voxels along x, y and z.
+    /// Returns the number of voxels along x, y and z.
     #[must_use]
     pub fn size(&self) -> [usize; 3] {
         self.size
     }
 
-    /// Number of images integrated.
+    /// Returns the number of integrated images.
     #[must_use]
     pub fn images(&self) -> u32 {
         self.images
     }
 
-    /// Integrates a depth image taken at `camera_from_volume`. Cost: O(voxels), some nanoseconds each.
+    /// Integrates a depth image taken at `camera_from_volume`, in meters.
+    ///
+    /// Cost: O(voxels), some nanoseconds each.
     ///
     /// # Errors
     ///
-    /// [`SimError::Image`] when image and camera are not of one size.
+    /// [`SimError::Image`] if the sizes of image and camera differ.
     pub fn integrate(
         &mut self,
         depth: &DepthImage,
@@ -170,7 +180,7 @@ impl TsdfVolume {
                         continue;
                     }
                     let along_axis = measured - p.z;
-                    // Along the ray it is farther than along the optical axis.
+                    // The distance along the ray is larger than along the optical axis.
                     if along_axis >= truncation {
                         merge(voxel, truncation, 1.0);
                     } else if along_axis > -truncation {
@@ -186,15 +196,18 @@ impl TsdfVolume {
         Ok(())
     }
 
-    /// Returns the surface between what is in front (positive) and behind.
+    /// Returns the surface between free space (positive) and the inside.
     ///
-    /// With [`Unseen::Solid`] it is closed; with [`Unseen::Open`] it ends where nothing was seen. Normals point to where it
-    /// is free. Always manifold, see [`ScalarGrid::surface`]; it may consist of several parts
-    /// ([`components`](crate::components)), cavities among them. Cost: O(voxels).
+    /// With [`Unseen::Solid`], the surface is closed; with [`Unseen::Open`], it ends at unseen
+    /// voxels. Normals point to free space. The surface is always manifold, see
+    /// [`ScalarGrid::surface`]. It may have several parts, including cavities; see
+    /// [`components`](crate::components).
+    ///
+    /// Cost: O(voxels).
     ///
     /// # Errors
     ///
-    /// [`SimError::NoSurface`] when there is none.
+    /// [`SimError::NoSurface`] if there is no surface.
     pub fn surface(&self, unseen: Unseen) -> Result<TriMesh, SimError> {
         let solid = unseen == Unseen::Solid;
         #[allow(clippy::cast_possible_truncation)]
@@ -206,7 +219,7 @@ impl TsdfVolume {
             (false, false) => f32::NAN,
         };
         let grid = if solid {
-            // One layer of free space around it closes the surface.
+            // A layer of free space around the volume closes the surface.
             let size = self.size.map(|n| n + 2);
             let mut values = vec![truncation; size.iter().product()];
             for (row, k_j) in self.voxels.chunks_exact(self.size[0]).zip(0..) {
@@ -239,7 +252,7 @@ impl TsdfVolume {
     }
 }
 
-/// Takes one more distance into a voxel's weighted mean.
+/// Adds a distance to a voxel's weighted mean.
 #[allow(clippy::cast_possible_truncation)]
 // f32 is the precision of voxels.
 fn merge(voxel: &mut (f32, f32), distance: f64, weight: f64) {

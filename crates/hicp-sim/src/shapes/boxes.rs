@@ -1,4 +1,4 @@
-//! Things with flat faces: boxes, plates at an angle, and what is built from them.
+//! Objects with flat faces: boxes, plates at an angle, and combinations of them.
 
 use hicp_core::{Isometry3, Point3, Vector3};
 
@@ -67,7 +67,7 @@ pub(crate) fn laptop() -> Solid {
     )
 }
 
-/// A camera: a body, a lens off its middle, and a viewfinder.
+/// A camera: a body, an off-center lens, and a viewfinder.
 pub(crate) fn camera() -> Solid {
     let lens = [
         (0.0, -0.02),
@@ -90,7 +90,7 @@ pub(crate) fn camera() -> Solid {
         )
 }
 
-/// Headphones: two cups and a band over the top, the same after half a turn.
+/// Headphones: two cups and a band, symmetric under a half rotation.
 pub(crate) fn headphones() -> Solid {
     let cup = [
         (0.0, -0.014),

@@ -88,7 +88,7 @@ pub(crate) fn knife() -> Solid {
     )
 }
 
-/// A roll of tape: a ring, the same from both sides.
+/// A roll of tape: a ring, symmetric when turned upside down.
 pub(crate) fn tape() -> Solid {
     let section = [
         (0.036, -0.012),

@@ -82,7 +82,7 @@ pub(crate) fn pan() -> Solid {
         .with(&Solid::sweep(&handle, 0.009, 12), &Isometry3::identity())
 }
 
-/// A can with recessed ends, the same at both.
+/// A can with recessed ends, symmetric when turned upside down.
 pub(crate) fn can() -> Solid {
     let outline = [
         (0.0, -0.053),
@@ -108,7 +108,8 @@ pub(crate) fn pot() -> Solid {
         (0.0, -0.045),
     ];
     let sixth = std::f64::consts::FRAC_PI_3;
-    // The polar equation of a regular hexagon with corners at multiples of a sixth of a turn, of unit circumradius.
+    // The polar equation of a regular hexagon with a circumradius of 1 and corners at multiples of
+    // 60°.
     let hexagon = |angle: f64| {
         let from_middle = (angle / sixth).fract() - 0.5;
         (sixth / 2.0).cos() / (from_middle * sixth).cos()
@@ -142,7 +143,7 @@ pub(crate) fn teapot() -> Solid {
 pub(crate) fn ladle() -> Solid {
     let handle = curve(20, |i| {
         let t = i / 20.0;
-        // A bend at the end to hang it by.
+        // A bend at the end, to hang it by.
         let hook = 0.03 * (t - 0.8).max(0.0) / 0.2;
         Point3::new(0.039 + 0.02 * t + hook, 0.0, 0.025 + 0.18 * t)
     });

@@ -1,4 +1,4 @@
-//! Integration tests of `hicp-sim`: one program, so that it is linked once.
+//! Integration tests of `hicp-sim`, in one program to link only once.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "helpers of tests")]
 

@@ -1,11 +1,12 @@
-//! The household objects keep what they promise.
+//! Guarantees of the household objects: size, closed surfaces and symmetries.
 
 use std::collections::{HashMap, HashSet};
 
 use hicp_core::{Facing, Isometry3, Model, Point3, TriMesh, Vector3};
 use hicp_sim::{Household, Proportions};
 
-/// Distance of a point from a triangle, by the regions of the nearest feature (Ericson 2005, 5.1.5).
+/// Returns the distance of a point from a triangle, by the region of the nearest feature (Ericson
+/// 2005, 5.1.5).
 fn distance_to_triangle(p: &Point3<f64>, [a, b, c]: [Point3<f64>; 3]) -> f64 {
     let along = |from: &Point3<f64>, to: &Point3<f64>| {
         let edge = to - from;
@@ -13,15 +14,15 @@ fn distance_to_triangle(p: &Point3<f64>, [a, b, c]: [Point3<f64>; 3]) -> f64 {
         (p - (from + edge * t)).norm()
     };
     let normal = (b - a).cross(&(c - a));
-    let beside =
+    let inside =
         |from: &Point3<f64>, to: &Point3<f64>| normal.cross(&(to - from)).dot(&(p - from)) >= 0.0;
-    if beside(&a, &b) && beside(&b, &c) && beside(&c, &a) {
+    if inside(&a, &b) && inside(&b, &c) && inside(&c, &a) {
         return (p - a).dot(&normal).abs() / normal.norm();
     }
     along(&a, &b).min(along(&b, &c)).min(along(&c, &a))
 }
 
-/// Largest distance from samples of the surface, moved by `motion`, to the surface.
+/// Returns the largest distance from samples of the surface, moved by `motion`, to the surface.
 fn misfit(model: &Model, motion: &Isometry3<f64>) -> f64 {
     let mesh = model.mesh();
     let triangles: Vec<_> = (0..mesh.triangles().len())
@@ -51,7 +52,7 @@ fn volume(mesh: &TriMesh) -> f64 {
 }
 
 #[test]
-fn there_are_twenty_in_two_disjoint_sets_of_ten() {
+fn twenty_objects_form_two_disjoint_sets_of_ten() {
     let names: HashSet<_> = Household::ALL.map(Household::name).into_iter().collect();
     assert_eq!(names.len(), 20);
     let both: HashSet<_> = Household::TUNING
@@ -98,7 +99,7 @@ fn every_object_is_watertight_outward_and_of_household_size() {
                 "{name}: edge {from}-{to}"
             );
         }
-        // Every part by itself has a positive volume, and so has the whole.
+        // Every part has a positive volume by itself, and so has the whole.
         assert_eq!(mesh.facing(), Facing::Outward, "{name}");
         assert!(volume(mesh) > 1e-6, "{name}: {} m3", volume(mesh));
 
@@ -121,7 +122,8 @@ fn every_declared_symmetry_maps_the_surface_onto_itself() {
                 assert!(misfit < 1e-6, "{}: {misfit} m at {motion}", object.name());
             }
             for axis in &object.symmetries().continuous {
-                // Off by an odd angle, facets do not meet: 40 facets at 0.1 m bulge by 0.31 mm at most.
+                // The facets of a rotated object do not coincide: 40 facets at 0.1 m deviate by at
+                // most 0.31 mm.
                 for angle in [0.1, 1.0, 2.345] {
                     let misfit = misfit(&model, &axis.rotation(angle));
                     assert!(
@@ -136,7 +138,7 @@ fn every_declared_symmetry_maps_the_surface_onto_itself() {
 }
 
 #[test]
-fn what_is_not_declared_is_no_symmetry() {
+fn undeclared_motions_are_not_symmetries() {
     let tau = std::f64::consts::TAU;
     for object in Household::ALL {
         let model = object.model().unwrap();

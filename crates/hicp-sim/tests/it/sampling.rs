@@ -1,4 +1,4 @@
-//! Samples follow their distributions, and cases keep what they promise.
+//! Distributions of random samples, and guarantees of cases.
 
 use hicp_core::{Mask, Model, PinholeCamera, Point3, Vector3, se3};
 use hicp_sim::{
@@ -9,7 +9,8 @@ use hicp_sim::{
 
 const SAMPLES: u32 = 4000;
 
-/// Largest distance between the empirical distribution and a distribution function, times √n (Kolmogorov & Smirnov).
+/// Returns the Kolmogorov-Smirnov statistic times √n: the largest distance between the empirical
+/// distribution and a distribution function.
 fn ks(mut samples: Vec<f64>, distribution: impl Fn(f64) -> f64) -> f64 {
     samples.sort_by(f64::total_cmp);
     let n = samples.len() as f64;
@@ -20,19 +21,20 @@ fn ks(mut samples: Vec<f64>, distribution: impl Fn(f64) -> f64) -> f64 {
     gap.fold(0.0, f64::max) * n.sqrt()
 }
 
-/// The value that √n D exceeds in one of 20 samples of the right distribution. The seeds are fixed: these do not.
+/// The value that √n D exceeds in one of 20 samples of the correct distribution. With the fixed
+/// seeds, it is not exceeded.
 const KS_LIMIT: f64 = 1.358;
 
 fn assert_follows(what: &str, samples: Vec<f64>, distribution: impl Fn(f64) -> f64) {
     let value = ks(samples.clone(), &distribution);
     assert!(value < KS_LIMIT, "{what}: {value}");
-    // A scale 8 % off is noticed.
+    // The test has the power to detect a scale error of 8 %.
     let wrong = ks(samples.iter().map(|x| x * 1.08).collect(), &distribution);
     assert!(wrong > KS_LIMIT, "{what}: the test has no power, {wrong}");
 }
 
 #[test]
-fn object_poses_have_the_papers_distances_and_any_orientation() {
+fn object_poses_have_the_distances_of_the_paper_and_any_orientation() {
     let mut rng = rng(21);
     let center = Point3::new(0.01, -0.02, 0.03);
     let poses: Vec<_> = (0..SAMPLES)
@@ -93,7 +95,7 @@ fn directions_and_rotations_are_uniform() {
 }
 
 #[test]
-fn the_ratio_is_that_of_the_paper() {
+fn the_ratio_of_rotation_to_translation_is_that_of_the_paper() {
     assert!((rotation_of(0.001).to_degrees() - 1.92).abs() < 1e-12);
     assert!((rotation_of(0.15).to_degrees() - 288.0).abs() < 1e-9);
 }
@@ -111,7 +113,7 @@ fn binned() -> InitialPose {
 }
 
 #[test]
-fn every_bin_of_every_object_is_filled_and_recomputes() {
+fn every_bin_of_every_object_is_filled() {
     let mut maker = maker(binned());
     for object in Household::ALL {
         let model = object.model().unwrap();
@@ -127,7 +129,7 @@ fn every_bin_of_every_object_is_filled_and_recomputes() {
             );
             let (angle, distance) = se3::pose_distance(&case.init, &case.camera_from_object);
             assert!(distance <= 0.15);
-            // Turns of more than half a circle come back from the other side.
+            // Rotations by more than 180° are equivalent to smaller ones in the other direction.
             let drawn = rotation_of(distance);
             let turn = drawn.min(std::f64::consts::TAU - drawn);
             assert!((angle - turn).abs() < 1e-6, "{angle} {turn}");
@@ -136,7 +138,7 @@ fn every_bin_of_every_object_is_filled_and_recomputes() {
 }
 
 #[test]
-fn translation_errors_are_uniform_where_nothing_is_rejected() {
+fn translation_errors_are_uniform_if_none_is_rejected() {
     let bins = VsdBins {
         count: 1,
         ..VsdBins::default()
@@ -155,14 +157,14 @@ fn translation_errors_are_uniform_where_nothing_is_rejected() {
 }
 
 #[test]
-fn a_stored_case_recomputes_to_the_same_number() {
+fn the_vsd_of_a_stored_case_is_reproducible() {
     let model = Household::Teapot.model().unwrap();
     let case = maker(binned()).case(&model, "teapot", 9, 4).unwrap();
-    // Another maker, another model of the same object, and only the poses of the case.
+    // Use another generator, another model of the same object, and only the poses of the case.
     let again = Household::Teapot.model().unwrap();
     let vsd = maker(InitialPose::mean_error()).vsd(&again, &case.camera_from_object, &case.init);
     assert_eq!(vsd.to_bits(), case.vsd_initial.to_bits());
-    // And by the definition, from whole distance images and silhouettes.
+    // Compare with the definition, computed from whole distance images and silhouettes.
     let image = |pose| hicp_raster::render_depth_image(model.mesh(), &camera(), pose);
     let mask = |depth: &hicp_core::DepthImage| {
         Mask::new(160, 120, depth.pixels().iter().map(|z| *z > 0.0).collect()).unwrap()
@@ -188,7 +190,7 @@ fn a_stored_case_recomputes_to_the_same_number() {
 }
 
 #[test]
-fn cases_follow_from_seed_name_and_index_alone() {
+fn cases_depend_only_on_seed_name_and_index() {
     let (mug, car) = (
         Household::Mug.model().unwrap(),
         Household::Car.model().unwrap(),
@@ -228,7 +230,7 @@ fn cases_follow_from_seed_name_and_index_alone() {
 }
 
 #[test]
-fn what_cannot_be_done_is_said() {
+fn errors_describe_impossible_cases() {
     let plate = Household::Plate.model().unwrap();
     let bins = VsdBins {
         max_translation_meters: 0.001,
@@ -266,7 +268,7 @@ fn what_cannot_be_done_is_said() {
 }
 
 #[test]
-fn corruptions_are_seeded_paired_and_leave_the_case() {
+fn corruptions_are_seeded_and_paired_and_do_not_change_the_case() {
     let model = Household::Iron.model().unwrap();
     let case = maker(InitialPose::mean_error())
         .case(&model, "iron", 5, 2)
@@ -285,7 +287,7 @@ fn corruptions_are_seeded_paired_and_leave_the_case() {
     let (one, _) = noisy(1.0).apply(&case).unwrap();
     let (three, _) = noisy(3.0).apply(&case).unwrap();
     assert_eq!(one, noisy(1.0).apply(&case).unwrap().0);
-    // The same deviates, three times as large.
+    // The deviates are the same, three times as large.
     for ((clean, one), three) in case
         .depth
         .pixels()
@@ -309,7 +311,7 @@ fn corruptions_are_seeded_paired_and_leave_the_case() {
 }
 
 #[test]
-fn an_occluder_hides_its_share_and_stands_in_front() {
+fn an_occluder_hides_its_share_and_is_in_front_of_the_object() {
     let model = Household::Iron.model().unwrap();
     let case = maker(InitialPose::mean_error())
         .case(&model, "iron", 5, 3)
@@ -341,7 +343,7 @@ fn an_occluder_hides_its_share_and_stands_in_front() {
         } else if *was {
             assert!(*now < nearest, "{now} is not in front of {nearest}");
         } else {
-            // The board, or the wall.
+            // The pixel shows the board or the wall.
             assert!(*now > 0.0);
         }
     }

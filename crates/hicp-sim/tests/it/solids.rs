@@ -1,9 +1,9 @@
-//! Solids by their definitions.
+//! Solids match their definitions.
 
 use hicp_sim::{Household, Proportions, Solid, VsdBins};
 
 #[test]
-fn a_solid_without_parts_is_no_mesh_and_adds_nothing() {
+fn a_solid_without_parts_has_no_mesh_and_adds_nothing() {
     assert!(Solid::new().to_mesh().is_err());
     let mug = Household::Mug.solid();
     let same = mug
@@ -38,7 +38,7 @@ fn a_shaped_lathe_multiplies_every_radius_by_its_shape() {
         .to_mesh()
         .unwrap();
     assert!((doubled.area() - round.area()).abs() > 0.1 * round.area());
-    // An ellipse with half axes of 0.1 and 0.05 in polar form.
+    // An ellipse with semi-axes of 0.1 and 0.05 in polar form.
     let ellipse = |angle: f64| 0.5 / (0.5 * angle.cos()).hypot(angle.sin());
     let oval = Solid::lathe_shaped(&profile, 12, ellipse)
         .to_mesh()
@@ -55,7 +55,7 @@ fn a_shaped_lathe_multiplies_every_radius_by_its_shape() {
 }
 
 #[test]
-fn bins_of_the_vsd_are_half_open_but_for_the_last() {
+fn bins_of_the_vsd_are_half_open_except_the_last() {
     let bins = VsdBins::default();
     let found = [0.0, 0.0999, 0.1, 0.55, 0.9, 1.0].map(|vsd| bins.bin_of(vsd));
     assert_eq!(found, [0, 0, 1, 5, 9, 9]);

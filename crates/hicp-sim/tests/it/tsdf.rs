@@ -1,4 +1,4 @@
-//! Volumes give back the surfaces that were integrated into them.
+//! Volumes reproduce the surfaces that were integrated into them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -13,7 +13,7 @@ fn camera() -> PinholeCamera {
     PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480).unwrap()
 }
 
-/// V − E + F; 2 for a sphere.
+/// Returns V − E + F, which is 2 for a sphere.
 fn euler_characteristic(mesh: &TriMesh) -> i64 {
     let edges: HashSet<_> = mesh
         .triangles()
@@ -26,7 +26,10 @@ fn euler_characteristic(mesh: &TriMesh) -> i64 {
     count(used) - count(edges.len()) + count(mesh.triangles().len())
 }
 
-/// Every edge in exactly two triangles, once each way; every vertex with one disc of triangles around it.
+/// Checks that a mesh is a closed manifold.
+///
+/// Every edge must be in exactly two triangles, once in each direction. The triangles around every
+/// vertex must form one disc.
 fn assert_manifold(mesh: &TriMesh) {
     let mut next: HashMap<u32, HashMap<u32, u32>> = HashMap::new();
     for &[a, b, c] in mesh.triangles() {
@@ -45,7 +48,7 @@ fn assert_manifold(mesh: &TriMesh) {
     }
 }
 
-/// A sphere of 80 mm about a point off the grid.
+/// Returns a sphere of 80 mm radius around a point off the grid.
 fn sphere(center: &Point3<f64>) -> TriMesh {
     let profile: Vec<_> = (0..=120)
         .map(|i| {
@@ -105,7 +108,7 @@ fn an_integrated_sphere_is_a_closed_manifold_with_its_radius() {
 }
 
 #[test]
-fn what_was_not_seen_is_solid_or_open() {
+fn unseen_voxels_are_solid_or_open() {
     let center = Point3::origin();
     let mesh = sphere(&center);
     let config = TsdfConfig {
@@ -128,55 +131,59 @@ fn what_was_not_seen_is_solid_or_open() {
         volume.surface(Unseen::Solid).unwrap(),
         volume.surface(Unseen::Open).unwrap(),
     );
-    // Closed, though a voxel between two rays that nothing reached may be a part of its own.
+    // The surface is closed, but an unreached voxel between two rays may be a separate part.
     assert_manifold(&solid);
     let parts = components(&solid).unwrap();
     assert!(parts[0].volume > 0.0 && parts[0].area > 0.99 * solid.area());
     assert_eq!(open.facing(), Facing::Unknown);
-    // Only what faces the camera, where it was measured.
+    // The open surface contains only measured points that face the camera.
     for p in open.vertices() {
         assert!(p.z < 0.0 && (p.coords.norm() - 0.08).abs() < 0.005, "{p}");
     }
 }
 
 #[test]
-fn volumes_that_cannot_be_are_refused() {
+fn invalid_volumes_are_refused() {
     let config = TsdfConfig {
         min: Point3::origin(),
         max: Point3::new(10.0, 10.0, 10.0),
         voxel_meters: 0.001,
         truncation_meters: 0.01,
     };
-    let told = TsdfVolume::new(config).unwrap_err().to_string();
+    let message = TsdfVolume::new(config).unwrap_err().to_string();
     assert!(
-        told.starts_with("a volume of 10001x10001x10001 voxels"),
-        "{told}"
+        message.starts_with("the volume has 10001x10001x10001 voxels"),
+        "{message}"
     );
-    let told = TsdfVolume::new(TsdfConfig {
+    let message = TsdfVolume::new(TsdfConfig {
         voxel_meters: 0.0,
         ..config
     })
     .unwrap_err()
     .to_string();
     assert_eq!(
-        told,
+        message,
         "voxel size in meters is 0, expected a number from 0.000001 to 1000"
     );
-    let told = TsdfVolume::new(TsdfConfig {
+    let message = TsdfVolume::new(TsdfConfig {
         max: Point3::new(1.0, -1.0, 1.0),
         ..config
     })
     .unwrap_err()
     .to_string();
-    assert!(told.starts_with("volume along y in meters is -1"), "{told}");
-    let told = ReconstructionNoise::level(5).unwrap_err().to_string();
+    assert!(
+        message.starts_with("volume along y in meters is -1"),
+        "{message}"
+    );
+    let message = ReconstructionNoise::level(5).unwrap_err().to_string();
     assert_eq!(
-        told,
+        message,
         "reconstruction level is 5, expected a number from 1 to 4"
     );
 }
 
-/// Mean distance from samples of one model to the nearest of the dense samples of another, metres.
+/// Returns the mean distance from samples of one model to the nearest of dense samples of another,
+/// meters.
 fn surface_error(from: &Model, to: &Model) -> f64 {
     let dense = hicp_core::sample_surface(to.mesh(), 20_000);
     let nearest = |p: &Point3<f32>| {
@@ -194,7 +201,7 @@ fn surface_error(from: &Model, to: &Model) -> f64 {
 }
 
 #[test]
-fn reconstructions_are_closed_and_worse_with_every_level() {
+fn reconstructions_are_closed_and_less_accurate_at_every_level() {
     for object in [Household::Mug, Household::Car] {
         let model = object.model().unwrap();
         let mut errors = Vec::new();
