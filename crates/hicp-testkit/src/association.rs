@@ -8,12 +8,14 @@ use hybrid_icp::core::{
 use crate::law::{Subject, Trial};
 use crate::scenes::{cases, sides, workspace};
 
-/// What [`check_association`] may take for granted of an association beyond the trait's contract.
+/// The laws that [`check_association`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssociationLaws {
-    /// Every pair's source is `source[source_index]`, moved by the pose. False for one that starts from the observation.
+    /// Every pair's source is `source[source_index]`, moved by the pose. False for an association
+    /// that starts from the observation.
     pub sources_are_the_selected: bool,
-    /// Every pair's target is the observation's surfel of `target_index`. False for one that interpolates.
+    /// Every pair's target is the observation's surfel of `target_index`. False for an association
+    /// that interpolates.
     pub targets_are_the_observed: bool,
 }
 
@@ -26,20 +28,21 @@ impl Default for AssociationLaws {
     }
 }
 
-/// Checks a [`DataAssociation`]; `make` makes a fresh one.
+/// Checks a [`DataAssociation`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - Pure: a fresh and a used instance give the same pairs in the same order, and so does a boxed one.
-/// - Never panics: without a source, with one point, with points and poses that are not finite, with nothing observed.
-/// - Pairs are finite; weights are finite and not negative.
-/// - The source is the selected point, *moved*; the target is the observed surfel of its index (see [`AssociationLaws`]);
-///   indices are in range.
-/// - The pose noted in the pairs stays.
+/// - Pure: a fresh, a used and a boxed instance give the same pairs in the same order.
+/// - Never panics: without a source, with one point, with points and poses that are not finite, and
+///   if nothing is observed.
+/// - Pairs are finite. Weights are finite and not negative.
+/// - The source is the selected point, *moved*. The target is the observed surfel of its index (see
+///   [`AssociationLaws`]). Indices are in range.
+/// - The pose stored in the pairs does not change.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_association<T: DataAssociation + 'static>(
     make: impl Fn() -> T,
     laws: AssociationLaws,
@@ -59,7 +62,7 @@ pub fn check_association<T: DataAssociation + 'static>(
             };
             let pairs = trial.calm(|| associate(&mut make()));
             contract(&trial, laws, &source, sides(&case.problem).1, &pairs);
-            let law = "the pose noted in the pairs stays";
+            let law = "the pose stored in the pairs does not change";
             trial.same(law, &case.pose, pairs.camera_from_object());
             trial.pure::<dyn DataAssociation, _>(&pairs, [&mut used, &mut boxed], associate);
         }
@@ -119,7 +122,7 @@ fn contract(
     }
 }
 
-/// Whether all coordinates of a pair are finite.
+/// Returns whether all coordinates of a pair are finite.
 pub(crate) fn finite(pair: &Pair) -> bool {
     [&pair.source, &pair.target].into_iter().all(|surfel| {
         surfel.point.iter().all(|x| x.is_finite()) && surfel.normal.iter().all(|x| x.is_finite())

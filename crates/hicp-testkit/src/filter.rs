@@ -7,30 +7,34 @@ use crate::association::finite;
 use crate::law::{Subject, Trial, bits};
 use crate::pairs::{PairSet, good_pairs, hard_pairs};
 
-/// What [`check_filter`] may take for granted of a filter beyond the trait's contract.
+/// The laws that [`check_filter`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FilterLaws {
-    /// Filtering twice is filtering once: fixed limits are, shares and weights are not.
+    /// Filtering twice gives the same pairs as filtering once. True for fixed limits, false for
+    /// shares and weights.
     pub idempotent: bool,
-    /// Weights stay: it only removes.
+    /// Weights do not change: the filter only removes pairs.
     pub keeps_weights: bool,
 }
 
-/// Checks an [`OutlierFilter`]; `make` makes a fresh one.
+/// Checks an [`OutlierFilter`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - Only removes pairs or changes their weights; keeps their order, and nothing stays nothing.
+/// - Only removes pairs or changes their weights, and keeps their order. An empty set stays empty.
 /// - Weights of finite pairs stay finite and not negative.
-/// - The pose and the number of candidates noted in the pairs stay.
-/// - Pure: a fresh and a used instance give the same bits, and so does a boxed one and a chain of it alone.
-/// - Pure given the iteration: the index decides, not which iterations came before.
-/// - Never panics: also with no pair, one, equal distances, and numbers that are not finite.
-/// - As declared in [`FilterLaws`].
+/// - The pose and the number of candidates stored in the pairs do not change.
+/// - Pure: a fresh, a used and a boxed instance, and a chain of this filter alone, give the same
+///   bits.
+/// - Pure given the iteration: the result depends on the index of the iteration, not on earlier
+///   iterations.
+/// - Never panics: also without pairs, with one pair, with equal distances, and with numbers that
+///   are not finite.
+/// - Keeps the laws declared in [`FilterLaws`].
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: FilterLaws) {
     let subject = Subject::new::<T>(None);
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn OutlierFilter>);
@@ -51,13 +55,14 @@ pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: Filt
                 for earlier in &before {
                     trial.calm(|| run(&mut filter, &set, *earlier, &set.pairs));
                 }
-                let law = "pure given the iteration: which iterations came before decides nothing";
+                let law = "pure given the iteration: earlier iterations do not change the result";
                 trial.same(law, &expected, &trial.calm(|| filtered(&mut filter)));
             }
-            let law = "a chain of one filter is that filter";
+            let law = "a chain of one filter gives the result of that filter";
             trial.same(law, &expected, &trial.calm(|| filtered(&mut (make(),))));
             if laws.idempotent {
-                let law = "idempotent, as declared: filtering twice is filtering once";
+                let law =
+                    "idempotent, as declared: filtering twice gives the same as filtering once";
                 let twice = trial.calm(|| run(&mut make(), &set, iteration, &expected));
                 trial.same(law, &expected, &twice);
             }
@@ -65,11 +70,13 @@ pub fn check_filter<T: OutlierFilter + 'static>(make: impl Fn() -> T, laws: Filt
     }
 }
 
-/// The iterations in which filters are tried.
+/// The iterations in which filters are tested.
 const ITERATIONS: [usize; 4] = [0, 1, 4, 49];
 
-/// Iterations that may have come before one: the regular ones, none of them, later ones of a run before, and the same, as
-/// after a rejected pose.
+/// Returns sequences of iterations that may precede an iteration.
+///
+/// They are the regular one, a gap, another run, and the same iteration again, as after a rejected
+/// pose.
 fn histories(iteration: usize) -> [Vec<usize>; 4] {
     [
         (0..iteration).collect(),
@@ -79,7 +86,7 @@ fn histories(iteration: usize) -> [Vec<usize>; 4] {
     ]
 }
 
-/// Filters a copy of the pairs as a stage does in an iteration.
+/// Filters a copy of the pairs, as a stage does in an iteration.
 fn run(
     filter: &mut dyn OutlierFilter,
     set: &PairSet,
@@ -99,7 +106,7 @@ fn contract(
     after: &Correspondences,
 ) {
     trial.same(
-        "the pose and the candidates noted in the pairs stay",
+        "the pose and the candidates stored in the pairs do not change",
         &(before.camera_from_object(), before.n_candidates()),
         &(after.camera_from_object(), after.n_candidates()),
     );
@@ -115,11 +122,15 @@ fn contract(
         let Some(origin) = rest.find(|candidate| identity(candidate) == wanted) else {
             trial.broken(
                 "only removes or re-weights pairs, and keeps their order",
-                format_args!("{pair:?}, which is not among the pairs that were left to come"),
+                format_args!("{pair:?}, which is not among the remaining input pairs"),
             );
         };
         if laws.keeps_weights {
-            trial.same("weights stay, as declared", &origin.weight, &pair.weight);
+            trial.same(
+                "weights do not change, as declared",
+                &origin.weight,
+                &pair.weight,
+            );
         }
         if finite(pair) && origin.weight.is_finite() {
             let law = "weights stay finite and not negative";

@@ -5,15 +5,19 @@ use hybrid_icp::fusion::{CameraMotion, Fuser, PoseEstimate, Update};
 
 use crate::law::{BOXED, PURE, Subject, Trial};
 
-/// What [`check_fuser`] may take for granted of a fuser beyond the trait's contract.
+/// The laws that [`check_fuser`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FuserLaws {
-    /// The order in which estimates come does not matter, but for rounding. False by default: filters are recursive.
+    /// The order of the estimates does not matter, except for rounding. False by default, because
+    /// filters are recursive.
     pub permutation: bool,
-    /// Moving the camera is the same as having seen everything from there: true when covariances are carried by the adjoint and
-    /// nothing is measured in the camera's own axes.
+    /// Fusing and then moving the camera gives the same as observing everything from the final
+    /// camera pose.
+    ///
+    /// True if covariances are transformed by the adjoint and nothing is measured along the
+    /// camera's axes.
     pub equivariant: bool,
-    /// The first estimate is taken as it is, covariance and MVE included.
+    /// The first estimate becomes the result unchanged, including its covariance and MVE.
     pub first_as_it_is: bool,
 }
 
@@ -27,31 +31,37 @@ impl Default for FuserLaws {
     }
 }
 
-/// Some estimates of one pose, and the motion of the camera after each.
+/// Estimates of one pose, and the motion of the camera after each.
 struct Course {
     name: &'static str,
     estimates: Vec<PoseEstimate>,
-    /// Consistent with their covariances and small: where laws hold to a few digits.
+    /// The estimates are close to each other and consistent with their covariances, so laws hold to
+    /// several digits.
     tame: bool,
 }
 
-/// Checks a [`Fuser`]; `make` makes a fresh one.
+/// Checks a [`Fuser`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - Nothing is believed before the first update nor after a reset; the first estimate as it is (see [`FuserLaws`]).
-/// - Never panics, and what is returned is finite with a covariance that is one: also for estimates half a turn apart, without
-///   variance, of absurd variance, and wildly wrong ones. (What is not finite cannot be given: [`PoseEstimate::new`] refuses it.)
-/// - A rejected update changes nothing that is believed.
-/// - Estimates that are all one are believed.
-/// - `propagate` moves the pose by the motion, and by nothing without one; the covariance stays one.
-/// - Equivariant: estimates from before and after a motion fuse as if all had been made after it (see [`FuserLaws`]).
+/// - There is no estimate before the first update and after a reset. The first estimate is the
+///   result unchanged (see [`FuserLaws`]).
+/// - Never panics, and returns finite poses with valid covariances. This also holds for estimates
+///   rotated by 180°, without variance, with huge variances, and for extreme outliers. Values that
+///   are not finite need no test, because [`PoseEstimate::new`] refuses them.
+/// - A rejected update does not change the estimate.
+/// - The result of equal estimates is that estimate.
+/// - `propagate` moves the pose by the motion of the camera. Without motion, it changes nothing.
+///   The covariance stays valid.
+/// - Equivariant: estimates from before and after a motion fuse as if all were made after it (see
+///   [`FuserLaws`]).
 /// - Permutation: see [`FuserLaws`].
-/// - Pure: a reset fuser gives the bits of a fresh one, whatever it was given before; so does a boxed one. Asking changes nothing.
+/// - Pure: a fuser after a reset and a boxed fuser give the same bits as a fresh one. Reading the
+///   estimate changes nothing.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_fuser<T: Fuser + 'static>(make: impl Fn() -> T, laws: FuserLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
     let courses = courses();
@@ -78,12 +88,12 @@ pub fn check_fuser<T: Fuser + 'static>(make: impl Fn() -> T, laws: FuserLaws) {
         subject.named([make().name(), make().name(), boxed.name()]);
         let estimates = &course.estimates;
         if laws.first_as_it_is {
-            let law = "the first estimate is taken as it is";
+            let law = "the first estimate is the result unchanged";
             let fuser = updated(make(), &estimates[..1]);
             trial.same(law, &Some(estimates[0]), &fuser.estimate());
         }
         let repeated = updated(make(), &vec![estimates[0]; 4]);
-        let law = "estimates that are all one are the result";
+        let law = "the result of equal estimates is that estimate";
         near(&trial, law, estimates[0].camera_from_object(), &repeated);
         moves(&trial, &mut updated(make(), &estimates[..1]));
         if course.tame && laws.equivariant {
@@ -110,15 +120,16 @@ fn updated<F: Fuser>(mut fuser: F, estimates: &[PoseEstimate]) -> F {
     fuser
 }
 
-/// The camera's motions between estimates.
+/// Returns the motion of the camera after an estimate.
 fn motion(step: usize) -> CameraMotion {
     let sign = if step.is_multiple_of(2) { 1.0 } else { -1.0 };
     let twist = Vector6::new(0.05 * sign, -0.02, -0.1, 0.1, 0.2 * sign, -0.05);
     CameraMotion::new(se3::exp(&twist)).expect("small")
 }
 
-/// Updates and moves through a course, with the laws that hold at every step. Returns everything
-/// that can be observed.
+/// Runs a course of updates and motions, and checks the laws of every step.
+///
+/// Returns everything that can be observed.
 fn drive(
     trial: &Trial<'_>,
     fuser: &mut dyn Fuser,
@@ -148,7 +159,7 @@ fn drive(
     seen
 }
 
-/// Returns the estimate, which must be a valid one.
+/// Returns the estimate after checking that it is valid.
 fn healthy(trial: &Trial<'_>, fuser: &(impl Fuser + ?Sized)) -> PoseEstimate {
     let Some(estimate) = fuser.estimate() else {
         trial.broken("there is an estimate after an update", "no estimate")
@@ -186,7 +197,7 @@ fn equivariant<F: Fuser>(trial: &Trial<'_>, make: &impl Fn() -> F, estimates: &[
     on_the_way.propagate(&motion);
     agree(
         trial,
-        "equivariant: moving the camera is having seen everything from there",
+        "equivariant: moving the camera gives the same as observing everything from there",
         &updated(make(), &there),
         &updated(on_the_way, &there[half..]),
     );
@@ -204,7 +215,7 @@ fn agree(trial: &Trial<'_>, law: &str, expected: &impl Fuser, found: &impl Fuser
     trial.holds(law, difference <= 1e-6 * size, covariances);
 }
 
-/// Returns the estimate that would have been made after a motion.
+/// Returns the estimate as it would be after a motion of the camera.
 fn seen_after(motion: &CameraMotion, estimate: &PoseEstimate) -> PoseEstimate {
     let adjoint = se3::adjoint(motion.next_camera_from_camera());
     let covariance = adjoint * estimate.covariance() * adjoint.transpose();
@@ -225,7 +236,7 @@ fn with_mve(pose: Isometry3<f64>, covariance: Matrix6<f64>, mve: f64) -> PoseEst
 #[allow(clippy::cast_precision_loss)] // Axes.
 fn courses() -> [Course; 9] {
     let center = se3::exp(&Vector6::new(0.05, -0.03, 0.6, 0.4, -0.9, 0.3));
-    // Six scattered estimates, of sizes that differ by far more than a factor.
+    // Six scattered estimates, whose covariances differ in size.
     let scattered = |size: f64, covariance: &dyn Fn(u32) -> Matrix6<f64>| {
         (0..6)
             .map(|k: u32| {
@@ -263,7 +274,7 @@ fn courses() -> [Course; 9] {
         ("estimates close together", near, true),
         ("estimates some way apart", apart, true),
         ("estimates far apart", scattered(0.4, &sized(0.1)), false),
-        ("estimates half a turn apart", turns, false),
+        ("estimates rotated by 180°", turns, false),
         ("one wild outlier", wild, false),
         (
             "estimates without variance",

@@ -1,4 +1,4 @@
-//! Reports broken laws.
+//! Reports of broken laws.
 
 use std::fmt::{Debug, Display};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +9,7 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
-    /// Names a component by its type, and by its name in traces if it has one.
+    /// Creates a subject from a component's type, and from its name in traces if it has one.
     pub(crate) fn new<T>(name: Option<&str>) -> Self {
         let full = std::any::type_name::<T>();
         Self {
@@ -20,7 +20,7 @@ impl Subject {
         }
     }
 
-    /// Tries the component on an input.
+    /// Starts a trial of the component on an input.
     pub(crate) fn on<'a>(&'a self, input: &'a str) -> Trial<'a> {
         let component = &self.component;
         Trial { component, input }
@@ -36,7 +36,7 @@ impl Subject {
     }
 }
 
-/// A component and an input that it is tried on.
+/// A component and the input of a trial.
 #[derive(Clone, Copy)]
 pub(crate) struct Trial<'a> {
     component: &'a str,
@@ -44,7 +44,7 @@ pub(crate) struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Reports a broken law.
+    /// Panics with a report of a broken law.
     pub(crate) fn broken(&self, law: &str, found: impl Display) -> ! {
         panic!(
             "{} breaks the law \"{law}\"\n  input: {}\n  found: {found}",
@@ -52,7 +52,7 @@ impl Trial<'_> {
         )
     }
 
-    /// Reports a broken law unless a condition holds.
+    /// Reports a broken law if a condition is false.
     pub(crate) fn holds(&self, law: &str, condition: bool, found: impl Display) {
         if !condition {
             self.broken(law, found);
@@ -67,7 +67,7 @@ impl Trial<'_> {
         }
     }
 
-    /// Runs a component; a panic is a broken law.
+    /// Runs a component, and reports a panic as a broken law.
     pub(crate) fn calm<R>(&self, run: impl FnOnce() -> R) -> R {
         catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
             let message = payload
@@ -81,16 +81,16 @@ impl Trial<'_> {
         })
     }
 
-    /// Checks how many renders a component added to the one of its pose.
+    /// Checks the number of renders that a component added to the one of its pose.
     pub(crate) fn shares_the_render(&self, renders: u64, allowed: u64) {
         self.holds(
-            "shares the render: takes the view of a pose from the context",
+            "shares the render: uses the view of a pose from the context",
             renders <= allowed,
             format_args!("{renders} more renders of a pose already rendered"),
         );
     }
 
-    /// Checks that a used instance (twice) and a boxed one give the bits of a fresh one.
+    /// Checks that a used instance (twice) and a boxed one give the same bits as a fresh one.
     pub(crate) fn pure<C: ?Sized, R: Debug>(
         &self,
         of_fresh: &R,
@@ -104,13 +104,15 @@ impl Trial<'_> {
     }
 }
 
-/// Returns a text that differs when the bits differ: numbers are printed with all the digits that
-/// distinguish them, −0 differs from 0, and NaN is equal to itself.
+/// Returns a text that differs if the bits differ.
+///
+/// Numbers are printed with all digits that distinguish them. −0 differs from 0, and NaN equals
+/// itself.
 pub(crate) fn bits(value: &impl Debug) -> String {
     format!("{value:?}")
 }
 
-/// Returns the place where two texts begin to differ, with some of its surroundings.
+/// Returns an excerpt of two texts around their first difference.
 fn first_difference(expected: &str, found: &str) -> String {
     let same = expected
         .chars()
@@ -127,6 +129,6 @@ fn first_difference(expected: &str, found: &str) -> String {
 }
 
 /// The law of purity.
-pub(crate) const PURE: &str = "pure: equal inputs give equal bits, whatever ran before";
+pub(crate) const PURE: &str = "pure: equal inputs give equal bits, regardless of earlier calls";
 /// The law of boxed components.
 pub(crate) const BOXED: &str = "boxed = static: the same bits behind a box";

@@ -1,11 +1,16 @@
-//! Conformance kit of Hybrid ICP: one function per extension point that tries a component on small scenes and on what can go
-//! wrong, and panics with the law that it breaks, the input and the values found.
+//! Conformance kit of Hybrid ICP: tests custom components against the laws of their traits.
 //!
-//! **Should you use this crate?** As a development dependency, if you write a selection, an association, a filter, a metric, a
-//! stop rule, a score, a switcher, a stage, a fuser or a renderer of your own: yes. To refine poses, use `hybrid-icp`.
+//! There is one function per extension point. It runs a component on small scenes and on difficult
+//! inputs. If the component breaks a law, the function panics with the law, the input and the
+//! values found.
 //!
-//! Each function takes a closure that makes the component afresh, so that a fresh instance can be compared with a used one, and
-//! the optional laws that this component declares. A call takes well below a second in a development profile.
+//! **Should you use this crate?** Use it as a development dependency if you write a custom
+//! selection, association, filter, metric, stop rule, score, switcher, stage, fuser or renderer. To
+//! refine poses, use `hybrid-icp`.
+//!
+//! Each function takes a closure that creates a fresh component, to compare fresh instances with
+//! used ones. It also takes the optional laws that this component declares. A call takes well below
+//! a second in a development profile.
 //!
 //! ```
 //! use hicp_testkit::{MetricLaws, check_metric};
@@ -44,14 +49,16 @@
 //!
 //! # What the kit cannot check
 //!
-//! *A warm run makes no heap allocation.* Counting allocations takes a global allocator, which is the program's and not a
-//! library's to choose. In a test binary of its own, install one that counts per thread and passes every call on to
-//! `std::alloc::System`; refine twice with one `Refiner`, and compare the count before and after the second time.
-//! `tests/tests/it/allocations_custom.rs` in the repository is such a test, to be copied.
+//! *A warm run makes no heap allocation.* Counting allocations requires a global allocator, which a
+//! program must choose and not a library. In a separate test binary, install an allocator that
+//! counts per thread and forwards every call to `std::alloc::System`. Refine twice with one
+//! `Refiner`, and compare the count before and after the second run. To start, copy
+//! `tests/tests/it/allocations_custom.rs` from the repository.
 //!
-//! *Observers* have one law, that looking changes nothing, and it is the engine that keeps it.
+//! *Observers* have one law: observing changes nothing. The engine ensures it.
 //!
-//! `tests/tests/it/custom_*.rs` in the repository show a component for every extension point, checked and in a whole pipeline.
+//! `tests/tests/it/custom_*.rs` in the repository show a component for every extension point,
+//! checked and used in a whole pipeline.
 
 // A test kit reports by panicking, and its own scenes are valid by construction.
 #![allow(clippy::panic, clippy::expect_used)]

@@ -8,19 +8,22 @@ use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, Step};
 use crate::law::{Subject, Trial};
 use crate::pairs::{good_pairs, hard_pairs};
 
-/// Which laws [`check_metric`] holds a metric to; all of them by default.
+/// The laws that [`check_metric`] checks; all of them by default.
 ///
-/// A metric with a fixed frame (a prior, a camera axis) has no `frame` invariance; one with a length of its own (a known σ, a
-/// floor) none of `units`; one that looks at ranks or medians treats a weight of two unlike two pairs.
+/// Some metrics cannot keep all laws:
+///
+/// - A metric with a fixed frame (a prior, a camera axis) does not keep `frame`.
+/// - A metric with a fixed length (a known σ, a lower bound) does not keep `units`.
+/// - A metric with ranks or medians does not keep `multiplicity`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MetricLaws {
-    /// Pairs moved by a rigid motion A have the same loss, and the increment A·T·A⁻¹.
+    /// Pairs moved by a rigid motion A have the same loss, and the increment T becomes A·T·A⁻¹.
     pub frame: bool,
     /// The order of the pairs does not matter, up to rounding.
     pub order: bool,
-    /// Lengths in another unit give the same motion in that unit, and the loss in its square.
+    /// Lengths in another unit give the same motion in that unit, and a loss in its square.
     pub units: bool,
-    /// A weight of two is two pairs.
+    /// A weight of two has the same effect as two pairs.
     pub multiplicity: bool,
     /// A tenth of the increment does not raise the mean loss.
     pub downhill: bool,
@@ -45,11 +48,11 @@ impl Default for MetricLaws {
 ///
 /// # Laws
 ///
-/// Those of [`check_minimize`], and the `rows` of [`MetricLaws`].
+/// The laws of [`check_minimize`], and `rows` of [`MetricLaws`].
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
     if laws.rows {
         let subject = Subject::new::<T>(Some(make().name()));
@@ -64,15 +67,16 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
 ///
 /// # Laws
 ///
-/// - Pure: a fresh and a used instance give the same bits in every method, and so does a boxed one.
-/// - Never panics, and never returns what is not finite: without pairs, with too few, with pairs that determine nothing or are
-///   not finite, `minimize`, `system` and `mean_loss` return `None` or finite numbers.
-/// - Losses are not negative; `minimize` reports the `mean_loss`.
-/// - Those of [`MetricLaws`] but for `rows`.
+/// - Pure: a fresh, a used and a boxed instance give the same bits in every method.
+/// - Never panics, and never returns numbers that are not finite. Without pairs, with too few, and
+///   with degenerate pairs or pairs that are not finite, `minimize`, `system` and `mean_loss`
+///   return `None` or finite numbers.
+/// - Losses are not negative. `minimize` reports the `mean_loss`.
+/// - Keeps the laws of [`MetricLaws`] except `rows`.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_minimize<T: Minimize + 'static>(make: impl Fn() -> T, laws: MetricLaws) {
     let subject = Subject::new::<T>(Some(make().label()));
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Minimize>);
@@ -100,19 +104,20 @@ pub fn check_minimize<T: Minimize + 'static>(make: impl Fn() -> T, laws: MetricL
     subject.named([make().label(), used.label(), boxed.label()]);
 }
 
-/// Checks that a metric that wraps another changes nothing: every method gives the same bits on all inputs of the kit.
+/// Checks that a wrapper of a metric gives the same bits in every method, on all inputs of the kit.
 ///
-/// For pass-through wrappers (that count, log, or box): provided methods that are not forwarded show here.
+/// Use it for wrappers that count, log or box. It detects provided methods that the wrapper does
+/// not forward.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a method is not forwarded.
+/// Panics if a method is not forwarded, with the law, the input and the value found.
 pub fn check_metric_forwards<A: Minimize, B: Minimize>(
     inner: impl Fn() -> A,
     wrapper: impl Fn() -> B,
 ) {
     let subject = Subject::new::<B>(Some(wrapper().label()));
-    // A metric tied to where the stage starts shows whether it receives the iteration.
+    // A metric that depends on the initial pose shows whether it receives the iteration.
     let init = Isometry3::translation(0.01, 0.02, 0.5);
     let later = Iteration::new(1, &init, Problem::default());
     for set in good_pairs().into_iter().chain(hard_pairs()) {
@@ -120,13 +125,13 @@ pub fn check_metric_forwards<A: Minimize, B: Minimize>(
         for iteration in [Iteration::default(), later] {
             let expected = Answers::of(&mut inner(), &iteration, &set.pairs);
             let found = trial.calm(|| Answers::of(&mut wrapper(), &iteration, &set.pairs));
-            let law = "forwards every method to what it wraps";
+            let law = "forwards every method to the wrapped metric";
             trial.same(law, &expected, &found);
         }
     }
 }
 
-/// What a metric returns for a set of pairs.
+/// The results of a metric for a set of pairs.
 #[derive(Debug)]
 struct Answers {
     step: Option<Step>,
@@ -150,7 +155,7 @@ impl Answers {
 
     fn are_finite(&self, trial: &Trial<'_>) {
         if let Some(step) = &self.step {
-            let law = "minimize gives nothing or a finite increment";
+            let law = "minimize returns None or a finite increment";
             let finite = se3::is_finite(&step.increment);
             trial.holds(law, finite, format_args!("{step:?}"));
         }
@@ -167,7 +172,7 @@ impl Answers {
     }
 }
 
-/// One set of pairs that determine a step.
+/// A set of pairs that determine a step.
 struct Check<'a> {
     trial: Trial<'a>,
     pairs: &'a Correspondences,
@@ -193,7 +198,7 @@ impl Check<'_> {
                     .flat_map(|(i, pair)| std::iter::repeat_n(pair, if third(i) { 2 } else { 1 })),
             );
             self.equal(
-                "a weight of two is two pairs",
+                "a weight of two has the same effect as two pairs",
                 &self.step(&mut make(), &doubled),
                 &self.step(&mut make(), &twice),
                 1e-6,
@@ -207,16 +212,16 @@ impl Check<'_> {
                 increment: motion * own.increment * motion.inverse(),
                 ..own
             };
-            let law = "frame: moving all pairs by A leaves the loss, and turns the increment T into A·T·A⁻¹";
+            let law = "frame: moving all pairs by A keeps the loss and changes the increment T to A·T·A⁻¹";
             self.equal(law, &expected, &found, 1e-3);
         }
         if laws.units {
-            // A power of two, so that changing the unit rounds nothing.
+            // A power of two, so that the change of the unit is exact.
             let found = self.step(&mut make(), &self.scaled(1024.0));
             let mut expected = own;
             expected.mean_loss *= 1024.0 * 1024.0;
             expected.increment.translation.vector *= 1024.0;
-            let law = "units: lengths times k move k times as far, turn the same, and lose k² times as much";
+            let law = "units: lengths times k give k times the translation, the same rotation and k² times the loss";
             self.equal(law, &expected, &found, 1e-6);
         }
         if laws.downhill {
@@ -272,8 +277,9 @@ impl Check<'_> {
         self.at(&pose, pairs)
     }
 
-    /// Checks that two steps agree in loss and motion. Lengths are compared relative to the size of
-    /// the motion.
+    /// Checks that two steps agree in loss and motion.
+    ///
+    /// Lengths are compared relative to the size of the motion.
     fn equal(&self, law: &str, expected: &Step, found: &Step, tolerance: f64) {
         let (angle, distance) = se3::pose_distance(&expected.increment, &found.increment);
         let scale = expected.increment.translation.vector.norm() + expected.mean_loss.sqrt();
@@ -312,7 +318,7 @@ fn rows(trial: &Trial<'_>, metric: &dyn ErrorMetric, pairs: &Correspondences) {
     }
 }
 
-/// Whether two losses are equal up to rounding.
+/// Returns whether two losses are equal up to rounding.
 fn close(a: f64, b: f64, tolerance: f64) -> bool {
     (a - b).abs() <= tolerance * a.abs().max(b.abs()) + 1e-18
 }

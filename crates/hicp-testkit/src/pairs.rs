@@ -1,18 +1,18 @@
-//! The pairs that filters and metrics are tried on.
+//! The pairs on which filters and metrics are tested.
 
 use hybrid_icp::association::{DataAssociation, NearestNeighbor, PointSelection, VisibleSurface};
 use hybrid_icp::core::{Correspondences, Isometry3, Pair, Point3, Problem};
 
 use crate::scenes::{Scene, scenes, workspace};
 
-/// Pairs with words for messages.
+/// A set of pairs with a label for messages.
 pub(crate) struct PairSet {
     pub(crate) label: String,
     pub(crate) problem: Problem<'static>,
     pub(crate) pairs: Correspondences,
 }
 
-/// Some 200 nearest-neighbour pairs of the visible surface, with weights that differ.
+/// Returns about 200 nearest-neighbor pairs of the visible surface with different weights.
 fn matched(scene: &'static Scene, pose: &Isometry3<f64>) -> Correspondences {
     let mut workspace = workspace();
     let problem = scene.problem();
@@ -23,7 +23,7 @@ fn matched(scene: &'static Scene, pose: &Isometry3<f64>) -> Correspondences {
     let source: Vec<_> = source.into_iter().step_by(step).collect();
     pairs.begin(pose, source.len());
     NearestNeighbor::default().associate(&mut context, &source, pose, &mut pairs);
-    // Weights with few digits, so that doubling and adding them is exact.
+    // Weights with few binary digits, so that doubling and adding them is exact.
     for (weight, pair) in [1.0, 0.5, 0.75, 1.0, 0.25]
         .iter()
         .cycle()
@@ -34,17 +34,17 @@ fn matched(scene: &'static Scene, pose: &Isometry3<f64>) -> Correspondences {
     pairs
 }
 
-/// The pairs of every scene at a pose nearly right and at one far off.
+/// Returns the pairs of every scene, at a pose near the true one and at one far away.
 pub(crate) fn good_pairs() -> Vec<PairSet> {
     scenes()
         .iter()
         .flat_map(|scene| {
             [
-                ("a pose nearly right", scene.near),
-                ("a pose far off", scene.far),
+                ("a pose near the true one", scene.near),
+                ("a pose far from the true one", scene.far),
             ]
             .map(|(what, pose)| PairSet {
-                label: format!("nearest-neighbour pairs of the {} at {what}", scene.name),
+                label: format!("nearest-neighbor pairs of the {} at {what}", scene.name),
                 problem: scene.problem(),
                 pairs: matched(scene, &pose),
             })
@@ -52,7 +52,7 @@ pub(crate) fn good_pairs() -> Vec<PairSet> {
         .collect()
 }
 
-/// Too few pairs, pairs that determine nothing, and pairs that are not finite.
+/// Returns too few pairs, degenerate pairs, and pairs that are not finite.
 pub(crate) fn hard_pairs() -> Vec<PairSet> {
     let scene = &scenes()[0];
     let base = matched(scene, &scene.near);

@@ -6,11 +6,13 @@ use hybrid_icp::raster::Rasterizer;
 use crate::law::{PURE, Subject, Trial};
 use crate::scenes::{Case, cases, sides};
 
-/// What [`check_renderer`] may take for granted of a renderer beyond the trait's contract.
+/// The laws that [`check_renderer`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererLaws {
-    /// Largest share of the pixels on which it may differ from [`Rasterizer`]: by 1 mm in depth, or in whether there is
-    /// anything. 2 % by default; `None` for renderers that draw something else than the mesh.
+    /// Largest share of pixels that may differ from [`Rasterizer`]; 2 % by default.
+    ///
+    /// A pixel differs if its depth is more than 1 mm off, or if only one of the two renders has a
+    /// depth. `None` for renderers that do not draw the mesh.
     pub differing_pixels: Option<f64>,
 }
 
@@ -22,20 +24,22 @@ impl Default for RendererLaws {
     }
 }
 
-/// Checks a [`Renderer`]; `make` makes a fresh one.
+/// Checks a [`Renderer`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - The view lies within the region asked for; what is rendered of a part of the image is that part of the whole.
-/// - Depths are finite and not negative; a pixel has a depth exactly if it has a triangle, whose index is one of the mesh.
-/// - Behind the camera there is nothing.
-/// - Pure: a fresh and a used instance, into a fresh and a used view, give the same bits; so does a boxed one.
+/// - The view lies within the requested region. A render of a part of the image is equal to that
+///   part of the whole render.
+/// - Depths are finite and not negative. A pixel has a depth if and only if it has a triangle of
+///   the mesh.
+/// - Nothing is visible behind the camera.
+/// - Pure: a fresh, a used and a boxed instance give the same bits, in a fresh and in a used view.
 /// - Never panics, also at poses that are not finite.
 /// - Agrees with the rasterizer, as declared.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: RendererLaws) {
     let subject = Subject::new::<T>(None);
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Renderer>);
@@ -62,7 +66,7 @@ pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: Rendere
             trial.calm(|| draw(&mut used, &case, &region, &mut used_view));
             trial.same(PURE, &view, &used_view);
             let whole = whole.get_or_insert_with(|| view.clone());
-            let law = "a part of the image shows what the whole shows there";
+            let law = "a render of a part of the image is equal to that part of the whole render";
             for (u, v) in pixels(&region) {
                 let (own, there) = (view.depth_at(u, v), whole.depth_at(u, v));
                 let found = format_args!("{own} in the part, {there} in the whole at ({u}, {v})");
@@ -90,12 +94,12 @@ fn contract(trial: &Trial<'_>, case: &Case, region: &PixelRegion, view: &Rendere
         let law = "depths are finite and not negative";
         trial.holds(law, depth.is_finite() && *depth >= 0.0, found);
         let shows = *triangle != NO_TRIANGLE;
-        let law = "a pixel has a depth exactly if it has a triangle of the mesh";
+        let law = "a pixel has a depth if and only if it has a triangle of the mesh";
         let in_range = !shows || (*triangle as usize) < triangles;
         trial.holds(law, (*depth > 0.0) == shows && in_range, found);
     }
     if behind(case) {
-        let law = "behind the camera there is nothing";
+        let law = "nothing is visible behind the camera";
         trial.holds(law, view.depth().iter().all(|z| *z == 0.0), shown);
     }
 }

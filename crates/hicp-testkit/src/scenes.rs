@@ -1,4 +1,4 @@
-//! The inputs that components are tried on: two small scenes, and what can go wrong with them.
+//! The test inputs of components: two small scenes, and difficult variants of them.
 
 use std::sync::{Arc, OnceLock};
 
@@ -10,29 +10,29 @@ use hybrid_icp::core::{
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::raster::{Rasterizer, render_depth_image};
 
-/// A model seen in a small depth image, and where it truly is.
+/// A model, a small depth image of it, and its true pose.
 #[derive(Debug)]
 pub struct Scene {
-    /// What it shows.
+    /// Name of the object.
     pub name: &'static str,
     /// The object.
     pub model: Model,
-    /// The image, 160×120 pixels with 0.5 % of noise.
+    /// The image of 160×120 pixels, with depth noise of 0.5 %.
     pub observation: Observation,
-    /// The same camera, seeing nothing.
+    /// An observation of the same camera that contains nothing.
     pub nothing: Observation,
     /// The same image with a mask of a single pixel.
     pub one_pixel: Observation,
-    /// The true pose, camera from object.
+    /// The true pose (`camera_from_object`), meters.
     pub truth: Isometry3<f64>,
-    /// 4 mm and 4° off.
+    /// A pose with an error of 4 mm and 4°.
     pub near: Isometry3<f64>,
-    /// 3 cm and 30° off.
+    /// A pose with an error of 3 cm and 30°.
     pub far: Isometry3<f64>,
 }
 
 impl Scene {
-    /// The scene as a problem.
+    /// Returns the scene as a problem.
     #[must_use]
     pub fn problem(&self) -> Problem<'_> {
         Problem::new(&self.model, &self.observation)
@@ -66,7 +66,9 @@ impl Scene {
     }
 }
 
-/// The scenes that the kit uses: a mug (thin walls, a handle) and a carton (planes). Made once; deterministic.
+/// Returns the scenes of the kit: a mug (thin walls, a handle) and a carton (planes).
+///
+/// They are built once and are deterministic.
 #[must_use]
 pub fn scenes() -> &'static [Scene] {
     static SCENES: OnceLock<Vec<Scene>> = OnceLock::new();
@@ -83,8 +85,9 @@ pub(crate) fn workspace() -> Workspace {
     Workspace::new(Rasterizer::default())
 }
 
-/// Calls `run` where the view of a pose is in the cache. Returns its result and the number of
-/// renders that it added.
+/// Calls `run` with the view of a pose in the cache.
+///
+/// Returns its result and the number of renders that it added.
 pub(crate) fn at_rendered_pose<R>(
     problem: &Problem<'_>,
     pose: &Isometry3<f64>,
@@ -97,14 +100,14 @@ pub(crate) fn at_rendered_pose<R>(
     (result, workspace.renders() - before)
 }
 
-/// A problem and a pose, with words for messages.
+/// A problem and a pose, with a label for messages.
 pub(crate) struct Case {
     pub(crate) label: String,
     pub(crate) problem: Problem<'static>,
     pub(crate) pose: Isometry3<f64>,
 }
 
-/// Every scene at good, bad and impossible poses, and with nothing or next to nothing observed.
+/// Returns every scene at good, bad and impossible poses, and with almost empty observations.
 pub(crate) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for scene in scenes() {
@@ -139,7 +142,7 @@ fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 9] {
         ("a pose nearly right", scene.near),
         ("a pose far off", scene.far),
         ("a pose behind the camera", moved(-t)),
-        ("a pose beside the image", moved(t + Vector3::x() * 5.0)),
+        ("a pose outside the image", moved(t + Vector3::x() * 5.0)),
         ("a pose around the camera", moved(Vector3::zeros())),
         (
             "a translation of NaN",

@@ -6,14 +6,15 @@ use hybrid_icp::switch::Switcher;
 use crate::law::Subject;
 use crate::scenes::{at_rendered_pose, cases, scenes};
 
-/// What [`check_score`] may take for granted of a score beyond the trait's contract.
+/// The laws that [`check_score`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScoreLaws {
-    /// The largest score there is; infinity by default.
+    /// The largest possible score; infinity by default.
     pub worst: f64,
-    /// The true pose scores better than one 3 cm and 30° off. False for scores that measure something else.
+    /// The true pose scores better than one with an error of 3 cm and 30°. False for scores with
+    /// another purpose.
     pub ranks_poses: bool,
-    /// Renders beside that of the pose; 0 by default.
+    /// Number of renders in addition to that of the pose; 0 by default.
     pub extra_renders: u64,
 }
 
@@ -27,19 +28,21 @@ impl Default for ScoreLaws {
     }
 }
 
-/// Checks a [`Score`]; `make` makes a fresh one.
+/// Checks a [`Score`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
 /// - Never NaN, never negative, never above [`ScoreLaws::worst`].
-/// - Pure: a fresh and a used instance give the same bits, and so does a boxed one.
-/// - Never panics: also with nothing observed, behind the camera, and at poses that are not finite.
-/// - Shares the render: asks the context, so that a pose already rendered costs no other render.
-/// - The truth scores better than a pose far off, as declared.
+/// - Pure: a fresh, a used and a boxed instance give the same bits.
+/// - Never panics: also if nothing is observed, behind the camera, and at poses that are not
+///   finite.
+/// - Shares the render: uses the view from the context, so that a rendered pose is not rendered
+///   again.
+/// - The true pose scores better than one far away, as declared.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_score<T: Score + 'static>(make: impl Fn() -> T, laws: ScoreLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Score>);
@@ -70,20 +73,20 @@ pub fn check_score<T: Score + 'static>(make: impl Fn() -> T, laws: ScoreLaws) {
         };
         let (truth, far) = (score(&scene.truth), score(&scene.far));
         subject.on(scene.name).holds(
-            "ranks poses, as declared: the truth scores better than a pose far off",
+            "ranks poses, as declared: the true pose scores better than one far away",
             truth < far,
-            format_args!("{truth} at the truth, {far} far off"),
+            format_args!("{truth} at the true pose, {far} far away"),
         );
     }
     subject.named([make().name(), used.name(), boxed.name()]);
 }
 
-/// What [`check_switcher`] may take for granted of a switcher.
+/// The laws that [`check_switcher`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwitcherLaws {
-    /// How many regimes there are; two by default.
+    /// Number of regimes; two by default.
     pub regimes: usize,
-    /// Renders beside that of the pose; 0 by default.
+    /// Number of renders in addition to that of the pose; 0 by default.
     pub extra_renders: u64,
 }
 
@@ -96,18 +99,20 @@ impl Default for SwitcherLaws {
     }
 }
 
-/// Checks a [`Switcher`]; `make` makes a fresh one.
+/// Checks a [`Switcher`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - The regime is one of those declared; the score it names is not NaN.
-/// - Pure: a fresh and a used instance give the same answer, and so does a boxed one.
-/// - Never panics: also with nothing observed, behind the camera, and at poses that are not finite.
-/// - Shares the render: asks the context, so that a pose already rendered costs no other render.
+/// - The regime is one of those declared. The reported score is not NaN.
+/// - Pure: a fresh, a used and a boxed instance give the same result.
+/// - Never panics: also if nothing is observed, behind the camera, and at poses that are not
+///   finite.
+/// - Shares the render: uses the view from the context, so that a rendered pose is not rendered
+///   again.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_switcher<T: Switcher + 'static>(make: impl Fn() -> T, laws: SwitcherLaws) {
     let subject = Subject::new::<T>(Some(make().name()));
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Switcher>);

@@ -10,14 +10,15 @@ use crate::scenes::{at_rendered_pose, cases};
 ///
 /// # Laws
 ///
-/// - Pure: a fresh and a used instance select the same bits, and so does a boxed one.
-/// - Never panics: also with nothing observed, behind the camera, and at poses that are not finite.
-/// - Finite points with unit normals.
-/// - Shares the render: at most one per pose, and none if the context has it already.
+/// - Pure: a fresh, a used and a boxed instance select the same points, bit for bit.
+/// - Never panics: also if nothing is observed, behind the camera, and at poses that are not
+///   finite.
+/// - Points are finite and have unit normals.
+/// - Shares the render: at most one render per pose, and none if the view is in the context.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and the value found if a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_selection<T: PointSelection + 'static>(make: impl Fn() -> T) {
     let subject = Subject::new::<T>(Some(make().name()));
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn PointSelection>);

@@ -8,11 +8,12 @@ use hybrid_icp::icp::{IterationEvent, Observer, Outcome, Session, Stage, Verdict
 use crate::law::{PURE, Subject, Trial, bits};
 use crate::scenes::{Case, cases, sides, workspace};
 
-/// What [`check_stage`] may take for granted of a stage beyond the trait's contract.
+/// The laws that [`check_stage`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StageLaws {
-    /// The observer hears of every pose evaluated, so that the one returned is among them. False for stages that evaluate
-    /// without an engine of the library inside.
+    /// The observer receives every evaluated pose, so the returned pose is among them.
+    ///
+    /// False for stages that evaluate poses without an engine of the library.
     pub tells_the_observer: bool,
 }
 
@@ -24,21 +25,24 @@ impl Default for StageLaws {
     }
 }
 
-/// Checks a [`Stage`]; `make` makes a fresh one.
+/// Checks a [`Stage`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - Never panics; the pose is finite when the initial one is, and the initial one bit for bit when that is not finite or
-///   nothing was observed.
-/// - "Kept" is the initial pose bit for bit.
-/// - Accept after evaluation: the returned pose was told to the observer, or is the initial one (see [`StageLaws`]).
-/// - The numbers agree: an evaluation has pairs and a finite loss, and no more iterations are told than counted.
-/// - Pure: a fresh and a used stage, with a fresh and a used workspace, give the same bits; so does a boxed one.
-/// - An observer that stops at once gets an end all the same.
+/// - Never panics. If the initial pose is finite, the result is finite. If it is not, or if nothing
+///   is observed, the result is the initial pose bit for bit.
+/// - The verdict "kept" means the initial pose bit for bit.
+/// - Accept after evaluation: the returned pose was reported to the observer or is the initial one
+///   (see [`StageLaws`]).
+/// - The numbers agree: an evaluation has pairs and a finite loss, and the observer receives at
+///   most the counted iterations.
+/// - Pure: a fresh, a used and a boxed stage give the same bits, with a fresh and with a used
+///   workspace.
+/// - If the observer stops the stage at the first iteration, the result is valid, too.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
     let subject = Subject::new::<T>(None);
     let (mut used, mut boxed) = (make(), Box::new(make()) as Box<dyn Stage>);
@@ -47,16 +51,16 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
         let trial = subject.on(&case.label);
         let init = &case.pose;
         let fresh = |stage: &mut (dyn Stage + 'static)| {
-            let mut told = Told::default();
-            let outcome = run(stage, &mut workspace(), &case, &mut told);
-            (outcome, told.0)
+            let mut reported = Reported::default();
+            let outcome = run(stage, &mut workspace(), &case, &mut reported);
+            (outcome, reported.0)
         };
         let of_fresh = trial.calm(|| fresh(&mut make()));
-        let (outcome, told) = &of_fresh;
-        contract(&trial, laws, init, outcome, told);
+        let (outcome, reported) = &of_fresh;
+        contract(&trial, laws, init, outcome, reported);
         trial.pure::<dyn Stage, _>(&of_fresh, [&mut used, &mut boxed], fresh);
-        let mut told_again = Told::default();
-        let again = trial.calm(|| run(&mut used, &mut used_workspace, &case, &mut told_again));
+        let mut reported_again = Reported::default();
+        let again = trial.calm(|| run(&mut used, &mut used_workspace, &case, &mut reported_again));
         trial.same(PURE, outcome, &again);
         if sides(&case.problem).1.n_surfels() == 0 {
             let law = "if nothing is observed, the initial pose is returned bit for bit";
@@ -77,18 +81,18 @@ fn run(
     stage.run(&case.problem, &case.pose, &mut session)
 }
 
-/// The poses that are reported to an observer.
+/// The poses reported to an observer.
 #[derive(Default)]
-struct Told(Vec<Isometry3<f64>>);
+struct Reported(Vec<Isometry3<f64>>);
 
-impl Observer for Told {
+impl Observer for Reported {
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
         self.0.push(*event.camera_from_object);
         ControlFlow::Continue(())
     }
 }
 
-/// Stops at the first occasion.
+/// An observer that stops at the first iteration.
 struct Stopper;
 
 impl Observer for Stopper {
@@ -113,7 +117,7 @@ fn contract(
     laws: StageLaws,
     init: &Isometry3<f64>,
     outcome: &Outcome,
-    told: &[Isometry3<f64>],
+    reported: &[Isometry3<f64>],
 ) {
     finite(trial, init, outcome);
     let found = format_args!("{outcome:?}");
@@ -126,13 +130,17 @@ fn contract(
     if laws.tells_the_observer {
         trial.holds(
             "accept after evaluation: the pose was reported to the observer, or is the initial one",
-            kept || told.iter().any(|evaluated| bits(evaluated) == pose),
-            format_args!("{outcome:?}, none of {} poses reported", told.len()),
+            kept || reported.iter().any(|evaluated| bits(evaluated) == pose),
+            format_args!("{outcome:?}, none of {} poses reported", reported.len()),
         );
         trial.holds(
             "no more iterations are reported than counted",
-            told.len() <= outcome.iterations,
-            format_args!("{} reported, {} counted", told.len(), outcome.iterations),
+            reported.len() <= outcome.iterations,
+            format_args!(
+                "{} reported, {} counted",
+                reported.len(),
+                outcome.iterations
+            ),
         );
     }
     if let Some(evaluation) = outcome.evaluation {

@@ -5,7 +5,7 @@ use hybrid_icp::icp::{Evaluation, Judgment, Progress, StopRule};
 
 use crate::law::{BOXED, PURE, Subject};
 
-/// What [`check_stop_rule`] may take for granted of a rule beyond the trait's contract.
+/// The laws that [`check_stop_rule`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StopRuleLaws {
     /// Equal runs give equal verdicts. False only for rules that read the clock.
@@ -20,23 +20,24 @@ impl Default for StopRuleLaws {
     }
 }
 
-/// One run as a rule sees it: a name, and (pairs, loss, pose) per iteration.
+/// A run as input of a rule: a name, and (pairs, loss, pose) of each iteration.
 struct Course {
     name: &'static str,
     iterations: Vec<(usize, f64, Isometry3<f64>)>,
 }
 
-/// Checks a [`StopRule`]; `make` makes a fresh one.
+/// Checks a [`StopRule`]; `make` creates a fresh one.
 ///
 /// # Laws
 ///
-/// - `start` forgets: after it, a used rule judges a run as a fresh one does, also when the run before was broken off.
-/// - Boxed rules, and the rule alone in a tuple or a `Vec`, give the same verdicts.
-/// - Never panics: also on losses and poses that are not finite, and without pairs.
+/// - `start` forgets: after it, a used rule gives the verdicts of a fresh one, also if the earlier
+///   run was interrupted.
+/// - A boxed rule, and the rule alone in a tuple or a `Vec`, give the same verdicts.
+/// - Never panics: also for losses and poses that are not finite, and without pairs.
 ///
 /// # Panics
 ///
-/// Panics with the law, the input and what was found when a law is broken.
+/// Panics if a law is broken, with the law, the input and the value found.
 pub fn check_stop_rule<T: StopRule + 'static>(make: impl Fn() -> T, laws: StopRuleLaws) {
     let subject = Subject::new::<T>(None);
     let courses = courses();
@@ -55,21 +56,22 @@ pub fn check_stop_rule<T: StopRule + 'static>(make: impl Fn() -> T, laws: StopRu
                 let input = format!("{}, after a run of: {}", course.name, before.name);
                 let trial = subject.on(&input);
                 trial.calm(|| verdicts(&mut used, before, broken_off_after));
-                let law = "start forgets: a used rule judges as a fresh one";
+                let law = "start forgets: a used rule gives the verdicts of a fresh one";
                 trial.same(law, &expected, &trial.calm(|| judge(&mut used)));
             }
         }
         let mut boxed: Box<dyn StopRule> = Box::new(make());
         verdicts(&mut boxed, &courses[0], 2);
         trial.same(BOXED, &expected, &trial.calm(|| judge(&mut boxed)));
-        let law = "a tuple of one rule is that rule";
+        let law = "a tuple of one rule gives the verdicts of that rule";
         trial.same(law, &expected, &trial.calm(|| judge(&mut (make(),))));
-        let law = "a list of one rule is that rule";
+        let law = "a list of one rule gives the verdicts of that rule";
         trial.same(law, &expected, &trial.calm(|| judge(&mut vec![make()])));
     }
 }
 
-/// Starts the rule and lets it judge until it ends the stage; at most `limit` iterations.
+/// Starts the rule and collects its verdicts until it ends the stage, for at most `limit`
+/// iterations.
 fn verdicts(rule: &mut dyn StopRule, course: &Course, limit: usize) -> Vec<Judgment> {
     rule.start();
     let mut verdicts = Vec::new();
@@ -98,12 +100,12 @@ fn verdicts(rule: &mut dyn StopRule, course: &Course, limit: usize) -> Vec<Judgm
 
 fn courses() -> Vec<Course> {
     let start = Isometry3::translation(0.1, -0.05, 0.6);
-    // A pose that is a share of the way back from the goal, along a twist.
+    // The pose with a given share of the initial error left, along a twist.
     let at = |share: f64| {
         let twist = Vector6::new(0.02, 0.01, -0.03, 0.2, -0.1, 0.3) * share;
         se3::exp(&twist) * start
     };
-    // Pairs, loss and share of each iteration.
+    // Each iteration has a number of pairs, a loss and a share.
     let course = |name, iteration: &dyn Fn(i32) -> (usize, f64, f64)| Course {
         name,
         iterations: (0..60)
@@ -129,14 +131,14 @@ fn courses() -> Vec<Course> {
                 (300, 0.0, 0.0)
             }
         }),
-        course("a loss that stands still", &|_| (300, 1e-5, 0.5)),
+        course("a constant loss", &|_| (300, 1e-5, 0.5)),
         course("a loss that rises", &|i| {
             (300, 1e-5 * 1.2_f64.powi(i), f64::from(i))
         }),
-        course("pairs that get lost", &|i| {
+        course("a falling number of pairs", &|i| {
             (pairs(i), 1e-5 * 0.9_f64.powi(i), 0.8_f64.powi(i))
         }),
-        course("a pose that goes to and fro", &|i| {
+        course("a pose that oscillates", &|i| {
             (300, 1e-5 * 0.99_f64.powi(i), f64::from(i % 2))
         }),
         course("losses of NaN", &|i| (300, f64::NAN, 0.8_f64.powi(i))),

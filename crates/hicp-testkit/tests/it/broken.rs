@@ -1,6 +1,4 @@
-//! Components that break one law each are caught, and the message names it.
-
-// A helper of tests may fail as a test does.
+//! Tests that components with one broken law are detected, and that the message names the law.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -29,18 +27,18 @@ use hybrid_icp::switch::Switcher;
 /// Runs a check that must fail with a message that names the law.
 fn caught(law: &str, check: impl FnOnce()) {
     let Err(payload) = catch_unwind(AssertUnwindSafe(check)) else {
-        panic!("nobody noticed that {law:?} is broken");
+        panic!("the check did not detect that {law:?} is broken");
     };
     let message = payload
         .downcast_ref::<String>()
-        .expect("a message with the law, the input and what was found");
+        .expect("a message with the law, the input and the value found");
     assert!(message.contains(law), "expected {law:?} in: {message}");
     for part in ["breaks the law", "input: ", "found: "] {
         assert!(message.contains(part), "expected {part:?} in: {message}");
     }
 }
 
-/// A metric with one fault.
+/// The single fault of a metric.
 #[derive(Clone, Copy)]
 enum Fault {
     NanLoss,
@@ -108,7 +106,7 @@ impl ErrorMetric for Fault {
 }
 
 #[test]
-fn metrics() {
+fn broken_metrics_are_detected() {
     let all = MetricLaws::default();
     for (law, fault) in [
         ("the loss is finite", Fault::NanLoss),
@@ -123,7 +121,7 @@ fn metrics() {
     }
 }
 
-/// A decorator whose loss depends on how often it was called.
+/// A decorator whose loss depends on the number of calls.
 #[derive(Clone, Copy)]
 struct Stateful(u32);
 
@@ -157,13 +155,13 @@ impl Minimize for Stateful {
 }
 
 #[test]
-fn a_decorator_that_remembers_its_calls() {
+fn a_decorator_that_counts_its_calls_is_detected() {
     caught("pure", || {
         check_minimize(|| Stateful(0), MetricLaws::default());
     });
 }
 
-/// Forwards what must be implemented, and none of what is provided.
+/// A wrapper that forwards the required methods but not the provided ones.
 struct Unforwarded<M>(M);
 
 impl<M: ErrorMetric> ErrorMetric for Unforwarded<M> {
@@ -173,13 +171,13 @@ impl<M: ErrorMetric> ErrorMetric for Unforwarded<M> {
 }
 
 #[test]
-fn a_wrapper_that_forwards_no_provided_method() {
+fn a_wrapper_that_forwards_no_provided_method_is_detected() {
     caught("forwards every method", || {
         check_metric_forwards(|| PointToPoint, || Unforwarded(PointToPoint));
     });
 }
 
-/// Selects something else each time, or what is not finite.
+/// A selection that differs at each call or returns points that are not finite.
 struct Sloppy {
     calls: usize,
     nan: bool,
@@ -203,13 +201,13 @@ impl PointSelection for Sloppy {
 }
 
 #[test]
-fn selections() {
+fn broken_selections_are_detected() {
     let sloppy = |nan| move || Sloppy { calls: 0, nan };
     caught("pure", || check_selection(sloppy(false)));
     caught("points are finite", || check_selection(sloppy(true)));
 }
 
-/// Changes the pairs of a right association.
+/// An association that changes the pairs of a correct association.
 struct Spoilt(fn(&[Surfel], &mut Pair));
 
 impl DataAssociation for Spoilt {
@@ -230,7 +228,7 @@ impl DataAssociation for Spoilt {
 }
 
 #[test]
-fn associations() {
+fn broken_associations_are_detected() {
     let laws = AssociationLaws::default();
     caught("moved by the pose", || {
         let unmoved = |source: &[Surfel], pair: &mut Pair| {
@@ -255,7 +253,7 @@ fn associations() {
     });
 }
 
-/// Filters by a function.
+/// A filter given by a function.
 #[derive(Clone, Copy)]
 struct By(fn(&mut Correspondences));
 
@@ -266,7 +264,7 @@ impl OutlierFilter for By {
 }
 
 #[test]
-fn filters() {
+fn broken_filters_are_detected() {
     let laws = FilterLaws::default();
     let spoils = |filter: fn(&mut Correspondences)| move || By(filter);
     caught("keeps their order", || {
@@ -300,7 +298,7 @@ fn filters() {
         };
         check_filter(spoils(halves), idempotent);
     });
-    caught("weights stay", || {
+    caught("weights do not change", || {
         let keeps_weights = FilterLaws {
             keeps_weights: true,
             ..laws
@@ -312,37 +310,42 @@ fn filters() {
     });
 }
 
-/// Keeps fewer pairs from iteration to iteration, by a memory of those begun so far.
+/// A filter that keeps fewer pairs with each iteration, based on a memory of earlier iterations.
 struct Remembers {
-    turns: usize,
+    iterations: usize,
     remember: fn(usize, usize) -> usize,
 }
 
 impl OutlierFilter for Remembers {
     fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
-        self.turns = (self.remember)(self.turns, iteration.index);
-        let limit = 0.05 / (1.0 + self.turns as f32);
+        self.iterations = (self.remember)(self.iterations, iteration.index);
+        let limit = 0.05 / (1.0 + self.iterations as f32);
         pairs.retain(|pair| pair.distance() < limit);
     }
 }
 
 #[test]
-fn filters_that_remember_what_iterations_came_before() {
-    let remembers = |remember| move || Remembers { turns: 0, remember };
+fn filters_that_remember_earlier_iterations_are_detected() {
+    let remembers = |remember| {
+        move || Remembers {
+            iterations: 0,
+            remember,
+        }
+    };
     let law = "pure given the iteration";
     caught(law, || {
-        let counts = |turns, _| turns + 1;
+        let counts = |iterations, _| iterations + 1;
         check_filter(remembers(counts), FilterLaws::default());
     });
     caught(law, || {
-        let never_back = |turns: usize, iteration| turns.max(iteration);
+        let never_back = |iterations: usize, iteration| iterations.max(iteration);
         check_filter(remembers(never_back), FilterLaws::default());
     });
-    // The same without the memory is a schedule.
+    // Without the memory, the same filter is a schedule, which is correct.
     check_filter(remembers(|_, iteration| iteration), FilterLaws::default());
 }
 
-/// Counts iterations and never forgets them.
+/// A rule that counts iterations and does not reset the count.
 struct Forgets(usize);
 
 impl StopRule for Forgets {
@@ -357,13 +360,13 @@ impl StopRule for Forgets {
 }
 
 #[test]
-fn a_stop_rule_that_forgets_to_forget() {
+fn a_stop_rule_that_does_not_reset_is_detected() {
     caught("start forgets", || {
         check_stop_rule(|| Forgets(0), StopRuleLaws::default());
     });
 }
 
-/// A score that is not a number where nothing was observed, or renders for itself.
+/// A score that is NaN if nothing is observed, or that renders another pose.
 struct Share {
     elsewhere: bool,
 }
@@ -392,7 +395,7 @@ impl Switcher for Share {
 }
 
 #[test]
-fn scores_and_switchers() {
+fn broken_scores_and_switchers_are_detected() {
     let share = |elsewhere| move || Share { elsewhere };
     let laws = ScoreLaws::default();
     caught("never NaN", || check_score(share(false), laws));
@@ -402,7 +405,8 @@ fn scores_and_switchers() {
     caught("regime", || check_switcher(share(true), laws));
 }
 
-/// Forgets the initial pose where it finds nothing, or returns a pose that nobody evaluated.
+/// A stage that loses the initial pose if nothing is observed, or returns a pose without
+/// evaluation.
 struct Rash {
     kept: bool,
 }
@@ -432,7 +436,7 @@ impl Stage for Rash {
 }
 
 #[test]
-fn stages() {
+fn broken_stages_are_detected() {
     let laws = StageLaws::default();
     caught("a kept pose", || check_stage(|| Rash { kept: true }, laws));
     caught("accept after evaluation", || {
@@ -440,7 +444,7 @@ fn stages() {
     });
 }
 
-/// Leaves the triangles of the last render where it draws nothing.
+/// A renderer that sets a triangle for pixels without depth.
 #[derive(Default)]
 struct NoTriangles(Rasterizer);
 
@@ -459,15 +463,16 @@ impl Renderer for NoTriangles {
 }
 
 #[test]
-fn renderers() {
-    caught("exactly if it has a triangle", || {
+fn broken_renderers_are_detected() {
+    caught("if and only if it has a triangle", || {
         check_renderer(NoTriangles::default, RendererLaws::default());
     });
 }
 
-/// The faults above are caught for what they are: without them the same code passes.
+/// Checks that the helpers of this file pass without a fault, so the faults themselves are
+/// detected.
 #[test]
-fn what_is_not_broken_passes() {
+fn components_without_a_fault_pass() {
     check_association(|| Spoilt(|_, _| ()), AssociationLaws::default());
     check_filter(|| By(|_| ()), FilterLaws::default());
     check_metric(|| Unforwarded(PointToPlane), MetricLaws::default());

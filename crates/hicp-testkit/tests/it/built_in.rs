@@ -1,4 +1,4 @@
-//! Every part that ships keeps the laws that it asks of others.
+//! Tests that every built-in component keeps the laws of its trait.
 
 use std::time::{Duration, Instant};
 
@@ -32,7 +32,7 @@ use hybrid_icp::score::{MeanVsd, SampledMve, Vsd};
 use hybrid_icp::switch::{PAPER_ALPHA, SwitchUntilStall, Threshold, Thresholds};
 
 #[test]
-fn selections() {
+fn built_in_selections_keep_the_laws() {
     check_selection(|| AllSamples);
     check_selection(VisibleSurface::default);
     check_selection(ObservedSurface::default);
@@ -46,7 +46,7 @@ fn selections() {
 }
 
 #[test]
-fn associations() {
+fn built_in_associations_keep_the_laws() {
     let strict = AssociationLaws::default();
     check_association(NearestNeighbor::default, strict);
     let k_d_tree = || NearestNeighbor::new(Stride::AboutPoints(4000), SearchIndex::KdTree);
@@ -71,7 +71,7 @@ fn associations() {
 }
 
 #[test]
-fn filters() {
+fn built_in_filters_keep_the_laws() {
     let removes = FilterLaws {
         keeps_weights: true,
         idempotent: false,
@@ -105,7 +105,7 @@ fn filters() {
 }
 
 #[test]
-fn metrics() {
+fn built_in_metrics_keep_the_laws() {
     let all = MetricLaws::default();
     check_metric(|| PointToPoint, all);
     check_metric(|| PointToPlane, all);
@@ -125,7 +125,7 @@ fn metrics() {
 }
 
 #[test]
-fn robust_metrics() {
+fn robust_metrics_keep_the_laws() {
     let all = MetricLaws::default();
     let known = MetricLaws {
         units: false,
@@ -161,7 +161,7 @@ fn robust_metrics() {
 }
 
 #[test]
-fn decorated_metrics() {
+fn decorated_metrics_keep_the_laws() {
     let all = MetricLaws::default();
     for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
         let conditioned = || Conditioned {
@@ -172,8 +172,8 @@ fn decorated_metrics() {
         check_minimize(conditioned, all);
     }
     check_minimize(GaussNewton::<PointToPlane>::default, all);
-    // Not over `Symmetric`: λ scales the diagonal of JᵀWJ, which depends on the axes, so steps cut short by the iteration limit far
-    // off differ from frame to frame.
+    // `Symmetric` is not tested here. λ scales the diagonal of JᵀWJ, which depends on the axes. Far
+    // from the minimum, the iteration limit ends the steps early, so they differ between frames.
     check_minimize(LevenbergMarquardt::<PointToPlane>::default, all);
     let frozen = |frame| Frozen {
         metric: PointToPlane,
@@ -204,7 +204,7 @@ fn decorated_metrics() {
 }
 
 #[test]
-fn decorators_that_change_nothing_forward_everything() {
+fn decorators_without_effect_forward_every_method() {
     check_metric_forwards(|| PointToPoint, Frozen::<PointToPoint>::default);
     check_metric_forwards(|| Symmetric, PosePrior::<Symmetric>::default);
     check_metric_forwards(|| Symmetric, || MetricSchedule::new(vec![Symmetric]));
@@ -212,7 +212,7 @@ fn decorators_that_change_nothing_forward_everything() {
 }
 
 #[test]
-fn stop_rules() {
+fn built_in_stop_rules_keep_the_laws() {
     let laws = StopRuleLaws::default();
     check_stop_rule(Divergence::strict, laws);
     check_stop_rule(Divergence::count_aware, laws);
@@ -241,7 +241,7 @@ fn stop_rules() {
 }
 
 #[test]
-fn scores_and_switchers() {
+fn built_in_scores_and_switchers_keep_the_laws() {
     let share = ScoreLaws {
         worst: 1.0,
         ..ScoreLaws::default()
@@ -274,7 +274,7 @@ fn scores_and_switchers() {
 }
 
 #[test]
-fn stages() {
+fn built_in_stages_keep_the_laws() {
     let laws = StageLaws::default();
     for preset in Preset::ALL {
         check_stage(|| preset.build(), laws);
@@ -317,6 +317,6 @@ fn stages() {
 }
 
 #[test]
-fn renderers() {
+fn the_rasterizer_keeps_the_laws() {
     check_renderer(Rasterizer::default, RendererLaws::default());
 }

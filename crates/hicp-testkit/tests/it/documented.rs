@@ -22,7 +22,7 @@ impl DataAssociation for SamePixel {
         let mover = RigidTransform::new(camera_from_object);
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
-            // Infinite coordinates must not enter a pair.
+            // Pairs must be finite.
             if !source.point.iter().all(|x| x.is_finite()) {
                 continue;
             }

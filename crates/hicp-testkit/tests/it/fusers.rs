@@ -1,6 +1,4 @@
-//! The laws of fusers hold for every one that ships, and catch broken ones.
-
-// Fusers made for tests fail like tests.
+//! Tests that the built-in fusers keep the laws, and that broken fusers are detected.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -30,7 +28,7 @@ const ORDERED: FuserLaws = FuserLaws {
 };
 
 #[test]
-fn the_six_methods() {
+fn the_six_methods_keep_the_laws() {
     check_fuser(|| BatchFuser::average(config()), STRICT);
     check_fuser(|| BatchFuser::weighted_average(config()), STRICT);
     check_fuser(|| MostConfident::new(Transport::Adjoint), STRICT);
@@ -43,7 +41,7 @@ fn the_six_methods() {
 }
 
 #[test]
-fn the_six_methods_as_the_paper_reads() {
+fn the_six_methods_of_the_paper_keep_the_laws() {
     for method in FusionMethod::ALL {
         let laws = FuserLaws {
             equivariant: false,
@@ -59,7 +57,7 @@ fn the_six_methods_as_the_paper_reads() {
 }
 
 #[test]
-fn gates_and_symmetries() {
+fn gated_and_symmetry_aware_fusers_keep_the_laws() {
     for method in FusionMethod::ALL {
         let gate = Gate::default();
         check_fuser(
@@ -78,7 +76,7 @@ fn gates_and_symmetries() {
     }
 }
 
-/// What a fuser of one's own does wrong.
+/// The fault of a custom fuser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -90,14 +88,14 @@ enum Fault {
     ChangesWhenRejecting,
 }
 
-/// A fuser as somebody might write it: the mean of the translations, the last rotation.
-struct Homemade {
+/// A custom fuser around a recursive one, with an optional fault.
+struct Custom {
     fault: Fault,
     inner: RecursiveFuser,
     count: f64,
 }
 
-impl Homemade {
+impl Custom {
     fn new(fault: Fault) -> Self {
         let config = match fault {
             Fault::ForgetsTheAdjoint => FuserConfig::paper(),
@@ -111,7 +109,7 @@ impl Homemade {
     }
 }
 
-impl Fuser for Homemade {
+impl Fuser for Custom {
     fn propagate(&mut self, motion: &CameraMotion) {
         if self.fault != Fault::ForgetsToMove {
             self.inner.propagate(motion);
@@ -144,7 +142,7 @@ impl Fuser for Homemade {
     fn estimate(&self) -> Option<PoseEstimate> {
         let held = self.inner.estimate()?;
         if self.fault == Fault::ReturnsNan {
-            // As near to it as the types allow: they refuse NaN.
+            // NaN is as close as a test can get, because the constructor refuses it.
             let huge = Matrix6::identity() * f64::NAN;
             return Some(PoseEstimate::new(*held.camera_from_object(), huge).unwrap());
         }
@@ -159,15 +157,15 @@ impl Fuser for Homemade {
     }
 }
 
-fn complaint(fault: Fault, laws: FuserLaws) -> String {
-    let check = || check_fuser(|| Homemade::new(fault), laws);
+fn report(fault: Fault, laws: FuserLaws) -> String {
+    let check = || check_fuser(|| Custom::new(fault), laws);
     let payload = catch_unwind(AssertUnwindSafe(check)).expect_err("a broken law");
     payload.downcast_ref::<String>().cloned().unwrap()
 }
 
 #[test]
-fn broken_fusers_are_caught() {
-    check_fuser(|| Homemade::new(Fault::None), ORDERED);
+fn broken_fusers_are_detected() {
+    check_fuser(|| Custom::new(Fault::None), ORDERED);
     for (fault, law) in [
         (Fault::ForgetsToReset, "reset forgets"),
         (Fault::ForgetsToMove, "propagate moves the pose"),
@@ -183,10 +181,10 @@ fn broken_fusers_are_caught() {
             },
             _ => ORDERED,
         };
-        let message = complaint(fault, laws);
+        let message = report(fault, laws);
         assert!(message.contains(law), "{fault:?}: {message}");
-        assert!(message.contains("Homemade"), "{message}");
+        assert!(message.contains("Custom"), "{message}");
     }
-    // A filter is no batch.
-    assert!(complaint(Fault::None, STRICT).contains("permutation"));
+    // A recursive filter depends on the order of the estimates, unlike a batch.
+    assert!(report(Fault::None, STRICT).contains("permutation"));
 }

@@ -1,4 +1,4 @@
-//! Integration tests of `hicp-testkit`: one program, so that it is linked once.
+//! Integration tests of `hicp-testkit`, in one program to link only once.
 
 #![allow(
     clippy::cast_possible_truncation,
