@@ -1,23 +1,28 @@
-//! Which mask each row of an object is refined in.
+//! Assignment of rows to masks.
 
-/// Assigns rows to masks by how many pixels of each mask the model covers at each row's pose.
+/// Assigns a mask to each row, from the number of pixels of each mask that the model covers.
 ///
-/// `overlaps[row][mask]` in pixels; every row has one number per mask. The result is, for every row, its mask; `None` for a
-/// row that covers no pixel of any.
+/// `overlaps[row][mask]` is in pixels; every row has one number per mask. Returns the mask of every
+/// row, or `None` for a row that covers no pixel of any mask.
 ///
-/// Rows compete: of all ways to give each mask to at most one row, the one with the largest sum of overlaps is taken. So
-/// where two instances of an object stand side by side and both estimates lie nearest to the same one, each still gets a mask of
-/// its own. Two rules keep a row from a mask that it has little to do with: it takes none of which it covers less than half as
-/// many pixels as of the mask that it covers most of, and a row that is left without one (several estimates of one
-/// instance, for example) shares the mask that it covers most of, the first among equals.
+/// Rows compete: each mask goes to at most one row, and the sum of the overlaps is as large as
+/// possible. If two instances of an object are next to each other, and both estimates are nearest
+/// to the same one, each row still gets a different mask.
 ///
-/// Deterministic. Cost: O(masks² · (rows + masks)), the Hungarian algorithm with the masks as its rows.
+/// Two rules keep a row from a mask that hardly belongs to it:
+///
+/// - A row never gets a mask of which it covers fewer than half as many pixels as of its best mask.
+/// - A row that is left without a mask shares its best mask, the first among equals. An example is
+///   several estimates of one instance.
+///
+/// The result is deterministic. Cost: O(masks² · (rows + masks)), for the Hungarian algorithm with
+/// the masks as its rows.
 ///
 /// ```
 /// use hicp_bop::assign_masks;
-/// // Both cover more of the first mask; the second row loses less by taking the other.
+/// // Both cover more of the first mask; the second row loses less with the other mask.
 /// assert_eq!(assign_masks(&[vec![900, 500], vec![700, 600]]), [Some(0), Some(1)]);
-/// // Two estimates of one instance, and a touch of its neighbour: both stay.
+/// // Two estimates of one instance, which hardly touch its neighbor: both keep the first mask.
 /// assert_eq!(assign_masks(&[vec![900, 10], vec![800, 20]]), [Some(0), Some(0)]);
 /// assert_eq!(assign_masks(&[vec![0, 0]]), [None]);
 /// ```
@@ -60,10 +65,11 @@ fn first_largest(values: &[u64]) -> Option<usize> {
     best
 }
 
-/// Returns the pairs of a matching between `n` things on the left and `m` on the right with the largest total gain.
+/// Returns a matching with the largest total gain between `n` items on the left and `m` on the
+/// right.
 ///
-/// A pair without gain is in no matching. The Hungarian algorithm by shortest augmenting paths; everything on the left may
-/// stay alone, for which there are `n` more columns of no gain.
+/// Pairs without gain are not matched. Uses the Hungarian algorithm with shortest augmenting paths.
+/// Every item on the left may stay unmatched; `n` additional columns without gain represent this.
 fn best_matching(n: usize, m: usize, gain: impl Fn(usize, usize) -> u64) -> Vec<(usize, usize)> {
     let columns = m + n;
     let cost = |left: usize, column: usize| -> i128 {
@@ -73,7 +79,7 @@ fn best_matching(n: usize, m: usize, gain: impl Fn(usize, usize) -> u64) -> Vec<
             0
         }
     };
-    // Numbered from 1, as 0 stands for "none yet".
+    // Indices start at 1, because 0 means "none yet".
     let (mut left_price, mut price) = (vec![0_i128; n + 1], vec![0_i128; columns + 1]);
     let mut partner = vec![0_usize; columns + 1];
     for left in 1..=n {
@@ -124,7 +130,7 @@ fn best_matching(n: usize, m: usize, gain: impl Fn(usize, usize) -> u64) -> Vec<
 mod tests {
     use super::*;
 
-    /// The largest total gain by trying everything.
+    /// Returns the largest total gain by exhaustive search.
     fn by_trying(gains: &[Vec<u64>], left: usize, taken: &mut Vec<bool>) -> u64 {
         let Some(of_left) = gains.get(left) else {
             return 0;
@@ -141,13 +147,13 @@ mod tests {
     }
 
     #[test]
-    fn overlaps_may_be_of_any_size() {
+    fn overlaps_may_have_any_size() {
         let overlaps = [vec![u64::MAX, 1], vec![1, 1]];
         assert_eq!(assign_masks(&overlaps), [Some(0), Some(1)]);
     }
 
     #[test]
-    fn the_matching_has_the_largest_gain_of_all() {
+    fn the_matching_has_the_largest_total_gain() {
         let mut state = 1_u64;
         let mut next = |bound: u64| -> u64 {
             state = state
@@ -180,11 +186,11 @@ mod tests {
     }
 
     #[test]
-    fn rows_beyond_the_masks_share_and_strangers_stay_away() {
+    fn surplus_rows_share_masks_and_rows_without_overlap_get_none() {
         // Three estimates of two instances.
         let overlaps = [vec![900, 600], vec![950, 500], vec![500, 800]];
         assert_eq!(assign_masks(&overlaps), [Some(0), Some(0), Some(1)]);
-        // The order of the rows decides nothing but ties.
+        // The order of the rows only affects ties.
         let reversed: Vec<_> = overlaps.iter().rev().cloned().collect();
         assert_eq!(assign_masks(&reversed), [Some(1), Some(0), Some(0)]);
         // More masks than rows.
@@ -193,7 +199,7 @@ mod tests {
         assert_eq!(assign_masks(&overlaps), [Some(2), Some(1)]);
         assert_eq!(assign_masks(&[vec![], vec![]]), [None, None]);
         assert_eq!(assign_masks(&[]), []);
-        // A row without any overlap leaves the others alone.
+        // A row without overlap does not affect the others.
         assert_eq!(assign_masks(&[vec![0, 0], vec![5, 4]]), [None, Some(0)]);
     }
 }

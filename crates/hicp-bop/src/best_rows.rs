@@ -1,4 +1,4 @@
-//! The best rows of every image and object.
+//! Selection of the best rows per image and object.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,14 @@ use hybrid_icp::score::top_estimates;
 
 use crate::frames::Targets;
 
-/// Keeps, of every object in every image, the rows with the best scores, in the order of the file.
+/// Keeps the rows with the best scores per image and object, in the order of the file.
 ///
-/// Counts as the benchmark's toolkit does: with `targets`, rows of no target are dropped and `inst_count` rows of every
-/// target kept, so what is left is what an evaluation looks at; with `top`, no more than that many. Of equal scores the first
-/// is kept. With neither, all rows are. Cost: O(n log n).
+/// With `targets`, rows without a target are dropped, and `inst_count` rows of every target are
+/// kept, as in the benchmark's toolkit. The result contains exactly the rows that an evaluation
+/// uses. With `top`, at most `top` rows per image and object are kept. Of equal scores, the first
+/// is kept. With neither, all rows are kept.
+///
+/// Cost: O(n log n).
 ///
 /// ```
 /// use hicp_io::bop::ResultRow;
@@ -84,17 +87,17 @@ mod tests {
     }
 
     #[test]
-    fn the_best_of_every_object_in_every_image_stay_in_order() {
+    fn the_best_rows_per_image_and_object_stay_in_order() {
         assert_eq!(best_rows(rows(), None, None), rows());
         assert_eq!(kept(Some(1), None), [(2, 5, 0.1), (1, 5, 0.7), (1, 6, 0.2)]);
-        // Of equals the first.
+        // Of equal scores, the first is kept.
         let best = best_rows(rows(), Some(2), None);
         assert_eq!(best, [0, 1, 2, 3].map(|index| rows()[index].clone()));
         assert_eq!(best_rows(rows(), Some(9), None), rows());
     }
 
     #[test]
-    fn targets_say_how_many_and_of_what() {
+    fn targets_limit_the_objects_and_their_number() {
         let targets = Targets::from([((1, 1), BTreeMap::from([(5, 2), (7, 1)]))]);
         assert_eq!(kept(None, Some(&targets)), [(1, 5, 0.3), (1, 5, 0.7)]);
         assert_eq!(kept(Some(1), Some(&targets)), [(1, 5, 0.7)]);

@@ -1,4 +1,4 @@
-//! The masks of an image, and its observations in them.
+//! The masks of an image, and its observations with them.
 
 use hybrid_icp::Refiner;
 use hybrid_icp::core::{Isometry3, Mask, Model, Observation};
@@ -11,23 +11,23 @@ use crate::mask_file::Source;
 use crate::row_status::RowStatus;
 use crate::scenes::Image;
 
-/// Bytes of masks, one per pixel, that are held at once.
+/// Default memory for masks that are held at once, in bytes. A mask has one byte per pixel.
 const HELD_BYTES: usize = 1 << 28;
 
-/// An image while its rows are refined ([`crate::MaskSource::frame`]).
+/// An image during the refinement of its rows ([`crate::MaskSource::frame`]).
 ///
-/// Its observations share its depth. A mask is read when a row of its object needs it, and its observation is created when a
-/// row is refined in it.
+/// All its observations share the depth image. A mask is read when a row of its object needs it. An
+/// observation is created when a row is refined with its mask.
 #[derive(Debug)]
 pub struct BopImage<'a> {
     image: Image,
     masks: Vec<Candidate<'a>>,
     faults: Vec<Fault>,
-    /// Bytes of masks that may be held.
+    /// Memory available for masks, in bytes.
     memory: usize,
 }
 
-/// A mask that rows of an object may be refined in.
+/// A mask for rows of an object.
 #[derive(Debug)]
 struct Candidate<'a> {
     obj_id: u32,
@@ -38,9 +38,9 @@ struct Candidate<'a> {
 /// The state of a mask.
 #[derive(Debug)]
 enum Seen {
-    /// It was not needed yet, or it was released.
+    /// The mask was not needed yet, or it was released.
     Unread,
-    /// It is missing or cannot be used.
+    /// The mask is missing or cannot be used.
     Unusable(RowStatus),
     Read(Mask),
     Observed(Box<Observation>),
@@ -58,7 +58,7 @@ impl Seen {
 }
 
 impl<'a> BopImage<'a> {
-    /// Creates an image with the masks that rows of objects may be refined in.
+    /// Creates an image with the masks for rows of objects.
     pub(crate) fn new(image: Image, masks: Vec<(u32, Source<'a>)>, faults: Vec<Fault>) -> Self {
         let unread = |(obj_id, source)| Candidate {
             obj_id,
@@ -73,10 +73,11 @@ impl<'a> BopImage<'a> {
         }
     }
 
-    /// Limits the memory of masks that are held at once, in bytes. The default is 256 MiB. One mask is always held.
+    /// Limits the memory of masks that are held at once, in bytes; the default is 256 MiB.
     ///
-    /// A few characters of a run-length code may stand for a whole image, so a file can name far more masks than fit into
-    /// memory. Beyond the limit, all masks are released and read again when they are needed, with the same results.
+    /// At least one mask is held. A run-length code of a few characters may describe a whole image,
+    /// so a file can contain far more masks than fit into memory. At the limit, all masks are
+    /// released and read again when needed, with the same results.
     #[must_use]
     pub fn with_memory(mut self, bytes: usize) -> Self {
         self.memory = bytes;
@@ -89,16 +90,17 @@ impl<'a> BopImage<'a> {
         &self.image
     }
 
-    /// Returns the faults of masks that rows needed and that are missing or cannot be used.
+    /// Returns the faults of required masks that are missing or cannot be used.
     #[must_use]
     pub fn into_faults(self) -> Vec<Fault> {
         self.faults
     }
 
-    /// Chooses a mask for every pose of an object with [`assign_masks`], or returns the reason why a pose has none.
+    /// Chooses a mask for every pose of an object with [`assign_masks`].
     ///
-    /// The masks returned are arguments of [`BopImage::observation`]. Cost: a render per pose and O(silhouette) per mask. The
-    /// renderer's cache keeps the last few, so the refinement of a single pose reuses the render that chose its mask.
+    /// Returns either an argument for [`BopImage::observation`] or the reason why the pose has no
+    /// mask. Cost: one render per pose and O(silhouette) per mask. The renderer's cache keeps the
+    /// last few renders, so the refinement of a single pose reuses the render that chose its mask.
     pub fn choose(
         &mut self,
         refiner: &mut Refiner,
@@ -129,11 +131,12 @@ impl<'a> BopImage<'a> {
             .collect()
     }
 
-    /// Returns the observation of the image in a mask, which is created when it is first needed.
+    /// Returns the observation of the image with a mask, and creates it on first use.
     ///
     /// # Errors
     ///
-    /// The status of rows in a mask that cannot be used; [`BopImage::choose`] returns no such mask.
+    /// [`RowStatus`] of the rows if the mask cannot be used. [`BopImage::choose`] never returns
+    /// such a mask.
     pub fn observation(&mut self, mask: usize) -> Result<&Observation, RowStatus> {
         self.read(mask)?;
         let seen = &mut self.masks[mask].seen;
@@ -152,7 +155,7 @@ impl<'a> BopImage<'a> {
         }
     }
 
-    /// Creates the observation of an estimate in the box around it, without a segmentation.
+    /// Creates an observation with a box around an estimate as its mask, without a segmentation.
     ///
     /// # Errors
     ///
@@ -171,7 +174,7 @@ impl<'a> BopImage<'a> {
         self.image.observe(mask).map_err(|_| RowStatus::Damaged)
     }
 
-    /// Reads a mask that is not held. If the masks would exceed the memory, releases the others.
+    /// Reads a mask that is not held. Releases all other masks if the memory would be exceeded.
     fn read(&mut self, index: usize) -> Result<(), RowStatus> {
         if matches!(self.masks[index].seen, Seen::Unread) {
             let held = self
@@ -200,7 +203,7 @@ impl<'a> BopImage<'a> {
         }
     }
 
-    /// Returns how many pixels of each mask the model covers at a pose.
+    /// Returns the number of pixels of each mask that the model covers at a pose.
     fn overlaps(
         &mut self,
         refiner: &mut Refiner,
@@ -212,7 +215,7 @@ impl<'a> BopImage<'a> {
         let view = refiner.workspace_mut().view(model, &camera, pose);
         let covered: Vec<(u32, u32)> = covered_pixels(view).collect();
         let overlap = |index: &usize| {
-            // If the file has changed since the mask was read, the mask covers nothing.
+            // If the file has changed since the first read, the mask covers nothing.
             let _ = self.read(*index);
             let mask = self.masks[*index].seen.mask()?;
             let both = covered

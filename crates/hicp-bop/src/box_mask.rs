@@ -1,4 +1,4 @@
-//! Masks without a segmentation: everything that was measured in a box around the estimate.
+//! Masks without a segmentation: all measured points in a box around the estimate.
 
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, Vector3,
@@ -6,15 +6,18 @@ use hybrid_icp::core::{
 
 use crate::covered::covered_pixels;
 
-/// Creates a mask from an estimate alone.
+/// The creation of a mask from an estimate alone.
 ///
 /// The mask has the pixels that meet two conditions:
 ///
-/// - They lie in the box of the model's silhouette at the estimate, grown on every side by `margin` times its longer side.
-/// - Their measured point lies in the model's bounding box at the estimate, grown on every side by `margin` times the diameter.
+/// - They lie in the box of the model's silhouette at the estimate, grown on every side by `margin`
+///   times its longer side.
+/// - Their measured point lies in the model's bounding box at the estimate, grown on every side by
+///   `margin` times the diameter.
 ///
-/// Anything else in that box is in the mask too. So this is for estimates that are near, for objects that stand free, and for
-/// projective pipelines. If there is a segmentation, it is better (`docs/results.md` has figures).
+/// The mask includes all other objects in that box. It is therefore suitable for accurate
+/// estimates, for isolated objects, and for projective pipelines. A segmentation gives better
+/// results (see `docs/results.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
     /// The growth of the boxes on every side, relative to their size.
@@ -22,7 +25,7 @@ pub struct BoxMask {
 }
 
 impl Default for BoxMask {
-    /// A twentieth.
+    /// Returns a margin of 0.05.
     fn default() -> Self {
         Self { margin: 0.05 }
     }
@@ -31,8 +34,10 @@ impl Default for BoxMask {
 impl BoxMask {
     /// Returns the mask of an estimate, or `None` if it has no pixel.
     ///
-    /// `view` is the render of the model at `camera_from_object`; depth image and camera are of one size. Cost: O(image) to
-    /// clear, O(vertices), then O(box).
+    /// `view` must be the render of the model at `camera_from_object`, in meters. The depth image
+    /// must have the size of the camera.
+    ///
+    /// Cost: O(image) to clear, O(vertices), then O(box).
     #[must_use]
     pub fn mask(
         &self,
@@ -65,7 +70,7 @@ impl BoxMask {
         mask?.ok()
     }
 
-    /// Returns two opposite corners of the model's grown bounding box, object frame.
+    /// Returns two opposite corners of the model's grown bounding box, in the object frame, meters.
     fn corners(&self, model: &Model) -> (Point3<f64>, Point3<f64>) {
         let by = (self.margin * model.diameter()).max(0.0);
         let center = model.center();
@@ -78,13 +83,13 @@ impl BoxMask {
         (center - half, center + half)
     }
 
-    /// Grows a box, within the image.
+    /// Grows a box on every side, within the image.
     fn grown(&self, region: &PixelRegion, depth: &DepthImage) -> PixelRegion {
         let longer = region.width().max(region.height());
         let pixels = (self.margin * longer as f64)
             .ceil()
             .clamp(0.0, f64::from(u32::MAX));
-        // In the range of u32, by the clamp; no number is 0.
+        // The clamp keeps the value in the range of u32, and NaN becomes 0.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let by = pixels as u32;
         PixelRegion {
@@ -96,7 +101,7 @@ impl BoxMask {
     }
 }
 
-/// Returns the smallest box of the pixels that were rendered, or `None` if there are none.
+/// Returns the smallest box around the rendered pixels, or `None` if there are none.
 fn silhouette_box(view: &RenderedView) -> Option<PixelRegion> {
     let pixels = covered_pixels(view).map(|(u, v)| PixelRegion {
         u_min: u,

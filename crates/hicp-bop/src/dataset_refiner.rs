@@ -16,25 +16,31 @@ use crate::result::{FrameResult, RowResult};
 use crate::row_status::RowStatus;
 use crate::scenes::Scenes;
 
-/// What all images of a dataset share: its models, its scenes, and where masks come from. Threads may share it, each with a
-/// [`Refiner`] of its own.
+/// The shared data of a dataset's images: its models, its scenes, and the source of masks.
+///
+/// Threads may share it; each thread needs a separate [`Refiner`].
 #[derive(Debug)]
 pub struct DatasetRefiner {
     /// The models of the objects that rows name.
     pub models: Models,
     /// The scenes.
     pub scenes: Scenes,
-    /// Where masks come from.
+    /// The source of masks.
     pub masks: MaskSource,
 }
 
 impl DatasetRefiner {
-    /// Refines the rows of one image: `indices` are their places in `rows`, ascending ([`crate::frames_of`]).
+    /// Refines the rows of one image.
     ///
-    /// The rows of an object compete for its masks ([`crate::assign_masks`]); without segmentation each has its own
-    /// ([`crate::BoxMask`]). Never fails: a row that cannot be refined has a [`RowStatus`] that says why, and what is missing or
-    /// damaged is in the faults. But for the time, the result depends on the arguments alone. Memory: the image, the masks of
-    /// the objects that its rows name, and an observation per mask that is used.
+    /// `indices` are the positions of these rows in `rows`, ascending ([`crate::frames_of`]). The
+    /// rows of an object compete for its masks ([`crate::assign_masks`]). Without segmentation,
+    /// each row has a separate mask ([`crate::BoxMask`]).
+    ///
+    /// Never fails: a row that cannot be refined has a [`RowStatus`] with the reason, and missing
+    /// or damaged files are listed in the faults. Except for the time, the result depends only on
+    /// the arguments.
+    ///
+    /// Memory: the image, the masks of the objects in its rows, and one observation per used mask.
     pub fn frame(
         &self,
         refiner: &mut Refiner,
@@ -94,7 +100,7 @@ impl DatasetRefiner {
     }
 }
 
-/// An image at work.
+/// The state of an image during its refinement.
 struct Work<'a, 'r> {
     frame: BopImage<'a>,
     refiner: &'r mut Refiner,
@@ -102,7 +108,7 @@ struct Work<'a, 'r> {
 }
 
 impl Work<'_, '_> {
-    /// Refines the rows of an object, each in the mask that it is assigned.
+    /// Refines the rows of an object, each with its assigned mask.
     fn in_masks(&mut self, model: &Model, obj_id: u32, rows: &[(usize, Isometry3<f64>)]) {
         let poses: Vec<Isometry3<f64>> = rows.iter().map(|(_, init)| *init).collect();
         let mut start = Instant::now();
@@ -117,7 +123,7 @@ impl Work<'_, '_> {
                     }
                     let row = refine(self.refiner, model, observation, (*index, init));
                     self.done(start, row);
-                    // The choice is counted once, with the first row that it is for.
+                    // Only the first refined row includes the time of the choice.
                     start = Instant::now();
                 }
                 Err(status) => self.leave(&[(*index, *init)], status),
@@ -138,7 +144,7 @@ impl Work<'_, '_> {
     }
 }
 
-/// Refines a row in an observation.
+/// Refines a row with an observation.
 fn refine(
     refiner: &mut Refiner,
     model: &Model,

@@ -8,25 +8,25 @@ use serde::{Deserialize, Serialize};
 /// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FaultKind {
-    /// A file is missing, which is common: many users have only a part of a dataset.
+    /// A file is missing. This is common, because many users have only a part of a dataset.
     Missing,
     /// A mask of an image is missing.
     MissingMask,
-    /// A file exists, but cannot be used.
+    /// A file exists but cannot be used.
     Damaged,
 }
 
-/// The reason why a file of a dataset cannot be used. It affects only the rows that need the file.
+/// The reason why a file of a dataset cannot be used. Only rows that need the file are affected.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// The kind.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// The message: path, place, the value found and what was expected.
+    /// The message: path, place, the value found and the value expected.
     pub text: String,
 }
 
 impl Fault {
-    /// Converts an error of a reader.
+    /// Converts the error of a reader to a fault.
     #[must_use]
     pub fn of(error: &IoError) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Fault {
         }
     }
 
-    /// Creates the fault of a file that exists, but cannot be used.
+    /// Creates the fault of a file that exists but cannot be used.
     #[must_use]
     pub fn damaged(text: String) -> Self {
         Self {

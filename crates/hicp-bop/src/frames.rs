@@ -1,16 +1,16 @@
-//! Rows by image.
+//! Grouping of rows by image.
 
 use std::collections::BTreeMap;
 
 use hicp_io::bop::{Detection, ResultRow};
 
-/// A scene and an image of it.
+/// The ids of a scene and of an image in it.
 pub type FrameKey = (u32, u32);
 
-/// How many instances of each object are asked for, by image.
+/// The number of requested instances of each object, by image.
 pub type Targets = BTreeMap<FrameKey, BTreeMap<u32, u32>>;
 
-/// The rows of an image: where they stand in the file, ascending.
+/// The rows of an image, as ascending indices into the file.
 pub type FrameRows = (FrameKey, Vec<usize>);
 
 /// Groups rows by image, in the order of scene and image.
@@ -32,7 +32,7 @@ pub fn frames_of(rows: &[ResultRow]) -> Vec<FrameRows> {
     frames.into_iter().collect()
 }
 
-/// Groups detections by image, each in the order given.
+/// Groups detections by image, in their given order.
 #[must_use]
 pub fn detections_by_frame(detections: Vec<Detection>) -> BTreeMap<FrameKey, Vec<Detection>> {
     let mut frames: BTreeMap<FrameKey, Vec<Detection>> = BTreeMap::new();

@@ -15,19 +15,22 @@ use crate::frames::{FrameKey, frames_of};
 use crate::models::Models;
 use crate::scenes::{Image, Scenes};
 
-/// A model with what its errors need.
+/// A model with the data for its errors.
 #[derive(Debug)]
 pub struct EvaluatedObject<'a> {
     /// The model.
     pub model: &'a Model,
     /// Its vertices and symmetries.
     pub points: ModelPoints,
-    /// Whether AD is ADI.
+    /// Whether the error AD is ADI, the one for symmetric objects.
     pub symmetric: bool,
 }
 
 impl<'a> EvaluatedObject<'a> {
-    /// Prepares models. AD is ADI for the `symmetric` objects, by default for those with declared symmetries.
+    /// Prepares the models for evaluation.
+    ///
+    /// AD is ADI for the objects in `symmetric`, or if it is `None`, for those with declared
+    /// symmetries.
     #[must_use]
     pub fn of_models(models: &'a Models, symmetric: Option<&[u32]>) -> BTreeMap<u32, Self> {
         let of = |(id, model)| {
@@ -44,7 +47,7 @@ impl<'a> EvaluatedObject<'a> {
     }
 }
 
-/// A target with the errors of its estimates.
+/// The errors of the estimates of one target.
 #[derive(Debug)]
 pub struct Judged {
     /// The image.
@@ -59,20 +62,20 @@ pub struct Judged {
     pub truths: Vec<usize>,
 }
 
-/// All targets of an image.
+/// The errors of all targets of an image.
 #[derive(Debug, Default)]
 pub struct JudgedFrame {
     /// The targets that could be evaluated.
     pub targets: Vec<Judged>,
-    /// The number of requested instances that could not be evaluated.
+    /// Number of requested instances that could not be evaluated.
     pub left_out: usize,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
-    /// Messages about files that do not fit together, which do not change the errors.
+    /// Messages about inconsistent files that do not change the errors.
     pub misfits: Vec<String>,
 }
 
-/// Scratch of a thread.
+/// The buffers of one thread.
 #[derive(Debug, Default)]
 pub struct Renders {
     rasterizer: Rasterizer,
@@ -80,7 +83,9 @@ pub struct Renders {
     truths: Vec<RenderedView>,
 }
 
-/// Computes the errors of a result file's rows, image by image. Threads may share it, each with its own [`Renders`].
+/// The evaluation of a result file's rows, image by image.
+///
+/// Threads may share it; each thread needs separate [`Renders`].
 #[derive(Debug)]
 pub struct Judge<'a> {
     /// The objects that can be evaluated, by id.
@@ -92,7 +97,9 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Creates a judge of a result file's rows. `delta_meters` is the visibility tolerance of VSD.
+    /// Creates an evaluation of a result file's rows.
+    ///
+    /// `delta_meters` is the visibility tolerance of VSD.
     #[must_use]
     pub fn new(
         objects: BTreeMap<u32, EvaluatedObject<'a>>,
@@ -109,9 +116,9 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Computes the errors of an image's estimates; `wanted` is the number of instances by object.
+    /// Computes the errors of an image's estimates. `wanted` is the number of instances per object.
     ///
-    /// Never fails: what is missing or damaged is in the result.
+    /// Never fails: missing and damaged files are listed in the result.
     pub fn frame(
         &self,
         renders: &mut Renders,
@@ -138,7 +145,7 @@ impl<'a> Judge<'a> {
             let n_truths = truths.len();
             if n_truths < count {
                 judged.misfits.push(format!(
-                    "{}, $.{}: {n_truths} instances of object {obj_id}, but the targets ask for {count}; the others are left out",
+                    "{}, $.{}: {n_truths} instances of object {obj_id}, but the targets request {count}; the missing instances are left out",
                     image.scene.dir().join("scene_gt.json").display(),
                     image.im_id,
                 ));
@@ -158,9 +165,10 @@ impl<'a> Judge<'a> {
         judged
     }
 
-    /// Computes the errors of an object's `count` estimates with the best scores against instances of an image.
+    /// Computes the errors of an object's best `count` estimates against instances of an image.
     ///
-    /// `frame` is the image's key, and `truths` are indices into its ground truth. Returns `None` if the object has no model.
+    /// The estimates are those with the highest scores. `frame` is the image's key, and `truths`
+    /// are indices into its ground truth. Returns `None` if the object has no model.
     ///
     /// # Errors
     ///
@@ -229,7 +237,7 @@ impl<'a> Judge<'a> {
         of_object.collect()
     }
 
-    /// Computes the errors of an estimate against an instance, each with its render.
+    /// Computes the errors of an estimate against an instance, with the renders of both.
     fn errors(
         &self,
         image: &Image,
@@ -253,7 +261,8 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Returns the `count` most visible instances of an object in an image, as indices into its ground truth.
+/// Returns the `count` most visible instances of an object in an image, as indices into its ground
+/// truth.
 #[must_use]
 pub fn instances(image: &Image, obj_id: u32, count: usize) -> Vec<usize> {
     let truths = image.scene.ground_truth(image.im_id).unwrap_or_default();
@@ -261,14 +270,16 @@ pub fn instances(image: &Image, obj_id: u32, count: usize) -> Vec<usize> {
     let infos = infos.unwrap_or_default();
     let of_object = (0..truths.len()).filter(|index| truths[*index].obj_id == obj_id);
     let of_object: Vec<usize> = of_object.collect();
-    // Without a statement, an instance counts as fully visible.
+    // An instance without a stated visibility counts as fully visible.
     let visible = |index: &usize| infos.get(*index)?.visible_fraction;
     let fractions = of_object.iter().map(|index| visible(index).unwrap_or(1.0));
     let kept = most_visible(&fractions.collect::<Vec<_>>(), count);
     kept.into_iter().map(|kept| of_object[kept]).collect()
 }
 
-/// Returns messages about masks and color images that have another size than the depth image, by their headers.
+/// Returns messages about masks and color images whose size differs from that of the depth image.
+///
+/// It reads only the headers of the files.
 fn wrong_sizes(image: &Image) -> Vec<String> {
     let (width, height) = (image.depth.width(), image.depth.height());
     let n_instances = image.scene.ground_truth(image.im_id).map_or(0, <[_]>::len);

@@ -1,8 +1,9 @@
-//! Refines the rows of BOP result files, image by image, as `hybrid-icp bop refine` does.
+//! Refinement of the rows of BOP result files, image by image, as in `hybrid-icp bop refine`.
 //!
-//! **Should you use this crate?** Yes, to refine whole result files from a custom program, a queue or a cluster. It groups rows
-//! by image, assigns a mask to each row, refines, and enters the results into the rows. From a shell, `hybrid-icp bop refine`
-//! does the same with threads and a journal. For single poses, use `hybrid-icp`; to read datasets only, use `hicp-io`.
+//! **Should you use this crate?** Use it to refine whole result files from a custom program, a
+//! queue or a cluster. It groups rows by image, assigns a mask to each row, refines, and writes the
+//! results into the rows. From a shell, `hybrid-icp bop refine` does the same with threads and a
+//! journal. For single poses, use `hybrid-icp`. To only read datasets, use `hicp-io`.
 //!
 //! ```no_run
 //! use hicp_bop::{DatasetRefiner, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of};
@@ -27,10 +28,10 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Nothing here starts threads, prints or writes. A missing or damaged file affects only the rows that need it; the result
-//! reports it ([`RowStatus`], [`Fault`]).
+//! This crate does not start threads, print or write files. A missing or damaged file affects only
+//! the rows that need it. The result reports it ([`RowStatus`], [`Fault`]).
 
-// Counts of pixels become floating point numbers; all are far below 2⁵³.
+// Counts of pixels are converted to floating-point numbers; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
 mod assignment;

@@ -1,4 +1,4 @@
-//! The place that a mask is stored in.
+//! The storage of a mask: an image file or a run-length code.
 
 use hicp_io::bop::Rle;
 use hybrid_icp::core::Mask;
@@ -6,7 +6,7 @@ use hybrid_icp::core::Mask;
 use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;
 
-/// The place that a mask is stored in.
+/// The storage of a mask.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Source<'a> {
     /// The visible mask of an instance, by its index in the ground truth.
@@ -16,7 +16,7 @@ pub(crate) enum Source<'a> {
 }
 
 impl Source<'_> {
-    /// Reads the mask, which must have the size of the image's depth.
+    /// Reads the mask and checks that it has the size of the depth image.
     pub(crate) fn read(self, image: &Image) -> Result<Mask, Fault> {
         let Image { scene, im_id, .. } = image;
         let expected = (image.depth.width(), image.depth.height());
@@ -36,7 +36,7 @@ impl Source<'_> {
                     found => Err(wrong_size(&path.display().to_string(), found, image)),
                 }
             }
-            // A short code may stand for a huge mask, so its size is checked before it is decoded.
+            // A short code may describe a huge mask, so its size is checked before decoding.
             Self::Code(code) => match (code.width(), code.height()) {
                 found if found == expected => Ok(code.to_mask()),
                 found => {

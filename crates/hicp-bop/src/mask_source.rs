@@ -1,4 +1,4 @@
-//! Where masks come from.
+//! The source of masks.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::frames::{FrameKey, detections_by_frame};
 use crate::mask_file::Source;
 use crate::scenes::Image;
 
-/// Where the masks of a dataset's images come from.
+/// The source of the masks of a dataset's images.
 #[derive(Clone, Debug, Default)]
 pub enum MaskSource {
     /// The visible masks (`mask_visib`) of the ground truth.
@@ -20,18 +20,21 @@ pub enum MaskSource {
     Visible,
     /// The segmentations of detections, by image ([`MaskSource::detections`]).
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
-    /// No segmentation: the mask of a row is everything that was measured in a box around its pose.
+    /// No segmentation: the mask of a row consists of all measured points in a box around its pose.
     Box(BoxMask),
 }
 
 impl MaskSource {
-    /// Creates a source of the segmentations of detections.
+    /// Creates a source from the segmentations of detections.
     #[must_use]
     pub fn detections(detections: Vec<Detection>) -> Self {
         Self::Detections(detections_by_frame(detections))
     }
 
-    /// Finds the masks of an image. Without ground truth, it has no visible masks and a fault.
+    /// Finds the masks of an image.
+    ///
+    /// With [`MaskSource::Visible`] and without ground truth, there are no masks, and the image has
+    /// a fault.
     #[must_use]
     pub fn frame(&self, key: FrameKey, image: Image) -> BopImage<'_> {
         let (mut masks, mut faults) = (Vec::new(), Vec::new());

@@ -22,16 +22,16 @@ impl ModelFolder {
     ///
     /// # Errors
     ///
-    /// As [`ReadLimits::read_models_info`].
+    /// As for [`ReadLimits::read_models_info`].
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
         Self::open_within(ReadLimits::DEFAULT, dir)
     }
 
-    /// Opens a folder as [`ModelFolder::open`] does, with read limits.
+    /// Opens a folder as [`ModelFolder::open`] does, within `limits`.
     ///
     /// # Errors
     ///
-    /// As [`ReadLimits::read_models_info`].
+    /// As for [`ReadLimits::read_models_info`].
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         let info = dir.join("models_info.json");
@@ -43,11 +43,11 @@ impl ModelFolder {
         Ok(Self { dir, infos, limits })
     }
 
-    /// Reads the model of an object in meters; `None` if there is none.
+    /// Reads the model of an object in meters, or returns `None` if its file does not exist.
     ///
     /// # Errors
     ///
-    /// As [`ReadLimits::read_mesh`].
+    /// As for [`ReadLimits::read_mesh`].
     pub fn read(&self, obj_id: u32) -> Result<Option<Model>, IoError> {
         let path = Dataset::model_path_in(&self.dir, obj_id);
         if is_absent(&path) {
@@ -64,9 +64,10 @@ impl ModelFolder {
     }
 }
 
-/// Models by object id, with the objects whose model is missing or broken.
+/// Models by object id, and the objects whose model is missing or cannot be used.
 ///
-/// Collects the results of [`ModelFolder::read`], so that a program can read models on its own threads.
+/// It can be collected from the results of [`ModelFolder::read`], so a program can read models in
+/// several threads.
 #[derive(Debug, Default)]
 pub struct Models {
     /// The models that can be used.
@@ -78,7 +79,7 @@ pub struct Models {
 }
 
 impl Models {
-    /// Reads the models of some objects, one after another.
+    /// Reads the models of `objects`, one after the other.
     #[must_use]
     pub fn read(folder: &ModelFolder, objects: &BTreeSet<u32>) -> Self {
         objects.iter().map(|id| (*id, folder.read(*id))).collect()

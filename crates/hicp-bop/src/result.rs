@@ -1,4 +1,4 @@
-//! The result of refining the rows of an image, and entering it into the rows of the file.
+//! The results of refining an image, and their transfer to the rows of the file.
 
 use hicp_io::bop::ResultRow;
 use hybrid_icp::core::Isometry3;
@@ -9,23 +9,26 @@ use serde::{Deserialize, Serialize};
 use crate::fault::Fault;
 use crate::row_status::RowStatus;
 
-/// The result of a row.
+/// The result of refining a row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowResult {
-    /// Its place among the rows that were given.
+    /// Index of the row in the given rows.
     pub index: usize,
-    /// Its status.
+    /// Status of the row.
     pub status: RowStatus,
-    /// `camera_from_object` in meters, if it differs from the row's.
+    /// `camera_from_object` of the result in meters, if it differs from the row's pose.
     pub pose: Option<Isometry3<f64>>,
-    /// MVE of the row's pose and of the result's pose; `None` if the row did not reach the pipeline.
+    /// MVE of the row's pose and of the result's pose; `None` if the row did not reach the
+    /// pipeline.
     pub mve: Option<(f64, f64)>,
-    /// How flat the surfaces are at the result's pose ([`hybrid_icp::Refinement::flatness`]).
+    /// Flatness of the surfaces at the result's pose ([`hybrid_icp::Refinement::flatness`]).
     pub flatness: Option<Flatness>,
 }
 
 impl RowResult {
-    /// Returns the reasons not to trust the pose ([`hybrid_icp::warnings_of_result`]); none without an MVE.
+    /// Returns the reasons not to trust the pose ([`hybrid_icp::warnings_of_result`]).
+    ///
+    /// Without an MVE, there are none.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         match self.mve {
@@ -47,34 +50,36 @@ impl RowResult {
     }
 }
 
-/// All rows of an image.
+/// The results of all rows of an image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameResult {
-    /// One per row, in the order of the rows.
+    /// One result per row, in the order of the rows.
     pub rows: Vec<RowResult>,
-    /// Seconds spent on its rows; `None` if none reached the pipeline.
+    /// Time spent on these rows in seconds; `None` if no row reached the pipeline.
     pub seconds: Option<f64>,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
-    /// Warnings about the inputs ([`hybrid_icp::warnings`]) by object, from the first row of each object that has a mask.
+    /// Warnings about the inputs ([`hybrid_icp::warnings`]) by object, from the first row of each
+    /// object that has a mask.
     pub warnings: Vec<(u32, Warning)>,
 }
 
 /// The score of a row in the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rescore {
-    /// The row's own score.
+    /// The score of the input row.
     #[default]
     Keep,
-    /// 1 − MVE of the row's pose in the output; 0 for a row without an MVE.
+    /// 1 − MVE of the row's output pose; 0 for a row without an MVE.
     Mve,
 }
 
 impl FrameResult {
-    /// Enters the poses, scores and the time of an image, which is the same for all of its rows, into the given rows.
+    /// Writes the poses, the scores and the time of an image into the given rows.
     ///
-    /// The time is added to the largest time of these rows. If `timed` is false, the time is unknown, so that the same input
-    /// gives the same bytes. Indices beyond `rows` are ignored.
+    /// All rows of the image get the same time: the largest time stated by them plus the time of
+    /// the refinement. If `timed` is false, the time becomes unknown, so that equal inputs give
+    /// equal bytes. Indices beyond `rows` are ignored.
     pub fn enter(&self, rows: &mut [ResultRow], rescore: Rescore, timed: bool) {
         let own = self
             .rows

@@ -1,4 +1,4 @@
-//! The status of a row after a refinement.
+//! The status of a row after refinement.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fault::{Fault, FaultKind};
 
-/// The status of a row of a result file. All but [`RowStatus::Refined`] leave the row's pose as it was.
+/// The status of a row of a result file. All except [`RowStatus::Refined`] keep the row's pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 #[non_exhaustive]
@@ -16,13 +16,13 @@ pub enum RowStatus {
     Refined,
     /// The dataset has no model of the row's object.
     MissingModel,
-    /// The dataset does not have the row's image, or no depth of it.
+    /// The dataset does not have the row's image or its depth.
     MissingFrame,
     /// The object has no mask in the image.
     NoMask,
-    /// The model at the row's pose covers no pixel of a mask of its object.
+    /// At the row's pose, the model covers no pixel of any mask of its object.
     NoOverlap,
-    /// Nothing was measured in the box around the row's pose ([`crate::MaskSource::Box`]).
+    /// There are no measurements in the box around the row's pose ([`crate::MaskSource::Box`]).
     NothingMeasured,
     /// A file that the row needs is damaged.
     Damaged,
@@ -31,7 +31,7 @@ pub enum RowStatus {
 }
 
 impl RowStatus {
-    /// Returns the status that `Display` writes as `text`, or `None` for any other text.
+    /// Returns the status that `Display` formats as `text`, or `None` for any other text.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let statuses = [
@@ -48,7 +48,9 @@ impl RowStatus {
         all.find(|status| status.to_string() == text)
     }
 
-    /// Returns the rank in summaries, and the text. Of two reasons why a row has no mask, the higher rank says more.
+    /// Returns the rank in summaries and the text.
+    ///
+    /// If there are two reasons for a missing mask, the one with the higher rank is more specific.
     fn parts(self) -> (u8, &'static str) {
         match self {
             Self::Refined => (0, "refined"),
@@ -113,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fate_is_read_as_it_is_written() {
+    fn every_status_is_parsed_back_from_its_text() {
         for status in Termination::ALL
             .map(RowStatus::Kept)
             .into_iter()

@@ -8,44 +8,46 @@ use hybrid_icp::core::{DepthImage, ImageError, Mask, Observation, PinholeCamera}
 use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;
 
-/// The scenes of a split, opened when they are asked for; each may be missing or damaged without harm to the others.
+/// The scenes of a split, opened on request.
 ///
-/// The annotations of the last few scenes are kept, not those of the dataset. Threads may share it.
+/// A missing or damaged scene does not affect the others. The annotations of the most recent scenes
+/// are kept in memory. Threads may share it.
 #[derive(Debug)]
 pub struct Scenes {
     dataset: Dataset,
     split: String,
     kept: usize,
-    /// Those kept, the one last asked for at the end.
+    /// The scenes in memory, from the least to the most recently requested.
     open: Mutex<Vec<(u32, Opened)>>,
 }
 
 type Opened = Arc<OnceLock<Result<Arc<Scene>, Fault>>>;
 
-/// An image with what the files say of it.
+/// An image of a scene, with its camera and its depth.
 #[derive(Clone, Debug)]
 pub struct Image {
-    /// Its scene.
+    /// The scene of the image.
     pub scene: Arc<Scene>,
-    /// Its id in the scene.
+    /// Id of the image in the scene.
     pub im_id: u32,
-    /// Its camera.
+    /// The camera of the image.
     pub camera: PinholeCamera,
-    /// Its depth, metres; the observations of all its masks share it.
+    /// The depth image, meters. The observations with all masks share it.
     pub depth: Arc<DepthImage>,
 }
 
 impl Image {
-    /// Creates the observation of the image in a mask.
+    /// Creates the observation of the image with a mask.
     pub(crate) fn observe(&self, mask: Mask) -> Result<Observation, ImageError> {
         Observation::new(Arc::clone(&self.depth), mask, self.camera)
     }
 }
 
 impl Scenes {
-    /// The scenes of a split, of which at most `kept` are in memory, at least one.
+    /// Creates the scenes of a split, of which at most `kept` stay in memory, at least one.
     ///
-    /// One more than there are threads is enough when each works through its images in the order of their scenes.
+    /// If each thread processes its images in the order of their scenes, the number of threads plus
+    /// one is sufficient.
     #[must_use]
     pub fn new(dataset: &Dataset, split: &str, kept: usize) -> Self {
         Self {
@@ -56,14 +58,15 @@ impl Scenes {
         }
     }
 
-    /// Returns a scene, opened if it is not in memory.
+    /// Returns a scene, and opens it if it is not in memory.
     ///
     /// # Errors
     ///
-    /// A [`Fault`] when the scene is not there or an annotation file is damaged.
+    /// [`Fault`] if the scene is missing or an annotation file is damaged.
     pub fn get(&self, scene_id: u32) -> Result<Arc<Scene>, Fault> {
         let opened = self.entry(scene_id);
-        // Outside the lock: other scenes can be opened meanwhile, this one is opened once.
+        // Open outside the lock, so that other scenes can be opened at the same time. `OnceLock`
+        // opens this one once.
         let scene = opened.get_or_init(|| {
             let scene = self.dataset.scene(&self.split, scene_id);
             scene.map(Arc::new).map_err(|error| Fault::of(&error))
@@ -89,7 +92,7 @@ impl Scenes {
     ///
     /// # Errors
     ///
-    /// A [`Fault`] when the image, its camera or its depth is missing or damaged.
+    /// [`Fault`] if the image, its camera or its depth is missing or damaged.
     pub fn read(&self, (scene_id, im_id): FrameKey) -> Result<Image, Fault> {
         let scene = self.get(scene_id)?;
         let camera = scene.camera(im_id).map_err(|e| Fault {
@@ -124,10 +127,11 @@ impl Scenes {
     }
 }
 
-/// Visible part from which the BOP benchmark requests an instance.
+/// Smallest visible fraction of an instance that the BOP benchmark requests.
 pub const MIN_VISIBLE_FRACTION: f64 = 0.1;
 
-/// Returns the objects in an image that are visible enough to be targets, an entry per instance.
+/// Returns the ids of the objects in an image that are visible enough to be targets, one per
+/// instance.
 ///
 /// An instance without a stated visibility counts as visible.
 #[must_use]

@@ -1,4 +1,4 @@
-//! Parts of a result file, so that several machines refine it together.
+//! Parts of a result file, for refining it on several machines.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use hicp_io::bop::ResultRow;
 
-/// Part `index` of `count`, from 1: written `index/count`.
+/// Part `index` of `count`, counted from 1 and written as `index/count`.
 ///
 /// ```
 /// let shard: hicp_bop::Shard = "2/8".parse()?;
@@ -39,21 +39,26 @@ impl fmt::Display for Shard {
     }
 }
 
-/// What [`Shard::take`] leaves.
+/// The result of [`Shard::take`].
 #[derive(Debug)]
 pub struct Part {
     /// The shard's rows, in the order of the file.
     pub rows: Vec<ResultRow>,
-    /// Whether the rows of every image stand together in the whole file, so that the shards' rows one after the other have its order.
+    /// Whether the rows of every image are adjacent in the whole file.
+    ///
+    /// If so, the concatenated shards have the order of the file.
     pub contiguous: bool,
 }
 
 impl Shard {
     /// Keeps the rows of the shard's images.
     ///
-    /// Images are taken in the order of their first rows and never split. An image belongs to the shard into whose equal
-    /// share of the rows its first row falls when the images are laid end to end. Every row is so in exactly one shard,
-    /// whatever the order of the rows; a shard may be empty. Cost: O(rows).
+    /// Images are in the order of their first rows and are never split. Each shard has an equal
+    /// share of the rows, laid out image by image. An image belongs to the shard in whose share its
+    /// first row lies. Every row is therefore in exactly one shard, in any order of the rows. A
+    /// shard may be empty.
+    ///
+    /// Cost: O(rows).
     #[must_use]
     pub fn take(self, rows: Vec<ResultRow>) -> Part {
         let image = |row: &ResultRow| (row.scene_id, row.im_id);
@@ -76,7 +81,7 @@ impl Shard {
         let mine: Vec<bool> = counts
             .iter()
             .map(|count| {
-                // before < total, so the shard is below their number.
+                // Because before < total, the index is below the number of shards.
                 let shard = before * shards / total;
                 before += count;
                 shard + 1 == u64::from(self.index)
@@ -111,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn shards_one_after_the_other_are_the_file() {
+    fn concatenated_shards_are_the_file() {
         let images = [5, 5, 5, 2, 2, 9, 1, 1, 1, 1, 7];
         let whole = parts(&images, 1).concat();
         assert_eq!(whole.len(), images.len());
@@ -119,7 +124,7 @@ mod tests {
             let parts = parts(&images, count);
             assert_eq!(parts.concat(), whole, "{count}");
         }
-        // As equal as whole images allow.
+        // The sizes are as equal as whole images allow.
         let lengths: Vec<usize> = parts(&images, 2).iter().map(Vec::len).collect();
         assert_eq!(lengths, [6, 5]);
         assert!(Shard { index: 1, count: 1 }.take(rows(&images)).contiguous);
@@ -127,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn images_whose_rows_are_scattered_stay_whole() {
+    fn images_with_scattered_rows_stay_whole() {
         let images = [5, 2, 5, 9, 2, 5, 1];
         assert!(!Shard { index: 1, count: 1 }.take(rows(&images)).contiguous);
         for count in 2..6 {
@@ -143,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn only_parts_that_are_there_are_understood() {
+    fn only_existing_parts_are_parsed() {
         assert_eq!("2/8".parse(), Ok(Shard { index: 2, count: 8 }));
         assert_eq!("2/8".parse::<Shard>().unwrap().to_string(), "2/8");
         for bad in [

@@ -1,4 +1,4 @@
-//! The mask of an estimate where there is no segmentation.
+//! Masks of estimates without a segmentation.
 
 use hicp_bop::BoxMask;
 use hybrid_icp::core::{
@@ -6,7 +6,7 @@ use hybrid_icp::core::{
     Vector3,
 };
 
-/// A plate of 0.3 m × 0.4 m, 0.5 m in diameter, about the origin.
+/// Returns a plate of 0.3 m × 0.4 m around the origin, with a diameter of 0.5 m.
 fn plate() -> Model {
     let corner = |x: f32, y: f32| Point3::new(x, y, 0.0);
     let corners = vec![
@@ -18,7 +18,7 @@ fn plate() -> Model {
     Model::new(TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap())
 }
 
-/// A render whose region is larger than its silhouette: columns 8 to 11, rows 5 to 14.
+/// Returns a render whose region is larger than its silhouette: columns 8 to 11, rows 5 to 14.
 fn view() -> RenderedView {
     let region = PixelRegion {
         u_min: 4,
@@ -37,7 +37,9 @@ fn view() -> RenderedView {
     view
 }
 
-/// A camera for which a pixel is 5 cm at 1 m, with the plate's silhouette where the view has it, were it larger.
+/// Returns a camera with pixels of 5 cm at a distance of 1 m.
+///
+/// It sees the plate at the place of the silhouette, which is a little smaller.
 fn camera() -> PinholeCamera {
     PinholeCamera::new(20.0, 20.0, 9.5, 9.5, 24, 16).unwrap()
 }
@@ -51,7 +53,7 @@ fn wall(z: f32) -> DepthImage {
     DepthImage::from_meters(24, 16, vec![z; 24 * 16]).unwrap()
 }
 
-/// Columns and rows of the box of the pixels set: first and one past the last.
+/// Returns the box of the set pixels: the first column and row, and one past the last ones.
 fn set(mask: &Mask) -> (u32, u32, u32, u32) {
     let region = mask.bounding_region();
     let count = mask.pixels().iter().filter(|set| **set).count();
@@ -61,9 +63,11 @@ fn set(mask: &Mask) -> (u32, u32, u32, u32) {
 
 #[test]
 fn the_boxes_grow_by_the_margin_within_the_image() {
-    // The plate covers columns 6.5 to 12.5 and rows 5.5 to 13.5; the silhouette's columns are 8 to 11, its rows 5 to 14.
+    // The plate covers columns 6.5 to 12.5 and rows 5.5 to 13.5. The silhouette covers columns 8 to
+    // 11 and rows 5 to 14.
     assert_eq!(set(&mask(0.0, &wall(1.0)).unwrap()), (8, 6, 12, 14));
-    // One pixel more in the image; in space 5 cm, which is one pixel: columns 5.5 to 13.5, rows 4.5 to 14.5.
+    // The image box grows by one pixel. The box in space grows by 5 cm, which is also one pixel:
+    // columns 5.5 to 13.5, rows 4.5 to 14.5.
     assert_eq!(set(&mask(0.1, &wall(1.0)).unwrap()), (7, 5, 13, 15));
     assert_eq!(set(&mask(1e30, &wall(1.0)).unwrap()), (0, 0, 24, 16));
     for without in [-1.0, f64::NAN] {
@@ -72,8 +76,8 @@ fn the_boxes_grow_by_the_margin_within_the_image() {
 }
 
 #[test]
-fn only_what_is_measured_inside_the_grown_box_is_set() {
-    // Flat as it is, the plate's box is 5 cm to both sides.
+fn only_points_measured_inside_the_grown_box_are_set() {
+    // The plate is flat, but its grown box extends 5 cm to both sides.
     for (z, within) in [(0.96, true), (1.04, true), (0.94, false), (1.06, false)] {
         assert_eq!(mask(0.1, &wall(z)).is_some(), within, "{z}");
     }
@@ -89,8 +93,9 @@ fn only_what_is_measured_inside_the_grown_box_is_set() {
 }
 
 #[test]
-fn a_box_turns_with_the_estimate() {
-    // Turned about the optical axis by a right angle, the plate is wider than high; the silhouette is that of the view.
+fn the_box_rotates_with_the_estimate() {
+    // Rotated by 90° around the optical axis, the plate is wider than high. The silhouette is that
+    // of the view.
     let pose = Isometry3::new(
         Vector3::new(0.0, 0.0, 1.0),
         Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2),
@@ -101,7 +106,7 @@ fn a_box_turns_with_the_estimate() {
 }
 
 #[test]
-fn a_model_out_of_sight_has_no_mask() {
+fn a_model_outside_the_view_has_no_mask() {
     let nothing = RenderedView::default();
     let pose = Isometry3::translation(0.0, 0.0, -1.0);
     let mask = BoxMask::default().mask(&nothing, (&wall(1.0), &camera()), &plate(), &pose);

@@ -1,4 +1,4 @@
-//! An image's estimates against its ground truth.
+//! The evaluation of an image's estimates against its ground truth.
 
 use std::collections::BTreeMap;
 
@@ -41,7 +41,7 @@ fn errors_are_those_of_the_best_rows() {
     assert_eq!(error.vsd, [0.0; 10]);
     assert!(error.add_m < 1e-12 && error.adi_m < 1e-12);
 
-    // Both estimates: the second is off by a known shift.
+    // Evaluate both estimates. The second one has a known translation error.
     let image = scenes.read(KEY).unwrap();
     assert_eq!(visible_objects(&image.scene, KEY.1), [BLOCK]);
     let target = judge.target(&mut renders, &image, KEY, BLOCK, vec![0], 2);
@@ -54,7 +54,7 @@ fn errors_are_those_of_the_best_rows() {
     assert!(missing.unwrap().is_none());
 }
 
-/// Programs store results and read them back: nothing may change.
+/// Stored results must be read back exactly, because programs store them and resume from them.
 #[test]
 fn results_are_stored_bit_for_bit() {
     let row = |status, pose, mve| hicp_bop::RowResult {

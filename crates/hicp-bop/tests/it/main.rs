@@ -1,4 +1,4 @@
-//! Integration tests of `hicp-bop`: one program, so that it is linked once.
+//! Integration tests of `hicp-bop`, in one program to link only once.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 

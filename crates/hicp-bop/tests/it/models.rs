@@ -1,11 +1,11 @@
-//! Folders of models within limits.
+//! Limits for reading folders of models.
 
 use hicp_bop::ModelFolder;
 use hicp_io::{IoError, IoErrorKind, LengthUnit, ReadLimits};
 use hybrid_icp::core::{Point3, TriMesh};
 
 #[test]
-fn sizes_and_models_are_read_within_the_limits() {
+fn diameters_and_models_are_read_within_the_limits() {
     let dir = tempfile::tempdir().unwrap();
     let corners = [
         [0.0, 0.0, 0.0],

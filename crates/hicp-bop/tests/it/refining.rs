@@ -1,4 +1,4 @@
-//! An image's rows, from its files to their results.
+//! The refinement of an image's rows, from files to results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -22,7 +22,7 @@ use hybrid_icp::{Preset, Refiner};
 pub(crate) const KEY: (u32, u32) = (1, 4);
 pub(crate) const BLOCK: u32 = 5;
 
-/// A block of 6 × 8 × 10 cm.
+/// Returns a block of 6 × 8 × 10 cm.
 fn block() -> TriMesh {
     let corner = |i: u8| {
         let side = |bit: u8, half: f32| if i & bit == 0 { -half } else { half };
@@ -54,7 +54,7 @@ pub(crate) fn estimate() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.004, -0.003, 0.004), Vector3::zeros()) * truth()
 }
 
-/// The block's depth, nothing else being there.
+/// Returns the depth of the block alone.
 fn depth() -> DepthImage {
     render_depth_image(&block(), &camera(), &truth())
 }
@@ -64,7 +64,7 @@ fn mask() -> Mask {
     Mask::new(160, 120, set).unwrap()
 }
 
-/// A dataset with one image of the block.
+/// Creates a dataset with one image of the block.
 pub(crate) fn dataset(dir: &Path) -> Dataset {
     let scene = dir.join("test/000001");
     for folder in ["depth", "mask_visib"] {
@@ -124,7 +124,7 @@ fn detection(mask: Option<&Mask>) -> Detection {
 }
 
 #[test]
-fn rows_become_results() {
+fn rows_are_refined() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let objects = models(&dataset, &[BLOCK, 9]);
@@ -158,7 +158,7 @@ fn rows_become_results() {
 }
 
 #[test]
-fn masks_are_those_of_their_source() {
+fn masks_come_from_their_source() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let models = models(&dataset, &[BLOCK]);
@@ -181,7 +181,7 @@ fn masks_are_those_of_their_source() {
     let mut frame = boxes.frame(KEY, image(&dataset));
     let none = frame.choose(&mut refiner, model, BLOCK, &[estimate()]);
     assert_eq!(none, [Err(RowStatus::NoMask)]);
-    // The box about the estimate has all that was measured of the block, and nothing else was measured.
+    // Only the block was measured, so the box around the estimate contains the whole mask.
     let all = BoxMask { margin: 0.1 };
     let seen = frame
         .observe_box(&mut refiner, model, &estimate(), &all)
@@ -191,9 +191,9 @@ fn masks_are_those_of_their_source() {
     assert_eq!(none.map(|_| ()), Err(RowStatus::NothingMeasured));
 }
 
-/// A short run-length code may stand for a whole image: what is held of many of them is limited, and nothing else changes.
+/// A short run-length code may describe a whole image, so the number of masks in memory is limited.
 #[test]
-fn masks_that_are_let_go_are_read_again_to_the_same_results() {
+fn released_masks_are_read_again_with_the_same_results() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let models = models(&dataset, &[BLOCK]);
@@ -203,7 +203,7 @@ fn masks_that_are_let_go_are_read_again_to_the_same_results() {
     let left = Mask::new(160, 120, left).unwrap();
     let masks = [&mask(), &left, &Mask::full(160, 120), &mask()];
     let mut detections: Vec<_> = masks.into_iter().map(|m| detection(Some(m))).collect();
-    // One that cannot be used is a fault, once, however often the others are read.
+    // An unusable mask gives exactly one fault, even if the other masks are read again.
     detections.push(detection(Some(&Mask::full(16, 12))));
     let detections = MaskSource::detections(detections);
     let poses = [truth(), estimate(), truth()];
@@ -218,7 +218,7 @@ fn masks_that_are_let_go_are_read_again_to_the_same_results() {
             let observation = frame.observation(*place.as_ref().unwrap()).unwrap();
             seen.push(observation.mask().clone());
         }
-        // The masks and observations that stand in it.
+        // Count the masks and observations in memory.
         let text = format!("{frame:?}");
         let held = text.matches("Read(").count() + text.matches("Observed(").count();
         (chosen, seen, frame.into_faults(), held)
@@ -233,7 +233,7 @@ fn masks_that_are_let_go_are_read_again_to_the_same_results() {
 }
 
 #[test]
-fn a_mask_that_cannot_be_used_is_a_fault_of_its_own() {
+fn an_unusable_mask_is_reported_as_a_fault() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let small = Mask::new(16, 12, vec![true; 16 * 12]).unwrap();
@@ -255,7 +255,7 @@ fn a_mask_that_cannot_be_used_is_a_fault_of_its_own() {
 }
 
 #[test]
-fn a_mask_that_is_missing_is_a_fault_that_names_it() {
+fn a_missing_mask_is_reported_as_a_fault_that_names_it() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = dataset(dir.path());
     let models = models(&dataset, &[BLOCK]);
@@ -277,7 +277,7 @@ fn a_mask_that_is_missing_is_a_fault_that_names_it() {
 }
 
 #[test]
-fn detections_go_to_their_images() {
+fn detections_are_grouped_by_image() {
     let elsewhere = Detection {
         image_id: 7,
         ..detection(None)
@@ -290,7 +290,7 @@ fn detections_go_to_their_images() {
 }
 
 #[test]
-fn limits_and_errors_are_told_as_faults() {
+fn limits_and_errors_are_reported_as_faults() {
     let dir = tempfile::tempdir().unwrap();
     let limits = ReadLimits {
         max_triangles: 3,
@@ -307,7 +307,7 @@ fn limits_and_errors_are_told_as_faults() {
         fault.kind == FaultKind::Damaged && fault.text.contains("obj_000005.ply"),
         "{fault:?}"
     );
-    // A dataset hands its limits on to its scenes; a scene can have its own.
+    // A dataset passes its limits to its scenes; a scene can have different limits.
     let scene = dataset.scene("test", 1).unwrap();
     let error = scene.read_depth(4).unwrap_err();
     assert!(Fault::of(&error).text.contains("000004.png"), "{error}");

@@ -1,4 +1,4 @@
-//! What of a dataset is in memory.
+//! The scenes that are kept in memory.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ fn dataset(scenes: &[u32]) -> tempfile::TempDir {
 }
 
 #[test]
-fn only_the_scenes_last_asked_for_are_kept() {
+fn only_the_most_recent_scenes_are_kept() {
     let dir = dataset(&[1, 2, 3]);
     let scenes = Scenes::new(&Dataset::open(dir.path()).unwrap(), "val", 2);
     let first = scenes.get(1).unwrap();
     let second = scenes.get(2).unwrap();
     assert!(Arc::ptr_eq(&first, &scenes.get(1).unwrap()));
-    // The third takes the place of the second, which was asked for longest ago.
+    // The third scene replaces the second, which is the least recently requested.
     scenes.get(3).unwrap();
     assert!(Arc::ptr_eq(&first, &scenes.get(1).unwrap()));
     assert_eq!(Arc::strong_count(&second), 1);
@@ -32,11 +32,11 @@ fn only_the_scenes_last_asked_for_are_kept() {
 }
 
 #[test]
-fn scenes_that_are_not_there_or_damaged_say_so() {
+fn missing_and_damaged_scenes_are_reported() {
     let dir = dataset(&[1, 2]);
     let file = dir.path().join("val/000002/scene_camera.json");
     std::fs::write(&file, "{").unwrap();
-    // Without room for a scene, one is kept all the same.
+    // At least one scene is kept, even with room for none.
     let scenes = Scenes::new(&Dataset::open(dir.path()).unwrap(), "val", 0);
     let missing = scenes.get(9).unwrap_err();
     assert!(

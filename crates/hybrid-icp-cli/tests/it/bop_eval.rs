@@ -256,7 +256,7 @@ fn what_does_not_fit_is_warned_of() {
         .complains(&[
             "no model of object 9",
             "scene_gt.json",
-            "2 instances of object 1, but the targets ask for 3",
+            "2 instances of object 1, but the targets request 3",
             "8 of 10 rows are of no target",
             "scene_camera.json, $: found 2 images, expected image 7",
             "and 1 more like it",
