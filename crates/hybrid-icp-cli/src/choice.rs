@@ -14,12 +14,14 @@ use crate::limits::pipeline_limits;
 pub(crate) struct PipelineArguments {
     /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
     ///
-    /// `auto` refines locally and searches where the MVE stays above 0.2: it may then end far from the initial pose, within
-    /// what `--set max_rotation_degrees=30` and `--set max_translation_meters=0.05` allow. `local` never searches, `hybrid` is
+    /// `auto` refines locally, and searches if the MVE stays above 0.2. After a search, the result
+    /// may be far from the initial pose. `--set max_rotation_degrees=30` and
+    /// `--set max_translation_meters=0.05` limit the distance. `local` never searches. `hybrid` is
     /// the paper's method.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "auto")]
     pipeline: Source,
-    /// Overrides a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be given several times.
+    /// Override a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be
+    /// given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     overrides: Vec<String>,
 }
@@ -30,13 +32,13 @@ impl PipelineArguments {
         self.pipeline.file()
     }
 
-    /// Reads the file, applies the overrides, and makes sure that the pipeline builds.
+    /// Reads the file, applies the overrides, and checks that the pipeline builds.
     pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
         self.pipeline.choose(&self.overrides)
     }
 }
 
-/// A pipeline as the command line names it.
+/// The value of `--pipeline`: a preset or a file.
 #[derive(Clone, Debug)]
 pub(crate) enum Source {
     Preset(Preset),
@@ -63,7 +65,7 @@ impl Source {
         }
     }
 
-    /// Returns a name for files: the preset's, or the file's without folder and ending.
+    /// Returns a name for output files: the preset's, or the file's without folder and extension.
     pub(crate) fn short_name(&self) -> String {
         match self {
             Self::Preset(preset) => preset.name().to_owned(),
@@ -74,7 +76,7 @@ impl Source {
         }
     }
 
-    /// Reads the file, applies overrides, and makes sure that the pipeline builds.
+    /// Reads the file, applies overrides, and checks that the pipeline builds.
     pub(crate) fn choose(&self, overrides: &[String]) -> anyhow::Result<Pipeline> {
         match self {
             Self::Preset(preset) => {
@@ -91,7 +93,7 @@ impl Source {
     }
 }
 
-/// A pipeline that is known to build. Creates any number of refiners, one per thread.
+/// A pipeline that builds. It creates any number of refiners, one per thread.
 #[derive(Clone, Debug)]
 pub(crate) struct Pipeline {
     /// The name for reports: that of the preset or file, and the overrides.
@@ -105,7 +107,7 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    /// Parses a pipeline, applies overrides, and makes sure that it builds; messages call it `origin`.
+    /// Parses a pipeline, applies overrides, and checks that it builds; messages call it `origin`.
     pub(crate) fn parse(origin: &str, toml: String, overrides: &[String]) -> anyhow::Result<Self> {
         let mut file = PipelineFile::parse(&toml, origin)?;
         let mut name = origin.to_owned();

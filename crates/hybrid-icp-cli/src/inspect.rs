@@ -10,11 +10,12 @@ use serde::Serialize;
 use crate::limits::limits;
 use crate::terminal::say;
 
-/// Describe a mesh file as it is read here: counts, size, whether it is closed, and warnings.
+/// Describe a mesh file: counts, size, whether it is closed, and warnings.
 ///
-/// Polygons are counted as the triangles they are cut into. With --json the keys are triangles, vertices, diameter_m, closed,
-/// warnings (a list of sentences, empty when nothing looks wrong) and more of the kind. The exit code is 0 if the file can be
-/// read, with or without warnings. Otherwise it is 1, and the message names the place of the error.
+/// Polygons are counted as the triangles that they are cut into. With --json, the keys include
+/// triangles, vertices, diameter_m, closed, and warnings (a list of sentences, empty if nothing
+/// looks wrong). The exit code is 0 if the file can be read, with or without warnings. Otherwise it
+/// is 1, and a message names the place of the error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -34,7 +35,7 @@ pub(crate) struct Arguments {
 /// Plausible diameters of an object in meters.
 const PLAUSIBLE_METERS: std::ops::RangeInclusive<f64> = 0.005..=5.0;
 
-/// Share of the diameter from which steps of the coordinates are too coarse.
+/// Steps of the coordinates above this share of the diameter are too coarse.
 const COARSE: f64 = 1e-4;
 
 #[derive(Debug, Serialize)]
@@ -44,7 +45,7 @@ struct Report {
     triangles: usize,
     vertices: usize,
     diameter_m: f64,
-    /// Every edge has exactly two triangles.
+    /// Whether every edge has exactly two triangles.
     closed: bool,
     warnings: Vec<String>,
     bounding_box_m: [[f32; 3]; 2],
@@ -58,7 +59,7 @@ struct Report {
     degenerate_triangles: usize,
     duplicate_triangles: usize,
     unused_vertices: usize,
-    /// The unit that would give the mesh the size of an object, if that of the command line does not.
+    /// If the given unit does not give the mesh a plausible size, the unit that does.
     suspected_unit: Option<String>,
 }
 
@@ -121,35 +122,34 @@ impl Report {
         let (least, most) = (*PLAUSIBLE_METERS.start(), *PLAUSIBLE_METERS.end());
         if !PLAUSIBLE_METERS.contains(&diameter) {
             let suspected = self.suspected_unit.as_ref();
-            let hint = suspected.map(|unit| format!("; in {unit} it would be an object's size"));
+            let hint = suspected.map(|unit| format!("; in {unit} its size would be plausible"));
             let hint = hint.unwrap_or_default();
             warnings.push(format!(
-                "the diameter is {diameter:.4e} m in {unit}, expected {least} to {most} m{hint}"
+                "the diameter with --unit {unit} is {diameter:.4e} m, expected {least} to {most} m{hint}"
             ));
         }
         if step > COARSE * diameter {
             warnings.push(format!(
-                "the coordinates are so far from the origin that they are rounded to steps of {step:.1e} m: move the mesh to its origin"
+                "the coordinates are rounded to steps of {step:.1e} m, because they are far from the origin: move the mesh to the origin"
             ));
         }
-        let wound =
-            "edges have triangles that are wound against each other: normals cannot be trusted";
-        let open = "edges have one triangle only: the surface is open";
+        let wound = "normals cannot be trusted: edges whose triangles have opposite winding";
+        let open = "the surface is open: edges with only one triangle";
         let counts = [
             (survey.boundary_edges, open),
             (
                 survey.non_manifold_edges,
-                "edges have more than two triangles",
+                "edges with more than two triangles",
             ),
             (survey.misoriented_edges, wound),
-            (survey.degenerate_triangles, "triangles have no area"),
-            (survey.duplicate_triangles, "triangles repeat another"),
-            (survey.unused_vertices, "vertices belong to no triangle"),
+            (survey.degenerate_triangles, "triangles without area"),
+            (survey.duplicate_triangles, "duplicate triangles"),
+            (survey.unused_vertices, "vertices without a triangle"),
         ];
         let found = counts.iter().filter(|(count, _)| *count > 0);
-        warnings.extend(found.map(|(count, what)| format!("{count} {what}")));
+        warnings.extend(found.map(|(count, what)| format!("{what}: {count}")));
         if self.facing == "inward" {
-            let text = "the triangles are wound clockwise seen from outside: normals point inward";
+            let text = "the triangles are clockwise seen from outside: normals point inward";
             warnings.push(text.to_owned());
         }
         warnings
@@ -168,9 +168,10 @@ impl Report {
             ..
         } = self;
         let closed = if self.closed { "closed" } else { "open" };
+        let parts = if *components == 1 { "part" } else { "parts" };
         let [x, y, z] = [right - left, bottom - top, far - near];
         let mut text = format!(
-            "{file}: {triangles} triangles, {vertices} vertices, {components} parts, {closed}, facing {facing}\n  \
+            "{file}: {triangles} triangles, {vertices} vertices, {components} {parts}, {closed}, facing {facing}\n  \
              diameter {diameter_m:.6} m, box {x:.6} x {y:.6} x {z:.6} m from ({left}, {top}, {near}), area {area_m2:.6} m2"
         );
         for warning in &self.warnings {
@@ -181,7 +182,7 @@ impl Report {
     }
 }
 
-/// Returns another unit in which a mesh of an implausible size would be an object.
+/// Returns another unit in which a mesh of an implausible size has a plausible one.
 fn suspected_unit(diameter_m: f64, unit: LengthUnit) -> Option<LengthUnit> {
     if PLAUSIBLE_METERS.contains(&diameter_m) {
         return None;

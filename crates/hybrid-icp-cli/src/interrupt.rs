@@ -1,8 +1,8 @@
-//! Ctrl-C and SIGTERM: the program ends within a second and keeps the results so far.
+//! Handles Ctrl-C and SIGTERM: the program ends within a second and keeps the results so far.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::bail;
@@ -17,24 +17,26 @@ use crate::terminal::{complain, warn};
 /// Exit code of an interrupted program, as in shells.
 pub(crate) const EXIT_CODE: u8 = 130;
 
-/// Time for a command that saves its work to end by itself.
+/// Time for a command that saves its work to end on its own.
 const GRACE: Duration = Duration::from_millis(700);
 
 /// Time between two checks of the flag.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// Time for removing an unfinished folder, and between two attempts.
+/// Time for removing an unfinished folder.
 const REMOVAL: Duration = Duration::from_millis(700);
+/// Time between two attempts to remove it.
 const BETWEEN_REMOVALS: Duration = Duration::from_millis(2);
 
 static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
-static SAVING: AtomicBool = AtomicBool::new(false);
+static RESUMED_BY: OnceLock<&str> = OnceLock::new();
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// Starts to handle signals.
 ///
-/// The first signal stops commands that save their work, and ends the program if they take too long. Other commands end at
-/// once, because they write nothing before they are done. A second signal ends the program immediately.
+/// The first signal stops commands that save their work, and ends the program if they take too
+/// long. Other commands end at once, because they write nothing before they are done. A second
+/// signal ends the program immediately.
 pub(crate) fn listen() {
     for signal in [SIGINT, SIGTERM] {
         let asked = &*ASKED;
@@ -43,24 +45,26 @@ pub(crate) fn listen() {
                 .and_then(|_| flag::register(signal, Arc::clone(asked)));
         if let Err(error) = heard {
             warn(format_args!(
-                "signal {signal} ends the program unsaved: {error}"
+                "signal {signal} will end the program without saving its work: {error}"
             ));
         }
     }
-    // A file beyond the user's limit is then a write error. By default, the signal would end the program and leave a temporary
-    // file behind.
+    // A file beyond the user's limit is then a write error. By default, the signal would end the
+    // program and leave a temporary file behind.
     #[cfg(unix)]
     if let Err(error) = flag::register(SIGXFSZ, Arc::default()) {
-        warn(format_args!("signal {SIGXFSZ} ends the program: {error}"));
+        warn(format_args!(
+            "signal {SIGXFSZ} will end the program: {error}"
+        ));
     }
     std::thread::spawn(|| {
         while !asked() {
             std::thread::sleep(PERIOD);
         }
-        if SAVING.load(Ordering::Relaxed) {
+        if RESUMED_BY.get().is_some() {
             std::thread::sleep(GRACE);
         }
-        // A second signal need not wait for this.
+        // Release the lock before removing, so that a second signal does not wait for it.
         let unfinished = UNFINISHED
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -68,17 +72,23 @@ pub(crate) fn listen() {
         if let Some(unfinished) = unfinished {
             remove(&unfinished);
         }
-        complain("interrupted");
+        match RESUMED_BY.get() {
+            Some(by) => complain(format_args!("interrupted: continue with {by}")),
+            None => complain("interrupted"),
+        }
         std::process::exit(i32::from(EXIT_CODE));
     });
 }
 
-/// Declares that the command checks [`asked`] from now on, and that its work can be resumed.
-pub(crate) fn can_resume() {
-    SAVING.store(true, Ordering::Relaxed);
+/// Declares that the command checks [`asked`] from now on, and that `by` resumes its work.
+pub(crate) fn can_resume(by: &'static str) {
+    // Later calls have no effect: `bop compare` runs several pipelines.
+    let _ = RESUMED_BY.set(by);
 }
 
-/// Removes a folder while other threads may write into it. They fail as soon as the folder is missing.
+/// Removes a folder while other threads may write into it.
+///
+/// They fail as soon as the folder is missing.
 fn remove(folder: &Path) {
     let start = Instant::now();
     while std::fs::remove_dir_all(folder).is_err() && folder.exists() && start.elapsed() < REMOVAL {
@@ -108,9 +118,9 @@ pub(crate) fn finish_folder(folder: NewFolder) -> anyhow::Result<()> {
 
 /// Waits for the end of an interrupted program that saves nothing.
 ///
-/// Its errors are not worth reporting: they may come from the removal of an unfinished folder.
+/// Its errors are not reported, because they may come from the removal of an unfinished folder.
 pub(crate) fn end_unless_saving() {
-    while asked() && !SAVING.load(Ordering::Relaxed) {
+    while asked() && RESUMED_BY.get().is_none() {
         std::thread::park();
     }
 }

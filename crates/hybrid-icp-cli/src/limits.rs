@@ -13,10 +13,10 @@ const WORK: PipelineLimits = PipelineLimits::DEFAULT;
 #[derive(Clone, Copy, Debug, Args)]
 #[command(next_help_heading = "Limits on what is read and computed")]
 pub(crate) struct Limits {
-    /// Bytes of a file, and of a JSON file if this raises its limit. 1 GiB if not given.
+    /// Bytes of a file; 1 GiB if not given. It applies to JSON files if it is above their limit.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_file_bytes: Option<u64>,
-    /// Bytes of a JSON file, which needs several dozen times as many in memory. 256 MiB if not given.
+    /// Bytes of a JSON file; 256 MiB if not given. In memory, it needs several dozen times as many.
     #[arg(long, value_name = "N", global = true, hide_short_help = true)]
     max_json_bytes: Option<u64>,
     /// Bytes of a JSON file that holds one pose, one camera or the configuration of a study.
@@ -34,7 +34,8 @@ pub(crate) struct Limits {
     /// Rows of a result file or of a study.
     #[arg(long, value_name = "N", global = true, hide_short_help = true, default_value_t = READ.max_rows)]
     max_rows: u64,
-    /// Iterations that a pipeline may request in the worst case. Ranked hypotheses and solver steps count.
+    /// Iterations that a pipeline may request in the worst case. Ranked hypotheses and solver steps
+    /// count.
     #[arg(long, value_name = "N", global = true, hide_short_help = true, default_value_t = WORK.max_iterations)]
     max_iterations: u64,
     /// Hypotheses that a search in a pipeline may request.

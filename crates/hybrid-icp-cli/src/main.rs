@@ -1,6 +1,7 @@
-//! The program `hybrid-icp`: `hybrid-icp --help` lists its commands.
+//! The program `hybrid-icp`. `hybrid-icp --help` lists its commands.
 //!
-//! Exit codes: 0 done; 1 something failed, and the message says what; 2 the command line is wrong; 130 interrupted.
+//! Exit codes: 0 if the command succeeded, 1 if something failed, 2 if the command line is wrong,
+//! 130 if the program was interrupted. A message names the cause of a failure.
 
 mod bop;
 mod choice;
@@ -24,9 +25,9 @@ use clap::{Parser, Subcommand};
 
 /// Refine 6D object poses in depth images.
 ///
-/// A detector gives a segmentation mask and a rough pose; this program moves the object's mesh onto the measured depth and
-/// scores the result by the mean VSD estimate (MVE): 0 where the pose explains the image everywhere, 1 where nowhere. Poses
-/// of 0.4 and above are not to be trusted.
+/// A detector provides a segmentation mask and a rough pose. This program aligns the object's mesh
+/// with the measured depth. It scores the result by the mean VSD estimate (MVE), from 0 (the pose
+/// explains every pixel) to 1 (it explains none). Do not trust poses with an MVE of 0.4 or more.
 #[derive(Debug, Parser)]
 #[command(name = "hybrid-icp", version, after_help = EXAMPLES, max_term_width = 110)]
 struct Cli {
@@ -52,8 +53,8 @@ Examples:
 
 Run `hybrid-icp help refine` for the details of a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong, 130
-interrupted (Ctrl-C or SIGTERM: within a second; bop refine and experiment keep
-what is done for --resume).";
+interrupted. Ctrl-C and SIGTERM end the program within a second. `bop refine`
+and `experiment` then continue with --resume, `bop compare` without it.";
 
 #[derive(Debug, Subcommand)]
 enum Command {

@@ -17,18 +17,19 @@ use crate::terminal::say;
 
 /// Write the twenty procedural household objects as meshes in meters, with a contact sheet.
 ///
-/// Writes one binary PLY mesh per object, `contact_sheet.png` (tuning objects in the upper two rows, test objects in the lower two) and
-/// `objects.csv`, which names them in the order of the sheet, with their sizes and symmetries.
+/// The folder receives one binary PLY mesh per object, `contact_sheet.png` and `objects.csv`. The
+/// sheet shows the tuning objects in the upper two rows and the test objects in the lower two. The
+/// table lists their names in the order of the sheet, with their sizes and symmetries.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The folder to write to, which is created if it does not exist. Files of the same names are replaced.
+    /// The folder to write to. It is created if it does not exist. Files of the same names are
+    /// replaced.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
-/// Side of a cell of the contact sheet, pixels.
+/// Side of a cell of the contact sheet in pixels.
 const CELL: u32 = 240;
-/// Cells of the contact sheet.
 const COLUMNS: u32 = 5;
 const ROWS: u32 = 4;
 /// Yellow, as CAD models are in the paper's pictures.
@@ -38,7 +39,7 @@ const SURFACE: [f64; 3] = [240.0, 200.0, 90.0];
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        .with_context(|| format!("cannot create the folder {}", folder.display()))?;
     let objects = || Household::TUNING.into_iter().chain(Household::TEST);
     let (width, height) = (COLUMNS * CELL, ROWS * CELL);
     let mut sheet = Picture {
@@ -77,18 +78,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         file.write_all(table.as_bytes())
     })?;
     say(format_args!(
-        "{}: {} meshes, contact_sheet.png, and objects.csv, which names them",
+        "{}: {} meshes, contact_sheet.png and objects.csv",
         folder.display(),
         objects().count()
     ))
 }
 
-/// Draws a model into the cell whose upper left corner is given, seen from above and aside, as large as fits.
+/// Draws a model into the cell with the given upper left corner.
+///
+/// The view is oblique from above, and the model fills the cell.
 fn shade(sheet: &mut Picture, model: &Model, left: u32, top: u32) -> anyhow::Result<()> {
     let middle = f64::from(CELL - 1) / 2.0;
     let focal = 2.5 * f64::from(CELL);
     let camera = PinholeCamera::new(focal, focal, middle, middle, CELL, CELL)?;
-    // Object z up in the picture, turned about it, then tipped toward the viewer.
+    // Object z points up in the picture. Rotate around it, then tip the model toward the viewer.
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.6);
     let tip =
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2 + 0.5);

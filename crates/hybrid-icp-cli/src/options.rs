@@ -1,6 +1,6 @@
-//! Values of options.
+//! Parsers for the values of options.
 
-/// Reads a number above 0.
+/// Parses a finite number above 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     let value: Option<f64> = text.parse().ok();
     value

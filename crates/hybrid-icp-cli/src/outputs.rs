@@ -36,19 +36,19 @@ impl<'a> Files<'a> {
         self
     }
 
-    /// Checks that every output can be written, and that none replaces an input or another output.
+    /// Checks that every output can be written and that none replaces an input or another output.
     pub(crate) fn check(&self) -> anyhow::Result<()> {
         self.check_in_place("", "")
     }
 
-    /// Checks the files, of which the output of one option may replace the input of another.
+    /// Checks the files, but allows the output of one option to replace the input of another.
     pub(crate) fn check_in_place(&self, output: &str, input: &str) -> anyhow::Result<()> {
         for (index, (option, path)) in self.written.iter().enumerate() {
             hicp_io::check_writable(path)?;
             for (other, other_path) in self.written[..index].iter().chain(&self.read) {
                 if (*option, *other) != (output, input) && same_file(path, other_path) {
                     bail!(
-                        "{option} and {other} both name {}, expected different files: it would be overwritten",
+                        "{option} and {other} both name {}, which would be overwritten: expected different files",
                         path.display()
                     );
                 }
@@ -57,10 +57,12 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Checks that no output replaces a file of a dataset: a model, a file of a scene, or an annotation of the whole.
+    /// Checks that no output replaces a file of a dataset.
     ///
-    /// Result files inside the dataset's folder may be replaced, and so may the inputs that [`Files::check_in_place`]
-    /// allows. Links in either path are followed. Journals are refused elsewhere if they are not journals.
+    /// These files are the models, the files of scenes, and the annotations of the whole. Result
+    /// files inside the dataset's folder may be replaced, and so may the inputs that
+    /// [`Files::check_in_place`] allows. Links in either path are followed. Other code checks that
+    /// a file in the place of a journal is a journal.
     pub(crate) fn spare_dataset(&self, root: &Path, split: &str) -> anyhow::Result<()> {
         let replaces_input = |path: &Path| self.read.iter().any(|(_, read)| same_file(path, read));
         let mut parts = None;
@@ -71,8 +73,8 @@ impl<'a> Files<'a> {
             let parts = parts.get_or_insert_with(|| parts_of(root, split));
             if places(path).iter().any(|place| parts.contains(place)) {
                 bail!(
-                    "{option} names {}, which is there and belongs to the dataset {} (its scenes, models or targets): \
-                     it would be overwritten, expected another file",
+                    "{option} names {}, which belongs to the dataset {} (its scenes, models or targets) \
+                     and would be overwritten: expected another file",
                     path.display(),
                     root.display()
                 );
@@ -82,7 +84,7 @@ impl<'a> Files<'a> {
     }
 }
 
-/// Returns the journal of an output, a file next to it; `None` for outputs that are not files.
+/// Returns the path of an output's journal, a file next to it; `None` for outputs that are streams.
 pub(crate) fn journal_of(output: &Path) -> Option<PathBuf> {
     let mut name = output.as_os_str().to_owned();
     name.push(".journal");
@@ -112,13 +114,13 @@ fn parts_of(root: &Path, split: &str) -> BTreeSet<PathBuf> {
         parts.append(&mut within);
     }
     let mut parts: BTreeSet<PathBuf> = parts.iter().flat_map(|p| p.canonicalize()).collect();
-    // With the split `.` the root holds scenes, but it holds result files as well.
+    // With the split `.`, the root contains scenes, but it may also contain result files.
     let root = root.canonicalize().unwrap_or_default();
     parts.retain(|part| !root.starts_with(part));
     parts
 }
 
-/// Returns what a folder holds; nothing if it cannot be listed.
+/// Returns the entries of a folder; none if it cannot be listed.
 fn entries(folder: &Path) -> Vec<PathBuf> {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     listed.map(|entry| entry.path()).collect()
@@ -139,7 +141,7 @@ fn is_scene(path: &Path) -> bool {
     name_of(path).parse::<u32>().is_ok() && holds(&is_annotation)
 }
 
-/// Returns whether a file next to the dataset's folders comes with the dataset.
+/// Returns whether a file next to the dataset's folders belongs to the dataset.
 fn is_annotation(path: &Path) -> bool {
     let name = name_of(path);
     let is_json = name.ends_with(".json");
@@ -147,9 +149,9 @@ fn is_annotation(path: &Path) -> bool {
         || (is_json && (name.starts_with("camera") || name.contains("_targets")))
 }
 
-/// Returns the file that a path leads to, the folders that hold it, and the folders that the path passes.
+/// Returns the destination of a path, the folders around it, and the folders that the path passes.
 fn places(path: &Path) -> Vec<PathBuf> {
-    // A path leaves again whatever comes before `..`.
+    // The folders before `..` are left again, so they do not count.
     let passed = path.ancestors().take_while(|path| !path.ends_with(".."));
     let mut places: Vec<PathBuf> = passed.flat_map(|path| path.canonicalize()).collect();
     let real = places.first().cloned().unwrap_or_default();

@@ -6,10 +6,10 @@ use hybrid_icp::pipeline::Catalog;
 
 use crate::terminal::{say, table};
 
-/// List the pipelines by name, show one as a file, or list the parts that files are made of.
+/// List the pipelines, print one as a TOML file, or print the catalog of parts.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Print this pipeline as a TOML file: a start for your own.
+    /// Print this pipeline as a TOML file, as a start for a custom one.
     #[arg(long, value_name = "NAME")]
     show: Option<Preset>,
     /// Print the catalog of parts, with their parameters, as Markdown.

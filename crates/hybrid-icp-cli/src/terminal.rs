@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// Prints a line to standard output.
 ///
-/// A closed pipe (`| head -1`) is not an error: the reader has what it needs.
+/// A closed pipe (`| head -1`) is not an error, because the reader needs no more lines.
 pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -19,7 +19,7 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a warning to standard error. A failure to print cannot be reported anywhere.
+/// Prints a warning to standard error. Ignores failures, because they cannot be reported.
 pub(crate) fn warn(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
 }

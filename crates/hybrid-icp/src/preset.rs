@@ -98,7 +98,7 @@ impl std::fmt::Display for Preset {
 
 /// A name that no preset has.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("no pipeline is named {name:?}{}; the names are: {}", did_you_mean(*suggestion), names())]
+#[error("no pipeline is named {name:?}{} The names are: {}", did_you_mean(*suggestion), names())]
 pub struct UnknownPreset {
     /// The name given.
     pub name: String,
@@ -107,7 +107,10 @@ pub struct UnknownPreset {
 }
 
 fn did_you_mean(suggestion: Option<&str>) -> String {
-    suggestion.map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
+    suggestion.map_or_else(
+        || ".".to_owned(),
+        |name| format!("; did you mean {name:?}?"),
+    )
 }
 
 fn names() -> String {

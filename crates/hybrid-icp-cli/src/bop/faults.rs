@@ -1,4 +1,4 @@
-//! Reports what is missing or damaged in a dataset.
+//! Reports missing and damaged files of a dataset.
 
 use std::collections::BTreeSet;
 
@@ -6,12 +6,12 @@ use hicp_bop::{Fault, FaultKind};
 
 use crate::terminal::{complain, warn};
 
-/// Most damaged files that are reported one by one.
+/// Largest number of damaged files that are reported one by one.
 const SHOWN: usize = 10;
 
-/// Warns of the first missing image and the first missing mask, and reports damaged files, each once.
+/// Reports damaged files, each once, and returns their number.
 ///
-/// Returns the number of damaged files.
+/// Also warns of the first missing image and the first missing mask.
 pub(crate) fn report<'a>(
     faults: impl Iterator<Item = &'a Fault> + Clone,
     broken_models: impl Iterator<Item = &'a String>,

@@ -1,4 +1,4 @@
-//! `hybrid-icp bop`: work on whole datasets.
+//! `hybrid-icp bop`: the commands over whole datasets.
 
 mod advice;
 mod compare;

@@ -18,9 +18,10 @@ pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoErro
     Ok(read.collect::<Vec<_>>().into_iter().collect())
 }
 
-/// Returns messages about the objects whose diameter in `models_info.json` differs from that of the mesh, on all threads.
+/// Returns a message for each object whose diameter in `models_info.json` differs from its mesh.
 ///
 /// Masks, pairs, the MVE and recalls depend on the diameter, and none of them fails if it is wrong.
+/// Works on all threads.
 pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
     let info = dir.join("models_info.json");
     // Without the file, the diameter is that of the mesh.
@@ -30,7 +31,7 @@ pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, Stri
     let wrong = models.by_id.par_iter().filter_map(|(obj_id, model)| {
         let warning = warning_of_diameter(model)?;
         let text = format!(
-            "{}: object {obj_id}: {warning}: poses, the MVE and recalls depend on it, check both",
+            "{}: object {obj_id}: {warning}: check both, because poses, the MVE and recalls depend on it",
             info.display()
         );
         Some((*obj_id, text))
@@ -38,11 +39,13 @@ pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, Stri
     wrong.collect()
 }
 
-/// Returns a message about the objects without a model in a folder, with the path where the first was expected.
+/// Returns a message about the objects without a model in a folder.
+///
+/// It names the path at which the first model was expected.
 pub(crate) fn missing(models: &Models, dir: &Path) -> Option<String> {
     let first = Dataset::model_path_in(dir, *models.missing.first()?);
     Some(format!(
-        "the dataset has no model of object {}, expected {}",
+        "the dataset has no model for object {}, expected {}",
         ids(&models.missing),
         first.display()
     ))

@@ -9,7 +9,7 @@ use hicp_io::bop::Dataset;
 
 use crate::limits::limits;
 
-/// Which images of which dataset.
+/// The options that choose images of a dataset.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct DatasetOptions {
     /// The dataset's folder, with models/ and the split's folder.
@@ -29,10 +29,10 @@ impl DatasetOptions {
     }
 }
 
-/// How many threads work.
+/// The option for the number of threads.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct ThreadOptions {
-    /// Threads; the number of cores if not given. Only times depend on it.
+    /// Number of threads; the number of cores if not given. Only times depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     threads: Option<u16>,
 }

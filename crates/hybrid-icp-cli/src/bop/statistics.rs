@@ -1,6 +1,8 @@
 //! Statistics for summaries.
 
-/// Returns the median, which is the mean of the middle two of an even number of values; `None` without any.
+/// Returns the median; for an even number of values, the mean of the middle two.
+///
+/// Returns `None` without values.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let upper = values.get(values.len() / 2)?;

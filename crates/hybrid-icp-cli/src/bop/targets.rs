@@ -10,10 +10,12 @@ use hicp_io::bop::Dataset;
 use crate::limits::limits;
 use crate::terminal::warn;
 
-/// Name of the benchmark's file.
+/// Name of the benchmark's file of targets.
 const TARGETS_FILE: &str = "test_targets_bop19.json";
 
-/// Reads the targets from `given`, or from the dataset's file. Without both, every visible instance is a target.
+/// Reads the targets from `given`, or from the dataset's file.
+///
+/// Without both, every visible instance is a target.
 pub(crate) fn choose(
     dataset: &Dataset,
     split: &str,
@@ -25,7 +27,7 @@ pub(crate) fn choose(
         None if !hicp_io::is_absent(&of_dataset) => &of_dataset,
         None => {
             warn(format_args!(
-                "{} does not exist: every instance of the split that is visible by {MIN_VISIBLE_FRACTION} or more is a target",
+                "{} does not exist: every instance of the split with a visible fraction of {MIN_VISIBLE_FRACTION} or more is a target",
                 of_dataset.display()
             ));
             return Ok(of_ground_truth(dataset, split)?);
@@ -34,7 +36,7 @@ pub(crate) fn choose(
     read(path)
 }
 
-/// Reads a file of targets.
+/// Reads a file of targets, and checks that it has each target once.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
     let mut targets = Targets::new();
     for target in limits().read_targets(path)? {
@@ -48,7 +50,7 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
         }
     }
     if targets.is_empty() {
-        bail!("{} holds no target, expected at least one", path.display());
+        bail!("{} has no target, expected at least one", path.display());
     }
     Ok(targets)
 }

@@ -70,7 +70,7 @@ impl StudyOptions {
         let bar = progress_bar(config.layout().n_cases(), unit);
         bar.set_message(name.to_owned());
         let mut has_started = false;
-        interrupt::can_resume();
+        interrupt::can_resume("--resume");
         let ran = run(config, subjects, out, options, &mut |done| {
             bar.set_position(done as u64);
             if !has_started {

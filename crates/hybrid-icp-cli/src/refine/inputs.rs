@@ -22,16 +22,19 @@ pub(crate) struct Inputs {
     /// The depth image: 16-bit gray PNG, 0 where nothing was measured.
     #[arg(long, value_name = "FILE")]
     pub(crate) depth: PathBuf,
-    /// Millimeters per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if not given.
+    /// Millimeters per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if
+    /// not given.
     #[arg(long, value_name = "MM_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) depth_scale: Option<f64>,
-    /// The object's mask: a PNG of the depth image's size, not zero on the object.
+    /// The object's mask: a PNG of the depth image's size, nonzero on the object.
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: PathBuf,
-    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and height. Pixel centers are at integers.
+    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and
+    /// height. Pixel centers are at integers.
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: PathBuf,
-    /// The rough pose: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three, mm), model to camera.
+    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
+    /// (three numbers in mm).
     #[arg(long, value_name = "FILE")]
     pub(crate) init: PathBuf,
 }
@@ -84,7 +87,9 @@ impl Inputs {
         ]
     }
 
-    /// Reads the camera and the depth scale, after checking that the depth image and the mask have one size.
+    /// Reads the camera and the depth scale.
+    ///
+    /// First checks that the depth image and the mask have the same size.
     fn read_camera(&self) -> anyhow::Result<(CameraFile, f64)> {
         let size = hicp_io::read_png_size(&self.depth)?;
         let (mask, camera) = (self.mask.display(), self.camera.display());
@@ -107,7 +112,7 @@ impl Inputs {
         match self.depth_scale.or(camera_file.depth_scale) {
             Some(depth_scale) => Ok((camera_file, depth_scale)),
             None => bail!(
-                "{camera}: no depth_scale there, expected it or --depth-scale (millimeters per unit of the depth image)"
+                "{camera}: no depth_scale, expected this key or --depth-scale (millimeters per unit of the depth image)"
             ),
         }
     }

@@ -21,10 +21,11 @@ use crate::terminal::{say, warn};
 
 /// Refine one pose in one depth image.
 ///
-/// The result is JSON: the pose as cam_R_m2c and cam_t_m2c (mm), mve_initial and mve, outcome (refined or kept_initial) and
-/// its reason, termination, iterations, n_pairs, time_ms, warnings (texts, none where nothing looks wrong: what standard error
-/// says), and a trace with one object per stage that ran. A pose that cannot be refined is given back with the numbers of the
-/// file; that is an outcome and no error.
+/// The result is JSON. It has the pose as cam_R_m2c and cam_t_m2c (mm), mve_initial and mve, and
+/// the outcome (refined or kept_initial) with its reason. It also has termination, iterations,
+/// n_pairs, time_ms, the warnings that are also on standard error, and a trace with one object per
+/// stage. If a pose cannot be refined, the result has the numbers of the file; this is not an
+/// error.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -32,14 +33,15 @@ pub(crate) struct Arguments {
     inputs: Inputs,
     #[command(flatten)]
     pipeline: PipelineArguments,
-    /// Where the JSON result goes; standard output if not given.
+    /// The file for the JSON result; standard output if not given.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Where a picture goes: the depth image with the model's outline before (orange) and after (blue), as PNG.
+    /// A PNG file for a picture: the depth image with the model's outline before (orange) and after
+    /// (blue) the refinement.
     #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
-    /// Where a trace of every iteration goes: one JSON object per line, each with its pose as in a pose file; `hybrid-icp replay`
-    /// runs it again.
+    /// A file for the trace: one JSON object per iteration and line, with its pose as in a pose
+    /// file. `hybrid-icp replay` runs it again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
 }
@@ -131,7 +133,7 @@ impl Arguments {
         for (option, path) in self.inputs.files() {
             files = files.reads(option, [path]);
         }
-        // The result has the keys of a pose file, so a pose can be refined in place.
+        // A pose can be refined in place, because the result has the keys of a pose file.
         files
             .reads("--pipeline", self.pipeline.file())
             .check_in_place("--output", "--init")

@@ -15,11 +15,11 @@ use crate::terminal::{say, warn};
 
 /// Run a trace again and compare every iteration.
 ///
-/// The trace (`hybrid-icp refine --trace FILE`) names the files and holds the pipeline that made it. The same files give the
-/// same iterations to the last digit. If a line differs, the exit code is 1.
+/// A trace (`hybrid-icp refine --trace FILE`) contains its pipeline and the names of its files. The
+/// same files give the same iterations to the last digit. If a line differs, the exit code is 1.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The trace.
+    /// The trace file.
     #[arg(value_name = "TRACE")]
     trace: PathBuf,
 }
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let version = header.text("version")?;
     if version != env!("CARGO_PKG_VERSION") {
         warn(format_args!(
-            "{} was made by version {version}, this is {}: results may differ",
+            "{} was written by version {version}, this is version {}: results may differ",
             path.display(),
             env!("CARGO_PKG_VERSION")
         ));
@@ -57,28 +57,28 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .find(|(_, (new, old))| new != old);
     if let Some((number, (new, old))) = differing {
         bail!(
-            "{}:{number} differs:\n  there {old}\n  now   {new}",
+            "{}:{number} differs:\n  trace    {old}\n  this run {new}",
             path.display()
         );
     }
     if new.len() != old.len() {
         bail!(
-            "{} has {} lines, the run has {}; those of both agree",
+            "{} has {} lines, but this run has {}; the lines that both have are equal",
             path.display(),
             old.len(),
             new.len()
         );
     }
     say(format_args!(
-        "{}: {} lines, all as they were",
+        "{}: {} lines, all equal",
         path.display(),
         old.len()
     ))
 }
 
-/// Runs what the header states, and returns the lines of that run under the same header.
+/// Runs the refinement of a header, and returns the lines of that run below the same header.
 fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
-    let overrides: Vec<String> = header.get("set", "a list of texts")?;
+    let overrides: Vec<String> = header.get("set", "a list of strings")?;
     let origin = format!("the pipeline of {}", header.path.display());
     let pipeline = Pipeline::parse(&origin, header.text("toml")?, &overrides)?;
     let unit = header.text("model_unit")?.parse();
@@ -97,14 +97,14 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
     let mut trace = TraceLines::new(Some(header.line.clone()));
     let mut refiner = pipeline.refiner();
     refiner.refine_observed(&read.model, &observation, &init, &mut trace);
-    // Through text, as the old lines: numbers in JSON are read back exactly.
+    // Convert through text as the old lines were; numbers in JSON are read back exactly.
     let lines = trace.lines().iter();
     lines
         .map(|line| Ok(serde_json::from_str(&line.to_string())?))
         .collect()
 }
 
-/// The first line.
+/// The first line of a trace.
 struct Header<'a> {
     path: &'a Path,
     line: &'a Value,
@@ -117,7 +117,7 @@ impl Header<'_> {
     }
 
     fn text(&self, key: &str) -> anyhow::Result<String> {
-        self.get(key, "a text")
+        self.get(key, "a string")
     }
 
     fn refuse(&self, key: &str, expected: &str) -> anyhow::Error {

@@ -32,11 +32,12 @@ pub(crate) struct Report {
 /// One ICP stage that ran.
 #[derive(Debug, Serialize)]
 struct StageReport {
-    /// Its number, from 1.
+    /// The number of the stage, counted from 1.
     stage: usize,
-    /// The choice of the switch before this stage, and the MVE behind it.
+    /// The choice of the switch before this stage.
     #[serde(skip_serializing_if = "Option::is_none")]
     regime: Option<&'static str>,
+    /// The MVE that this choice depends on.
     #[serde(skip_serializing_if = "Option::is_none")]
     regime_mve: Option<f64>,
     selection: &'static str,
@@ -65,7 +66,7 @@ impl Report {
         let outcome = &refined.outcome;
         let (rotation, translation_mm) = match outcome.verdict {
             Verdict::Refined => hicp_io::pose_to_bop(&outcome.camera_from_object),
-            // The numbers of the file, which may be orthogonal to their digits only.
+            // The rotation in the file may be orthogonal only to its number of digits.
             Verdict::KeptInitial(_) => (init.rotation, init.translation_mm),
         };
         Self {
@@ -146,7 +147,7 @@ pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
     table(&rows, 5)
 }
 
-/// Returns one line about the whole.
+/// Returns a one-line summary of the refinement.
 pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
     let outcome = &refined.outcome;
     match outcome.verdict {

@@ -15,8 +15,9 @@ use crate::pose_json::add_pose;
 
 /// Stores the stages for the report and, with a header, a line for every event.
 ///
-/// A line holds the pose as a pose file does, so the line of any iteration can be the
-/// `--init` of another run. The first line names the pipeline and the files, so that `hybrid-icp replay` can run it again.
+/// A line has the keys of a pose file, so the line of any iteration can be the `--init` of another
+/// run. The first line names the pipeline and the files, so that `hybrid-icp replay` can repeat the
+/// run.
 #[derive(Debug, Default)]
 pub(super) struct TraceLines {
     pub(super) trace: Trace,
@@ -24,7 +25,7 @@ pub(super) struct TraceLines {
 }
 
 impl TraceLines {
-    /// Starts with a header. Without one, stores no lines.
+    /// Creates a trace that starts with a header. Without a header, it stores no lines.
     pub(super) fn new(header: Option<Value>) -> Self {
         Self {
             trace: Trace::new(),
@@ -58,9 +59,9 @@ impl TraceLines {
     }
 }
 
-/// Returns the first line of a trace, which states everything that the others follow from except `depth_scale`.
+/// Returns the first line of a trace: all inputs of the run except `depth_scale`.
 ///
-/// Fails if a path is not UTF-8, because JSON cannot name it.
+/// Fails if a path is not UTF-8, because JSON cannot represent it.
 pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Value> {
     let mut line = json!({
         "event": "start",
@@ -73,7 +74,7 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
     for (option, path) in inputs.files() {
         let text = path.to_str().ok_or_else(|| {
             anyhow!(
-                "{option} names {}, which is not UTF-8: --trace cannot name it, expected another name or no --trace",
+                "{option} names {}, which is not UTF-8 and cannot be written to --trace: rename the file or omit --trace",
                 path.display()
             )
         })?;

@@ -1,4 +1,5 @@
-//! Warnings about well-formed inputs of a refinement that do not fit together, and about its result.
+//! Warnings about well-formed inputs of a refinement that do not fit together, and about its
+//! result.
 
 use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::icp::Verdict;
@@ -9,7 +10,9 @@ use super::inputs::Inputs;
 /// The largest depth of a `DepthImage`.
 const MAX_DEPTH_METERS: f32 = 1000.0;
 
-/// Returns why a refinement ended as it did. For a pose that was kept, names the cause in the inputs if there is a plain one.
+/// Returns the reason for the outcome of a refinement.
+///
+/// If the initial pose was kept because of an evident flaw of the inputs, the reason names it.
 pub(crate) fn reason(
     refined: &Refinement,
     model: &Model,
@@ -51,7 +54,7 @@ pub(super) fn about_units(
             Warning::NoDepth => (
                 depth,
                 format!(
-                    " at {depth_scale} mm per unit; depths beyond {MAX_DEPTH_METERS} m count as missing: check --depth-scale \
+                    " at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): check --depth-scale \
                      and {mask}"
                 ),
             ),
@@ -70,7 +73,7 @@ pub(super) fn about_units(
     warnings.map(in_words).collect()
 }
 
-/// Returns warnings about a pose that is not to be trusted.
+/// Returns warnings about a refined pose that should not be trusted.
 pub(crate) fn about_result(refined: &Refinement) -> Vec<String> {
     refined.warnings().iter().map(ToString::to_string).collect()
 }

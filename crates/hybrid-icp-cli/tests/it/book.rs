@@ -16,7 +16,7 @@ fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
         .collect()
 }
 
-/// Runs the `sh` blocks of a page; those marked `bash` need data or tools that are not here.
+/// Runs the `sh` blocks of a page. Blocks marked `bash` need data or tools that may be missing.
 fn run_page(name: &str) {
     let page = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../docs")

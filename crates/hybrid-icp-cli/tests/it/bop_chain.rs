@@ -1,15 +1,16 @@
-//! The whole path over a generated dataset, as a user goes it: generate, refine, eval, compare, show.
+//! All steps over a generated dataset: generate, refine, eval, compare, show.
 //!
-//! What is printed is held to `golden/bop_chain.txt` digit for digit: the dataset follows from its seed, no pose depends on the
-//! number of threads, and the figures are rounded to three digits. `HICP_BLESS=1 cargo test -p hybrid-icp-cli --test it bop_chain`
-//! writes it anew; the commit says why it changed.
+//! The printed text must equal `golden/bop_chain.txt`. This is possible because the dataset follows
+//! from its seed, no pose depends on the number of threads, and numbers are rounded to three
+//! digits. `HICP_BLESS=1 cargo test -p hybrid-icp-cli --test it bop_chain` writes the file again;
+//! the commit message must explain the change.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::common::*;
 
-/// Runs a command of `hybrid-icp bop` that must succeed without a warning; returns what it printed.
+/// Runs a command of `hybrid-icp bop`, asserts success without warnings, and returns its output.
 #[track_caller]
 fn bop(folder: &Path, words: &str) -> String {
     let told = run(folder, std::iter::once("bop").chain(words.split(' '))).exits(0);
@@ -17,7 +18,7 @@ fn bop(folder: &Path, words: &str) -> String {
     told.out
 }
 
-/// The Markdown's lines without the columns of times, which no two runs have in common.
+/// Removes the columns of times, which differ between runs, from Markdown.
 fn without_times(markdown: &str) -> String {
     let mut text = String::new();
     let (table, rest) = markdown.split_once("\n\n").unwrap();
@@ -49,7 +50,7 @@ fn generate_refine_eval_compare_show() {
     let pipelines = "hybrid,projective-cascade-point-plane";
     let compare =
         format!("compare --dataset set --init {initial} --pipelines {pipelines} --out compared");
-    // The pipelines are no equals: what is left of one of them is warned of.
+    // One of the pipelines fails for some rows, so there are warnings.
     let words = compare.split(' ');
     let told = run(folder, std::iter::once("bop").chain(words)).exits(0);
     let markdown = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();

@@ -8,7 +8,7 @@ use serde_json::Value;
 const COMPARE: &str =
     "bop compare --dataset set --init set/initial_synthetic-test.csv --out compared";
 
-/// The cells of the first table's lines below its head.
+/// Returns the cells of the first table without its head.
 fn cells(folder: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
     let lines = text
@@ -25,14 +25,14 @@ fn cells(folder: &Path) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn pipelines_are_compared_by_what_eval_says_of_them() {
+fn pipelines_are_compared_by_the_numbers_of_eval() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let words = "bop generate --scenes 1 --images 2 --instances 5 --out set";
     run(folder, words.split(' ')).exits(0);
     let words = format!("{COMPARE} --pipelines hybrid,nn-point-to-point");
     let told = run(folder, words.split(' ')).exits(0);
-    // What did not come out well is told by the pipeline that it is of.
+    // Warnings about poses name the file of their pipeline.
     let begin = "warning: compared/nn-point-to-point.csv: ";
     assert!(
         told.err.lines().count() == 1 && told.err.starts_with(begin),
@@ -85,7 +85,7 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
             assert_eq!(entry[key], report[key], "{key}");
         }
     }
-    // The page has the same figures, holds everything and has a row per object.
+    // The page has the same numbers, loads no other file, and has a row per object.
     let page = read("compare.html");
     for line in &cells {
         let row: String = line.iter().map(|cell| format!("<td>{cell}</td>")).collect();
@@ -103,7 +103,7 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
         );
     }
 
-    // What refine alone writes.
+    // `bop refine` alone writes the same poses.
     let words = "bop refine --dataset set --results set/initial_synthetic-test.csv --pipeline hybrid --output alone.csv";
     run(folder, words.split(' ')).exits(0);
     let poses = |name: &str| -> Vec<_> {
@@ -114,7 +114,7 @@ fn pipelines_are_compared_by_what_eval_says_of_them() {
 }
 
 #[test]
-fn wrong_pipelines_are_told_before_anything_is_computed() {
+fn wrong_pipelines_are_reported_before_anything_is_computed() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     std::fs::write(folder.join("hybrid.toml"), "").unwrap();

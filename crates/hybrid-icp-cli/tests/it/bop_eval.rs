@@ -1,4 +1,4 @@
-//! `hybrid-icp bop eval` on a small dataset made here.
+//! `hybrid-icp bop eval` on a small dataset.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use hicp_io::bop::{ResultRow, write_results};
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, Vector3};
 use serde_json::{Value, json};
 
-/// The dataset with targets: every instance of it. The depth of an image with an occluder says nothing against the truth.
+/// Creates a dataset in which every instance is a target.
 fn dataset() -> World {
     let world = World::new();
     let mut targets = Vec::new();
@@ -30,7 +30,7 @@ fn dataset() -> World {
     world
 }
 
-/// The truth, in an order that is not that of the ground truth.
+/// Returns the true poses as rows, in another order than the ground truth.
 fn truth_as_results(world: &World) -> Vec<ResultRow> {
     let mut rows = Vec::new();
     for ((scene, image), truths) in world.truths.iter().rev() {
@@ -50,7 +50,7 @@ fn eval(world: &World, options: &[&str]) -> Run {
     )
 }
 
-/// Evaluates rows without a complaint and returns the report.
+/// Evaluates rows, asserts that there is no message, and returns the report.
 #[track_caller]
 fn report(world: &World, rows: &[ResultRow], options: &[&str]) -> Value {
     write_results(world.path("in.csv"), rows).unwrap();
@@ -64,7 +64,7 @@ fn read_json(world: &World) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// AR, AR_VSD, AR_MSSD, AR_MSPD and the recall of AD.
+/// Returns AR, AR_VSD, AR_MSSD, AR_MSPD and the recall of AD.
 fn recalls(part: &Value) -> [f64; 5] {
     ["ar", "ar_vsd", "ar_mssd", "ar_mspd", "ad_recall"].map(|key| part[key].as_f64().unwrap())
 }
@@ -84,7 +84,7 @@ fn the_truth_scores_one_on_every_metric() {
         assert_eq!(report["objects"][id]["targets"], json!(count));
     }
 
-    // Two cars per image: both are compared with both instances, the hammer with itself.
+    // Each image has two cars: both are compared with both instances, the hammer with itself.
     let errors = std::fs::read_to_string(world.path("errors.csv")).unwrap();
     assert_eq!(errors.lines().count(), 1 + 4 * 4 + 2);
     let columns = errors.lines().next().unwrap().split(',').count();
@@ -99,16 +99,16 @@ fn the_truth_scores_one_on_every_metric() {
     assert!(lines[0].contains("MSSD") && lines[3].trim_start().starts_with("all"));
 }
 
-/// Ten times the diameter makes nearly every pose a correct one.
+/// With ten times the diameter, nearly every pose would count as correct.
 #[test]
-fn a_stated_diameter_that_is_not_the_meshs_is_told() {
+fn a_stated_diameter_that_differs_from_the_mesh_is_warned_of() {
     let world = dataset();
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
     let info = json!({"1": {"diameter": 1500.0}}).to_string();
     std::fs::write(world.path("models/models_info.json"), info).unwrap();
     let run = eval(&world, &[]).exits(0).complains(&[
         "models_info.json: object 1: the stated diameter is 1.5000 m, but that of the mesh is 0.1",
-        "recalls depend on it",
+        "check both, because poses, the MVE and recalls depend on it",
     ]);
     assert_eq!(run.err.lines().count(), 1, "{}", run.err);
     let warnings = &read_json(&world)["warnings"];
@@ -127,7 +127,8 @@ fn neither_threads_nor_the_order_of_rows_change_a_byte() {
     let recalls_of_one = read_json(&world);
     report(&world, &rows, &["--threads", "3"]);
     assert_eq!(std::fs::read(world.path("errors.csv")).unwrap(), one);
-    // Equal scores: of two estimates the first is preferred, so only those of different objects may be exchanged.
+    // Of two estimates with equal scores, the first is preferred, so only estimates of different
+    // objects may be exchanged.
     rows.sort_by_key(|row| row.obj_id);
     let sorted = report(&world, &rows, &[]);
     assert_eq!(recalls(&sorted), recalls(&recalls_of_one));
@@ -155,7 +156,7 @@ fn worse_estimates_have_lower_recalls_and_missing_ones_count() {
         assert!(adi > 0.0 && adi <= mm, "{adi}");
     }
 
-    // Half of the estimates are perfect, the others are not there.
+    // Half of the estimates are perfect, the others are missing.
     let half: Vec<_> = truth.iter().step_by(2).cloned().collect();
     let found = report(&world, &half, &[]);
     assert_eq!(recalls(&found), [0.5; 5]);
@@ -193,7 +194,8 @@ fn a_symmetric_equivalent_scores_one_on_mssd_and_mspd() {
     let declared = report(&world, &rows, &[]);
     let [_, _, mssd, mspd, _] = recalls(&declared);
     assert_eq!((mssd, mspd), (1.0, 1.0));
-    // AD is ADI for the symmetric: these objects are not really, so it differs from both ADD and a perfect score.
+    // AD is ADI for objects with declared symmetries. These objects are not symmetric, so ADI
+    // differs from both ADD and a perfect score.
     let as_add = report(&world, &rows, &["--symmetric", "7"]);
     let as_adi = report(&world, &rows, &["--symmetric", "1,2"]);
     assert_eq!(as_adi, declared);
@@ -201,7 +203,7 @@ fn a_symmetric_equivalent_scores_one_on_mssd_and_mspd() {
 }
 
 #[test]
-fn only_the_best_scores_are_looked_at() {
+fn only_the_best_scores_are_evaluated() {
     let world = dataset();
     let mut rows = truth_as_results(&world);
     let mut worse = rows.clone();
@@ -210,12 +212,12 @@ fn only_the_best_scores_are_looked_at() {
         row.score = 0.5;
         row.set_camera_from_object(Isometry3::translation(0.0, 0.0, 0.5) * pose);
     }
-    // Ten perfect rows and ten bad ones; the bad ones come first in the file and have the lower score.
+    // There are ten perfect rows and ten bad ones. The bad ones come first and have lower scores.
     let together = [worse.clone(), rows.clone()].concat();
     write_results(world.path("in.csv"), &together).unwrap();
     eval(&world, &[])
         .exits(0)
-        .complains(&["warning: in.csv: 10 rows beyond", "lowest scores"]);
+        .complains(&["warning: in.csv: 10 rows are ignored", "lowest scores"]);
     assert_eq!(recalls(&read_json(&world)), [1.0; 5]);
 
     for row in &mut rows {
@@ -227,7 +229,7 @@ fn only_the_best_scores_are_looked_at() {
 }
 
 #[test]
-fn what_does_not_fit_is_warned_of() {
+fn rows_and_targets_that_do_not_match_are_warned_of() {
     let world = dataset();
     let mut rows = truth_as_results(&world);
     let pose = rows[0].camera_from_object();
@@ -235,13 +237,13 @@ fn what_does_not_fit_is_warned_of() {
     rows.push(ResultRow::new(77, 0, CAR, pose));
     write_results(world.path("in.csv"), &rows).unwrap();
     eval(&world, &[]).exits(0).complains(&[
-        "warning: in.csv: 2 of 12 rows are of no target",
+        "warning: in.csv: 2 of 12 rows have no target",
         "object 9 in image 0 of scene 3",
     ]);
     assert_eq!(recalls(&read_json(&world)), [1.0; 5]);
     assert_eq!(read_json(&world)["warnings"].as_array().unwrap().len(), 1);
 
-    // An object that there is no model of, more instances than there are, and an image that is not there.
+    // The targets name an object without a model, more instances than exist, and a missing image.
     let asked = |scene: u32, image: u32, object: u32, count: u32| json!({"scene_id": scene, "im_id": image, "obj_id": object, "inst_count": count});
     let targets = json!([
         asked(3, 0, CAR, 3),
@@ -254,15 +256,15 @@ fn what_does_not_fit_is_warned_of() {
     let run = eval(&world, &["--targets", "asked.json"])
         .exits(0)
         .complains(&[
-            "no model of object 9",
+            "no model for object 9",
             "scene_gt.json",
             "2 instances of object 1, but the targets request 3",
-            "8 of 10 rows are of no target",
+            "8 of 10 rows have no target",
             "scene_camera.json, $: found 2 images, expected image 7",
             "and 1 more like it",
         ]);
     assert!(
-        run.out.contains("8 targets could not be judged"),
+        run.out.contains("8 targets could not be evaluated"),
         "{}",
         run.out
     );
@@ -273,7 +275,7 @@ fn what_does_not_fit_is_warned_of() {
     );
     assert_eq!(recalls(&report), [1.0; 5]);
 
-    // Masks are not needed here, but ones of another size are a sign of the wrong files.
+    // Masks are not required here, but masks of another size indicate wrong files.
     hicp_io::write_mask_png(world.mask_path(3, 0, 1), &Mask::full(32, 24)).unwrap();
     eval(&world, &[])
         .exits(0)
@@ -281,7 +283,7 @@ fn what_does_not_fit_is_warned_of() {
 }
 
 #[test]
-fn without_targets_every_visible_instance_is_one() {
+fn without_targets_every_visible_instance_is_a_target() {
     let world = dataset();
     std::fs::remove_file(world.path("test_targets_bop19.json")).unwrap();
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
@@ -290,19 +292,20 @@ fn without_targets_every_visible_instance_is_one() {
         .complains(&["warning: ", "test_targets_bop19.json does not exist"]);
     assert_eq!(read_json(&world)["targets"], json!(10));
 
-    // Of two cars, the one that is more visible is asked for; nobody asks for one that hardly is.
+    // Of two cars, only the more visible one is a target; the other is visible by less than a
+    // tenth.
     let visible = |a: f64, b: f64| json!([{"visib_fract": a}, {"visib_fract": b}]);
     let info = json!({"0": visible(0.05, 0.9)});
     std::fs::write(world.scene(3).join("scene_gt_info.json"), info.to_string()).unwrap();
     eval(&world, &[]).exits(0);
     let report = read_json(&world);
     assert_eq!(report["targets"], json!(9));
-    // The first row of that image is of the visible one: rows are in the inverse order of the ground truth.
+    // Rows are in the inverse order of the ground truth, so the first row is the visible car.
     assert_eq!(recalls(&report), [1.0; 5]);
 }
 
 #[test]
-fn damaged_files_are_reported_and_the_rest_is_judged() {
+fn damaged_files_are_reported_and_the_rest_is_evaluated() {
     let world = dataset();
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
     let scene_gt = world.scene(12).join("scene_gt.json");
@@ -332,7 +335,7 @@ fn damaged_files_are_reported_and_the_rest_is_judged() {
             &["000040.png: found 8-bit", "expected 16-bit"],
             7,
         ),
-        // A number for a list.
+        // The value is a number instead of a list.
         (
             scene_gt.clone(),
             br#"{"0": 5}"#.to_vec(),
@@ -386,7 +389,7 @@ fn damaged_files_are_reported_and_the_rest_is_judged() {
         std::fs::write(&path, before).unwrap();
     }
 
-    // An image without depth is one that is not there.
+    // An image without depth counts as missing.
     let depth = world.depth_path(3, 0);
     let whole = std::fs::read(&depth).unwrap();
     std::fs::remove_file(&depth).unwrap();
@@ -395,7 +398,7 @@ fn damaged_files_are_reported_and_the_rest_is_judged() {
         "000003/depth/000000.png does not exist",
     ]);
     assert_eq!(read_json(&world)["left_out"], json!(2));
-    // One of the wrong size does not fit its masks.
+    // A depth image of the wrong size does not match its masks.
     std::fs::copy(small_path, &depth).unwrap();
     eval(&world, &[])
         .exits(0)
@@ -465,7 +468,7 @@ fn bad_results_and_targets_name_their_place() {
             format!("[{target}, {target}]"),
             &["bad.json: object 1 in image 0 of scene 3 appears twice"][..],
         ),
-        ("[]".to_owned(), &["bad.json holds no target"]),
+        ("[]".to_owned(), &["bad.json has no target"]),
         ("7".to_owned(), &["bad.json, $: found 7, expected an array"]),
         (
             target.replace(": 1}", ": \"one\"}").replace('{', "[{") + "]",
@@ -489,7 +492,7 @@ fn bad_results_and_targets_name_their_place() {
     .unwrap();
     eval(&world, &["--targets", "gone.json"])
         .exits(1)
-        .complains(&["none of the 1 targets could be judged", "--split"]);
+        .complains(&["none of the 1 targets could be evaluated", "--split"]);
     eval(&world, &["--split", "tset"])
         .exits(1)
         .complains(&["split is missing", "tset"]);
@@ -504,9 +507,10 @@ fn bad_results_and_targets_name_their_place() {
 }
 
 #[test]
-fn scores_are_held_against_correctness() {
+fn scores_are_compared_with_correctness() {
     let world = dataset();
-    // Ten right rows, and ten that are half a metre off; one of each has the score of the other kind.
+    // There are ten correct rows and ten that are half a meter off. One row of each kind has the
+    // score of the other kind.
     let mut rows = truth_as_results(&world);
     let mut wrong = rows.clone();
     for row in &mut rows {
@@ -519,7 +523,7 @@ fn scores_are_held_against_correctness() {
         );
     }
     (rows[3].score, wrong[7].score) = (0.25, 0.95);
-    // Rows of no image or object are left out.
+    // Rows without an image or an object are left out.
     let pose = rows[0].camera_from_object();
     let strangers = [
         ResultRow::new(3, 77, CAR, pose),
@@ -532,7 +536,7 @@ fn scores_are_held_against_correctness() {
     .unwrap();
     let run = eval(&world, &["--calibration"]).exits(0);
     let found = read_json(&world)["calibration"].clone();
-    // Of 100 pairs 81 are in order, 18 are ties and one is in reverse.
+    // Of 100 pairs, 81 are in order, 18 are ties, and one is in reverse.
     assert_eq!(found["roc_area"], json!(0.9));
     assert_eq!(
         (&found["estimates"], &found["correct"]),
@@ -556,11 +560,11 @@ fn scores_are_held_against_correctness() {
         assert!(run.out.contains(part), "no {part:?} in {}", run.out);
     }
 
-    // All alike: there is nothing to rank.
+    // If all are correct, there is nothing to rank.
     write_results(world.path("in.csv"), &rows).unwrap();
     let run = eval(&world, &["--calibration"]).exits(0);
     assert!(read_json(&world)["calibration"]["roc_area"].is_null());
-    assert!(run.out.contains("not defined"), "{}", run.out);
+    assert!(run.out.contains("undefined"), "{}", run.out);
     eval(&world, &[]).exits(0);
     assert!(read_json(&world).get("calibration").is_none());
 }

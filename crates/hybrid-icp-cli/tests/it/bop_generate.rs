@@ -1,4 +1,4 @@
-//! `hybrid-icp bop generate`, and the whole path from there: refine, evaluate.
+//! `hybrid-icp bop generate`, and the refinement and evaluation of its datasets.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ fn generate(folder: &Path, options: &str) -> Run {
     run
 }
 
-/// Every file below a folder with its content.
+/// Returns all files below a folder with their contents.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -34,7 +34,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Evaluates without a warning; returns the report.
+/// Evaluates, asserts that there is no warning, and returns the report.
 #[track_caller]
 fn eval(folder: &Path, results: &str) -> Value {
     let words = format!("bop eval --dataset set --results {results} --json report.json");
@@ -52,7 +52,7 @@ fn generated_refined_evaluated() {
     let initial = "set/initial_synthetic-test.csv";
     let words = format!("bop refine --dataset set --results {initial} --output out.csv");
     let run = run(folder, words.split(' ')).exits(0);
-    // Of what is mostly hidden the initial pose may explain nothing.
+    // The initial pose of a mostly hidden object may explain nothing.
     let elsewhere = "rows the initial pose explained nothing of the mask";
     assert!(
         run.err.lines().all(|line| line.contains(elsewhere)),
@@ -70,12 +70,12 @@ fn generated_refined_evaluated() {
         assert_eq!(truth[recall], 1.0, "{recall}");
     }
     assert_eq!(truth["missing"], 0);
-    // Of two estimates of an instance one is looked at.
+    // Of two estimates of an instance, only one is evaluated.
     let rows = read_results(folder.join(initial)).unwrap();
     let alone = read_results(folder.join("set/truth_synthetic-test.csv")).unwrap();
     assert_eq!(rows.len(), 2 * alone.len());
     assert_eq!(truth["targets"].as_u64().unwrap(), alone.len() as u64);
-    // One start each, so that every instance has one estimate and none is beyond the targets'.
+    // With one start each, every instance has one estimate, and no row is beyond the targets.
     let one_each = |name: &str, from: &str| {
         let rows: Vec<_> = read_results(folder.join(from))
             .unwrap()
@@ -116,7 +116,7 @@ fn symmetric_equivalents_of_the_truth_score_one() {
         let symmetries = &infos[&row.obj_id].symmetries;
         let mut pose = row.camera_from_object();
         if let Some(axis) = symmetries.continuous.first() {
-            // No multiple of the steps that BOP takes about an axis.
+            // The angle is not a multiple of BOP's steps around an axis.
             pose *= axis.rotation(2.345);
             turned += 1;
         }
@@ -132,10 +132,11 @@ fn symmetric_equivalents_of_the_truth_score_one() {
     assert_eq!(report["ar_mssd"], 1.0);
     assert_eq!(report["ar_mspd"], 1.0);
     assert_eq!(report["ad_recall"], 1.0);
-    // Meshes are not as round as their symmetries say: the silhouettes' pixels need not all agree.
+    // Meshes are less round than their symmetries declare, so some pixels of silhouettes may
+    // differ.
     assert!(report["ar_vsd"].as_f64().unwrap() >= 0.989);
 
-    // Where nothing is declared, the same poses are wrong.
+    // Without declared symmetries, the same poses are wrong.
     let path = folder.join("set/models/models_info.json");
     let mut declared: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     for info in declared.as_object_mut().unwrap().values_mut() {
@@ -184,7 +185,7 @@ fn the_layout_is_that_of_the_benchmark() {
                 .camera_from_world
                 .unwrap()
                 .inverse();
-            // The objects stay where they are while the camera moves.
+            // The objects do not move while the camera does.
             let poses: Vec<_> = truths
                 .iter()
                 .map(|t| world * t.camera_from_object)
@@ -197,7 +198,7 @@ fn the_layout_is_that_of_the_benchmark() {
                 let mask = scene.read_visible_mask(im_id, index).unwrap();
                 let seen = mask.pixels().iter().filter(|set| **set).count();
                 assert_eq!(info.visible_pixels.unwrap() as usize, seen);
-                // Depth where the object is seen, but for what the sensor loses, is near the object.
+                // Measured depth in the object's mask is near the object.
                 let z = truth.camera_from_object.translation.z;
                 let radius = infos[&truth.obj_id].diameter_m;
                 for (depth, set) in depth.pixels().iter().zip(mask.pixels()) {
@@ -221,13 +222,14 @@ fn the_layout_is_that_of_the_benchmark() {
 }
 
 #[test]
-fn the_same_options_make_the_same_bytes_on_any_number_of_threads() {
+fn the_same_options_give_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     generate(folder, "--out a --threads 1");
     generate(folder, "--out b --threads 3");
     let files_of_a = files(&folder.join("a"));
-    // 4 images: depth and twice 5 masks each; 2 scenes with 3 files; 20 models with their info; 4 files beside.
+    // 4 images have a depth image and 2 x 5 masks each. 2 scenes have 3 files each. There are 20
+    // models with their info, and 4 other files.
     assert_eq!(files_of_a.len(), 4 * 11 + 6 + 21 + 4);
     assert!(files_of_a == files(&folder.join("b")));
     let other = SMALL.replace("11", "12") + " --out c";
@@ -235,7 +237,8 @@ fn the_same_options_make_the_same_bytes_on_any_number_of_threads() {
     let depth = Path::new("test/000001/depth/000000.png");
     assert_ne!(files(&folder.join("c"))[depth], files_of_a[depth]);
 
-    // Its own models make the same scenes again: ids, sizes and symmetries come from the files.
+    // The models of the dataset give the same scenes: ids, sizes and symmetries come from the
+    // files.
     generate(folder, "--out d --objects a/models");
     let read = |set: &str| {
         Dataset::open(folder.join(set))
@@ -258,14 +261,14 @@ fn the_same_options_make_the_same_bytes_on_any_number_of_threads() {
         };
         assert_eq!(count(info), count(&theirs[id]));
     }
-    // Meshes of any name, in metres.
+    // Meshes may have any name; these are in meters.
     run(folder, ["objects", "--out", "meshes"]).exits(0);
     generate(folder, "--out e --objects meshes");
     assert_eq!(read("e").len(), 20);
 }
 
 #[test]
-fn what_cannot_be_made_is_refused() {
+fn impossible_options_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let fails = |options: &str, code: i32, parts: &[&str]| {

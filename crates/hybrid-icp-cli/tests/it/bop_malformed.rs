@@ -1,4 +1,6 @@
-//! Malformed inputs of every command over datasets: each is told with its file, its line or key, and what was expected.
+//! Malformed inputs of every command over datasets.
+//!
+//! Each is reported with its file, its line or key, and the expected value.
 
 use std::path::{Path, PathBuf};
 
@@ -15,14 +17,14 @@ const SHOW: &str = "bop show --dataset . --scene 3 --image 0 --results in.csv --
 const HEADER: &str = "scene_id,im_id,obj_id,score,R,t,time";
 const ROW: &str = "3,0,1,1,1 0 0 0 1 0 0 0 1,0 0 500,-1";
 
-/// A dataset with rows of its images.
+/// Creates a dataset with rows of its images.
 fn dataset() -> World {
     let world = World::new();
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     world
 }
 
-/// Runs commands that must fail and say all of these.
+/// Runs commands, and asserts that they fail with all of these texts.
 #[track_caller]
 fn all_fail(world: &World, commands: &[&str], parts: &[&str]) {
     for command in commands {
@@ -31,7 +33,7 @@ fn all_fail(world: &World, commands: &[&str], parts: &[&str]) {
     }
 }
 
-/// Puts another content in the place of a file while something runs.
+/// Replaces the content of a file while a function runs.
 fn with<C: AsRef<[u8]>>(path: &Path, content: C, then: impl FnOnce()) {
     let before = std::fs::read(path).unwrap();
     std::fs::write(path, content).unwrap();
@@ -105,7 +107,7 @@ fn an_unknown_object_names_the_model_that_is_missing() {
     all_fail(
         &world,
         &[SHOW],
-        &["no model of object 9, expected", "obj_000009.ply"],
+        &["no model for object 9, expected", "obj_000009.ply"],
     );
     let target = json!([
         {"scene_id": 3, "im_id": 0, "obj_id": ABSENT, "inst_count": 1},
@@ -116,7 +118,7 @@ fn an_unknown_object_names_the_model_that_is_missing() {
     run(world.folder.path(), words.split(' '))
         .exits(0)
         .complains(&[
-            "no model of object 9, expected",
+            "no model for object 9, expected",
             "obj_000009.ply",
             "left out",
         ]);
@@ -143,7 +145,8 @@ fn images_name_the_file_and_what_it_should_be() {
         told.complains(&["warning: "]).complains(&parts);
     });
 
-    // An image without depth is one that a part of a dataset does not have; there is nothing to show of it.
+    // An image without depth counts as missing: `bop refine` and `bop eval` skip it, `bop show`
+    // fails.
     let whole = std::fs::read(&depth).unwrap();
     std::fs::remove_file(&depth).unwrap();
     let parts = ["000003/depth/000000.png does not exist"];

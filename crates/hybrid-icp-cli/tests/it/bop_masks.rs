@@ -1,4 +1,4 @@
-//! `hybrid-icp bop refine`: which rows are refined, and in which masks.
+//! `hybrid-icp bop refine`: the choice of rows and of their masks.
 
 use crate::common::*;
 use crate::world::*;
@@ -7,12 +7,12 @@ use hybrid_icp::core::{Isometry3, Mask};
 use serde_json::{Value, json};
 
 #[test]
-fn without_segmentation_rows_are_refined_in_the_box_about_their_pose() {
+fn without_segmentation_rows_are_refined_in_the_box_around_their_pose() {
     let world = World::new();
     let mut rows = world.rows();
     let refinable = rows.len();
     let pose = rows[0].camera_from_object();
-    // Nothing was measured where this one is, and this one is behind the camera.
+    // Nothing was measured around the first pose, and the second is behind the camera.
     rows.push(ResultRow::new(
         3,
         0,
@@ -36,7 +36,7 @@ fn without_segmentation_rows_are_refined_in_the_box_about_their_pose() {
     }
     let whole = std::fs::read(world.path("out.csv")).unwrap();
 
-    // Neither masks nor ground truth are looked at.
+    // Neither masks nor ground truth are read.
     for scene in [3, 12] {
         std::fs::remove_dir_all(world.scene(scene).join("mask_visib")).unwrap();
         std::fs::remove_file(world.scene(scene).join("scene_gt.json")).unwrap();
@@ -60,7 +60,8 @@ fn rows_of_one_object_compete_for_its_masks() {
         usize::from(distance(&cars[1]) < distance(&cars[0]))
     };
     let good = ResultRow::new(3, 0, CAR, nearby(&cars[0], 1));
-    // The second car, seen ever nearer to the first, until alone it takes the first one's mask.
+    // The estimate of the second car moves toward the first, until alone it would use that one's
+    // mask.
     let astray = (10..40).map(|step| {
         let toward = cars[0].translation.vector - cars[1].translation.vector;
         let shift = f64::from(step) * 0.025 * toward;
@@ -80,7 +81,7 @@ fn rows_of_one_object_compete_for_its_masks() {
     for rows in [[good.clone(), astray.clone()], [astray, good]] {
         let (run, refined) = world.refine(&rows, &["--no-time"]);
         run.exits(0);
-        // Each has a mask of its own.
+        // Each estimate has its own mask.
         let mut found: Vec<usize> = refined.iter().map(nearest).collect();
         found.sort_unstable();
         assert_eq!(found, [0, 1]);
@@ -136,7 +137,7 @@ fn the_best_rows_of_every_object_are_kept() {
     assert_eq!(kept(&["--targets", "targets.json"]), of_targets);
     let both = kept(&["--targets", "targets.json", "--top-k", "1"]);
     assert_eq!(both, [of_targets[0], of_targets[2]]);
-    // Shards divide what is left.
+    // Shards divide the remaining rows.
     let mut parts = kept(&["--top-k", "1", "--shard", "1/2"]);
     parts.extend(kept(&["--top-k", "1", "--shard", "2/2"]));
     assert_eq!(parts, expected);
@@ -223,7 +224,7 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
         std::fs::rename(world.path(split), world.path("test")).unwrap();
     }
 
-    // Gray images stand where colour images do; their size is checked by the evaluation.
+    // Some datasets have gray images instead of color images. The evaluation checks their size.
     let gray = world.scene(3).join("gray");
     std::fs::create_dir(&gray).unwrap();
     hicp_io::write_mask_png(gray.join("000000.png"), &Mask::full(320, 240)).unwrap();

@@ -1,4 +1,4 @@
-//! `hybrid-icp bop refine` on a small dataset made here.
+//! `hybrid-icp bop refine` on a small dataset.
 
 use std::collections::BTreeMap;
 
@@ -45,7 +45,8 @@ fn threads_do_not_change_a_byte() {
 fn the_time_is_the_same_on_all_rows_of_an_image() {
     let world = World::new();
     let mut rows = world.rows();
-    // Times in the input are added to; where the rows of an image disagree, or only some state one, the largest counts.
+    // The time is added to the time in the input. If the rows of an image differ, or if only some
+    // have a time, the largest counts.
     for (index, row) in rows.iter_mut().enumerate() {
         row.time_s = match row.scene_id {
             3 => Some(100.0),
@@ -113,12 +114,12 @@ fn rows_that_cannot_be_refined_are_kept_and_counted() {
         .filter(|(a, b)| same_pose(a, b))
         .count();
     assert_eq!(kept, rows.len() - refinable);
-    // Nothing was computed for these, so nothing is known of the time.
+    // Nothing was computed for these rows, so their time is unknown.
     for row in &refined[rows.len() - 2..] {
         assert_eq!(row.time_s, None);
     }
 
-    // The numbers are those of the file, though its rotation is one to nine digits only.
+    // The numbers are those of the file, although its rotation is orthogonal to only nine digits.
     let numbers = "0.768311175 -0.0665434694 0.636608126 0.311033385 0.908074697 -0.280461366 -0.559424858 0.413487982 0.718381178,78.6667817 -7.67105284 1035.65777";
     let text = format!("scene_id,im_id,obj_id,score,R,t,time\n3,0,9,0.5,{numbers},1.25\n");
     std::fs::write(world.path("in.csv"), &text).unwrap();
@@ -135,7 +136,7 @@ fn missing_files_cost_their_rows_only() {
     let rows = world.rows();
     std::fs::remove_file(world.depth_path(3, 0)).unwrap();
     std::fs::remove_file(world.mask_path(12, 40, 1)).unwrap();
-    // One of two cars loses its mask: its row has none that it overlaps.
+    // One of two cars loses its mask, so its row overlaps no mask.
     std::fs::remove_file(world.mask_path(12, 0, 0)).unwrap();
     let (run, refined) = world.refine(&rows, &[]);
     let run = run.exits(0).complains(&[
@@ -162,7 +163,7 @@ fn missing_files_cost_their_rows_only() {
 }
 
 #[test]
-fn ground_truth_that_masks_are_named_by_is_told_where_it_is_missing() {
+fn missing_ground_truth_is_reported_if_masks_depend_on_it() {
     let world = World::new();
     let rows = world.rows();
     let path = world.scene(3).join("scene_gt.json");
@@ -176,19 +177,19 @@ fn ground_truth_that_masks_are_named_by_is_told_where_it_is_missing() {
     std::fs::remove_file(&path).unwrap();
     let (run, _) = world.refine(&rows, &[]);
     assert!(run.out.contains("5  kept: no mask"), "{}", run.out);
-    // Of both images, and told once.
+    // It is missing for both images, but reported once.
     assert_eq!(
         run.exits(0).err,
         "warning: ground truth is missing: ./test/000003/scene_gt.json does not exist\n"
     );
-    // Nobody asks for it where masks come from elsewhere.
+    // With masks from a file, it is not required.
     let (run, _) = world.refine(&rows, &["--mask", "none"]);
     assert_eq!(run.exits(0).err, "");
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_is_wrong_is_told_where_the_summary_cannot_be_written() {
+fn errors_are_reported_even_if_the_summary_cannot_be_written() {
     if !std::path::Path::new("/dev/full").exists() {
         println!("skipped: no /dev/full");
         return;
@@ -216,7 +217,7 @@ fn what_is_wrong_is_told_where_the_summary_cannot_be_written() {
     ] {
         assert!(err.contains(part), "no {part:?} in: {err}");
     }
-    // Without it the summary is all that is wrong.
+    // Without the damaged file, the summary is the only error.
     std::fs::remove_file(&depth).unwrap();
     let err = told();
     for part in ["warning: depth", "error: cannot write to standard output"] {
@@ -250,7 +251,7 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
         for (before, after) in changed {
             world.assert_refined(before, after);
         }
-        // What cannot be read is not missing.
+        // An unreadable file does not count as missing.
         std::fs::remove_file(&path).unwrap();
         std::fs::create_dir(&path).unwrap();
         let (run, _) = world.refine(&rows, &[]);
@@ -299,7 +300,7 @@ fn masks_of_a_detections_file_are_the_same_masks() {
                 }));
             }
         }
-        // One without a segmentation is of no use and no harm.
+        // A detection without a segmentation is ignored.
         detections.push(json!({"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1}));
         std::fs::write(
             world.path("found.json"),
@@ -310,7 +311,7 @@ fn masks_of_a_detections_file_are_the_same_masks() {
         run.exits(0);
         assert_eq!(refined, reference);
 
-        // Without ground truth too: that is what they are for.
+        // Detections work without ground truth.
         for scene in [3, 12] {
             let file = world.scene(scene).join("scene_gt.json");
             let aside = file.with_extension("aside");
@@ -354,7 +355,7 @@ fn masks_of_a_detections_file_are_the_same_masks() {
 }
 
 #[test]
-fn what_fails_before_the_refinement_touches_nothing() {
+fn failures_before_the_refinement_change_no_file() {
     let world = World::new();
     let rows = world.rows();
     write_results(world.path("in.csv"), &rows).unwrap();

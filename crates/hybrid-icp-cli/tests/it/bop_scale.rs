@@ -1,4 +1,4 @@
-//! `hybrid-icp bop refine` on files too large for one sitting: shards, limits, killed runs, scores.
+//! `hybrid-icp bop refine` on large files: shards, limits, killed runs, scores.
 
 use std::time::{Duration, Instant, SystemTime};
 
@@ -15,7 +15,7 @@ fn journal(world: &World) -> std::path::PathBuf {
     world.path("out.csv.journal")
 }
 
-/// Kills a run on one thread when it has done an image of four; returns what its journal held.
+/// Kills a run on one thread after one of four images, and returns its journal.
 fn killed(world: &World) -> Vec<u8> {
     let words = "bop refine --dataset . --results in.csv --output out.csv --no-time --threads 1";
     let mut child = program(world.folder.path())
@@ -29,19 +29,19 @@ fn killed(world: &World) -> Vec<u8> {
         text.iter().filter(|byte| **byte == b'\n').count()
     };
     while lines() < 2 {
-        assert!(child.try_wait().unwrap().is_none(), "done too early");
+        assert!(child.try_wait().unwrap().is_none(), "finished too early");
         assert!(start.elapsed() < Duration::from_secs(300));
         std::thread::sleep(Duration::from_millis(1));
     }
-    // SIGKILL where there are signals.
+    // This sends SIGKILL on systems with signals.
     child.kill().unwrap();
-    assert!(!child.wait().unwrap().success(), "done too early");
+    assert!(!child.wait().unwrap().success(), "finished too early");
     assert!(lines() < 5);
     std::fs::read(journal(world)).unwrap()
 }
 
 #[test]
-fn a_killed_run_goes_on_to_the_same_bytes() {
+fn a_killed_run_continues_to_the_same_bytes() {
     let world = World::new();
     let rows = grouped_for_signals(&world);
     let (whole, _) = world.refine(&rows, &["--no-time"]);
@@ -51,11 +51,11 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     std::fs::write(world.path("out.csv"), "the user's").unwrap();
 
     let held = killed(&world);
-    // Nobody sees half an output.
+    // There is no partial output.
     assert_eq!(output(&world), b"the user's");
     world.run(&["--no-time"]).exits(1).complains(&[
         "out.csv.journal",
-        "did not finish",
+        "unfinished run",
         "--resume",
     ]);
     for (options, parts) in [
@@ -100,7 +100,7 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
     assert_eq!(output(&world), expected);
     assert!(!journal(&world).exists());
 
-    // Lines that the end of a run cut off are done again.
+    // If the end of a run cut off a line, its image is refined again.
     for length in [3, held.len() / 2, held.len() - 1] {
         std::fs::write(journal(&world), &held[..length]).unwrap();
         world
@@ -108,7 +108,7 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
             .exits(0);
         assert_eq!(output(&world), expected);
     }
-    // What the journal holds is not done again: it is written as it stands there.
+    // Images in the journal are not refined again: their results are written as stored.
     let text = String::from_utf8(held).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines[1] = lines[1].replacen("\"refined\"", "\"kept: no mask of the object\"", 1);
@@ -119,14 +119,14 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         "{}",
         run.out
     );
-    // Without a journal there is nothing to go on with.
+    // Without a journal, there is nothing to continue.
     let run = world.run(&["--no-time", "--resume"]).exits(0);
     assert!(!run.out.contains("journal"));
     assert_eq!(output(&world), expected);
 }
 
 #[test]
-fn damaged_lines_of_the_journal_are_done_again() {
+fn images_of_damaged_journal_lines_are_refined_again() {
     let world = World::new();
     let (whole, _) = world.refine(&grouped_for_signals(&world), &["--no-time"]);
     whole.exits(0);
@@ -134,14 +134,14 @@ fn damaged_lines_of_the_journal_are_done_again() {
     let held = killed(&world);
     let begin = held.iter().position(|byte| *byte == b'\n').unwrap() + 1;
     let length = held[begin..].iter().position(|b| *b == b'\n').unwrap();
-    // A line that does not parse, one of another image, and one whose end is lost.
+    // The lines are one that does not parse, one of another image, and one without its end.
     for (place, bit) in [(begin, 1), (begin + 1, 1), (begin + length, 4)] {
         let mut changed = held.clone();
         changed[place] ^= bit;
         std::fs::write(journal(&world), changed).unwrap();
         let run = world.run(&["--no-time", "--resume"]).exits(0);
         assert_eq!(output(&world), expected, "byte {place}");
-        // Without its end the line may be one that was cut off.
+        // A line without its end may be one that was cut off, so it gives no warning.
         if place < begin + length {
             run.complains(&["warning: out.csv.journal: 1 lines are damaged"]);
         }
@@ -149,7 +149,7 @@ fn damaged_lines_of_the_journal_are_done_again() {
 }
 
 #[test]
-fn a_run_goes_on_only_over_the_files_that_it_began_with() {
+fn a_run_continues_only_with_the_files_that_it_started_with() {
     let world = World::new();
     let (whole, _) = world.refine(&grouped_for_signals(&world), &["--no-time"]);
     whole.exits(0);
@@ -174,7 +174,7 @@ fn a_run_goes_on_only_over_the_files_that_it_began_with() {
             file.set_modified(time).unwrap();
         };
         let time = metadata.modified().unwrap();
-        // The same size at another time, and another size at the same time.
+        // Change only the time, then only the size.
         changed_at(time + Duration::from_secs(10));
         refused(name, ["-bytes@", "expected \""]);
         std::fs::write(&path, [&content[..], b" "].concat()).unwrap();
@@ -192,7 +192,7 @@ fn a_run_goes_on_only_over_the_files_that_it_began_with() {
         refused(name, ["=absent", "=2-bytes@"]);
         std::fs::remove_file(world.path(name)).unwrap();
     }
-    // Scenes without rows are no matter of this run.
+    // Scenes without rows do not belong to this run.
     std::fs::create_dir(world.path("test/000004")).unwrap();
     std::fs::write(world.path("test/000004/scene_gt.json"), "{}").unwrap();
     world.run(&["--no-time", "--resume"]).exits(0);
@@ -200,7 +200,7 @@ fn a_run_goes_on_only_over_the_files_that_it_began_with() {
 }
 
 #[test]
-fn what_looks_wrong_is_told_by_the_run_that_goes_on_as_well() {
+fn a_continued_run_repeats_the_warnings() {
     let world = World::new();
     for scene in [3, 12] {
         let path = world.scene(scene).join("scene_camera.json");
@@ -218,7 +218,7 @@ fn what_looks_wrong_is_told_by_the_run_that_goes_on_as_well() {
 }
 
 #[test]
-fn a_file_in_the_place_of_the_journal_stays_as_it_is() {
+fn another_file_in_the_place_of_the_journal_is_not_changed() {
     let world = World::new();
     let rows = grouped(&world, 1);
     write_results(world.path("in.csv"), &rows).unwrap();
@@ -243,7 +243,7 @@ fn a_file_in_the_place_of_the_journal_stays_as_it_is() {
         world.run(resume).exits(1).complains(&["out.csv.journal"]);
         std::fs::remove_dir(journal(&world)).unwrap();
     }
-    // An input is no place for it either, nor for what is told of the rows, and neither is the output.
+    // The journal and the file of `--rows` may not replace an input or the output.
     write_results(world.path("k.csv.journal"), &rows).unwrap();
     let input = std::fs::read(world.path("k.csv.journal")).unwrap();
     let words = "bop refine --dataset . --results k.csv.journal --output k.csv";
@@ -264,10 +264,10 @@ fn a_file_in_the_place_of_the_journal_stays_as_it_is() {
     assert!(!world.path("k.csv").exists() && !world.path("out.csv").exists());
 }
 
-/// The output may be the input: it is replaced last, so that a run that cannot write something else goes on.
+/// The output may be the input. It is replaced last, so that a run that fails before can continue.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_run_in_place_that_cannot_tell_its_rows_goes_on() {
+fn a_run_in_place_that_cannot_write_its_rows_can_continue() {
     let world = World::new();
     write_results(world.path("io.csv"), &world.rows()).unwrap();
     let input = std::fs::read(world.path("io.csv")).unwrap();
@@ -288,7 +288,7 @@ fn a_run_in_place_that_cannot_tell_its_rows_goes_on() {
 }
 
 #[test]
-fn shards_one_after_the_other_are_one_run() {
+fn the_outputs_of_all_shards_equal_the_output_of_one_run() {
     let world = World::new();
     write_results(world.path("in.csv"), &grouped(&world, 2)).unwrap();
     world.run(&["--no-time", "--rescore", "mve"]).exits(0);
@@ -310,7 +310,7 @@ fn shards_one_after_the_other_are_one_run() {
         assert_eq!(joined, whole, "{count}");
     }
 
-    // Scattered rows: the same lines in another order, and that is told.
+    // If rows are scattered, the lines have another order, and a warning reports it.
     let rows = world.rows();
     let (run, _) = world.refine(&rows, &["--no-time"]);
     run.exits(0);
@@ -333,7 +333,7 @@ fn shards_one_after_the_other_are_one_run() {
         world
             .run(&["--no-time", "--shard", shard])
             .exits(0)
-            .complains(&["warning: in.csv: the rows of an image do not stand together"]);
+            .complains(&["warning: in.csv: the rows of an image are not contiguous"]);
         output(&world)
     });
     assert!(parts.iter().all(|part| part.len() > 200));
@@ -353,7 +353,7 @@ fn limits_and_scores() {
     let upside_down = pose * Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     rows.insert(3, ResultRow::new(12, 40, CAR, upside_down));
     write_results(world.path("in.csv"), &rows).unwrap();
-    // One that does not search: the pose that is upside down stays bad.
+    // This pipeline does not search, so the upside-down pose stays wrong.
     let run =
         |options: &[&str]| world.run(&[&["--no-time", "--pipeline", "hybrid"], options].concat());
     run(&[]).exits(0);
@@ -373,7 +373,7 @@ fn limits_and_scores() {
             _ => assert!(after.score > 0.0 && after.score <= 1.0),
         }
     }
-    // Upside down: what ICP finds from there explains the image worse than every other pose does.
+    // The result from the upside-down pose explains the image worse than all other poses.
     let others = scored[4..].iter().chain(&scored[..1]);
     let lowest = others.map(|row| row.score).fold(1.0, f64::min);
     let score = scored[3].score;

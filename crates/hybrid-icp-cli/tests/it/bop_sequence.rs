@@ -1,4 +1,7 @@
-//! `hybrid-icp bop sequence` on generated scenes: fused poses near the truth, images without the object, and what is refused.
+//! `hybrid-icp bop sequence` on generated scenes.
+//!
+//! Fused poses are near the truth, images without the object are handled, and wrong inputs are
+//! refused.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +16,7 @@ const IMAGES: usize = 7;
 const SEQUENCE: &str = "bop sequence --dataset set --scene 1 --object 1 --output out.jsonl --init";
 const INITIAL: &str = "set/initial_synthetic-test.csv";
 
-/// Three cars on a table, seen along a path: which of them is meant, only the pose says.
+/// Creates three equal cars on a table, seen along a path; only the pose selects one of them.
 fn cars() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("meshes")).unwrap();
@@ -42,7 +45,7 @@ fn scene(folder: &Path) -> Scene {
     dataset.scene("test", 1).unwrap()
 }
 
-/// The instance whose perturbed pose comes first, and its true poses by image.
+/// Returns the instance whose perturbed pose comes first, and its true poses by image.
 fn followed(folder: &Path) -> (usize, Vec<Isometry3<f64>>) {
     let init = read_results(folder.join(INITIAL)).unwrap()[0].camera_from_object();
     let scene = scene(folder);
@@ -63,11 +66,11 @@ fn off(pose: &Isometry3<f64>, truth: &Isometry3<f64>) -> (f64, f64) {
 }
 
 #[test]
-fn one_of_three_alike_is_followed() {
+fn one_of_three_equal_cars_is_followed() {
     let folder = cars();
     let folder = folder.path();
     let (instance, truths) = followed(folder);
-    // The camera does move, and all of its poses belong together.
+    // The camera moves, so the object moves in the camera frame.
     assert!(off(&truths[0], &truths[6]).1 > 0.05);
     for fuser in ["weighted-average", "filtering --uncertainty mve"] {
         let options = format!("--results fused.csv --fuser {fuser}");
@@ -105,9 +108,9 @@ fn one_of_three_alike_is_followed() {
     }
 }
 
-/// A dataset in the wrong unit is followed as well as can be, but not without a word.
+/// A dataset in the wrong unit is processed, but with warnings.
 #[test]
-fn scales_and_sizes_that_cannot_be_are_told() {
+fn impossible_scales_and_sizes_are_warned_of() {
     let folder = cars();
     let folder = folder.path();
     let cameras = folder.join("set/test/000001/scene_camera.json");
@@ -121,16 +124,13 @@ fn scales_and_sizes_that_cannot_be_are_told() {
         fs::write(&cameras, value.to_string()).unwrap();
         sequence(folder, INITIAL, "").exits(0)
     };
-    let none =
-        "warning: out.jsonl: none of its 7 images was accepted: its poses are not to be trusted\n";
+    let none = "warning: out.jsonl: none of its 7 images was accepted: do not trust its poses\n";
     assert_eq!(scaled(2.0).err, none);
     let told = scaled(10.0).err;
     let begin = "warning: object 1 in image 0 of scene 1: the median depth inside the mask is ";
     assert!(told.starts_with(begin) && told.ends_with(none), "{told}");
     assert!(
-        told.contains(
-            ": check depth_scale in scene_camera.json, and that --init states millimetres\n"
-        ),
+        told.contains(": check depth_scale in scene_camera.json, and that --init is in mm\n"),
         "{told}"
     );
     assert_eq!(told.lines().count(), 2, "{told}");
@@ -156,7 +156,7 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
     let folder = folder.path();
     let (_, truths) = followed(folder);
     let scene_dir = folder.join("set/test/000001");
-    // No masks in image 2, no depth in image 4.
+    // Image 2 has no masks, image 4 has no depth.
     for instance in 0..3 {
         fs::remove_file(scene(folder).visible_mask_path(2, instance)).unwrap();
     }
@@ -176,14 +176,14 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
             (&"moved".into(), &Value::Null)
         );
         assert!(line["reason"].as_str().unwrap().contains(reason));
-        // As the true pose moves.
+        // The pose moves like the true pose.
         let motion = truths[im_id] * truths[im_id - 1].inverse();
         let (angle, distance) = off(&pose_of(line), &(motion * pose_of(before)));
         assert!(angle < 1e-9 && distance < 1e-9, "{angle} rad, {distance} m");
     }
     assert_improved(&pose_of(&fused[6]), &truths[6]);
 
-    // A damaged image costs its estimate, is told, and all the others are written.
+    // A damaged image has no estimate and is reported. The lines of the other images are written.
     fs::write(scene_dir.join("depth/000005.png"), "no image").unwrap();
     sequence(folder, INITIAL, "")
         .exits(1)
@@ -197,7 +197,7 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_inputs_are_named() {
     let folder = cars();
     let folder = folder.path();
     let refused = |init: &str, options: &str, parts: &[&str]| {
@@ -234,7 +234,7 @@ fn what_is_missing_is_named() {
     value["3"].as_object_mut().unwrap().remove("cam_R_w2c");
     fs::write(&cameras, value.to_string()).unwrap();
     refused(INITIAL, "", &["scene_camera.json", "$.3", "cam_R_w2c"]);
-    // Begun behind it, it does not matter.
+    // If the sequence starts after that image, the camera pose is not required.
     let pose = pose_json(&followed(folder).1[4]);
     fs::write(folder.join("init.json"), pose.to_string()).unwrap();
     sequence(folder, "init.json", "--first 4").exits(0);

@@ -1,4 +1,4 @@
-//! `hybrid-icp bop show` on a small dataset made here.
+//! `hybrid-icp bop show` on a small dataset.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ const BEFORE: [u8; 3] = [230, 159, 0];
 /// The image with two cars and a hammer.
 const FRAME: (u32, u32) = (3, 40);
 
-/// A dataset with two result files: the truth, and poses off by 3 mm and 5 degrees.
+/// Creates a dataset with two result files: the truth, and poses off by 3 mm and 5 degrees.
 fn dataset() -> World {
     let world = World::new();
     write_results(world.path("off.csv"), &world.rows()).unwrap();
@@ -36,7 +36,7 @@ fn show(world: &World, options: &str) -> Run {
     )
 }
 
-/// The printed cells by the object's tag.
+/// Returns the printed cells by the object's tag.
 fn cells(told: &Run) -> BTreeMap<String, Vec<String>> {
     let lines = told.out.lines().skip(2);
     let lines = lines.take_while(|line| line.starts_with(' '));
@@ -48,7 +48,7 @@ fn cells(told: &Run) -> BTreeMap<String, Vec<String>> {
         .collect()
 }
 
-/// Width, height and colours of the picture.
+/// Returns the width, height and colors of the picture.
 fn picture(world: &World) -> (u32, u32, Vec<[u8; 3]>) {
     let (width, height, rgb) = hicp_io::read_rgb_png(world.path("show.png")).unwrap();
     let pixels = rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
@@ -60,7 +60,7 @@ fn count(pixels: &[[u8; 3]], color: [u8; 3]) -> usize {
 }
 
 #[test]
-fn outlines_of_both_files_and_what_eval_says_of_them() {
+fn outlines_of_both_files_with_the_errors_of_eval() {
     let world = dataset();
     let told = show(&world, "--results truth.csv --against off.csv").exits(0);
     assert_eq!(told.err, "");
@@ -72,7 +72,7 @@ fn outlines_of_both_files_and_what_eval_says_of_them() {
         let [score, mve, adi, vsd] = [0, 1, 2, 3].map(|i| cells[i].as_str());
         assert_eq!((score, adi, vsd), ("1.000", "0.00", "0.000"));
         assert!(mve.parse::<f64>().unwrap() < 0.02, "{mve}");
-        // Paired with the estimate that is off a little, not with that of the other car.
+        // The estimate is paired with the nearby one, not with that of the other car.
         let adi: f64 = cells[6].parse().unwrap();
         assert!(adi > 0.5 && adi < 6.0, "{adi}");
         assert!(cells[5].parse::<f64>().unwrap() > mve.parse().unwrap());
@@ -112,7 +112,7 @@ fn outlines_of_both_files_and_what_eval_says_of_them() {
     assert!(height > 240 + 3 * 19, "{height}");
     let image = &pixels[..640 * 240];
     assert!(count(image, AFTER) > 300 && count(image, BEFORE) > 100);
-    // A solid and a dashed line in the legend.
+    // The legend has a solid and a dashed line.
     let legend = &pixels[640 * 240..];
     assert!(count(legend, AFTER) > count(legend, BEFORE) && count(legend, BEFORE) > 20);
 
@@ -120,7 +120,7 @@ fn outlines_of_both_files_and_what_eval_says_of_them() {
     show(&world, "--results truth.csv --against off.csv").exits(0);
     assert_eq!(std::fs::read(world.path("show.png")).unwrap(), bytes);
 
-    // Alone, there is one colour.
+    // With one file, there is one color.
     show(&world, "--results truth.csv").exits(0);
     let (_, _, pixels) = picture(&world);
     assert!(count(&pixels, AFTER) > 300);
@@ -128,7 +128,7 @@ fn outlines_of_both_files_and_what_eval_says_of_them() {
 }
 
 #[test]
-fn the_colour_image_is_the_ground_where_it_can_be_read() {
+fn the_color_image_is_the_background_if_it_can_be_read() {
     let world = dataset();
     let folder = world.scene(3).join("rgb");
     std::fs::create_dir(&folder).unwrap();
@@ -137,7 +137,7 @@ fn the_colour_image_is_the_ground_where_it_can_be_read() {
     hicp_io::write_rgb_png(&path, 320, 240, &green.repeat(320 * 240)).unwrap();
     show(&world, "--results off.csv").exits(0);
     let (width, height, pixels) = picture(&world);
-    // In the middle of the width, and nothing but the outlines hides it: the legend is below.
+    // The image is centered, and only outlines cover it, because the legend is below.
     let is_image = |index: usize| (160..480).contains(&(index % 640)) && index / 640 < 240;
     let (mut of_image, mut changed) = (0, 0);
     for (index, pixel) in pixels.iter().enumerate() {
@@ -184,7 +184,7 @@ fn without_ground_truth_there_is_the_mve_of_detections() {
     let known = cells(&show(&world, "--results off.csv --top 2").exits(0));
     std::fs::remove_file(world.scene(3).join("scene_gt.json")).unwrap();
     let told = show(&world, "--results off.csv").exits(0);
-    // One of each object, as nothing says that there are two cars.
+    // One estimate per object is shown, because the number of cars is unknown.
     let told = told.complains(&["warning: off.csv: 1 estimates", "--top"]);
     for cells in cells(&told).values() {
         assert_eq!(cells[1..], ["–"; 3]);
@@ -200,19 +200,19 @@ fn without_ground_truth_there_is_the_mve_of_detections() {
 }
 
 #[test]
-fn what_has_no_estimate_is_told() {
+fn objects_without_an_estimate_are_reported() {
     let world = dataset();
     let rows = world.rows();
     let of_hammer = |row: &ResultRow| row.obj_id == HAMMER && (row.scene_id, row.im_id) == FRAME;
     let mut hammer: Vec<_> = rows.into_iter().filter(of_hammer).collect();
     let pose = hammer[0].camera_from_object();
     hammer.push(ResultRow::new(3, 40, ABSENT, pose));
-    // Beside its mask: no MVE, and the errors of a pose that is far away.
+    // A pose next to its mask has no MVE, and the errors of a distant pose.
     let aside = Isometry3::translation(0.3, 0.0, 0.0) * pose;
     hammer[0].set_camera_from_object(aside);
     write_results(world.path("in.csv"), &hammer).unwrap();
     let told = show(&world, "--results in.csv").exits(0);
-    let told = told.complains(&["warning: the dataset has no model of object 9"]);
+    let told = told.complains(&["warning: the dataset has no model for object 9"]);
     let found = cells(&told);
     let dashes = ["–"; 4].map(String::from);
     assert_eq!(
@@ -227,7 +227,7 @@ fn what_has_no_estimate_is_told() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused() {
+fn images_that_cannot_be_shown_are_refused() {
     let world = dataset();
     let fails = |options: &str, parts: &[&str]| {
         let told = show(&world, options).exits(1).complains(parts);
@@ -299,7 +299,7 @@ fn what_cannot_be_shown_is_refused() {
         &["--top", "1.."],
     );
 
-    // A damaged mask costs its MVE only.
+    // A damaged mask removes only its MVE.
     let mask = world.mask_path(3, 40, 1);
     let whole = std::fs::read(&mask).unwrap();
     std::fs::write(&mask, &whole[..whole.len() / 3]).unwrap();

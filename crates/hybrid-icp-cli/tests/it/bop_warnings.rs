@@ -1,5 +1,6 @@
-//! `hybrid-icp bop refine` on datasets in the wrong unit: it refines what it can, and says once per object what looks wrong;
-//! and where its poses are not to be trusted.
+//! Warnings of `hybrid-icp bop refine` about datasets in the wrong unit and about doubtful poses.
+//!
+//! The program refines all rows that it can, and reports each flaw once per object.
 
 use crate::common::*;
 use crate::world::*;
@@ -8,10 +9,10 @@ use hicp_io::bop::{read_results, write_results};
 use hybrid_icp::core::{DepthImage, Isometry3, Point3, TriMesh};
 use serde_json::json;
 
-/// What the cameras state of the depth.
+/// The depth scale in the camera files.
 const SCALE: &str = "\"depth_scale\":0.1";
 
-/// Lines of warnings.
+/// Returns the lines with warnings.
 fn warnings(run: &Run) -> Vec<&str> {
     run.err
         .lines()
@@ -19,7 +20,7 @@ fn warnings(run: &Run) -> Vec<&str> {
         .collect()
 }
 
-/// Those of them that are not about the poses in the output.
+/// Returns the warnings that are not about the poses in the output.
 fn about_inputs(run: &Run) -> Vec<&str> {
     let of_output = |line: &&str| line.starts_with("warning: out.csv: ");
     warnings(run)
@@ -28,7 +29,7 @@ fn about_inputs(run: &Run) -> Vec<&str> {
         .collect()
 }
 
-/// The fields of the lines that `--rows rows.csv` wrote.
+/// Returns the fields of the lines that `--rows rows.csv` wrote.
 fn lines_of(world: &World) -> Vec<Vec<String>> {
     let mut lines = csv::Reader::from_path(world.path("rows.csv")).unwrap();
     let header = "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings";
@@ -39,7 +40,7 @@ fn lines_of(world: &World) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Changes what the cameras of some scenes state.
+/// Replaces text in the camera files of some scenes.
 fn in_cameras(world: &World, scenes: &[u32], from: &str, to: &str) {
     for &scene in scenes {
         let path = world.scene(scene).join("scene_camera.json");
@@ -50,14 +51,14 @@ fn in_cameras(world: &World, scenes: &[u32], from: &str, to: &str) {
 }
 
 #[test]
-fn nothing_is_said_of_a_dataset_that_is_right() {
+fn a_correct_dataset_gives_no_warning() {
     let world = World::new();
     let (run, _) = world.refine(&world.rows(), &[]);
     assert_eq!(run.exits(0).err, "");
 }
 
 #[test]
-fn depth_at_ten_times_its_scale_is_told_once_per_object() {
+fn depth_at_ten_times_its_scale_is_reported_once_per_object() {
     let world = World::new();
     in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":1.0");
     let (run, _) = world.refine(&world.rows(), &[]);
@@ -68,15 +69,15 @@ fn depth_at_ten_times_its_scale_is_told_once_per_object() {
         let begin = format!("warning: object {object}: the median depth inside the mask is ");
         assert!(line.starts_with(&begin), "{line}");
         let end = format!(
-            " ({images} of {images} images of scenes 3, 12): check depth_scale in scene_camera.json, and that --results states millimetres"
+            " ({images} of {images} images of scenes 3, 12): check depth_scale in scene_camera.json, and that --results is in mm"
         );
         assert!(line.ends_with(&end), "{line}");
     }
 }
 
-/// Every scene has its own files: one of many must not be outvoted.
+/// Every scene has its own files, so one wrong scene of many must be reported.
 #[test]
-fn depth_of_one_scene_at_ten_times_its_scale_is_told() {
+fn depth_of_one_scene_at_ten_times_its_scale_is_reported() {
     let world = World::new();
     in_cameras(&world, &[3], SCALE, "\"depth_scale\":1.0");
     let (run, _) = world.refine(&world.rows(), &[]);
@@ -93,9 +94,9 @@ fn depth_of_one_scene_at_ten_times_its_scale_is_told() {
     }
 }
 
-/// Twice the scale is within what a rough pose may be off, so that only the scores tell.
+/// A factor of two is within the error of a rough pose, so only the scores reveal it.
 #[test]
-fn poses_that_do_not_explain_their_image_are_counted_and_told_once() {
+fn poses_that_do_not_explain_their_image_are_counted_and_reported_once() {
     let world = World::new();
     in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":0.2");
     let rows = world.rows();
@@ -104,10 +105,10 @@ fn poses_that_do_not_explain_their_image_are_counted_and_told_once() {
     let scored = read_results(world.path("out.csv")).unwrap();
     let bad = scored.iter().filter(|row| row.score <= 0.6).count();
     assert!(bad > rows.len() / 2, "{bad}");
-    let counted = format!("{bad:>7}  with an MVE of 0.4 or more: not to be trusted");
+    let counted = format!("{bad:>7}  with an MVE of 0.4 or more: do not trust them");
     assert!(ranked.out.contains(&counted), "{}", ranked.out);
     let told = format!(
-        "warning: out.csv: {bad} of {} rows have an MVE of 0.4 or more after refinement: they are not to be trusted",
+        "warning: out.csv: {bad} of {} rows have an MVE of 0.4 or more after refinement: do not trust them",
         rows.len()
     );
     let about_scores = |run: &Run| -> Vec<String> {
@@ -118,14 +119,14 @@ fn poses_that_do_not_explain_their_image_are_counted_and_told_once() {
     };
     assert_eq!(
         about_scores(&ranked),
-        [format!("{told} (--rows tells which)")]
+        [format!("{told} (--rows lists them)")]
     );
     let kept = world.run(&["--rows", "rows.csv"]).exits(0);
     assert_eq!(
         about_scores(&kept),
-        [format!("{told} (rows.csv tells which)")]
+        [format!("{told} (rows.csv lists them)")]
     );
-    // A line per row of the output, in its order, with the numbers that the run ends with.
+    // There is one line per row of the output, in its order, with the final numbers.
     let lines = lines_of(&world);
     assert_eq!(lines.len(), rows.len());
     for ((number, row), line) in (0..).zip(&scored).zip(&lines) {
@@ -142,10 +143,11 @@ fn poses_that_do_not_explain_their_image_are_counted_and_told_once() {
 }
 
 #[test]
-fn what_is_found_where_the_initial_pose_explained_nothing_is_told() {
+fn results_from_an_initial_pose_that_explained_nothing_are_warned_of() {
     let world = World::new();
     let mut rows = world.rows();
-    // A car seen in its mask, but 15 cm behind what was measured there: no pixel agrees, and the search finds the car.
+    // The pose shows the car in its mask, but 15 cm behind the measured depth. No pixel agrees, and
+    // the search finds the car.
     let row = rows.iter_mut().find(|row| row.obj_id == CAR).unwrap();
     let mut pose = row.camera_from_object();
     pose.translation.vector *= 1.3;
@@ -154,7 +156,7 @@ fn what_is_found_where_the_initial_pose_explained_nothing_is_told() {
     assert_eq!(
         warnings(&run.exits(0)),
         [
-            "warning: out.csv: in 1 of 10 rows the initial pose explained nothing of the mask (MVE 0.9 or more): what was found there may be another object (rows.csv tells which)"
+            "warning: out.csv: in 1 of 10 rows the initial pose explained nothing of the mask (MVE 0.9 or more): the result may be another object (rows.csv lists them)"
         ]
     );
     for line in lines_of(&world) {
@@ -167,9 +169,9 @@ fn what_is_found_where_the_initial_pose_explained_nothing_is_told() {
 }
 
 #[test]
-fn what_is_found_on_a_wall_is_told() {
+fn results_on_a_wall_are_warned_of() {
     let world = World::new();
-    // Cars and a hammer were seen there, and what the camera measures is the wall that they stood before.
+    // The masks show cars and a hammer, but the camera measures the wall behind them.
     let (width, height) = (camera().width(), camera().height());
     let wall = vec![0.5; (width * height) as usize];
     let wall = DepthImage::from_meters(width, height, wall).unwrap();
@@ -178,14 +180,14 @@ fn what_is_found_on_a_wall_is_told() {
     let run = run.exits(0);
     assert!(
         warnings(&run).contains(
-            &"warning: out.csv: in 1 of 10 rows the surface inside the mask is flat, and that of the model at the pose is not: what was found there may be another object (--rows tells which)"
+            &"warning: out.csv: in 1 of 10 rows the surface inside the mask is flat, but the model at the pose is not: the result may be another object (--rows lists them)"
         ),
         "{}",
         run.err
     );
 }
 
-/// The diameters of the models, millimetres, that of the car times a factor.
+/// Writes the diameters of the models in millimeters, that of the car times a factor.
 fn state_diameters(world: &World, factor: f64) {
     let info = json!({
         "1": {"diameter": factor * world.diameter_mm(CAR)},
@@ -195,7 +197,7 @@ fn state_diameters(world: &World, factor: f64) {
 }
 
 #[test]
-fn a_stated_diameter_that_is_not_the_meshs_is_told_once() {
+fn a_stated_diameter_that_differs_from_the_mesh_is_reported_once() {
     let world = World::new();
     let told = |factor: f64| -> Vec<String> {
         state_diameters(&world, factor);
@@ -206,7 +208,7 @@ fn a_stated_diameter_that_is_not_the_meshs_is_told_once() {
     for near in [1.0, 0.96, 1.04] {
         assert_eq!(told(near), [""; 0]);
     }
-    // Not the unit of the mesh is to blame for a diameter of more than a hundred metres.
+    // A stated diameter of more than a hundred meters is not caused by the unit of the mesh.
     for far in [1.0 / 3.0, 1.06, 10.0, 1000.0] {
         let lines = told(far);
         assert_eq!(lines.len(), 1, "{lines:?}");
@@ -220,7 +222,7 @@ fn a_stated_diameter_that_is_not_the_meshs_is_told_once() {
 }
 
 #[test]
-fn depth_that_counts_as_missing_is_told_once_per_object() {
+fn depth_that_counts_as_missing_is_reported_once_per_object() {
     let world = World::new();
     in_cameras(&world, &[3, 12], SCALE, "\"depth_scale\":1e9");
     let (run, rows) = world.refine(&world.rows(), &[]);
@@ -235,7 +237,7 @@ fn depth_that_counts_as_missing_is_told_once_per_object() {
 }
 
 #[test]
-fn a_model_in_metres_is_told_before_a_pose_depends_on_it() {
+fn a_model_in_meters_is_reported_before_a_pose_depends_on_it() {
     let world = World::new();
     let path = world.path("models/obj_000001.ply");
     hicp_io::write_ply(&path, &car(), LengthUnit::Meters).unwrap();
@@ -260,7 +262,7 @@ fn a_model_in_metres_is_told_before_a_pose_depends_on_it() {
 }
 
 #[test]
-fn a_model_of_a_tenth_of_its_size_is_told_by_the_masks() {
+fn a_model_of_a_tenth_of_its_size_is_detected_by_the_masks() {
     let world = World::new();
     let small = car();
     let vertices = small
@@ -280,17 +282,17 @@ fn a_model_of_a_tenth_of_its_size_is_told_by_the_masks() {
         run.err
     );
     assert!(
-        told[0].contains("check that models are in mm"),
+        told[0].contains("check that models and --results are in mm"),
         "{}",
         run.err
     );
 }
 
 #[test]
-fn poses_that_are_far_off_in_a_few_images_are_no_matter_of_units() {
+fn poses_that_are_far_off_in_a_few_images_are_not_attributed_to_units() {
     let world = World::new();
     let mut rows = world.rows();
-    // One image of four: its cars four times as far, on the same line of sight.
+    // In one image of four, the cars are four times as far away, on the same line of sight.
     for row in rows
         .iter_mut()
         .filter(|row| (row.scene_id, row.im_id) == (3, 0))

@@ -6,9 +6,9 @@ use std::process::Stdio;
 use crate::common::{Scene, program, run};
 
 #[test]
-fn help_teaches_within_80_columns() {
+fn help_texts_have_80_columns_and_the_important_words() {
     let folder = tempfile::tempdir().unwrap();
-    for (command, taught) in [
+    for (command, words) in [
         (
             "--help",
             &["Examples:", "Exit codes", "demo", "bop refine", "0.4"][..],
@@ -47,7 +47,7 @@ fn help_teaches_within_80_columns() {
         ("pipelines --help", &["Usage"]),
     ] {
         let help = run(folder.path(), command.split(' ')).exits(0).out;
-        for word in taught {
+        for word in words {
             assert!(help.contains(word), "no {word:?} in {command}");
         }
         for line in help.lines() {
@@ -140,9 +140,9 @@ fn pipelines_are_listed_one_per_line() {
     }
 }
 
-/// A pipe whose reader is gone before the program writes.
+/// The reader of the pipe closes it before the program writes.
 #[test]
-fn a_closed_pipe_is_no_error_and_the_work_is_done() {
+fn a_closed_pipe_is_not_an_error_and_the_work_is_done() {
     let scene = Scene::new()
         .without("--output")
         .with("--overlay", "overlay.png");

@@ -2,7 +2,7 @@
 
 use crate::common::{names, run};
 
-/// The numbers of a line of the table of errors: degrees, millimetres, MVE, VSD.
+/// Returns the numbers of a line of the table of errors: degrees, millimeters, MVE, VSD.
 fn errors(out: &str, when: &str) -> Vec<f64> {
     let line = out.lines().find(|line| line.starts_with(when)).unwrap();
     line.split_whitespace()
@@ -48,7 +48,7 @@ fn it_needs_nothing_and_shows_everything() {
 
     let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("demo.png")).unwrap();
     assert_eq!((width, height), (640, 480));
-    // Both outlines and the measured depth are there.
+    // The picture has both outlines and the measured depth.
     let count = |wanted: &dyn Fn(&[u8]) -> bool| rgb.chunks_exact(3).filter(|p| wanted(p)).count();
     assert!(count(&|p| p == [230, 159, 0]) > 100);
     assert!(count(&|p| p == [86, 180, 233]) > 100);
@@ -83,7 +83,7 @@ fn every_object_and_pipeline_runs() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_written_is_told_first() {
+fn a_picture_that_cannot_be_written_is_reported_first() {
     let folder = tempfile::tempdir().unwrap();
     let told = run(folder.path(), ["demo", "--picture", "no/demo.png"]).exits(1);
     let told = told.complains(&["cannot write no/demo.png", "folder no does not exist"]);

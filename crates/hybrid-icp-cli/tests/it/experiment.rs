@@ -19,7 +19,7 @@ const OUTPUTS: [&str; 8] = [
     "summary.csv",
 ];
 
-/// A folder with a folder of one or two meshes.
+/// Creates a folder with a folder of one or two meshes.
 fn meshes(objects: &[Household]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("meshes")).unwrap();
@@ -188,7 +188,7 @@ fn variants_are_names_and_files() {
         cases.contains("\nbook,0,hybrid,0,0,") && cases.contains("\nbook,0,eager,0,0,"),
         "{cases}"
     );
-    // What is there was made with other variants.
+    // The existing study has other variants.
     run(folder.path(), arguments("hybrid"))
         .exits(1)
         .complains(&["config.json", "as in the command that started the study"]);
@@ -263,7 +263,7 @@ fn files_that_are_not_those_of_a_study_are_refused() {
         cases.replace(",hybrid,", ",local,"),
         &["line 2: found variant \"local\""],
     );
-    // The limits are those of the command line.
+    // The limits of the command line apply.
     std::fs::write(out.join("cases.csv"), &cases).unwrap();
     for words in [&report[..], &resumed] {
         run(folder.path(), [words, &["--max-file-bytes", "20"]].concat())
@@ -276,7 +276,7 @@ fn files_that_are_not_those_of_a_study_are_refused() {
         .exits(1)
         .complains(&["config.json", "--max-small-json-bytes"]);
     }
-    // A last line that was cut off is none of this.
+    // An incomplete last line is accepted.
     std::fs::write(out.join("cases.csv"), &cases[..cases.len() - 9]).unwrap();
     run(folder.path(), &resumed).exits(0);
     assert_eq!(read(&out, "cases.csv"), cases);

@@ -7,7 +7,7 @@ use serde_json::Value;
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// What the program says of a file.
+/// Returns the JSON report about a file.
 fn inspected(name: &str, content: impl AsRef<[u8]>, options: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(name), content).unwrap();
@@ -62,11 +62,11 @@ fn a_clean_mesh() {
 }
 
 #[test]
-fn what_looks_wrong_is_told() {
+fn flaws_are_warned_of() {
     let small = inspected("cube.obj", CUBE, &["--unit", "mm"]);
     warned(
         &small,
-        &["the diameter is 1.7321e-3 m in mm, expected 0.005 to 5 m; in m"],
+        &["the diameter with --unit mm is 1.7321e-3 m, expected 0.005 to 5 m; in m"],
     );
     assert_eq!(small["suspected_unit"], "m");
     let large = inspected("cube.obj", CUBE, &["--unit", "cm", "--max-rows", "1"]);
@@ -75,33 +75,33 @@ fn what_looks_wrong_is_told() {
     let open = CUBE.replace("f 4 3 2 1\n", "");
     let open = inspected("cube.obj", open, &[]);
     assert_eq!(open["closed"], false);
-    warned(&open, &["4 edges have one triangle only"]);
+    warned(
+        &open,
+        &["the surface is open: edges with only one triangle: 4"],
+    );
     let turned = inspected("cube.obj", CUBE.replace("f 4 3 2 1", "f 1 2 3 4"), &[]);
     assert_eq!(turned["closed"], true);
     assert_eq!(turned["facing"], "unknown");
-    warned(
-        &turned,
-        &["4 edges have triangles that are wound against each other"],
-    );
+    warned(&turned, &["edges whose triangles have opposite winding: 4"]);
     let twice = inspected("cube.obj", format!("{CUBE}f 5 6 7\n"), &[]);
     warned(
         &twice,
         &[
-            "3 edges have more than two triangles",
-            "1 triangles repeat another",
+            "edges with more than two triangles: 3",
+            "duplicate triangles: 1",
         ],
     );
     let flat = inspected("cube.obj", format!("{CUBE}f 1 1 2\n"), &[]);
-    warned(&flat, &["1 triangles have no area"]);
+    warned(&flat, &["triangles without area: 1"]);
     let off = "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n7 7 7\n3 0 1 2\n";
     warned(
         &inspected("a.off", off, &[]),
-        &["3 edges have one", "1 vertices belong to no triangle"],
+        &["only one triangle: 3", "vertices without a triangle: 1"],
     );
     let far = "v 500000 4582345.26 0\nv 500001 4582345 0\nv 500000 4582346 0\nf 1 2 3\n";
     warned(
         &inspected("a.obj", far, &[]),
-        &["steps of 5.0e-1 m", "3 edges have one"],
+        &["steps of 5.0e-1 m", "only one triangle: 3"],
     );
 }
 
@@ -132,7 +132,7 @@ fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
         .run()
         .exits(1)
         .complains(&["camera.json", "at most 9", "--max-small-json-bytes"]);
-    // Wherever a limit stands, it is one.
+    // A limit applies wherever the option is on the command line.
     let scene = Scene::new().with("--max-pixels", "1000");
     scene
         .run()
@@ -141,12 +141,15 @@ fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
 }
 
 #[test]
-fn awkward_files_are_told_as_a_reference_reader_tells_them() {
+fn awkward_files_have_the_verdicts_of_a_reference_reader() {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     let root = std::env::var_os("HICP_DATA").unwrap_or_else(|| beside.into());
     let folder = std::path::PathBuf::from(root).join("awkward");
     let Ok(manifest) = std::fs::read(folder.join("manifest.json")) else {
-        println!("skipped: {} is not there (set HICP_DATA)", folder.display());
+        println!(
+            "skipped: {} does not exist (set HICP_DATA)",
+            folder.display()
+        );
         return;
     };
     let manifest: Vec<Value> = serde_json::from_slice(&manifest).unwrap();

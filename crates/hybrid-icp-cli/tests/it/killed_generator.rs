@@ -1,4 +1,4 @@
-//! A `bop generate` that is killed or interrupted.
+//! Runs of `bop generate` that are killed or interrupted.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use rand::RngExt as _;
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
 
-/// All files below a folder; none if it is not there.
+/// Returns all files below a folder; none if it does not exist.
 fn files(folder: &Path) -> Files {
     let mut found = Files::new();
     let mut folders = vec![folder.to_owned()];
@@ -29,9 +29,11 @@ fn files(folder: &Path) -> Files {
     found
 }
 
-/// A generated dataset is there when it is whole: a run that is killed leaves the name free, or the folder that was there empty.
+/// A generated dataset appears when it is complete.
+///
+/// If a run is killed, the name stays free, or the existing folder stays empty.
 #[test]
-fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
+fn a_killed_generator_leaves_no_part_of_a_dataset() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let words = "bop generate --scenes 2 --images 2 --instances 3 --seed 3 --threads 1 --out";
@@ -59,7 +61,7 @@ fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
         let output = child.wait_with_output().unwrap();
         let ended = output.status;
         if ended.code() == Some(130) {
-            // Not what failed because the folder in the making was removed.
+            // Failures caused by removing the unfinished folder are not reported.
             let told = String::from_utf8_lossy(&output.stderr);
             assert_eq!(told, "error: interrupted\n");
         }
@@ -73,7 +75,7 @@ fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
             continue;
         }
         unfinished += 1;
-        // All of it where the program was killed between the renaming and its end.
+        // The dataset is complete if the program was killed after renaming it.
         assert!(
             found.is_empty() || found == whole,
             "{out}: {} files",
@@ -89,7 +91,10 @@ fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
         let left = names(folder).into_iter();
         let left: Vec<String> = left.filter(|name| name.starts_with(".hicp-")).collect();
         if signal == "-INT" && ended.code() == Some(130) {
-            assert_eq!(left, [""; 0], "asked to stop, it tidies up");
+            assert_eq!(
+                left, [""; 0],
+                "an interrupted run removes its temporary files"
+            );
         }
         for name in left {
             std::fs::remove_dir_all(folder.join(name)).unwrap();
@@ -98,7 +103,7 @@ fn a_generator_that_is_killed_leaves_no_part_of_a_dataset() {
     assert!(unfinished > 0);
     assert_eq!(names(folder), ["empty", "mine", "whole"]);
     assert!(files(&folder.join("whole")) == whole);
-    // What is left behind is in nobody's way.
+    // Leftover temporary folders do not disturb another run.
     std::fs::create_dir(folder.join(".hicp-x.tmp")).unwrap();
     run(folder, words("empty")).exits(0);
     assert!(files(&folder.join("empty")) == whole);

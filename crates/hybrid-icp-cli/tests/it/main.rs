@@ -1,4 +1,4 @@
-//! Integration tests of `hybrid-icp-cli`: one program, so that it is linked once.
+//! Integration tests of `hybrid-icp-cli`, in one program so that it is linked once.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -26,6 +26,7 @@ mod common;
 mod demo;
 mod experiment;
 mod faults;
+mod help_examples;
 mod inspect;
 mod killed_generator;
 mod no_regular_files;

@@ -1,4 +1,6 @@
-//! Pipes that nobody writes to, devices without an end, and folders in the place of every input: each is told, and nothing waits.
+//! Pipes without a writer, endless devices, and folders in the place of every input.
+//!
+//! Each is reported, and the program never waits.
 #![cfg(unix)]
 
 use std::path::Path;
@@ -9,10 +11,10 @@ use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::write_results;
 
-/// A program that has not ended by then hangs; none of these computes anything.
+/// After this time, the program counts as hanging; these runs compute almost nothing.
 const HANGS_AFTER: Duration = Duration::from_secs(300);
 
-/// Runs the program, and ends it when it hangs.
+/// Runs the program, and kills it if it hangs.
 #[track_caller]
 fn ends(folder: &Path, words: &[&str]) -> Run {
     let mut child = program(folder)
@@ -39,10 +41,10 @@ fn ends(folder: &Path, words: &[&str]) -> Run {
     }
 }
 
-/// What may stand in the place of a file.
+/// Things that may be in the place of a file.
 const STRANGERS: [&str; 3] = ["a pipe", "a device", "a folder"];
 
-/// Puts a stranger at a path, where nothing else is.
+/// Creates a stranger at a path that does not exist.
 fn put(kind: &str, path: &Path) {
     match kind {
         "a pipe" => assert!(Command::new("mkfifo").arg(path).status().unwrap().success()),
@@ -59,9 +61,9 @@ fn take_away(path: &Path) {
     }
 }
 
-/// Puts every stranger in the place of a file, runs, and puts the file back.
+/// Replaces a file by each stranger, asserts that the run fails, and restores the file.
 #[track_caller]
-fn each_is_told(folder: &Path, words: &str, file: &str) {
+fn each_is_reported(folder: &Path, words: &str, file: &str) {
     let words: Vec<&str> = words.split(' ').collect();
     let (path, aside) = (folder.join(file), folder.join("aside"));
     std::fs::rename(&path, &aside).unwrap();
@@ -96,10 +98,10 @@ fn every_input_of_refine() {
         "init.json",
         "mine.toml",
     ] {
-        each_is_told(folder, words, file);
+        each_is_reported(folder, words, file);
         assert!(!scene.path("out.json").exists(), "{file}");
     }
-    // With all of them back it runs.
+    // With all files restored, the command succeeds.
     ends(folder, &words.split(' ').collect::<Vec<_>>()).exits(0);
 }
 
@@ -131,24 +133,24 @@ fn every_input_of_the_commands_over_datasets() {
     std::fs::write(world.path("detections.json"), "[]").unwrap();
     std::fs::write(world.path("targets.json"), "[]").unwrap();
     let refine = "bop refine --dataset . --results in.csv --output out.csv";
-    each_is_told(folder, refine, "in.csv");
+    each_is_reported(folder, refine, "in.csv");
     let detections = format!("{refine} --detections detections.json");
-    each_is_told(folder, &detections, "detections.json");
-    each_is_told(
+    each_is_reported(folder, &detections, "detections.json");
+    each_is_reported(
         folder,
         &format!("{refine} --targets targets.json"),
         "targets.json",
     );
-    each_is_told(folder, "bop eval --dataset . --results in.csv", "in.csv");
+    each_is_reported(folder, "bop eval --dataset . --results in.csv", "in.csv");
     let show = "bop show --dataset . --scene 3 --image 0 --results in.csv --out show.png";
-    each_is_told(folder, show, "in.csv");
+    each_is_reported(folder, show, "in.csv");
     std::fs::write(world.path("out.csv.journal"), "").unwrap();
-    each_is_told(folder, refine, "out.csv.journal");
+    each_is_reported(folder, refine, "out.csv.journal");
     std::fs::remove_file(world.path("out.csv.journal")).unwrap();
     assert!(!world.path("out.csv").exists() && !world.path("show.png").exists());
 }
 
-/// What a dataset's folders hold is looked for: what is no file is not there, and costs the rows that need it.
+/// In a dataset's folders, an entry that is not a file counts as missing: its rows are kept.
 #[test]
 fn every_file_of_a_dataset() {
     let world = World::new();
@@ -173,7 +175,7 @@ fn every_file_of_a_dataset() {
                 "{kind} for {file}: {}",
                 told.err
             );
-            // The rows of the other scene are refined all the same.
+            // The rows of the other scene are refined anyway.
             assert!(
                 told.out.contains(" refined"),
                 "{kind} for {file}: {}",
@@ -243,8 +245,8 @@ fn files_of_studies() {
     std::fs::create_dir(folder.join("a")).unwrap();
     std::fs::write(folder.join("a/config.json"), "{}").unwrap();
     std::fs::write(folder.join("a/cases.csv"), "object").unwrap();
-    each_is_told(folder, words, "a/config.json");
-    each_is_told(folder, "experiment report --out r a", "a/config.json");
+    each_is_reported(folder, words, "a/config.json");
+    each_is_reported(folder, "experiment report --out r a", "a/config.json");
     let config = hicp_experiments::Config::new(
         hicp_experiments::Experiment::InitNoise,
         &hicp_experiments::Subject::household(&hicp_sim::Household::TUNING).unwrap(),
@@ -257,14 +259,14 @@ fn files_of_studies() {
     .unwrap();
     let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
     std::fs::write(folder.join("a/config.json"), text).unwrap();
-    each_is_told(folder, words, "a/cases.csv");
-    each_is_told(folder, "experiment report --out r a", "a/cases.csv");
+    each_is_reported(folder, words, "a/cases.csv");
+    each_is_reported(folder, "experiment report --out r a", "a/cases.csv");
 
     let words = "experiment sequential --resume --out s";
     std::fs::create_dir(folder.join("s")).unwrap();
     std::fs::write(folder.join("s/config.json"), "{}").unwrap();
     std::fs::write(folder.join("s/trajectories.csv"), "object").unwrap();
-    each_is_told(folder, words, "s/config.json");
+    each_is_reported(folder, words, "s/config.json");
     let config = hicp_experiments::TrajectoryConfig::new(
         &hicp_experiments::Subject::household(&hicp_sim::Household::TEST).unwrap(),
         &[
@@ -277,6 +279,6 @@ fn files_of_studies() {
     .unwrap();
     let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
     std::fs::write(folder.join("s/config.json"), text).unwrap();
-    each_is_told(folder, words, "s/trajectories.csv");
+    each_is_reported(folder, words, "s/trajectories.csv");
     assert!(!folder.join("r").exists());
 }

@@ -31,7 +31,7 @@ fn it_writes_every_object_a_sheet_and_a_table() {
             "{table}"
         );
     }
-    // Something is drawn in every cell.
+    // Every cell has a drawing.
     let (width, height, rgb) = hicp_io::read_rgb_png(written.join("contact_sheet.png")).unwrap();
     assert_eq!((width, height), (1200, 960));
     for (row, column) in (0..4).flat_map(|row| (0..5).map(move |column| (row, column))) {
@@ -48,9 +48,9 @@ fn it_writes_every_object_a_sheet_and_a_table() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_told() {
+fn a_folder_that_cannot_be_created_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("file"), "").unwrap();
     let told = run(folder.path(), ["objects", "--out", "file/below"]).exits(1);
-    told.complains(&["cannot make the folder file/below"]);
+    told.complains(&["cannot create the folder file/below"]);
 }

@@ -1,4 +1,6 @@
-//! Outputs take the place of nothing that the user had: what a shell has redirected, files of the dataset, rows of the input, each other.
+//! Outputs never replace other data of the user.
+//!
+//! Such data are redirected files, files of the dataset, rows of the input, and other outputs.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -12,7 +14,7 @@ use hicp_io::bop::write_results;
 #[cfg(target_os = "linux")]
 use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
 
-/// Runs the program with its standard output in a file; returns its standard error.
+/// Runs the program with its standard output in a file.
 #[cfg(target_os = "linux")]
 #[track_caller]
 fn redirected(folder: &Path, words: &str, file: File) -> Run {
@@ -42,13 +44,13 @@ fn the_standard_output_is_added_to() {
     redirected(folder, &format!("{REFINE} -"), log.unwrap()).exits(0);
     let text = read_to_string(scene.path("log")).unwrap();
     let added = text.strip_prefix("precious\n").unwrap();
-    // What the program says on the stream comes after the result and not over it.
+    // The summary on the stream comes after the result and does not overwrite it.
     let end = added.rfind('}').unwrap() + 1;
     serde_json::from_str::<Value>(&added[..end]).unwrap();
     assert!(added[end..].contains("MVE"), "{added}");
     let after = std::fs::metadata(scene.path("log")).unwrap().ino();
     assert_eq!(after, inode, "replaced");
-    // Not opened for appending, as by `> log`: the position is the stream's own.
+    // As with `> log`, this file is not opened for appending, so the stream has its own position.
     let log = File::create(scene.path("log")).unwrap();
     redirected(folder, &format!("{REFINE} -"), log).exits(0);
     let text = read_to_string(scene.path("log")).unwrap();
@@ -58,7 +60,9 @@ fn the_standard_output_is_added_to() {
     assert!(!names(folder).iter().any(|name| name.ends_with(".tmp")));
 }
 
-/// The other names of a redirected stream are refused: replacing its file would lose what a shell writes to it.
+/// Other names of a redirected stream are refused.
+///
+/// Replacing its file would lose the text that a shell writes to it.
 #[cfg(target_os = "linux")]
 #[test]
 fn files_behind_streams_are_not_replaced() {
@@ -106,7 +110,7 @@ fn the_standard_output_of_the_commands_over_datasets() {
     assert_eq!(notes, b"my notes");
 }
 
-/// Every file below a folder with what it holds.
+/// Returns all files below a folder with their contents.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -121,7 +125,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// A dataset in the folder `set`, with files as they come with one, and results of it beside.
+/// Creates a dataset with the usual other files, and with results next to it.
 fn dataset() -> World {
     let world = World::new();
     for name in ["train_pbr/000007", "models_eval", "models_fine", "results"] {
@@ -145,7 +149,7 @@ fn dataset() -> World {
     world
 }
 
-/// Every command with a dataset, but for the path of one of its outputs.
+/// Every command over datasets, without the path of one of its outputs.
 const COMMANDS: [(&str, &str); 7] = [
     ("bop refine --dataset . --results in.csv", "--output"),
     (
@@ -185,7 +189,7 @@ fn files_of_the_dataset_are_spared_by_every_command() {
         ] {
             let words = format!("{command} {option} {path}");
             let told = run(folder, words.split(' ')).exits(1);
-            let names = format!("error: {option} names {path}, which is there and belongs to");
+            let names = format!("error: {option} names {path}, which belongs to");
             assert_eq!(told.complains(&[&names, "overwritten"]).out, "");
         }
         assert_eq!(files(folder), before, "{command} {option}");
@@ -199,7 +203,7 @@ fn files_of_the_dataset_are_spared_by_every_command() {
 }
 
 #[test]
-fn what_belongs_to_a_dataset_and_what_does_not() {
+fn files_are_divided_into_those_of_the_dataset_and_others() {
     let world = dataset();
     let folder = world.folder.path();
     let before = files(folder);
@@ -207,7 +211,8 @@ fn what_belongs_to_a_dataset_and_what_does_not() {
         let words = "bop eval --dataset . --results in.csv --json";
         run(folder, words.split(' ').chain([json]))
     };
-    // Whatever lies in a folder of the dataset, also of another split, and what comes with one beside them.
+    // Files in the folders of any split belong to the dataset, and so do the usual files next to
+    // them.
     for path in [
         "camera_uw.json",
         "dataset_info.md",
@@ -221,7 +226,8 @@ fn what_belongs_to_a_dataset_and_what_does_not() {
     }
     assert_eq!(files(folder), before);
     std::fs::remove_dir_all(world.path("models_eval")).unwrap();
-    // What a run has left in the dataset's folder or beside its others is written anew, and where nothing is, nothing is lost.
+    // Outputs of an earlier run inside the dataset's folder may be replaced, and new files may be
+    // created anywhere.
     for path in [
         "old.json",
         "results/old.json",
@@ -234,7 +240,7 @@ fn what_belongs_to_a_dataset_and_what_does_not() {
         let text = read_to_string(world.path(path)).unwrap();
         assert!(text.contains("\"ar\""), "{path}");
     }
-    // The dataset's folder as a split has scenes, and not all there is.
+    // With the split `.`, the dataset's folder contains scenes, but also other files.
     for path in ["7/scene_gt.json", "obj_000001.ply"] {
         std::fs::create_dir_all(world.path(path).parent().unwrap()).unwrap();
         std::fs::write(world.path(path), "{}").unwrap();
@@ -248,7 +254,7 @@ fn what_belongs_to_a_dataset_and_what_does_not() {
     assert!(!told.err.contains("belongs"), "{}", told.err);
 }
 
-/// Splits, scenes and meshes are often links into another disk: neither name of such a file may be written to.
+/// Splits, scenes and meshes are often links to another disk; neither name may be written to.
 #[test]
 fn links_do_not_hide_a_dataset() {
     let world = dataset();
@@ -302,7 +308,7 @@ fn rows_that_are_left_out_are_not_lost_in_place() {
     let folder = world.folder.path();
     symlink("in.csv", world.path("link.csv")).unwrap();
     let before = std::fs::read(world.path("in.csv")).unwrap();
-    // Ten rows: three of every image with a hammer, and two targets.
+    // There are ten rows, three for each image with a hammer, and two targets.
     for (option, left_out) in [
         ("--limit 4", "--limit leaves out 6 of its 10 rows"),
         ("--top-k 1", "--top-k leaves out 4 of its 10 rows"),
@@ -321,12 +327,12 @@ fn rows_that_are_left_out_are_not_lost_in_place() {
                 format!("bop refine --dataset . --results in.csv --output {output} {option}");
             let told = run(folder, words.split(' ')).exits(1);
             let both = format!("--output and --results both name {output}, and {left_out}");
-            told.complains(&[&both, "they would be lost"]);
+            told.complains(&[&both, "would be lost"]);
             assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), before);
             assert!(!world.path("in.csv.journal").exists());
         }
     }
-    // Options that leave nothing out do no harm.
+    // Options that leave no row out are accepted.
     let words =
         "bop refine --dataset . --results in.csv --output in.csv --limit 10 --shard 1/1 --top-k 2";
     run(folder, words.split(' ')).exits(0);

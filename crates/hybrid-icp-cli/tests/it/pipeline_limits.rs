@@ -1,9 +1,9 @@
-//! Limits on the work that pipelines ask for, through the program.
+//! Limits on the work that pipelines request, through the program.
 
 use crate::common::*;
 
 #[test]
-fn pipelines_that_ask_for_years_are_refused_and_the_limits_can_be_raised() {
+fn pipelines_that_would_run_for_years_are_refused_and_the_limits_can_be_raised() {
     let scene = Scene::new()
         .with("--pipeline", "hybrid")
         .with("--set", "times=1000000000");
@@ -13,7 +13,7 @@ fn pipelines_that_ask_for_years_are_refused_and_the_limits_can_be_raised() {
         "--max-iterations N",
     ]);
     assert!(!scene.path("out.json").exists());
-    // Three times two stages of 50: as much as it asks for at worst, and one less.
+    // In the worst case, the pipeline runs three times two stages of 50 iterations.
     let limited = |limit: &str| {
         Scene::new()
             .with("--pipeline", "hybrid")

@@ -1,6 +1,6 @@
 //! Pipelines from files and overrides, through the program.
 
-// A helper of tests may fail as a test does.
+// Helpers of tests may panic like tests.
 
 use std::process::{Command, Output};
 
@@ -15,7 +15,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// What a demo prints but for its time and the names of its pipeline and picture.
+/// Returns the output of a demo without its time and the names of its pipeline and picture.
 fn demo(pipeline: &[&str], picture: &str) -> (Option<i32>, Vec<String>, String) {
     let mut arguments = vec!["demo", "--picture", picture];
     arguments.extend(pipeline);
@@ -29,7 +29,7 @@ fn demo(pipeline: &[&str], picture: &str) -> (Option<i32>, Vec<String>, String) 
 }
 
 #[test]
-fn a_pipeline_that_is_shown_runs_from_its_file_as_by_its_name() {
+fn a_printed_pipeline_gives_the_same_result_from_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("demo.png");
     let picture = picture.to_str().unwrap();
@@ -43,7 +43,7 @@ fn a_pipeline_that_is_shown_runs_from_its_file_as_by_its_name() {
         assert_eq!(by_name.0, Some(0));
         assert!(by_name.1.len() > 5);
         assert_eq!(demo(&["--pipeline", file], picture), by_name);
-        // An override that changes nothing changes nothing; one that does, does.
+        // An override with the default value keeps the result; another value changes it.
         let metric = if name == "hybrid" {
             "times=2"
         } else {
@@ -101,7 +101,7 @@ fn wrong_pipelines_are_refused_with_their_place() {
 }
 
 #[test]
-fn the_catalogue_is_printed() {
+fn the_catalog_is_printed() {
     let output = hybrid_icp(&["pipelines", "--parts"]);
     assert!(output.status.success());
     let page = text(&output.stdout);

@@ -1,4 +1,4 @@
-//! `hybrid-icp refine` where it succeeds.
+//! `hybrid-icp refine` on valid inputs.
 
 use crate::common::*;
 use hicp_io::LengthUnit;
@@ -92,7 +92,7 @@ fn without_an_output_the_json_is_printed_alone() {
 
 #[test]
 fn every_line_of_a_trace_can_be_the_start_of_another_run() {
-    // What the last stage of `hybrid` returns is what the run does; `auto` returns the best of its stages.
+    // `hybrid` returns the pose of its last stage; `auto` returns the best of its stages.
     let scene = Scene::new()
         .with("--trace", "trace.jsonl")
         .with("--pipeline", "hybrid");
@@ -111,20 +111,20 @@ fn every_line_of_a_trace_can_be_the_start_of_another_run() {
     let stages = result["trace"].as_array().unwrap();
     assert_eq!(of("stage_end").len(), stages.len());
     assert_eq!(of("regime").len(), 2);
-    // An iteration that found no pairs evaluates nothing, and has no line.
+    // An iteration without pairs evaluates nothing and has no line.
     assert!(of("iteration").len() <= result["iterations"].as_u64().unwrap() as usize);
     let last = of("stage_end")[stages.len() - 1];
     assert_eq!(last["cam_R_m2c"], result["cam_R_m2c"]);
     assert_eq!(last["cam_t_m2c"], result["cam_t_m2c"]);
-    // From the pose of the last line the result is the same or better.
+    // A run from the pose of the last line starts with the MVE of this result.
     scene.write("init.json", last.to_string());
     let again = scene.result();
     assert_eq!(again["mve_initial"], result["mve"]);
 }
 
-/// Who reads only the file is told what is told on standard error, word for word.
+/// The result has the same warnings as standard error, word for word.
 #[test]
-fn the_result_holds_every_warning() {
+fn the_result_has_every_warning() {
     let told = |scene: &Scene, parts: &[&str]| {
         let run = scene.run().exits(0).complains(parts);
         let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
@@ -140,7 +140,8 @@ fn the_result_holds_every_warning() {
         &["the median depth inside the mask", "do not trust it"],
     );
 
-    // The search finds the car in its mask wherever it is told to begin; whether that is what the detector saw, nothing says.
+    // The search finds the car in its mask from any initial pose. It cannot check that the detector
+    // meant this object.
     let scene = Scene::new();
     let aside = Isometry3::translation(3.0, 0.0, 0.0) * truth();
     scene.write("init.json", pose_json(&aside).to_string());
@@ -161,10 +162,10 @@ fn a_trace_is_replayed_to_the_last_digit() {
         .with("--set", "stage.stages.0.max_steps=2");
     scene.result();
     let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
-    let said = replay().exits(0).out;
+    let printed = replay().exits(0).out;
     let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
-    assert!(said.contains(&format!("{} lines, all as they were", text.lines().count())));
-    // A line that was not so.
+    assert!(printed.contains(&format!("{} lines, all equal", text.lines().count())));
+    // A changed line is reported.
     let (number, line) = text
         .lines()
         .enumerate()
@@ -175,18 +176,18 @@ fn a_trace_is_replayed_to_the_last_digit() {
     scene.write("trace.jsonl", text.replace(line, &changed.to_string()));
     let complaint = format!("trace.jsonl:{} differs", number + 1);
     replay().exits(1).complains(&[&complaint]);
-    // Not a trace at all.
+    // Other files are refused.
     for (content, expected) in [
         ("", "empty, expected a trace"),
         ("{", "trace.jsonl:1: expected JSON"),
         ("{\"event\": \"iteration\"}", "expected \"start\""),
         (
             "{\"event\": \"start\", \"version\": 3}",
-            "\"version\" is 3, expected a text",
+            "\"version\" is 3, expected a string",
         ),
         (
             "{\"event\": \"start\", \"version\": \"0.1.0\", \"set\": \"times=1\"}",
-            "\"set\" is \"times=1\", expected a list of texts",
+            "\"set\" is \"times=1\", expected a list of strings",
         ),
     ] {
         scene.write("trace.jsonl", content);
@@ -217,7 +218,7 @@ fn forms_of_cameras_and_units_of_meshes_agree() {
         scene.write("camera.json", &text);
         near(&scene, &text);
     }
-    // The option wins over the file.
+    // The option has priority over the file.
     scene.write("camera.json", BOP_CAMERA.replace("0.1", "7"));
     near(&scene.with("--depth-scale", "0.1"), "--depth-scale");
 
@@ -251,7 +252,7 @@ fn every_pipeline_is_reachable_by_name() {
     }
 }
 
-/// A pose file as people write them: orthogonal to its digits, and to fewer than an f64 has.
+/// A pose file with a rounded rotation, which is orthogonal to fewer digits than an `f64` has.
 const ROUNDED: &str = r#"{"cam_R_m2c": [0.768311175, -0.0665434694, 0.636608126, 0.311033385, 0.908074697, -0.280461366,
     -0.559424858, 0.413487982, 0.718381178], "cam_t_m2c": [0.1, -2e-7, 500]}"#;
 
@@ -280,7 +281,7 @@ fn assert_kept(scene: &Scene, reason: &str) {
 }
 
 #[test]
-fn what_cannot_be_refined_is_given_back_with_the_very_numbers() {
+fn a_pose_that_cannot_be_refined_keeps_the_numbers_of_the_file() {
     let scene = Scene::new().with("--overlay", "overlay.png");
     scene.write("init.json", ROUNDED);
     hicp_io::write_mask_png(
@@ -313,14 +314,14 @@ fn what_cannot_be_refined_is_given_back_with_the_very_numbers() {
 }
 
 #[test]
-fn objects_out_of_sight_and_odd_meshes_have_an_outcome() {
+fn objects_out_of_view_and_odd_meshes_have_an_outcome() {
     let honest = |scene: &Scene| {
         let result = scene.result();
         let outcome = result["outcome"].as_str().unwrap();
         assert!(["refined", "kept_initial"].contains(&outcome));
         assert!(result["mve"].is_f64() && result["mve_initial"].is_f64());
         let _ = pose_of(&result);
-        // A pose that is worse than the initial one, or bad, is not passed off as good.
+        // A pose that is worse than the initial one, or bad, gives a warning.
         let (mve, init) = (result["mve"].as_f64(), result["mve_initial"].as_f64());
         let err = scene.run().err;
         assert_eq!(err.contains("worse than the initial"), mve > init);
@@ -368,7 +369,7 @@ fn objects_out_of_sight_and_odd_meshes_have_an_outcome() {
 #[test]
 fn three_hundred_thousand_triangles_are_refined() {
     let scene = Scene::new();
-    // A bent sheet without symmetry.
+    // The mesh is a bent sheet without symmetry.
     let side = 388_u32;
     let at = |i: u32, j: u32| {
         let (x, y) = (f64::from(i) / 388.0 - 0.5, f64::from(j) / 388.0 - 0.5);
@@ -398,7 +399,7 @@ fn three_hundred_thousand_triangles_are_refined() {
 }
 
 #[test]
-fn units_that_do_not_go_together_are_warned_of() {
+fn units_that_do_not_match_are_warned_of() {
     let warned = |scene: &Scene, parts: &[&str]| {
         scene.run().exits(0).complains(parts);
     };
@@ -440,7 +441,7 @@ fn units_that_do_not_go_together_are_warned_of() {
     let scene = Scene::new().with("--model-unit", "mm");
     hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Centimeters).unwrap();
     warned(&scene, &["warning: mask.png", "pixels", "--model-unit mm"]);
-    // Nothing to say where all is well.
+    // Correct inputs give no warning.
     assert_eq!(Scene::new().run().exits(0).err, "");
 }
 
@@ -450,13 +451,13 @@ fn a_pose_can_be_refined_in_place() {
     scene.run().exits(0);
     let text = std::fs::read_to_string(scene.path("init.json")).unwrap();
     assert_improved(&pose_of(&serde_json::from_str(&text).unwrap()), &truth());
-    // And its result again.
+    // The result can be refined again.
     scene.run().exits(0);
 }
 
 #[cfg(unix)]
 #[test]
-fn names_that_are_not_utf_8_are_names() {
+fn names_that_are_not_utf_8_are_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let name = |bytes: &[u8]| std::ffi::OsStr::from_bytes(bytes).to_owned();
     let scene = Scene::new();
@@ -468,7 +469,7 @@ fn names_that_are_not_utf_8_are_names() {
         .with("--overlay", name(b"\xfd.png"));
     scene.run().exits(0);
     assert!(scene.folder.path().join(name(b"o\xfe.json")).is_file());
-    // Only a trace has to name its inputs as text; its own name does not matter.
+    // Only a trace stores the names of its inputs as text; its own name may be any.
     let scene = scene.with("--trace", "trace.jsonl");
     let told = scene.run().exits(1);
     assert_eq!(told.out, "");

@@ -1,10 +1,11 @@
-//! What `hybrid-icp refine` refuses, and how it says so: file, field, value, what was expected.
+//! Inputs that `hybrid-icp refine` refuses, with messages that name file, field, value and
+//! expectation.
 
 use crate::common::*;
 use hicp_io::LengthUnit;
 use hybrid_icp::core::{DepthImage, Mask};
 
-/// Asserts that a scene is refused with all of these words, and that outputs that were there stay as they were.
+/// Asserts that a scene is refused with all of these texts and that existing outputs are kept.
 #[track_caller]
 fn refused(scene: Scene, parts: &[&str]) {
     let scene = if scene.arguments.iter().any(|(o, _)| *o == "--overlay") {
@@ -173,7 +174,7 @@ fn initial_poses() {
     ] {
         refused_file("init.json", text, &[&["init.json"], parts].concat());
     }
-    // What four digits explain is a rotation.
+    // A rotation that is rounded to four digits is accepted.
     let scene = Scene::new();
     scene.write(
         "init.json",
@@ -206,7 +207,7 @@ fn meshes() {
 #[test]
 fn outputs_are_checked_before_anything_is_read() {
     for option in ["--output", "--overlay"] {
-        // The model is missing too: the output is what is told.
+        // The model is missing too, but the message is about the output.
         let scene = Scene::new()
             .with("--model", "gone.ply")
             .with(option, "no/where");
@@ -241,7 +242,7 @@ fn outputs_are_checked_before_anything_is_read() {
         .exits(1)
         .complains(&["--output", "--overlay", "different files"]);
     assert!(!scene.path("x").exists());
-    // Not the folder: a file in its place.
+    // The path of the folder is a file.
     refused(
         Scene::new().with("--output", "mask.png/out.json"),
         &["cannot write mask.png/out.json"],
@@ -249,7 +250,7 @@ fn outputs_are_checked_before_anything_is_read() {
 }
 
 #[test]
-fn a_result_replaces_an_older_one_and_leaves_nothing_else() {
+fn a_result_replaces_an_older_one_and_leaves_no_other_file() {
     let scene = Scene::new();
     scene.write("out.json", "older");
     let before = names(scene.folder.path());

@@ -1,4 +1,4 @@
-//! A small BOP dataset in files, and rows for it.
+//! A small BOP dataset in files, with rows of a result file.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,13 +14,15 @@ use crate::common::*;
 
 pub(crate) const CAR: u32 = 1;
 pub(crate) const HAMMER: u32 = 2;
-/// An object that the dataset has no model of.
+/// An object without a model in the dataset.
 pub(crate) const ABSENT: u32 = 9;
 
 /// An object and its true pose.
 pub(crate) type Instance = (u32, Isometry3<f64>);
 
-/// Scenes 3 and 12 with images 0 and 40 each: two cars side by side, and in image 40 a hammer behind them.
+/// Scenes 3 and 12 with images 0 and 40 each.
+///
+/// Every image shows two cars side by side. Image 40 also shows a hammer behind them.
 pub(crate) struct World {
     pub(crate) folder: tempfile::TempDir,
     /// True poses by scene and image, in the order of the ground truth.
@@ -50,9 +52,9 @@ impl World {
                 std::fs::create_dir_all(world.scene(scene).join(folder)).unwrap();
             }
             for image in [0, 40] {
-                let turn = f64::from(scene + image) * 0.03;
+                let angle = f64::from(scene + image) * 0.03;
                 let at = |x: f64, y: f64, z: f64, shift: f64| {
-                    Isometry3::new(Vector3::new(x, y, z), Vector3::new(2.1, 0.7 + turn, shift))
+                    Isometry3::new(Vector3::new(x, y, z), Vector3::new(2.1, 0.7 + angle, shift))
                 };
                 let mut truths = vec![
                     (CAR, at(-0.09, -0.03, 0.5, -0.4)),
@@ -101,7 +103,7 @@ impl World {
             .join(format!("mask_visib/{image:06}_{instance:06}.png"))
     }
 
-    /// Diameter of an object's mesh, millimetres.
+    /// Returns the diameter of an object's mesh in millimeters.
     pub(crate) fn diameter_mm(&self, obj_id: u32) -> f64 {
         let path = self.path(&format!("models/obj_{obj_id:06}.ply"));
         1e3 * Model::new(read_mesh(path, LengthUnit::Millimeters).unwrap()).diameter()
@@ -136,7 +138,7 @@ impl World {
         }
     }
 
-    /// One row per instance, off by 3 mm and 5 degrees, not in the order of the frames.
+    /// Returns one row per instance, off by 3 mm and 5 degrees, not in the order of the frames.
     pub(crate) fn rows(&self) -> Vec<ResultRow> {
         let mut rows = Vec::new();
         for ((scene, image), truths) in self.truths.iter().rev() {
@@ -145,7 +147,7 @@ impl World {
                 rows.push(ResultRow::new(*scene, *image, *id, nearby(pose, seed)));
             }
         }
-        // Images apart from each other in the file.
+        // Separate the rows of an image in the file.
         let half = rows.len() / 2;
         rows.rotate_left(half);
         rows.swap(0, 7);
@@ -177,7 +179,7 @@ impl World {
         )
     }
 
-    /// Asserts that a row is near a true pose of its object, and nearer to it than to the other instance's.
+    /// Asserts that a row is near the true pose of its object that was nearest before refinement.
     #[track_caller]
     pub(crate) fn assert_refined(&self, before: &ResultRow, after: &ResultRow) {
         let truths = &self.truths[&(before.scene_id, before.im_id)];
@@ -199,7 +201,9 @@ impl World {
     }
 }
 
-/// A pose so near that every pipeline finds back: what is tested is which mask and which frame a row meets.
+/// Returns a pose so near the truth that every pipeline converges.
+///
+/// These tests check the mask and the frame that a row is refined in, not the pipeline.
 pub(crate) fn nearby(pose: &Isometry3<f64>, seed: u64) -> Isometry3<f64> {
     perturb(&mut rng(seed), pose, 0.003, 5.0_f64.to_radians())
 }
@@ -208,13 +212,15 @@ pub(crate) fn same_pose(a: &ResultRow, b: &ResultRow) -> bool {
     a.rotation() == b.rotation() && a.translation_mm() == b.translation_mm()
 }
 
-/// Rows whose images stand together, several per instance.
+/// Returns several rows per instance; the rows of an image are contiguous.
 pub(crate) fn grouped(world: &World, per_instance: u64) -> Vec<ResultRow> {
     grouped_by(world, [per_instance; 4])
 }
 
-/// Rows grouped by image, most of them in the second and the third of the four: a signal that is sent when the first is done comes before
-/// the last on a busy machine too, and no image takes as long as the program waits for the one in hand.
+/// Returns rows grouped by image, most of them in the second and the third of four images.
+///
+/// A signal that is sent when the first image is done then arrives before the last one, also on a
+/// busy machine. No image takes longer than the program waits for the current one.
 pub(crate) fn grouped_for_signals(world: &World) -> Vec<ResultRow> {
     grouped_by(world, [12, 36, 30, 12])
 }

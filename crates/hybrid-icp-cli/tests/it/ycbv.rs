@@ -1,4 +1,4 @@
-//! The program on real frames, where the machine has them.
+//! The program on real frames, if the machine has them.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,9 @@ use hybrid_icp::core::{DepthImage, Observation};
 use hybrid_icp::switch::PAPER_ALPHA;
 use hybrid_icp::{Preset, Refiner, Warning};
 
-/// The dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data beside the project, where it has result files as
-/// the excerpt has that these tests are of.
+/// Returns the dataset's folder: `ycbv` in `BOP_PATH`, in `HICP_DATA/bop`, or in the shared data.
+///
+/// The folder must have the result files of the excerpt that these tests use.
 fn root() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/bop");
     let folders = [
@@ -37,7 +38,7 @@ fn real_estimates_of_four_methods_are_improved() {
     improves(&root, &[]);
 }
 
-/// The paper's method keeps its result whatever the score says; the default keeps a pose that it does not make better.
+/// The paper's method always keeps its result; the default keeps a pose that it does not improve.
 #[test]
 fn the_papers_method_moves_most_real_estimates() {
     let Some(root) = root() else { return };
@@ -46,7 +47,9 @@ fn the_papers_method_moves_most_real_estimates() {
     }
 }
 
-/// Refines the four result files, on one and on two threads; returns how many poses were moved, and of how many.
+/// Refines the four result files on one and on two threads.
+///
+/// Returns the number of moved poses and of all poses for each.
 fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
     let mut all_moved = Vec::new();
     let folder = tempfile::tempdir().unwrap();
@@ -73,7 +76,7 @@ fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
             ];
             arguments.extend(options.iter().map(OsStr::new));
             let done = run(folder.path(), arguments).exits(0);
-            // Real estimates do not all come out well; nothing is wrong with the dataset.
+            // Some real estimates give warnings, but the dataset gives none.
             let of_poses = |line: &str| line.starts_with("warning: out.csv: ");
             assert!(done.err.lines().all(of_poses), "{}", done.err);
             let line = done.out.lines().find(|l| l.contains("median MVE")).unwrap();
@@ -102,19 +105,21 @@ fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
     all_moved
 }
 
-/// What is in the mask that a row is refined in.
+/// The content of the mask that a row is refined in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Inside {
-    /// Its object.
+    /// The object of the row.
     Own,
-    /// Another object of the image: the first.
+    /// The first other object of the image.
     Other,
-    /// Its mask, with a wall in the place of every depth: through the object's centre but for a fifth of its diameter, which is nearer.
+    /// A wall in the mask of the object, nearer than its center by a fifth of the diameter.
     Wall,
 }
 
-/// Refines the rows of a result file and returns of how many the MVE is good, of how many of these it is doubted that it is the object for
-/// being found elsewhere, of how many for being flat, and of how many rows.
+/// Refines the rows of a result file and returns four counts.
+///
+/// They are the rows with a good MVE, the rows with the warnings `FoundElsewhere` and `Flat`, and
+/// all rows.
 fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 4] {
     let dataset = Dataset::open(root).unwrap();
     let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
@@ -140,7 +145,7 @@ fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 4] {
                 depth.height(),
                 vec![z as f32; depth.pixels().len()],
             );
-            // 0.3 % of noise.
+            // Add 0.3 % of noise.
             depth = RelativeGaussian { percent: 0.3 }.apply(&mut rng(3), &wall.unwrap());
         }
         let observation = Observation::new(depth, mask, camera).unwrap();
@@ -155,10 +160,12 @@ fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 4] {
     counts
 }
 
-/// What a search finds in the mask of another object is never passed off as the one that was looked for, of what it finds on a wall half is
-/// not, and hardly any of the poses that real estimators gave for their own object is doubted.
+/// Results in the mask of something else give a warning.
+///
+/// All results on another object do, and at least half of those on a wall. Hardly any results on
+/// the correct object do.
 #[test]
-fn what_is_found_in_the_mask_of_something_else_is_doubted() {
+fn results_in_the_mask_of_something_else_are_warned_of() {
     let Some(root) = root() else { return };
     let (mut own, mut wall) = ([0; 4], [0; 4]);
     for entry in std::fs::read_dir(root.join("results")).unwrap() {
@@ -172,7 +179,7 @@ fn what_is_found_in_the_mask_of_something_else_is_doubted() {
     let file = root.join("results/cosypose_ycbv-test.csv");
     let other = found_in(&root, &file, Inside::Other);
     println!(
-        "good, of these doubted as found elsewhere and as flat, all: on their own object {own:?}, another {other:?}, a wall {wall:?}"
+        "good, found elsewhere, flat, all: on the correct object {own:?}, another {other:?}, a wall {wall:?}"
     );
     assert!(
         20 * own[1] <= own[3] && own[2] == 0 && 10 * own[0] >= 9 * own[3],
@@ -183,7 +190,7 @@ fn what_is_found_in_the_mask_of_something_else_is_doubted() {
 }
 
 #[test]
-fn one_real_instance_is_refined_by_its_files() {
+fn one_real_instance_is_refined_from_its_files() {
     let Some(root) = root() else { return };
     let folder = tempfile::tempdir().unwrap();
     let dataset = Dataset::open(&root).unwrap();
@@ -196,7 +203,7 @@ fn one_real_instance_is_refined_by_its_files() {
         .unwrap();
     let init = folder.path().join("init.json");
     hicp_io::write_pose_json(&init, &row.camera_from_object()).unwrap();
-    // A scene_camera.json of one image is a camera file.
+    // A `scene_camera.json` with one image is a valid camera file.
     let (model, depth) = (
         dataset.model_path(truth.obj_id).unwrap(),
         scene.depth_path(1).unwrap(),

@@ -1,4 +1,4 @@
-//! Whether the scores of a result file separate right estimates from wrong ones.
+//! Checks whether the scores of a result file separate correct estimates from wrong ones.
 
 use std::collections::BTreeMap;
 
@@ -10,21 +10,21 @@ use serde::Serialize;
 
 use crate::terminal::table;
 
-/// Share of the diameter below which the ADI to the nearest instance is correct.
+/// An estimate is correct if its ADI to the nearest instance is below this share of the diameter.
 const THRESHOLD: f64 = 0.1;
-/// Ranges of the reliability table.
+/// Number of score ranges in the reliability table.
 const BINS: usize = 10;
 
-/// Scores against correctness.
+/// The relation between scores and correctness.
 #[derive(Debug, Serialize)]
 pub(super) struct Calibration {
     /// Rows with ground truth of their object in their image.
     estimates: usize,
     /// Estimates whose ADI is below a tenth of the diameter.
     correct: usize,
-    /// `null` unless there are right and wrong estimates.
+    /// `null` unless there are correct and wrong estimates.
     roc_area: Option<f64>,
-    /// Ranges of the score that hold any estimate.
+    /// Ranges of the score that contain estimates.
     reliability: Vec<Line>,
 }
 
@@ -39,13 +39,15 @@ struct Line {
 }
 
 impl Calibration {
-    /// Judges every row whose object has ground truth in its image, including those that the recalls leave out.
+    /// Judges every row whose object has ground truth in its image.
+    ///
+    /// This includes rows that the recalls leave out.
     pub(super) fn of(
         rows: &[ResultRow],
         scenes: &Scenes,
         objects: &BTreeMap<u32, EvaluatedObject<'_>>,
     ) -> Self {
-        // By image, so that the threads need few scenes at once.
+        // Sort rows by image, so that the threads need few scenes at once.
         let frames = frames_of(rows).into_iter();
         let order: Vec<usize> = frames.flat_map(|(_, indices)| indices).collect();
         let judged = order.par_iter().with_max_len(64);
@@ -74,7 +76,7 @@ impl Calibration {
         let number = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v:.3}"));
         let area = match self.roc_area {
             Some(_) => number(self.roc_area),
-            None => "not defined, as all are alike".to_owned(),
+            None => "undefined, because all are correct or all are wrong".to_owned(),
         };
         let heads = ["score", "estimates", "share correct", "mean score"];
         let mut rows = vec![heads.map(str::to_owned)];
@@ -108,7 +110,7 @@ fn judge(
     let of_object = truths.filter(|truth| truth.obj_id == row.obj_id);
     let errors = of_object.map(|truth| {
         let truth = truth.camera_from_object;
-        // As in the benchmark's errors. It also saves the search for the nearest vertices.
+        // The benchmark's errors do the same. It also saves the search for the nearest vertices.
         match (estimate.translation.vector - truth.translation.vector).norm() >= diameter {
             true => f64::INFINITY,
             false => object.points.adi(&estimate, &truth),

@@ -1,4 +1,4 @@
-//! The errors of every estimate as comma-separated values.
+//! Writes the errors of every estimate as comma-separated values.
 
 use std::path::Path;
 
@@ -9,9 +9,10 @@ use hicp_io::bop::ResultRow;
 const IDS: [&str; 6] = ["scene_id", "im_id", "obj_id", "row", "gt", "score"];
 const ERRORS: [&str; 5] = ["mssd_mm", "mspd_px", "add_mm", "adi_mm", "translation_mm"];
 
-/// Writes one line per compared estimate and instance: lengths in millimeters, MSPD in pixels of the image.
+/// Writes one line per compared estimate and instance.
 ///
-/// `row` counts the result file's rows from 0, `gt` the image's ground truth.
+/// Lengths are in millimeters, and MSPD is in pixels of the image. `row` is the index of a row of
+/// the result file, `gt` that of an instance in the image's ground truth; both count from 0.
 pub(super) fn write(path: &Path, targets: &[&Judged], rows: &[ResultRow]) -> Result<(), IoError> {
     hicp_io::write_atomically(path, |file| {
         let mut lines = csv::Writer::from_writer(file);

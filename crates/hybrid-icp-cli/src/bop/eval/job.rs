@@ -19,30 +19,30 @@ use crate::terminal::{progress_bar, say, warn};
 /// The benchmark's visibility tolerance in millimeters.
 pub(crate) const DELTA_MM: f64 = 15.0;
 
-/// Most messages about images that are reported one by one.
+/// Largest number of messages about images that are reported one by one.
 const MISFITS_SHOWN: usize = 10;
 
 /// An evaluation of a result file.
 pub(crate) struct EvalJob<'a> {
     pub(crate) dataset: &'a DatasetOptions,
     pub(crate) results: &'a Path,
-    /// The targets, if not those of the dataset.
+    /// The file of targets; the dataset's if `None`.
     pub(crate) targets: Option<&'a Path>,
-    /// Objects whose AD is ADI, if not those with declared symmetries.
+    /// Objects whose AD is ADI; those with declared symmetries if `None`.
     pub(crate) symmetric: Option<&'a [u32]>,
     /// Visibility tolerance of VSD in millimeters.
     pub(crate) delta_mm: f64,
-    /// Where the recalls go as JSON.
+    /// The file for the recalls as JSON.
     pub(crate) json: Option<&'a Path>,
-    /// Where the errors of every estimate go.
+    /// The file for the errors of every estimate.
     pub(crate) errors: Option<&'a Path>,
-    /// Whether to report if the scores rank right poses first.
+    /// Whether to report if the scores rank correct poses first.
     pub(crate) calibration: bool,
     pub(crate) threads: ThreadOptions,
 }
 
 impl EvalJob<'_> {
-    /// Evaluates the file, prints the table and writes the outputs.
+    /// Evaluates the file, prints the table, and writes the outputs.
     pub(crate) fn run(&self) -> anyhow::Result<Report> {
         let rows = limits().read_results(self.results)?;
         let dataset = self.dataset.open()?;
@@ -83,7 +83,7 @@ impl EvalJob<'_> {
         misfits.truncate(MISFITS_SHOWN);
         warnings.append(&mut misfits);
         if more > 0 {
-            warnings.push(format!("{more} more files that do not fit"));
+            warnings.push(format!("{more} more files that do not match"));
         }
         warnings.iter().for_each(warn);
         let targets: Vec<&Judged> = judged.iter().flat_map(|image| &image.targets).collect();
@@ -120,18 +120,18 @@ impl EvalJob<'_> {
         let faults = judged.iter().flat_map(|image| &image.faults);
         let damaged = faults::report(faults, models.broken.values());
         if damaged > 0 {
-            bail!("{damaged} files could not be used; their targets are in no figure");
+            bail!("{damaged} files could not be used; their targets are left out of the results");
         }
         if is_empty {
             bail!(
-                "none of the {} targets could be judged, expected --dataset and --split to name images with ground truth, depth and models",
+                "none of the {} targets could be evaluated, expected --dataset and --split to name images with ground truth, depth and models",
                 report.left_out
             );
         }
         Ok(report)
     }
 
-    /// Returns warnings about rows that belong to no target or exceed the instances of theirs.
+    /// Returns warnings about rows without a target and rows beyond the instances of their target.
     fn misfits(&self, rows: &[ResultRow], wanted: &Targets) -> Vec<String> {
         let results = self.results.display();
         let mut warnings = Vec::new();
@@ -149,7 +149,7 @@ impl EvalJob<'_> {
         }
         if let Some(first) = strangers.first() {
             warnings.push(format!(
-                "{results}: {} of {} rows are of no target and not looked at, the first of object {} in image {} of scene {}",
+                "{results}: {} of {} rows have no target and are ignored; the first is object {} in image {} of scene {}",
                 strangers.len(),
                 rows.len(),
                 first.obj_id,
@@ -159,7 +159,7 @@ impl EvalJob<'_> {
         }
         if beyond > 0 {
             warnings.push(format!(
-                "{results}: {beyond} rows beyond the number of instances of their target are not looked at, those with the lowest scores"
+                "{results}: {beyond} rows are ignored, because their target has fewer instances than rows; they have the lowest scores"
             ));
         }
         warnings

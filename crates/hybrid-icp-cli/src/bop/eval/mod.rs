@@ -17,13 +17,15 @@ use crate::outputs::Files;
 
 /// Compare a result file with the ground truth, as the BOP benchmark does.
 ///
-/// The table has, per object and in all, the average recalls of VSD, MSSD and MSPD, their mean AR, the recall of ADD below a
-/// tenth of the diameter (of ADI for symmetric objects), and the median ADI. The estimates of every target with the best
-/// scores are matched greedily to the most visible instances; an instance without an estimate counts as not found. The models
-/// are those in models_eval/ of the dataset, or in models/ without it.
+/// The table has one row per object and one for all. Its columns are the average recalls of VSD,
+/// MSSD and MSPD, their mean AR, the recall of AD below a tenth of the diameter, and the median
+/// ADI. AD is ADI for symmetric objects and ADD for the others. The estimates of a target with the
+/// best scores are matched greedily to its most visible instances. An instance without an estimate
+/// counts as not found. The models come from models_eval/ of the dataset, or from models/ if it
+/// does not exist.
 ///
-/// The exit code is 0 with warnings about targets and rows that do not fit, and 1 if a file is damaged (the rest is still
-/// reported) or nothing could be evaluated.
+/// The exit code is 0 even if warnings report targets and rows that do not match. It is 1 if
+/// nothing could be evaluated or if a file is damaged; the rest is still reported.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -32,10 +34,11 @@ pub(crate) struct Arguments {
     /// The result file: CSV with scene_id, im_id, obj_id, score, R, t and time.
     #[arg(long, value_name = "FILE.csv")]
     results: PathBuf,
-    /// The targets; test_targets_bop19.json of the dataset if not given, every visible instance if there is none.
+    /// The file of targets; test_targets_bop19.json of the dataset if not given. Without both,
+    /// every visible instance is a target.
     #[arg(long, value_name = "FILE.json")]
     targets: Option<PathBuf>,
-    /// Objects whose AD is ADI; those with declared symmetries if not given.
+    /// Ids of the objects whose AD is ADI; those with declared symmetries if not given.
     #[arg(long, value_name = "ID,…", value_delimiter = ',')]
     symmetric: Option<Vec<u32>>,
     /// Visibility tolerance of VSD in millimeters; the benchmark uses 5 for ITODD.
@@ -47,8 +50,9 @@ pub(crate) struct Arguments {
     /// Also write the errors of every estimate against every instance of its target as CSV.
     #[arg(long, value_name = "FILE.csv")]
     errors: Option<PathBuf>,
-    /// Also report whether the scores of all rows, from 0 to 1, rank the correct ones (ADI below a tenth of the diameter) first:
-    /// the area under the ROC curve, and the share that is correct by range of the score.
+    /// Also report whether the scores, from 0 to 1, rank correct rows first: the area under the ROC
+    /// curve, and the share of correct rows by range of the score. A row is correct if its ADI is
+    /// below a tenth of the diameter.
     #[arg(long)]
     calibration: bool,
     #[command(flatten)]

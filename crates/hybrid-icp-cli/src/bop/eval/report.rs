@@ -13,17 +13,17 @@ use crate::terminal::table;
 /// The recalls of a part of the dataset.
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
-    /// Evaluated instances.
+    /// Number of evaluated instances.
     pub(crate) targets: usize,
-    /// Evaluated instances beyond the number of estimates.
+    /// Number of evaluated instances without an estimate.
     missing: usize,
     pub(crate) ar: f64,
     pub(crate) ar_vsd: f64,
     pub(crate) ar_mssd: f64,
     pub(crate) ar_mspd: f64,
-    /// Recall of ADD, of ADI for symmetric objects, below a tenth of the diameter.
+    /// Recall of ADD (ADI for symmetric objects) below a tenth of the diameter.
     ad_recall: f64,
-    /// Median ADI of the estimates that are matched to an instance in millimeters; `null` without any.
+    /// Median ADI in millimeters of the estimates that match an instance; `null` without any.
     pub(crate) median_adi_mm: Option<f64>,
 }
 
@@ -90,7 +90,7 @@ pub(crate) struct Report {
     pub(crate) all: Summary,
     pub(crate) objects: BTreeMap<u32, Summary>,
     pub(super) warnings: Vec<String>,
-    /// Whether the scores rank right poses first, if requested.
+    /// Reports whether the scores rank correct poses first, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) calibration: Option<Calibration>,
     /// ADI of the evaluated estimates to the nearest instance of their target in meters, by row.
@@ -121,7 +121,7 @@ impl Report {
         if self.left_out > 0 {
             let count = self.left_out;
             text.push_str(&format!(
-                "\n{count} targets could not be judged and are in no figure"
+                "\n{count} targets could not be evaluated and are left out"
             ));
         }
         if let Some(calibration) = &self.calibration {

@@ -23,45 +23,46 @@ use crate::interrupt;
 use crate::options::positive;
 use crate::terminal::{progress_bar, say};
 
-/// Make a dataset of cluttered scenes, to try everything without one.
+/// Generate a dataset of cluttered scenes, to try all commands without real data.
 ///
-/// Every scene has objects standing on a table, and images of them from all sides: depth with the noise of an Intel D435,
-/// masks, true poses, models and targets in the BOP layout. Two result files come with them: initial_synthetic-test.csv with
-/// perturbed poses to refine, and truth_synthetic-test.csv. The same options make the same bytes.
+/// A scene has objects on a table and images of them from all sides. The depth has the noise of an
+/// Intel D435. The dataset has masks, true poses, models and targets in the BOP layout. It also has
+/// two result files: initial_synthetic-test.csv with perturbed poses to refine, and
+/// truth_synthetic-test.csv with the true poses. The same options give the same bytes.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
-    /// The folder to write to: new or empty. It appears when it is complete.
+    /// The folder to write to, which must be new or empty. It appears when it is complete.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A folder of meshes (PLY, OBJ, STL), or of BOP models (models_info.json with obj_000001.ply, …); the twenty household
-    /// objects if not given.
+    /// A folder of meshes (PLY, OBJ, STL) or BOP models (models_info.json with obj_000001.ply, …).
+    /// Without it, the twenty household objects are used.
     #[arg(long, value_name = "DIR")]
     objects: Option<PathBuf>,
-    /// The length unit of the meshes: m, mm or cm. BOP models are in mm whatever it says.
+    /// The length unit of the meshes: m, mm or cm. BOP models are always in mm.
     #[arg(long, value_name = "UNIT", default_value = "m")]
     objects_unit: LengthUnit,
     /// Number of scenes.
     #[arg(long, value_name = "N", value_parser = count(), allow_negative_numbers = true)]
     scenes: u32,
-    /// Images of every scene.
+    /// Number of images per scene.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(), allow_negative_numbers = true)]
     images: u32,
-    /// Move the camera along a path through the images of a scene, nearer and round the objects, instead of looking from all
-    /// sides: for bop sequence.
+    /// Move the camera along a path toward and around the objects, instead of placing it on all
+    /// sides. `bop sequence` needs such a path.
     #[arg(long)]
     trajectory: bool,
-    /// Objects of every scene; one may be there several times.
+    /// Number of objects per scene. An object may appear several times.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=40), allow_negative_numbers = true)]
     instances: u32,
-    /// Perturbed poses of every object that is at least a tenth visible.
+    /// Number of perturbed poses per object that is at least a tenth visible.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(), allow_negative_numbers = true)]
     starts: u32,
-    /// How far off these are, in the mean errors of a sampling-based estimator (6.2 mm and 9.5 degrees): half to one and a half
-    /// times this, drawn for translation and rotation apart.
+    /// Size of the perturbation in units of the mean errors of a sampling-based estimator (6.2 mm
+    /// and 9.5 degrees). Translation and rotation are each drawn from 0.5 to 1.5 times this size.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = perturbation, allow_negative_numbers = true)]
     perturbation: f64,
-    /// Where the random numbers come from.
+    /// Seed of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -72,7 +73,7 @@ fn count() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=100_000)
 }
 
-/// The largest `--perturbation`: beyond it no object is near its place, and numbers of any size would be written.
+/// The largest `--perturbation`. Larger values would write numbers of any size.
 const MAX_PERTURBATION: f64 = 1000.0;
 
 fn perturbation(text: &str) -> Result<f64, String> {
@@ -101,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let n_images = u64::from(arguments.scenes) * u64::from(arguments.images);
     if n_images > MAX_IMAGES {
         bail!(
-            "--scenes {} of --images {} are {n_images} images, expected at most {MAX_IMAGES} in all",
+            "--scenes {} with --images {} give {n_images} images, expected at most {MAX_IMAGES} in all",
             arguments.scenes,
             arguments.images
         );
@@ -166,16 +167,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ))
 }
 
-/// Creates a folder in an existing one, so that it is not created again while an unfinished dataset is removed.
+/// Creates a folder in an existing one.
+///
+/// It never creates the parent, so an unfinished dataset does not reappear while it is removed.
 fn make_folder(folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir(folder).with_context(|| cannot_make(folder))
 }
 
 fn cannot_make(folder: &Path) -> String {
-    format!("cannot make the folder {}", folder.display())
+    format!("cannot create the folder {}", folder.display())
 }
 
-/// Checks that a folder is empty, or creates the folders above it.
+/// Checks that a folder is empty. If it does not exist, creates the folders above it.
 fn check_folder(out: &Path) -> anyhow::Result<()> {
     if !out.exists() {
         let parent = out.parent().unwrap_or(Path::new(""));

@@ -1,4 +1,4 @@
-//! The objects that scenes are made of.
+//! The objects of generated scenes.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use hybrid_icp::core::Model;
 use crate::bop::models;
 use crate::limits::limits;
 
-/// Models with their ids, ascending.
+/// Models with their ids in ascending order.
 #[derive(Debug)]
 pub(super) struct Objects {
     pub(super) ids: Vec<u32>,
     pub(super) models: Vec<Model>,
 }
 
-/// Diameters in meters that a scene can hold.
+/// Diameters in meters of objects that fit into a scene.
 const DIAMETERS: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 
 impl Objects {
@@ -30,7 +30,10 @@ impl Objects {
         Ok(Self { ids, models })
     }
 
-    /// Reads a folder: BOP models by their ids where it has a models_info.json, else its meshes numbered from 1 by name.
+    /// Reads the models of a folder.
+    ///
+    /// If it has a models_info.json, the models keep their BOP ids. Otherwise, the meshes are
+    /// sorted by name and numbered from 1.
     pub(super) fn read(dir: &Path, unit: LengthUnit) -> anyhow::Result<Self> {
         let info = dir.join("models_info.json");
         let (ids, models): (Vec<u32>, Vec<Model>) = if hicp_io::is_absent(&info) {
@@ -66,7 +69,7 @@ impl Objects {
     }
 }
 
-/// Returns the mesh files of a folder, by name.
+/// Returns the mesh files of a folder, sorted by name.
 fn meshes(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let cannot = || format!("cannot list --objects {}", dir.display());
     let mut paths = Vec::new();

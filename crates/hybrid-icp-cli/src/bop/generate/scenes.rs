@@ -1,4 +1,4 @@
-//! The scenes of a generated dataset: images, annotations, and result files.
+//! The scenes of a generated dataset: images, annotations and result files.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ use super::objects::Objects;
 
 /// Millimeters per unit of the depth images.
 pub(super) const DEPTH_SCALE: f64 = 0.1;
-/// Perturbation relative to the mean one (§VI-A.4), translation and rotation each.
+/// Perturbation relative to the mean one (§VI-A.4), for translation and rotation each.
 const PERTURBATION: std::ops::Range<f64> = 0.5..1.5;
 
 /// The annotations and result rows of an image.
@@ -43,11 +43,11 @@ pub(super) struct Generator<'a> {
     pub(super) objects: &'a Objects,
     pub(super) camera: PinholeCamera,
     pub(super) seed: u64,
-    /// Objects of every scene.
+    /// Number of objects per scene.
     pub(super) instances: usize,
-    /// Images of the camera's path, if it moves along one.
+    /// Number of images on the camera's path, if it moves along one.
     pub(super) path_length: Option<usize>,
-    /// Perturbed poses of every target.
+    /// Number of perturbed poses per target.
     pub(super) starts: u32,
     /// Perturbation relative to the mean error of an estimator.
     pub(super) perturbation: f64,
@@ -59,7 +59,9 @@ impl Generator<'_> {
         self.dir.join(format!("{scene:06}"))
     }
 
-    /// Creates an image and writes its files. Every image has its own random streams, so images may be created in any order.
+    /// Creates an image and writes its files.
+    ///
+    /// Every image has its own random streams, so images may be created in any order.
     pub(super) fn image(&self, scene_id: u32, im_id: u32) -> anyhow::Result<ImageRecord> {
         let seed = self.seed;
         let place = (u64::from(scene_id) << 32) + u64::from(im_id);
@@ -164,7 +166,9 @@ pub(super) fn targets(records: &[ImageRecord]) -> Vec<Target> {
     targets.collect()
 }
 
-/// Returns a sensor with the axial noise and the millimeter steps of a D435, and no depth at grazing angles and edges.
+/// Returns a sensor with the axial noise and the millimeter steps of a D435.
+///
+/// It measures no depth at grazing angles and edges.
 fn sensor() -> DepthSensor {
     DepthSensor {
         noise: DepthNoise::Axial(AxialPolynomial::d435_ahn2019_axial()),
@@ -181,7 +185,7 @@ fn matrix(camera: &PinholeCamera) -> Matrix3<f64> {
     Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
 }
 
-/// Returns the visibility of an instance. Its silhouette is cut at the border of the image.
+/// Returns the visibility of an instance, whose silhouette ends at the border of the image.
 fn info(instance: &SeenObject) -> GroundTruthInfo {
     let (all, bbox_object) = extent(&instance.silhouette);
     let (visible, bbox_visible) = extent(&instance.visible);
@@ -193,7 +197,9 @@ fn info(instance: &SeenObject) -> GroundTruthInfo {
     }
 }
 
-/// Returns the number of pixels of a mask, and their box: x, y, width, height, -1 without any.
+/// Returns the number of set pixels of a mask and their box: x, y, width, height.
+///
+/// Without set pixels, all numbers of the box are -1.
 fn extent(mask: &Mask) -> (u32, [f64; 4]) {
     let pixels = mask.pixels().iter().filter(|set| **set).count() as u32;
     let region = mask.bounding_region();

@@ -14,22 +14,22 @@ pub(crate) struct RefineJob<'a> {
     pub(crate) dataset: &'a DatasetOptions,
     /// The result file, for messages.
     pub(crate) results: &'a Path,
-    /// How the rows were chosen from the file.
+    /// The options that chose the rows from the file.
     pub(crate) choice: RowOptions,
     pub(crate) masks: MaskSource,
     pub(crate) pipeline: Pipeline,
-    /// Where the result file goes.
+    /// The path of the refined result file.
     pub(crate) output: &'a Path,
-    /// Where the status of every row goes.
+    /// The file for the status of every row.
     pub(crate) rows: Option<&'a Path>,
     pub(crate) threads: ThreadOptions,
     /// Whether to write times.
     pub(crate) timed: bool,
     pub(crate) rescore: Rescore,
-    /// Whether to continue with a journal that is there.
+    /// Whether to continue an existing journal.
     pub(crate) resume: bool,
-    /// Names what continues an interrupted run, for messages.
+    /// The option that continues an interrupted run, for messages.
     pub(crate) resumed_by: &'static str,
-    /// Names the option that lists the status of every row, for messages.
+    /// The option that lists the status of every row, for messages.
     pub(crate) listed_by: Option<&'static str>,
 }

@@ -1,4 +1,6 @@
-//! The journal of a `bop refine`: the results of finished images, so that a killed run can be resumed.
+//! The journal of `bop refine`, with the results of finished images.
+//!
+//! It allows resuming a run that was killed.
 
 use std::path::Path;
 
@@ -9,14 +11,16 @@ use hicp_io::{RowLog, is_absent};
 use crate::limits::limits;
 use crate::terminal::warn;
 
-/// A file next to the output: a header with the settings of the run, then a line of JSON for every finished image.
+/// A file next to the output.
+///
+/// It has a header with the settings of the run, then a line of JSON for every finished image.
 #[derive(Debug)]
 pub(super) struct Journal(RowLog);
 
 impl Journal {
-    /// Starts a journal for a run with these settings, or with `resume` continues the one that is there.
+    /// Starts a journal for a run with these settings, or with `resume` continues an existing one.
     ///
-    /// Returns the stored result of every image, `None` for images that are not done.
+    /// Returns the stored result of every image; `None` for images that are not finished.
     pub(super) fn open(
         path: &Path,
         settings: &str,
@@ -25,7 +29,7 @@ impl Journal {
     ) -> anyhow::Result<(Self, Vec<Option<FrameResult>>)> {
         if !resume && !is_absent(path) {
             bail!(
-                "{} is there, and may hold the results of a run that did not finish: continue that run with --resume, or remove the file",
+                "{} exists and may have the results of an unfinished run: continue that run with --resume, or remove the file",
                 path.display()
             );
         }
@@ -42,7 +46,7 @@ impl Journal {
         }
         if damaged > 0 {
             warn(format_args!(
-                "{}: {damaged} lines are damaged; their images are done again",
+                "{}: {damaged} lines are damaged; their images are refined again",
                 path.display()
             ));
         }
@@ -61,7 +65,7 @@ impl Journal {
     }
 }
 
-/// Returns whether a result is of the rows of an image.
+/// Returns whether a result has exactly the rows of an image.
 fn is_of(frame: Option<&FrameRows>, result: &FrameResult) -> bool {
     let indices = result.rows.iter().map(|row| row.index);
     frame.is_some_and(|(_, expected)| indices.eq(expected.iter().copied()))

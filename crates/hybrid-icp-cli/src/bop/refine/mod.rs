@@ -25,15 +25,18 @@ use crate::outputs::{self, Files, journal_of};
 
 /// Refine every row of a result file.
 ///
-/// The output has the same rows in the same order. A row is refined in one of its object's visible masks (mask_visib), or
-/// in one of the segmentations of a detections file. It takes the mask that the silhouette at its pose overlaps most, but the
-/// rows of one object in one image compete: each mask goes to one row, and the sum of the overlaps is as large as possible.
-/// The remaining rows share the mask that they overlap most. No row takes a mask that it overlaps less than half as much as
-/// another. Rows that cannot be refined keep their numbers and are counted by reason at the end. The time column holds the
-/// seconds spent on all rows of the image, added to the time that the input states.
+/// The output has the same rows in the same order. Rows that cannot be refined keep their numbers
+/// and are counted by reason at the end. The time column has the seconds spent on all rows of the
+/// image, added to the time in the input.
 ///
-/// A journal next to the output (OUT.csv.journal) stores every image that is done. If a run is killed, --resume continues
-/// with it. The output itself is written at the end, whole or not at all.
+/// A row is refined in one of its object's visible masks (mask_visib), or in one of the
+/// segmentations of a detections file. It uses the mask that the silhouette at its pose overlaps
+/// most. The rows of one object in one image compete: each mask is assigned to one row, so that the
+/// sum of the overlaps is as large as possible. The remaining rows share the mask that they overlap
+/// most. No row uses a mask that it overlaps less than half as much as another mask.
+///
+/// A journal next to the output (OUT.csv.journal) stores the finished images. If a run is killed,
+/// --resume continues it. The output itself is written at the end, completely or not at all.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -42,10 +45,10 @@ pub(crate) struct Arguments {
     /// The result file to refine: CSV with scene_id, im_id, obj_id, score, R, t and time.
     #[arg(long, value_name = "IN.csv")]
     results: PathBuf,
-    /// Where the refined result file goes.
+    /// The refined result file to write.
     #[arg(long, value_name = "OUT.csv")]
     output: PathBuf,
-    /// Take the masks from a detections file (JSON with RLE segmentations) instead of mask_visib.
+    /// Use the masks of a detections file (JSON with RLE segmentations) instead of mask_visib.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
     /// The kind of mask.
@@ -61,20 +64,21 @@ pub(crate) struct Arguments {
     pipeline: PipelineArguments,
     #[command(flatten)]
     threads: ThreadOptions,
-    /// Write -1 into the time column, so that the same input gives the same bytes.
+    /// Write -1 to the time column, so that the same input gives the same bytes.
     #[arg(long)]
     no_time: bool,
     #[command(flatten)]
     choice: RowOptions,
-    /// Write another score than that of the input, so that poses can be ranked without ground truth: with mve, 1 - MVE of the
-    /// row's pose in the output, and 0 for a row without an MVE.
+    /// Replace the score, so that poses can be ranked without ground truth. With mve, the score is
+    /// 1 - MVE of the row's pose in the output, and 0 for a row without an MVE.
     #[arg(long, value_name = "BY", value_parser = ["mve"])]
     rescore: Option<String>,
-    /// Write the status of every row of the output to a file: comma-separated, with its MVE before and after, and the reasons
+    /// Also write the status of every row as CSV, with its MVE before and after, and the reasons
     /// not to trust its pose.
     #[arg(long, value_name = "ROWS.csv")]
     rows: Option<PathBuf>,
-    /// Continue a run of the same options that was killed; start from the beginning if it left no journal.
+    /// Continue a killed run with the same options. If it left no journal, start from the
+    /// beginning.
     #[arg(long)]
     resume: bool,
 }
@@ -84,8 +88,9 @@ pub(crate) struct Arguments {
 enum MaskKind {
     /// The visible masks of the ground truth (mask_visib).
     Visible,
-    /// No segmentation: a row is refined in whatever was measured inside the model's bounding box at its pose, grown by a
-    /// twentieth of the diameter. Best with a projective pipeline, such as projective-cascade-plane-point.
+    /// No segmentation: a row uses all depth inside the model's bounding box at its pose. The box
+    /// is enlarged by a twentieth of the diameter. Use it with a projective pipeline, such as
+    /// projective-cascade-plane-point.
     None,
 }
 
@@ -98,10 +103,10 @@ Example:
   hybrid-icp bop refine --dataset bop/ycbv --split test \\
       --results cosypose_ycbv-test.csv --output refined_ycbv-test.csv
 
-Exit codes: 0 done, with the rows kept and the reasons in the summary; 1 a file
-is damaged or no image was found (if that came up while refining, the output is
-still written); 2 the command line is wrong; 130 interrupted (Ctrl-C or
-SIGTERM), with the images that are done in the journal for --resume.";
+Exit codes: 0 done, and the summary counts the rows that were kept; 1 a file is
+damaged or no image was found (if this is detected while refining, the output
+is still written); 2 the command line is wrong; 130 interrupted (Ctrl-C or
+SIGTERM), and the journal has the finished images for --resume.";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -134,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
-    /// Checks that the outputs can be written, and that they replace no other input than the result file.
+    /// Checks that the outputs can be written and that they replace no input but the result file.
     fn check_files(&self) -> anyhow::Result<()> {
         let journal = journal_of(&self.output);
         let files = Files::default()
@@ -149,14 +154,14 @@ impl Arguments {
         files.spare_dataset(&self.dataset.root, &self.dataset.split)
     }
 
-    /// Reads the rows to refine. A run in place must not lose the others.
+    /// Reads the rows to refine. Fails if a run in place would lose the other rows.
     fn read_rows(&self) -> anyhow::Result<Vec<ResultRow>> {
         let rows = limits().read_results(&self.results)?;
         let count = rows.len();
         let rows = self.choice.choose(rows, &self.results)?;
         if rows.len() < count && outputs::same_file(&self.output, &self.results) {
             bail!(
-                "--output and --results both name {}, and {} leaves out {} of its {count} rows, expected different files: they would be lost",
+                "--output and --results both name {}, and {} leaves out {} of its {count} rows, which would be lost: expected different files",
                 self.output.display(),
                 self.choice.given().join(" with "),
                 count - rows.len()

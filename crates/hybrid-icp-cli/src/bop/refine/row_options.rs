@@ -9,21 +9,24 @@ use hicp_io::bop::ResultRow;
 use crate::bop::targets;
 use crate::terminal::warn;
 
-/// Which rows of a result file are refined and written; all by default.
+/// The options that choose the rows to refine and write; all by default.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct RowOptions {
-    /// Refine and write only part I of N, counted from 1. Images are never split. If the rows of each image stand together,
-    /// the outputs of all parts, concatenated without all but the first header line, equal the output of one run.
+    /// Refine and write only part I of N, counted from 1. Images are never split. If the rows of
+    /// each image are contiguous, the concatenated outputs of all parts, with one header line,
+    /// equal the output of one run.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     shard: Option<Shard>,
-    /// Read only the first N rows of the result file; --top-k and --targets choose among these, and --shard divides the rest.
+    /// Read only the first N rows of the result file. --top-k and --targets choose among these, and
+    /// --shard divides the rest.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     limit: Option<u32>,
-    /// Refine and write only the K rows with the best scores of every object in every image, the first of equals.
+    /// Refine and write only the K rows with the best scores of every object in every image. Of
+    /// equal scores, the first rows are used.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     top_k: Option<u32>,
-    /// Refine and write only rows of the targets of this file: of each target the inst_count rows with the best scores, which
-    /// are the rows that an evaluation reads.
+    /// Refine and write only the rows of the targets in this file. Of each target, these are the
+    /// inst_count rows with the best scores, which an evaluation uses.
     #[arg(long, value_name = "FILE.json")]
     pub(super) targets: Option<PathBuf>,
 }
@@ -63,7 +66,7 @@ impl RowOptions {
         let part = shard.take(rows);
         if !part.contiguous {
             warn(format_args!(
-                "{}: the rows of an image do not stand together, so the concatenated outputs of all shards have another order than one run",
+                "{}: the rows of an image are not contiguous, so the concatenated outputs of all shards have another order than one run",
                 file.display()
             ));
         }

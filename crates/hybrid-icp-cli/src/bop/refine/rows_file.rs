@@ -1,4 +1,4 @@
-//! The status of every row of a `bop refine`, as comma-separated values.
+//! Writes the status of every row of a `bop refine` as comma-separated values.
 
 use std::path::Path;
 
@@ -17,9 +17,10 @@ const HEADER: [&str; 8] = [
     "warnings",
 ];
 
-/// Writes a line per row of the output, in its order: its status, its MVE before and after, and its warnings.
+/// Writes one line per row of the output, in the order of the output.
 ///
-/// The MVE is empty for a row that did not reach the pipeline. `row` counts from 0, as in the errors of `bop eval`.
+/// A line has the status, the MVE before and after, and the warnings. The MVE is empty for a row
+/// that did not reach the pipeline. `row` counts from 0, as in the errors of `bop eval`.
 pub(super) fn write(
     path: &Path,
     rows: &[ResultRow],
@@ -55,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_in_the_order_of_the_output_with_what_is_known_of_them() {
+    fn rows_have_the_order_of_the_output_with_status_mve_and_warnings() {
         let rows: Vec<ResultRow> = (5..8)
             .map(|obj_id| ResultRow::new(1, 2, obj_id, Isometry3::identity()))
             .collect();

@@ -27,7 +27,7 @@ impl RefineJob<'_> {
         let pool = self.threads.pool(frames.len())?;
         let start = Instant::now();
         let models_dir = dataset.models_dir()?;
-        // A file that changes while it is read must count as another file when the run is continued.
+        // Read the settings first: if a file changes later, `--resume` must detect the change.
         let settings = settings::of(self, &rows, &models_dir);
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
         let models = pool.install(|| models::read(&models_dir, &objects))?;
@@ -53,7 +53,7 @@ impl RefineJob<'_> {
         let ran = pool.install(|| self.work(&shared, journal_ref, &rows, &frames, &mut results));
         if interrupt::asked() && ran.is_err() && journal.is_some() {
             bail!(
-                "interrupted: {} of {} frames are done; {} goes on from there",
+                "interrupted: {} of {} frames are done; continue with {}",
                 results.iter().flatten().count(),
                 frames.len(),
                 self.resumed_by
@@ -64,7 +64,8 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
-        // The output may replace the input. It comes last, so that a run that fails before can be continued.
+        // The output may replace the input. Write it last, so that a run that fails before can be
+        // continued.
         if let Some(path) = self.rows {
             rows_file::write(path, &rows, &results)?;
         }
@@ -95,7 +96,8 @@ impl RefineJob<'_> {
 
     /// Refines the images that have no result yet.
     ///
-    /// Threads take images in order, so they work in the same few scenes, and memory holds one image per thread.
+    /// Threads process images in order, so they need only a few scenes at a time. The memory use is
+    /// one image per thread.
     fn work(
         &self,
         shared: &DatasetRefiner,
@@ -105,7 +107,9 @@ impl RefineJob<'_> {
         results: &mut [Option<FrameResult>],
     ) -> anyhow::Result<()> {
         let progress = progress_bar(rows.len(), "rows");
-        interrupt::can_resume();
+        if journal.is_some() {
+            interrupt::can_resume(self.resumed_by);
+        }
         let places = results.iter_mut().zip(frames).enumerate();
         let ran = places.par_bridge().try_for_each_init(
             || self.pipeline.refiner(),

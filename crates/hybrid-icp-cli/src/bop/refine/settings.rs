@@ -1,4 +1,4 @@
-//! The settings that the results of a `bop refine` depend on.
+//! The settings that the results of `bop refine` depend on.
 
 use std::collections::BTreeSet;
 use std::fmt::{self, Write as _};
@@ -11,12 +11,12 @@ use hicp_io::bop::{Dataset, ResultRow};
 
 use super::job::RefineJob;
 
-/// Version of the journal's lines.
+/// Version of the journal's format.
 const FORM: u32 = 5;
 
-/// Returns the settings of a job as a line of text, by option and by file of the dataset.
+/// Returns the settings of a job as a line of text: its options and the state of its files.
 ///
-/// A run continues only with the results of a run with equal settings. Images are left out because there are too many.
+/// A run continues only a run with equal settings. Images are left out because there are too many.
 pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> String {
     let root = &job.dataset.root;
     let dataset = root.canonicalize().unwrap_or_else(|_| root.clone());
@@ -41,9 +41,10 @@ pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> 
     settings.join(", ").replace('\n', " ")
 }
 
-/// Returns the files that describe the models and scenes that rows name, each with its state.
+/// Returns the files that describe the models and scenes of the rows, each with its state.
 ///
-/// Two files of one size and time of change count as equal: reading all of them would take as long as some runs.
+/// Files with equal size and modification time count as equal, because reading all of them would
+/// take as long as some runs.
 fn files(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> Vec<String> {
     let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
     let scenes: BTreeSet<u32> = rows.iter().map(|row| row.scene_id).collect();
@@ -62,7 +63,7 @@ fn files(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> Vec<Stri
     paths.iter().map(|path| named(path)).collect()
 }
 
-/// Describes a file by its size and the time of its last change in nanoseconds since 1970, without spaces.
+/// Describes a file by its size and its modification time in nanoseconds since 1970.
 fn state(path: &Path) -> String {
     let state = std::fs::metadata(path).and_then(|metadata| {
         let changed = metadata.modified()?.duration_since(UNIX_EPOCH);
@@ -75,7 +76,7 @@ fn state(path: &Path) -> String {
     })
 }
 
-/// Returns a digest of the debug form of a value, which it need not hold in memory.
+/// Returns a digest of the debug text of a value without storing the text.
 fn digest(value: &impl fmt::Debug) -> String {
     struct Digest(DefaultHasher);
     impl fmt::Write for Digest {

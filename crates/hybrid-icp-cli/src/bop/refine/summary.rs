@@ -1,4 +1,4 @@
-//! The report at the end of a `bop refine`.
+//! The report at the end of `bop refine`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -38,13 +38,13 @@ pub(super) fn summary(results: &[FrameResult], models: &Models, distrust: &Distr
     if distrust.unexplained > 0 {
         let count = distrust.unexplained;
         text.push_str(&format!(
-            "\n  {count:>7}  with an MVE of {PAPER_ALPHA} or more: not to be trusted"
+            "\n  {count:>7}  with an MVE of {PAPER_ALPHA} or more: do not trust them"
         ));
     }
     text
 }
 
-/// The poses in the output that are not to be trusted.
+/// The poses in the output that should not be trusted.
 pub(super) struct Distrust {
     /// The number of rows whose pose does not explain the image.
     unexplained: usize,
@@ -61,7 +61,7 @@ impl Distrust {
             of_kind.count()
         };
         let rows = warnings.len();
-        let other = "what was found there may be another object";
+        let other = "the result may be another object";
         let unexplained = count(|w| matches!(w, Warning::Unexplained { .. }));
         let elsewhere = count(|w| matches!(w, Warning::FoundElsewhere { .. }));
         let flat = count(|w| matches!(w, Warning::Flat { .. }));
@@ -69,7 +69,7 @@ impl Distrust {
             (
                 unexplained,
                 format!(
-                    "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: they are not to be trusted"
+                    "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: do not trust them"
                 ),
             ),
             (
@@ -81,7 +81,7 @@ impl Distrust {
             (
                 flat,
                 format!(
-                    "in {flat} of {rows} rows the surface inside the mask is flat, and that of the model at the pose is not: {other}"
+                    "in {flat} of {rows} rows the surface inside the mask is flat, but the model at the pose is not: {other}"
                 ),
             ),
         ];
@@ -93,8 +93,8 @@ impl Distrust {
     /// Warns of these poses.
     pub(super) fn warn(&self, job: &RefineJob<'_>) {
         let which = match (job.rows, job.listed_by) {
-            (Some(path), _) => format!(" ({} tells which)", path.display()),
-            (None, Some(option)) => format!(" ({option} tells which)"),
+            (Some(path), _) => format!(" ({} lists them)", path.display()),
+            (None, Some(option)) => format!(" ({option} lists them)"),
             (None, None) => String::new(),
         };
         for text in &self.texts {
@@ -103,7 +103,7 @@ impl Distrust {
     }
 }
 
-/// Returns the mean seconds per pose that reached the pipeline, `None` without any.
+/// Returns the mean seconds per pose that reached the pipeline; `None` without any.
 pub(super) fn mean_seconds(results: &[FrameResult]) -> Option<f64> {
     let spent: f64 = results.iter().filter_map(|result| result.seconds).sum();
     let poses = rows_of(results).filter(|row| row.mve.is_some()).count();
@@ -123,14 +123,14 @@ pub(super) fn report_faults(
     let damaged = faults::report(faults, models.broken.values());
     if damaged > 0 {
         bail!(
-            "{damaged} files could not be used; their rows are in {} unchanged",
+            "{damaged} files could not be used; their rows are unchanged in {}",
             job.output.display()
         );
     }
     let is_missing = |row: &RowResult| row.status == RowStatus::MissingFrame;
     if !results.is_empty() && rows_of(results).all(is_missing) {
         bail!(
-            "{}: none of its frames is in {}, expected --dataset and --split to name the images that it was made for",
+            "{}: none of its frames is in {}, expected --dataset and --split to name the images of the rows",
             job.results.display(),
             job.dataset.root.join(&job.dataset.split).display()
         );

@@ -11,10 +11,10 @@ use crate::bop::advice::advice;
 use crate::bop::models;
 use crate::terminal::warn;
 
-/// Most scenes that a message names.
+/// Largest number of scenes that a message names.
 const SCENES_SHOWN: usize = 5;
 
-/// Warns of models that seem to have another unit, and of stated diameters that differ from those of the meshes.
+/// Warns of models that seem to have another unit and of diameters that differ from the meshes.
 pub(super) fn about_models(models: &Models, models_dir: &Path) {
     let diameters = models::wrong_diameters(models, models_dir);
     for (obj_id, model) in &models.by_id {
@@ -32,15 +32,15 @@ pub(super) fn about_models(models: &Models, models_dir: &Path) {
     }
 }
 
-/// A scene, how many of its images have the warning, how many images it has, and the first warning.
+/// A scene, its number of images with the warning, its number of images, and the first warning.
 type OfScene = (u32, usize, usize, Warning);
 
-/// Warns of what looks wrong in most images of an object in a scene, because each scene has its own files.
+/// Warns of flaws in most images of an object in a scene, because each scene has its own files.
 ///
-/// If it looks wrong in a few images only, their poses are far off, and the files are right.
+/// If only a few images have the flaw, their poses are wrong, and the files are right.
 pub(super) fn about_images(results: &[FrameResult], rows: &[ResultRow]) {
     let mut images: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-    // The advice stands for the kind of warning.
+    // The advice identifies the kind of warning.
     let mut warned: BTreeMap<(u32, String, u32), (usize, Warning)> = BTreeMap::new();
     for result in results {
         // All rows of a result are of one image.

@@ -4,7 +4,7 @@ use anyhow::{Context as _, bail};
 use hicp_io::bop::Scene;
 use hybrid_icp::fusion::CameraMotion;
 
-/// Returns the images of a scene by ascending id, each with the motion of the camera since the image before.
+/// Returns the images of a scene by ascending id, each with the camera's motion since the last.
 ///
 /// The path starts with the scene's first image or with `first`. Each image needs a camera pose.
 pub(super) fn camera_path(
@@ -16,7 +16,7 @@ pub(super) fn camera_path(
         && !scene.image_ids().any(|id| id == first)
     {
         bail!(
-            "--first {first} is no image of {}, expected one of its {}",
+            "--first {first} is not an image of {}, expected one of its {}",
             file.display(),
             scene.image_ids().count()
         );

@@ -8,7 +8,9 @@ use hybrid_icp::core::Isometry3;
 
 use crate::limits::limits;
 
-/// Reads a pose file, or the row with the highest score for a scene, image and object of a result file (`.csv`).
+/// Reads the pose from a pose file or a result file (`.csv`).
+///
+/// Of a result file, returns the row with the highest score for `place`: a scene, image and object.
 pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isometry3<f64>> {
     if path.extension().is_none_or(|extension| extension != "csv") {
         let pose = limits()
@@ -19,7 +21,7 @@ pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isomet
     let (scene_id, im_id, obj_id) = place;
     let rows = limits().read_results(path).context("cannot read --init")?;
     let of_place = |row: &&ResultRow| (row.scene_id, row.im_id, row.obj_id) == place;
-    // Of equal scores the first row.
+    // Of rows with equal scores, the first is used.
     let best = rows.iter().filter(of_place).reduce(
         |best, row| {
             if row.score > best.score { row } else { best }
@@ -28,7 +30,7 @@ pub(super) fn read(path: &Path, place: (u32, u32, u32)) -> anyhow::Result<Isomet
     match best {
         Some(row) => Ok(row.camera_from_object()),
         None => bail!(
-            "--init {}: none of its {} rows is for scene {scene_id}, image {im_id}, object {obj_id}; expected one: --first names another image to begin with",
+            "--init {}: none of its {} rows is for scene {scene_id}, image {im_id}, object {obj_id}, expected at least one: start from another image with --first",
             path.display(),
             rows.len()
         ),

@@ -1,4 +1,4 @@
-//! The report of one image, as a line of JSON.
+//! The report of one image as a line of JSON.
 
 use hybrid_icp::core::{Isometry3, Matrix6};
 use hybrid_icp::fusion::Update;
@@ -12,13 +12,13 @@ use crate::pose_json::add_pose;
 #[derive(Clone, Debug)]
 pub(super) struct Line {
     pub(super) im_id: u32,
-    /// Index of the instance whose mask the image was registered in, in the ground truth of the image.
+    /// Index, in the ground truth of the image, of the instance whose mask was used.
     pub(super) instance: Option<usize>,
     pub(super) fused: Isometry3<f64>,
     covariance: Option<Matrix6<f64>>,
     /// The outcome from this image alone, and its MVE.
     pub(super) single: Option<(Outcome, Option<f64>)>,
-    /// The outcome in one word, or a few joined by hyphens, for programs.
+    /// The outcome for programs: words joined by hyphens.
     pub(super) outcome: &'static str,
     /// The outcome for people.
     pub(super) description: &'static str,
@@ -28,7 +28,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Reports an image without an estimate: the pose moved with the camera.
+    /// Creates the report of an image without an estimate, whose pose moved with the camera.
     pub(super) fn moved(
         im_id: u32,
         why: &'static str,
@@ -48,7 +48,7 @@ impl Line {
         }
     }
 
-    /// Reports an image that was registered.
+    /// Creates the report of an image that was registered.
     pub(super) fn registered(im_id: u32, instance: usize, step: SequentialStep) -> Self {
         let (outcome, description, reason) = describe(&step.event);
         Self {
@@ -64,11 +64,11 @@ impl Line {
         }
     }
 
-    /// Returns the line.
+    /// Returns the line of JSON.
     pub(super) fn json(&self, scene_id: u32, obj_id: u32) -> Value {
         let mut line = json!({
             "scene_id": scene_id, "im_id": self.im_id, "obj_id": obj_id, "outcome": self.outcome,
-            // Symmetric: rows are columns.
+            // The matrix is symmetric, so the order of rows and columns does not matter.
             "covariance": self.covariance.as_ref().map(Matrix6::as_slice),
         });
         if let Some(reason) = &self.reason {
@@ -95,7 +95,7 @@ fn describe(event: &SequentialEvent) -> (&'static str, &'static str, Option<Stri
     match event {
         SequentialEvent::Estimated(update) => {
             let description = match update {
-                Update::Provisional(..) => "kept until a better one comes",
+                Update::Provisional(..) => "kept until there is a better one",
                 Update::Rejected(_) => "rejected by the gate",
                 Update::Restarted(..) => "started again: contradicted the fused pose",
                 _ => update.name(),

@@ -30,65 +30,68 @@ use crate::terminal::{progress_bar, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
-/// Images are read by ascending id. The motion of the camera between them comes from cam_R_w2c and cam_t_w2c of
-/// scene_camera.json, so the object must stand still in the world. Each image is registered from the pose fused so far, moved
-/// with the camera, in the visible mask (mask_visib) of the instance of the object that the model overlaps most at that pose. If
-/// an image has no such mask, the pose moves with the camera alone, and the line says so.
+/// Images are read by ascending id. The camera's motion between them comes from cam_R_w2c and
+/// cam_t_w2c of scene_camera.json, so the object must stand still in the world. The initial pose
+/// for an image is the pose fused so far, moved with the camera. The mask is the visible mask
+/// (mask_visib) of the instance of the object that the model overlaps most at that pose. If an
+/// image has no such mask, the pose moves with the camera alone, and the line reports it.
 ///
-/// The output has a line of JSON for every image: the fused pose (cam_R_m2c, cam_t_m2c in mm) with its 6x6 covariance (m and
-/// rad; translation first, left perturbation in the camera frame), under "single" the pose from this image alone with its MVE,
-/// and the outcome of the image.
+/// The output has one line of JSON per image: the fused pose (cam_R_m2c, cam_t_m2c in mm), its 6x6
+/// covariance, and the outcome of the image. Under "single", it has the pose from this image alone
+/// with its MVE. Covariances are in m and rad, translation first, for a left perturbation in the
+/// camera frame.
 ///
-/// The exit code is 0 with the images without an estimate in the summary, and 1 if a file is missing or damaged; the lines are
-/// still written if that is found on the way.
+/// The exit code is 0 even if images have no estimate; the summary counts them. It is 1 if a file
+/// is missing or damaged. If this is detected during the run, the lines are still written.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 #[command(mut_arg("pipeline", follows))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     dataset: DatasetOptions,
-    /// The scene.
+    /// The id of the scene.
     #[arg(long, value_name = "ID")]
     scene: u32,
-    /// The object.
+    /// The id of the object.
     #[arg(long, value_name = "ID")]
     object: u32,
-    /// The rough pose in the first image: a pose file (JSON), or a result file (CSV), of whose rows for that image and object
-    /// the one with the highest score is taken.
+    /// The rough pose in the first image: a pose file (JSON) or a result file (CSV). Of a result
+    /// file, the row for that image and object with the highest score is used.
     #[arg(long, value_name = "FILE.json|FILE.csv")]
     init: PathBuf,
-    /// The image to begin with; the scene's first if not given.
+    /// The id of the image to start with; the scene's first if not given.
     #[arg(long, value_name = "ID")]
     first: Option<u32>,
-    /// The file of lines to write.
+    /// The file for the lines.
     #[arg(long, value_name = "OUT.jsonl")]
     output: PathBuf,
     /// Also write the fused poses as a result file, for bop eval.
     #[arg(long, value_name = "OUT.csv")]
     results: Option<PathBuf>,
-    /// How estimates are fused: last-estimate, average, weighted-average, filtering-constant, filtering or most-confident.
+    /// The fusion of estimates: last-estimate, average, weighted-average, filtering-constant,
+    /// filtering or most-confident.
     #[arg(long, value_name = "NAME", default_value = "weighted-average")]
     fuser: FusionMethod,
-    /// Where the covariance of an estimate comes from.
+    /// The source of an estimate's covariance.
     #[arg(long, value_enum, value_name = "FROM", default_value_t = Uncertainty::Registration)]
     uncertainty: Uncertainty,
     #[command(flatten)]
     pipeline: PipelineArguments,
 }
 
-/// What is followed is refined, not searched for: covariances and gate were fitted to `hybrid`.
+/// Makes `hybrid` the default: its covariances and gate are calibrated, and it never searches.
 fn follows(pipeline: Arg) -> Arg {
     let help = "The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file. Covariances are calibrated for `hybrid`; \
-        `auto` and `search` may leap from one image to the next";
+        with `auto` and `search`, poses may jump from one image to the next";
     pipeline.default_value("hybrid").long_help(help)
 }
 
-/// What an estimate's covariance is made of.
+/// The source of an estimate's covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Uncertainty {
-    /// The registration's own covariance, calibrated, with a gate on the Mahalanobis distance.
+    /// The calibrated covariance of the registration, with a gate on the Mahalanobis distance.
     Registration,
-    /// The MVE alone, as in the paper, about the object's center.
+    /// The MVE alone, as in the paper, around the object's center.
     Mve,
 }
 
@@ -162,13 +165,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     if !lines.iter().any(|line| line.outcome == "accepted") {
         warn(format_args!(
-            "{output}: none of its {} images was accepted: its poses are not to be trusted",
+            "{output}: none of its {} images was accepted: do not trust its poses",
             lines.len()
         ));
     }
     let damaged = faults::report(tracker.faults.iter(), [].iter());
     if damaged > 0 {
-        bail!("{damaged} files could not be used; {output} has their images without an estimate");
+        bail!("{damaged} files could not be used; {output} has no estimate for their images");
     }
     Ok(())
 }
@@ -216,7 +219,7 @@ impl Arguments {
     }
 }
 
-/// Checks that the ground truth, which chooses the masks, has the object in some image.
+/// Checks that the ground truth, which selects the masks, has the object in some image.
 fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> anyhow::Result<()> {
     let file = scene.dir().join("scene_gt.json");
     let truths = path
@@ -228,7 +231,7 @@ fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> any
     }
     if hicp_io::is_absent(&file) {
         bail!(
-            "{} does not exist, expected one: it assigns masks to objects",
+            "{} does not exist, but is required: it assigns masks to objects",
             file.display()
         );
     }
@@ -239,7 +242,9 @@ fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> any
     )
 }
 
-/// Counts the images by outcome. If the truth is known, the distances from it show the effect of fusing.
+/// Counts the images by outcome.
+///
+/// If there is ground truth, adds the distances from it, which show the effect of fusion.
 fn summarize(lines: &[Line]) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for line in lines {
@@ -258,7 +263,7 @@ fn summarize(lines: &[Line]) -> String {
     if let (Some(single), Some(fused)) = (median(&mut single), median(&mut fused)) {
         let (single, fused) = (1e3 * single, 1e3 * fused);
         text.push_str(&format!(
-            "\n  object's center off by {single:.2} mm from one image, {fused:.2} mm fused (medians, against the ground truth)"
+            "\n  median error of the object's center: {single:.2} mm from one image, {fused:.2} mm fused"
         ));
     }
     text

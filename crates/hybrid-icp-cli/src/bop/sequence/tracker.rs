@@ -14,11 +14,11 @@ pub(super) struct Tracker<'a> {
     object: u32,
     model: &'a Model,
     estimator: SequentialEstimator,
-    /// Renders the model to choose a mask.
+    /// Renders the model to select a mask.
     refiner: Refiner,
     /// Files that were missing or damaged.
     pub(super) faults: Vec<Fault>,
-    /// Warnings about the first image that was registered, which has the units and scales of all.
+    /// Warnings about the first registered image; the other images have the same units and scales.
     pub(super) warnings: Option<(u32, Vec<Warning>)>,
 }
 
@@ -60,7 +60,9 @@ impl<'a> Tracker<'a> {
             })
     }
 
-    /// Registers an image in the visible mask of the instance that the model overlaps most at the predicted pose.
+    /// Registers an image in the visible mask of one instance of the object.
+    ///
+    /// It is the instance that the model overlaps most at the predicted pose.
     fn register(
         &mut self,
         im_id: u32,

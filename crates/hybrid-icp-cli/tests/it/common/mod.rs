@@ -1,4 +1,4 @@
-//! Running the program, and a scene in files for it to work on.
+//! Helpers that run the program, and a scene in files for it.
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use hybrid_icp::core::{DepthImage, Isometry3, Mask, PinholeCamera, TriMesh, Vect
 use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
 
-/// What a run of the program left behind.
+/// The exit code and the printed text of a run of the program.
 #[derive(Debug)]
 pub(crate) struct Run {
     pub(crate) code: i32,
@@ -26,7 +26,7 @@ impl Run {
         self
     }
 
-    /// Asserts that standard error says all of these.
+    /// Asserts that standard error contains all of these texts.
     #[track_caller]
     pub(crate) fn complains(self, parts: &[&str]) -> Self {
         for part in parts {
@@ -36,7 +36,7 @@ impl Run {
     }
 }
 
-/// The program in a folder, not yet running.
+/// Returns a command that runs the program in a folder.
 pub(crate) fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid-icp"));
     command
@@ -46,7 +46,9 @@ pub(crate) fn program(folder: &Path) -> Command {
     command
 }
 
-/// Sends a signal, `-INT` say, by the shell, which is there where no program `kill` is; returns whether the process was still there.
+/// Sends a signal such as `-INT`, and returns whether the process still existed.
+///
+/// Uses the shell, because some systems have no program `kill`.
 pub(crate) fn send(signal: &str, child: &std::process::Child) -> bool {
     let kill = ["-c", "kill \"$0\" \"$1\" 2>/dev/null", signal];
     let status = Command::new("sh")
@@ -56,7 +58,7 @@ pub(crate) fn send(signal: &str, child: &std::process::Child) -> bool {
     status.unwrap().success()
 }
 
-/// Runs the program in a folder; it must never panic.
+/// Runs the program in a folder, and asserts that it does not panic.
 #[track_caller]
 pub(crate) fn run<I, S>(folder: &Path, arguments: I) -> Run
 where
@@ -73,7 +75,7 @@ where
     run
 }
 
-/// The names in a folder, in order.
+/// Returns the names in a folder, sorted.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries
@@ -87,7 +89,7 @@ pub(crate) fn camera() -> PinholeCamera {
     PinholeCamera::new(400.0, 402.0, 161.5, 118.0, 320, 240).unwrap()
 }
 
-/// A pose that looks at the car from aside.
+/// Returns a pose that shows the car from the side.
 pub(crate) fn truth() -> Isometry3<f64> {
     Isometry3::new(
         Vector3::new(0.012, -0.008, 0.5),
@@ -95,7 +97,7 @@ pub(crate) fn truth() -> Isometry3<f64> {
     )
 }
 
-/// A pose that is off by 6.2 mm and 9.5 degrees.
+/// Returns a pose that is off by 6.2 mm and 9.5 degrees.
 pub(crate) fn off(pose: &Isometry3<f64>, seed: u64) -> Isometry3<f64> {
     perturb(&mut rng(seed), pose, 0.0062, 9.5_f64.to_radians())
 }
@@ -114,7 +116,7 @@ pub(crate) fn pose_json(pose: &Isometry3<f64>) -> Value {
     json!({"cam_R_m2c": rotation, "cam_t_m2c": translation})
 }
 
-/// The pose that a JSON object states.
+/// Returns the pose in a JSON object.
 pub(crate) fn pose_of(value: &Value) -> Isometry3<f64> {
     let numbers = |key: &str| -> Vec<f64> {
         let items = value[key].as_array().unwrap();
@@ -127,7 +129,7 @@ pub(crate) fn pose_of(value: &Value) -> Isometry3<f64> {
     .unwrap()
 }
 
-/// Asserts that a pose is nearer to the truth than the initial one was, and near.
+/// Asserts that a pose is much nearer to the truth than the initial one.
 #[track_caller]
 pub(crate) fn assert_improved(pose: &Isometry3<f64>, truth: &Isometry3<f64>) {
     let (angle, distance) = se3::pose_distance(pose, truth);
@@ -138,14 +140,14 @@ pub(crate) fn assert_improved(pose: &Isometry3<f64>, truth: &Isometry3<f64>) {
     );
 }
 
-/// A scene in the files that `refine` wants, and the call that refines it.
+/// A scene in the files that `refine` reads, and the arguments that refine it.
 pub(crate) struct Scene {
     pub(crate) folder: tempfile::TempDir,
     pub(crate) arguments: Vec<(&'static str, OsString)>,
 }
 
 impl Scene {
-    /// A car seen without noise, its pose off by 6.2 mm and 9.5 degrees.
+    /// Creates a car seen without noise, with a pose that is off by 6.2 mm and 9.5 degrees.
     pub(crate) fn new() -> Self {
         let scene = Self {
             folder: tempfile::tempdir().unwrap(),
@@ -202,7 +204,7 @@ impl Scene {
         )
     }
 
-    /// Runs to success and returns the result.
+    /// Runs the program, asserts that it succeeds, and returns the result.
     #[track_caller]
     pub(crate) fn result(&self) -> Value {
         self.run().exits(0);
