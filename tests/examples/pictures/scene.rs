@@ -98,8 +98,8 @@ impl Scene {
     }
 
     /// Opens a panel that shows a part of the shaded depth image. What is added until
-    /// [`close`] is in pixels of the image.
-    pub(crate) fn panel(
+    /// Opens a panel that shows a part of the shaded depth image. Shapes that are added until
+    /// [`close`] are in pixels of the image.
         &self,
         svg: &mut Svg,
         (x, y): Place,

@@ -16,7 +16,7 @@ pub(crate) const GOOD: &str = "#009e73";
 pub(crate) const BAD: &str = "#d55e00";
 pub(crate) const OTHER: &str = "#cc79a7";
 
-/// Where a text is relative to its place.
+/// The alignment of a text at its position.
 #[derive(Clone, Copy)]
 pub(crate) enum Anchor {
     Start,
