@@ -57,7 +57,7 @@ const CLEAN: &[&str] = &[
     "crates/hybrid-icp/",
     "docs/",
     "fuzz/",
-    "tests/src/",
+    "tests/",
     "xtask/",
 ];
 

@@ -97,9 +97,9 @@ impl Scene {
         Ok(Observation::new(self.depth.clone(), mask, self.camera)?)
     }
 
-    /// Opens a panel that shows a part of the shaded depth image. What is added until
     /// Opens a panel that shows a part of the shaded depth image. Shapes that are added until
     /// [`close`] are in pixels of the image.
+    pub(crate) fn panel(
         &self,
         svg: &mut Svg,
         (x, y): Place,
