@@ -9,6 +9,7 @@ mod deviations;
 mod fuzz;
 mod instructions;
 mod licenses;
+mod look;
 mod miri;
 mod mutants;
 mod peers;
@@ -41,6 +42,8 @@ cargo xtask COMMAND
   pictures [--data]
             draws the pictures of the book from simulated scenes into docs/pictures; with --data those of real
             frames into target/pictures (needs BOP_PATH)
+  look PAGE.html...
+            takes pictures of pages, 400 and 1,400 pixels wide, into target/look; needs Chromium
 
   python [--ray] [--open3d] [PYTEST OPTIONS]
             builds and tests the Python module: pytest, doctests, mypy, examples; --ray and --open3d add the
@@ -90,6 +93,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["book"] => book::build(),
         ["pictures"] => pictures::draw(),
         ["pictures", "--data"] => pictures::draw_data(),
+        ["look", pages @ ..] => look::take(pages),
         ["licenses"] => licenses::run(),
         ["bless"] => deviations::bless(),
         ["python", options @ ..] => python::check(options),

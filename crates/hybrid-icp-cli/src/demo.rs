@@ -21,12 +21,13 @@ use crate::terminal::{say, table, warn};
 
 /// Refine a synthetic object's pose, to see that it works; needs no files and writes demo.png.
 ///
-/// Makes an object, renders a noisy depth image of it, puts its pose off by 6.2 mm and 9.5 degrees (the mean error of a
-/// sampling-based estimator), refines it, and prints the errors before and after, the trace of the stages that ran, and the
-/// time. Everything but the time follows from the seed.
+/// Creates an object and renders a noisy depth image of it. Displaces its pose by 6.2 mm and 9.5
+/// degrees, the mean error of a sampling-based estimator, and refines it. Prints the errors before
+/// and after, the trace of the stages that ran, and the time. Everything except the time follows
+/// from the seed.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The object: one of those that `hybrid-icp objects` writes, such as mug, carton, teapot or laptop.
+    /// The object: one of those that `hybrid-icp objects` writes, such as mug, teapot or laptop.
     #[arg(long, value_name = "NAME", default_value = "hammer", value_parser = object)]
     object: Household,
     /// Depth noise: standard deviation in percent of the depth.
@@ -37,7 +38,8 @@ pub(crate) struct Arguments {
     seed: u64,
     #[command(flatten)]
     pipeline: PipelineArguments,
-    /// The picture: the depth image with the model's outline before (orange) and after (blue).
+    /// The picture: the depth around the object, with the model's outline before (orange, dashed)
+    /// and after (blue), and the errors of both poses.
     #[arg(long, value_name = "FILE", default_value = "demo.png")]
     picture: PathBuf,
 }
@@ -98,22 +100,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let heads = ["", "rotation error", "translation error", "MVE", "VSD"];
     let mut errors = vec![heads.map(str::to_owned)];
-    for (when, pose, mve) in [
+    let poses = [
         ("before", &init, refined.mve_initial),
         ("after", &pose, refined.mve),
-    ] {
+    ];
+    let captioned = poses.map(|(when, pose, mve)| {
         let (angle, distance) = se3::pose_distance(pose, &truth);
+        let (degrees, mm) = (angle.to_degrees(), distance * 1e3);
         errors.push([
             when.to_owned(),
-            format!("{:.3} deg", angle.to_degrees()),
-            format!("{:.3} mm", distance * 1e3),
+            format!("{degrees:.3} deg"),
+            format!("{mm:.3} mm"),
             format!("{mve:.3}"),
             format!("{:.3}", vsd(pose)),
         ]);
-    }
-    let poses = [&init, &pose];
-    Picture::before_and_after(&mut refiner, &model, &observation, poses)
-        .write(&arguments.picture)?;
+        let caption = format!("{when}: {degrees:.2} deg and {mm:.2} mm off, MVE {mve:.3}");
+        (pose, caption)
+    });
+    Picture::before_and_after(&model, &observation, captioned)?.write(&arguments.picture)?;
 
     let reason = warnings::reason(&refined, &model, &observation, &init);
     say(format_args!(
@@ -131,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     say(format_args!("\n{}\n", report::trace_table(&trace.stages)))?;
     say(report::summary(&refined, &reason))?;
     say(format_args!(
-        "{time_ms:.1} ms from depth image to pose, on one core\n{}: the model's outline before (orange) and after (blue)",
+        "{time_ms:.1} ms from depth image to pose, on one core\n{}: the model's outline before (orange, dashed) and after (blue)",
         arguments.picture.display()
     ))?;
     warnings::about_result(&refined).iter().for_each(warn);

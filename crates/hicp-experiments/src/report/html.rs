@@ -1,5 +1,7 @@
 //! Tables, and HTML pages that load nothing. Names are escaped.
 
+use std::collections::BTreeSet;
+
 use crate::study::to_csv;
 
 /// A table: a heading, and rows with the same number of fields.
@@ -9,6 +11,8 @@ pub struct Table {
     pub head: Vec<String>,
     /// The rows.
     pub rows: Vec<Vec<String>>,
+    /// The row and column of every cell that is bold in HTML.
+    pub bold: BTreeSet<(usize, usize)>,
 }
 
 impl Table {
@@ -17,7 +21,7 @@ impl Table {
     pub fn new(head: &[&str]) -> Self {
         Self {
             head: head.iter().map(|h| (*h).to_owned()).collect(),
-            rows: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -44,14 +48,20 @@ impl Table {
     /// Returns the table as HTML, for [`html_page`](crate::html_page).
     #[must_use]
     pub fn html(&self) -> String {
-        let line = |fields: &[String], tag: &str| {
-            let cells = fields
-                .iter()
-                .map(|f| format!("<{tag}>{}</{tag}>", escaped(f)));
-            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        let cell = |tag: &str, text: &str| format!("<{tag}>{text}</{tag}>");
+        let bold = |row, (column, text): (usize, &String)| {
+            let is_bold = self.bold.contains(&(row, column));
+            let text = escaped(text);
+            if is_bold { cell("b", &text) } else { text }
         };
-        let rows: String = self.rows.iter().map(|row| line(row, "td")).collect();
-        format!("<table>\n{}{rows}</table>\n", line(&self.head, "th"))
+        let line = |cells: String| format!("<tr>{cells}</tr>\n");
+        let head = self.head.iter().map(|text| cell("th", &escaped(text)));
+        let rows = self.rows.iter().enumerate().map(|(row, fields)| {
+            let cells = fields.iter().enumerate();
+            line(cells.map(|field| cell("td", &bold(row, field))).collect())
+        });
+        let (head, rows) = (line(head.collect()), rows.collect::<String>());
+        format!("<table>\n{head}{rows}</table>\n")
     }
 
     /// Returns the table as Markdown.
@@ -112,6 +122,10 @@ th { background: #f2f2f2 }
 figure { margin: 0 }
 svg { max-width: 100%; height: auto }
 @media (max-width: 700px) { td { min-width: 6em } td:last-child { min-width: 20em } }
+.numbers th + th, .numbers td + td { text-align: right }
+.numbers td, .numbers td:last-child { min-width: 0 }
+.pictures { display: flex; flex-wrap: wrap; gap: 1em }
+.pictures img { max-width: 100% }
 </style>
 </head>
 <body>
@@ -127,9 +141,10 @@ mod tests {
         table
             .rows
             .push(vec!["x|y & \"z\"".to_owned(), "1".to_owned()]);
+        table.bold.insert((0, 1));
         assert_eq!(
             table.html(),
-            "<table>\n<tr><th>a&lt;b</th><th>n</th></tr>\n<tr><td>x|y &amp; &quot;z&quot;</td><td>1</td></tr>\n</table>\n"
+            "<table>\n<tr><th>a&lt;b</th><th>n</th></tr>\n<tr><td>x|y &amp; &quot;z&quot;</td><td><b>1</b></td></tr>\n</table>\n"
         );
         assert_eq!(
             table.markdown(),

@@ -1,6 +1,6 @@
 //! Options that the commands over datasets share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -27,6 +27,18 @@ impl DatasetOptions {
         dataset.scene_ids(&self.split)?;
         Ok(dataset)
     }
+
+    /// Returns the name of the dataset's folder.
+    pub(crate) fn name(&self) -> String {
+        let root = self.root.canonicalize();
+        file_name(root.as_deref().unwrap_or(&self.root))
+    }
+}
+
+/// Returns the name of a file or a folder, for people.
+pub(crate) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
 }
 
 /// The option for the number of threads.

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use hicp_bop::covered_pixels;
 use hybrid_icp::core::RenderedView;
 
-/// A side between a pixel inside and a pixel outside the silhouette, as columns and rows of the image.
+/// A side between a pixel inside and a pixel outside the silhouette, as columns and rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Side {
     pub(crate) inside: (u32, u32),
@@ -13,14 +13,17 @@ pub(crate) struct Side {
     pub(crate) outside: (i64, i64),
 }
 
-/// Steps of a path from corner to corner of the pixels: east, south, west and north. The inside is to its right.
+/// Steps of a path from corner to corner of the pixels: east, south, west and north.
+///
+/// The inside is to its right.
 const STEPS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 /// The pixel to the right of a step, relative to the corner where the step starts.
 const RIGHT: [(i64, i64); 4] = [(0, 0), (-1, 0), (-1, -1), (0, -1)];
 const EAST: usize = 0;
 
-/// Returns the outlines of a view's silhouettes and of their holes; each starts at its topmost row's first side.
+/// Returns the outlines of a view's silhouettes and of their holes.
 ///
+/// Each starts at the first side of its topmost row.
 /// Pixels that touch only at a corner belong to different silhouettes. Cost: the region's pixels.
 pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
     let pixel = |(u, v): (i64, i64)| Some((u32::try_from(u).ok()?, u32::try_from(v).ok()?));
@@ -105,8 +108,8 @@ mod tests {
         let mut expected = 0;
         for (u, v) in covered_pixels(&view) {
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1_i64)] {
-                let beside = |x: u32, d: i64| u32::try_from(i64::from(x) + d).unwrap();
-                let other = view.depth_at(beside(u, du), beside(v, dv));
+                let next_to = |x: u32, d: i64| u32::try_from(i64::from(x) + d).unwrap();
+                let other = view.depth_at(next_to(u, du), next_to(v, dv));
                 expected += usize::from(view.depth_at(u, v) > 0.0 && other == 0.0);
             }
         }

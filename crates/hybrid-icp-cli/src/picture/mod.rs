@@ -1,37 +1,44 @@
 //! Pictures of images, with the outlines of models drawn on them.
 
-pub(crate) mod contour;
+mod before_after;
+mod contour;
+pub(crate) mod legend;
 pub(crate) mod text;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use hybrid_icp::Refiner;
-use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, RenderedView,
-};
+use hybrid_icp::core::{DepthImage, Mask, Observation, PinholeCamera, RenderedView};
 
 use contour::contours;
 
 /// A color, 8 bits per channel.
 pub(crate) type Rgb = [u8; 3];
 
-/// Orange: the pose before. Distinguishable from [`AFTER`] by color-blind people.
-pub(crate) const BEFORE: Rgb = [230, 159, 0];
-/// Sky blue: the pose after.
-pub(crate) const AFTER: Rgb = [86, 180, 233];
+/// Solid sky blue: the poses of a result, after a refinement.
+pub(crate) const RESULT: Line = Line {
+    color: [86, 180, 233],
+    dashed: false,
+};
+/// Dashed orange: the poses to compare with, before a refinement.
+///
+/// Color-blind people can tell the two colors apart.
+pub(crate) const AGAINST: Line = Line {
+    color: [230, 159, 0],
+    dashed: true,
+};
 
 /// The length of a dash and of a gap, in sides of pixels.
 const DASH: (usize, usize) = (7, 5);
 /// The opacity of a line where something hides the model.
 const FAINT: f32 = 0.4;
-/// How much darker the pixels next to a line become, so that it stands out from any color.
+/// The opacity of the shade next to a line, which makes it visible on any color.
 const SHADE: f32 = 0.55;
 
-/// How much darker a surface is when it is seen from the side.
+/// The opacity of the shade on a surface that is seen from the side.
 const TURNED: f32 = 0.6;
 
-/// How an outline is drawn.
+/// The style of an outline.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     pub(crate) color: Rgb,
@@ -39,13 +46,6 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    pub(crate) fn solid(color: Rgb) -> Self {
-        Self {
-            color,
-            dashed: false,
-        }
-    }
-
     /// Returns whether it is drawn at a place along it, in pixels.
     pub(crate) fn draws(&self, place: usize) -> bool {
         !self.dashed || place % (DASH.0 + DASH.1) < DASH.0
@@ -83,7 +83,7 @@ impl Picture {
         Self { width, height, rgb }
     }
 
-    /// Shows depth as [`Picture::of_depth`] does, darker where the surface turns away from the camera.
+    /// Shows depth like [`Picture::of_depth`], darker where the surface turns away from the camera.
     pub(crate) fn shaded(
         depth: &Arc<DepthImage>,
         camera: &PinholeCamera,
@@ -97,24 +97,6 @@ impl Picture {
             picture.mix((u.into(), v.into()), [0; 3], TURNED * (1.0 - facing));
         }
         Ok(picture)
-    }
-
-    /// Shows the depth of an observation with the model's outlines before and after a refinement.
-    pub(crate) fn before_and_after(
-        refiner: &mut Refiner,
-        model: &Model,
-        observation: &Observation,
-        [before, after]: [&Isometry3<f64>; 2],
-    ) -> Self {
-        let mut picture = Self::of_depth(observation.depth());
-        for (pose, color) in [(before, BEFORE), (after, AFTER)] {
-            let workspace = refiner.workspace_mut();
-            let view = workspace.view(model, observation.camera(), pose);
-            let mut ink = Ink::of(&picture);
-            ink.outline(view, Line::solid(color), |_, _, _| false);
-            picture.draw(&ink);
-        }
-        picture
     }
 
     /// Draws lines: first the shade next to all of them, then the lines in their order.
@@ -172,13 +154,24 @@ impl Picture {
         }
     }
 
+    /// Encodes the picture as PNG.
+    pub(crate) fn png(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
     /// Writes the picture as PNG.
     pub(crate) fn write(&self, path: &std::path::Path) -> Result<(), hicp_io::IoError> {
         hicp_io::write_rgb_png(path, self.width, self.height, &self.rgb)
     }
 }
 
-/// Lines to draw: all of a picture's together, so that no line shades another.
+/// All lines of a picture. They are drawn together, so that no line shades another.
 #[derive(Debug)]
 pub(crate) struct Ink {
     width: i64,
@@ -197,8 +190,9 @@ impl Ink {
         }
     }
 
-    /// Adds the outline of a view, two pixels wide, faint where `hidden(u, v, depth of the model)` holds.
+    /// Adds the outline of a view, two pixels wide.
     ///
+    /// It is faint where `hidden(u, v, depth of the model)` holds.
     /// There is no outline where the border of the image cuts the silhouette.
     pub(crate) fn outline(
         &mut self,

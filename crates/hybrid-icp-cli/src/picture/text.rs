@@ -42,7 +42,9 @@ impl Picture {
     }
 }
 
-/// Returns a text that is at most `width` pixels wide, with an ellipsis in its middle if it is shortened.
+/// Returns a text that is at most `width` pixels wide.
+///
+/// A shortened text has an ellipsis in its middle.
 pub(crate) fn fitted(text: &str, size: i32, width: u32) -> String {
     register();
     let font = ("sans-serif", size).into_font();
@@ -86,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_drawn_where_it_is_asked_for() {
+    fn text_is_drawn_at_its_place() {
         let mut picture = Picture {
             width: 80,
             height: 30,

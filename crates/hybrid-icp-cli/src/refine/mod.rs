@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use hybrid_icp::icp::Verdict;
 
 use self::inputs::{Inputs, Read};
 use self::report::Report;
@@ -36,8 +37,8 @@ pub(crate) struct Arguments {
     /// The file for the JSON result; standard output if not given.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// A PNG file for a picture: the depth image with the model's outline before (orange) and after
-    /// (blue) the refinement.
+    /// A PNG file for a picture: the depth around the object, with the model's outline before
+    /// (orange, dashed) and after (blue) the refinement, and the MVE of both poses.
     #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
     /// A file for the trace: one JSON object per iteration and line, with its pose as in a pose
@@ -114,8 +115,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         trace.write(path)?;
     }
     if let Some(path) = &arguments.overlay {
-        let poses = [&init, &refined.outcome.camera_from_object];
-        Picture::before_and_after(&mut refiner, &model, &observation, poses).write(path)?;
+        let after = match refined.outcome.verdict {
+            Verdict::Refined => "after",
+            Verdict::KeptInitial(_) => "after, the same pose",
+        };
+        let poses = [
+            (&init, format!("before: MVE {:.3}", refined.mve_initial)),
+            (
+                &refined.outcome.camera_from_object,
+                format!("{after}: MVE {:.3}", refined.mve),
+            ),
+        ];
+        Picture::before_and_after(&model, &observation, poses)?.write(path)?;
     }
     report.warnings.iter().for_each(warn);
     match arguments.output {

@@ -30,7 +30,16 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     let folder = folder.path();
     let words = "bop generate --scenes 1 --images 2 --instances 5 --out set";
     run(folder, words.split(' ')).exits(0);
-    let words = format!("{COMPARE} --pipelines hybrid,nn-point-to-point");
+    // The page names files without their folders.
+    let (dataset, init) = (
+        folder.join("set"),
+        folder.join("set/initial_synthetic-test.csv"),
+    );
+    let words = format!(
+        "bop compare --dataset {} --init {} --out compared --pipelines hybrid,nn-point-to-point",
+        dataset.display(),
+        init.display()
+    );
     let told = run(folder, words.split(' ')).exits(0);
     // Warnings about poses name the file of their pipeline.
     let begin = "warning: compared/nn-point-to-point.csv: ";
@@ -87,16 +96,38 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     }
     // The page has the same numbers, loads no other file, and has a row per object.
     let page = read("compare.html");
+    let plain = page.replace("<b>", "").replace("</b>", "");
     for line in &cells {
         let row: String = line.iter().map(|cell| format!("<td>{cell}</td>")).collect();
-        assert!(page.contains(&format!("<tr>{row}</tr>")), "{row}");
+        assert!(plain.contains(&format!("<tr>{row}</tr>")), "{row}");
     }
-    for loaded in ["src=", "href=", "url(", "<script"] {
+    for loaded in ["href=", "url(", "<script"] {
         assert!(!page.contains(loaded), "{loaded}");
+    }
+    assert_eq!(page.matches("src=").count(), 3);
+    let picture = "<figure><img src=\"data:image/png;base64,iVBORw0KGgo";
+    assert_eq!(page.matches(picture).count(), 3);
+    // A dot per line for AR and for the median ADI.
+    assert_eq!(page.matches("<circle").count(), 6);
+    let best = cells.iter().map(|line| &line[1]).max().unwrap();
+    assert!(page.contains(&format!("<td><b>{best}</b></td>")), "{best}");
+    let least = cells.iter().map(|line| &line[5]);
+    let least = least
+        .min_by_key(|cell| (cell.len(), (*cell).clone()))
+        .unwrap();
+    assert!(
+        page.contains(&format!("<td><b>{least}</b></td>")),
+        "{least}"
+    );
+    let path = folder.to_str().unwrap();
+    for name in ["compare.html", "compare.md"] {
+        let text = read(name);
+        assert!(text.contains("initial_synthetic-test.csv in set, split test: "));
+        assert!(!text.contains(path), "{name}");
     }
     let objects = document["entries"][0]["objects"].as_object().unwrap();
     for id in objects.keys() {
-        assert_eq!(page.matches(&format!("<tr><td>{id}</td>")).count(), 2);
+        assert_eq!(plain.matches(&format!("<tr><td>{id}</td>")).count(), 2);
         assert_eq!(
             read("compare.md").matches(&format!("\n| {id} |")).count(),
             2

@@ -47,7 +47,12 @@ fn it_needs_nothing_and_shows_everything() {
     assert_eq!(names(folder.path()), ["demo.png"]);
 
     let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("demo.png")).unwrap();
-    assert_eq!((width, height), (640, 480));
+    // The picture shows the object, twice as large, and two rows of a legend.
+    assert!(width == 640 && (400..700).contains(&height), "{height}");
+    let legend = &rgb[rgb.len() - 3 * 640 * 50..];
+    assert_eq!(legend[..3], [255; 3]);
+    assert!(legend.chunks_exact(3).any(|p| p == [230, 159, 0]));
+    assert!(legend.chunks_exact(3).any(|p| p == [86, 180, 233]));
     // The picture has both outlines and the measured depth.
     let count = |wanted: &dyn Fn(&[u8]) -> bool| rgb.chunks_exact(3).filter(|p| wanted(p)).count();
     assert!(count(&|p| p == [230, 159, 0]) > 100);

@@ -1,6 +1,8 @@
 //! `hybrid-icp bop compare`.
 
+mod dots;
 mod report;
+mod worst;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,10 +22,12 @@ use crate::terminal::say;
 
 /// Refine a result file with several pipelines, and compare them by their evaluations.
 ///
-/// Writes, for every pipeline, its result file and its evaluation as JSON, and the comparison as compare.md, compare.html and
-/// compare.json: average recalls, the median ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, the time
-/// per pose on one thread and its ratio to that of the first pipeline; AR and median ADI by object. If a run is interrupted,
-/// the same command continues it.
+/// Writes the result file and the evaluation (JSON) of every pipeline. Writes the comparison as
+/// compare.md, compare.html and compare.json: average recalls, the median ADI, the shares of the
+/// poses whose ADI fell and rose by more than 0.1 mm, and the time per pose on one thread with its
+/// ratio to that of the first pipeline; AR and median ADI by object. The page also has pictures of
+/// the three rows with the largest ADI after a pipeline. If a run is interrupted, the same command
+/// continues it.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -92,7 +96,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let seconds = job.run(limits().read_results(&arguments.init)?)?;
         comparison.add(&name, arguments.evaluate(&name, &output)?, seconds);
     }
-    let texts = [comparison.markdown(), comparison.html(), comparison.json()?];
+    let results = |name: &str| out.join(format!("{name}.csv"));
+    let worst = comparison.worst();
+    let pictures = worst::pictures(&worst, &arguments.dataset, &arguments.init, results)?;
+    let html = comparison.html(&pictures);
+    let texts = [comparison.markdown(), html, comparison.json()?];
     for (ending, text) in FORMS.iter().zip(texts) {
         let path = out.join(format!("{COMPARISON}.{ending}"));
         hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;

@@ -7,8 +7,10 @@ use anyhow::Context as _;
 use hicp_experiments::{Table, html_escaped, html_page};
 use serde::Serialize;
 
+use super::dots::dot_plot;
+use super::worst::Worst;
 use crate::bop::eval::{self, Summary};
-use crate::bop::options::DatasetOptions;
+use crate::bop::options::{DatasetOptions, file_name};
 
 /// Result files of one dataset: the initial one, and that of every pipeline.
 #[derive(Serialize)]
@@ -17,6 +19,9 @@ pub(super) struct Comparison {
     split: String,
     init: String,
     entries: Vec<Entry>,
+    /// The names of the compared files, without their folders.
+    #[serde(skip)]
+    subject: String,
 }
 
 /// The evaluation of a result file.
@@ -49,6 +54,13 @@ type Figure<T> = fn(&T) -> Option<f64>;
 /// Change of the ADI in meters from which a pose counts as improved or worsened.
 const CHANGE: f64 = 1e-4;
 
+/// Rows that the page has pictures of.
+const N_WORST: usize = 3;
+
+/// Signs of figures of which the highest, or the lowest, is the best.
+const HIGHEST: f64 = 1.0;
+const LOWEST: f64 = -1.0;
+
 const EXPLAINED: &str = "AR is the mean of the average recalls of VSD, MSSD and MSPD; ADI is that of the estimates matched to an \
     instance. A pose is improved or worsened when its ADI fell or rose by more than 0.1 mm. Times are of one thread, for mask, \
     normals and pipeline; compare their ratios.";
@@ -61,10 +73,17 @@ impl Comparison {
             split: dataset.split.clone(),
             init: init.display().to_string(),
             entries: Vec::new(),
+            subject: format!(
+                "{} in {}, split {}",
+                file_name(init),
+                dataset.name(),
+                dataset.split
+            ),
         }
     }
 
-    /// Adds an evaluation with the mean seconds per pose: the initial one first, then that of every pipeline.
+    /// Adds an evaluation with the mean seconds per pose: first that of the initial poses, then
+    /// that of every pipeline.
     pub(super) fn add(&mut self, name: &str, evaluation: eval::Report, seconds: Option<f64>) {
         let ms_per_pose = seconds.map(|s| 1e3 * s);
         let first = self.entries.get(1).map_or(ms_per_pose, |e| e.ms_per_pose);
@@ -84,35 +103,39 @@ impl Comparison {
     pub(super) fn overall(&self) -> Table {
         let first = self.entries.get(1).map_or("", |entry| &entry.name);
         let ratio = format!("time / {first}");
-        let columns: [(&str, usize, Figure<Entry>); 9] = [
-            ("AR", 3, |e| Some(e.all.ar)),
-            ("VSD", 3, |e| Some(e.all.ar_vsd)),
-            ("MSSD", 3, |e| Some(e.all.ar_mssd)),
-            ("MSPD", 3, |e| Some(e.all.ar_mspd)),
-            ("median ADI mm", 2, |e| e.all.median_adi_mm),
-            ("improved %", 1, |e| Some(100.0 * e.changes?.improved)),
-            ("worsened %", 1, |e| Some(100.0 * e.changes?.worsened)),
-            ("ms per pose", 2, |e| e.ms_per_pose),
-            (&ratio, 2, |e| e.time_ratio),
+        let columns: [(&str, usize, f64, Figure<Entry>); 9] = [
+            ("AR", 3, HIGHEST, |e| Some(e.all.ar)),
+            ("VSD", 3, HIGHEST, |e| Some(e.all.ar_vsd)),
+            ("MSSD", 3, HIGHEST, |e| Some(e.all.ar_mssd)),
+            ("MSPD", 3, HIGHEST, |e| Some(e.all.ar_mspd)),
+            ("median ADI mm", 2, LOWEST, |e| e.all.median_adi_mm),
+            ("improved %", 1, HIGHEST, |e| {
+                Some(100.0 * e.changes?.improved)
+            }),
+            ("worsened %", 1, LOWEST, |e| {
+                Some(100.0 * e.changes?.worsened)
+            }),
+            ("ms per pose", 2, LOWEST, |e| e.ms_per_pose),
+            (&ratio, 2, LOWEST, |e| e.time_ratio),
         ];
         let mut table = Table::new(&["pipeline"]);
-        table
-            .head
-            .extend(columns.iter().map(|(head, ..)| (*head).to_owned()));
+        let heads = columns.iter().map(|(head, ..)| (*head).to_owned());
+        table.head.extend(heads);
         for entry in &self.entries {
-            let mut row = vec![entry.name.clone()];
-            row.extend(
-                columns
-                    .iter()
-                    .map(|(_, digits, figure)| number(figure(entry), *digits)),
-            );
-            table.rows.push(row);
+            let figures = columns.iter();
+            let figures = figures.map(|(_, digits, _, figure)| number(figure(entry), *digits));
+            let name = std::iter::once(entry.name.clone());
+            table.rows.push(name.chain(figures).collect());
+        }
+        for (column, (_, _, sign, _)) in (1..).zip(&columns) {
+            let cells = (0..table.rows.len()).map(|row| (row, column));
+            mark_best(&mut table, *sign, cells);
         }
         table
     }
 
     /// Returns a figure by object and, in columns, by entry.
-    fn by_object(&self, digits: usize, figure: Figure<Summary>) -> Table {
+    fn by_object(&self, digits: usize, sign: f64, figure: Figure<Summary>) -> Table {
         let mut table = Table::new(&["object", "targets"]);
         table
             .head
@@ -132,6 +155,9 @@ impl Comparison {
             let mut row = vec![id.to_string(), targets.unwrap_or_else(|| "-".to_owned())];
             row.extend(summaries.map(|summary| number(summary.and_then(figure), digits)));
             table.rows.push(row);
+            let row = table.rows.len() - 1;
+            let cells = (2..table.head.len()).map(|column| (row, column));
+            mark_best(&mut table, sign, cells);
         }
         table
     }
@@ -139,22 +165,39 @@ impl Comparison {
     /// Names the compared files.
     fn subject(&self) -> String {
         let targets = self.entries.first().map_or(0, |first| first.all.targets);
-        format!(
-            "{} in {}, split {}: {targets} targets",
-            self.init, self.dataset, self.split
-        )
+        format!("{}: {targets} targets", self.subject)
     }
 
     /// Returns the tables by object, with their headings.
     fn objects(&self) -> [(&'static str, Table); 2] {
-        let median = self.by_object(2, |summary| summary.median_adi_mm);
-        [
-            (
-                "AR by object",
-                self.by_object(3, |summary| Some(summary.ar)),
-            ),
-            ("Median ADI by object, mm", median),
-        ]
+        let ar = self.by_object(3, HIGHEST, |summary| Some(summary.ar));
+        let median = self.by_object(2, LOWEST, |summary| summary.median_adi_mm);
+        [("AR by object", ar), ("Median ADI by object, mm", median)]
+    }
+
+    /// Returns the rows with the largest ADI after any of the pipelines, each with that pipeline.
+    pub(super) fn worst(&self) -> Vec<Worst> {
+        let mut largest: BTreeMap<usize, (f64, &str)> = BTreeMap::new();
+        for entry in self.entries.iter().skip(1) {
+            for (row, adi) in &entry.adi_m {
+                let most = largest.entry(*row).or_insert((*adi, &entry.name));
+                if *adi > most.0 {
+                    *most = (*adi, &entry.name);
+                }
+            }
+        }
+        let mut rows: Vec<_> = largest.into_iter().collect();
+        rows.sort_by(|(_, a), (_, b)| b.0.total_cmp(&a.0));
+        let before = |row| self.entries.first()?.adi_m.get(row).copied();
+        let worst = rows
+            .iter()
+            .take(N_WORST)
+            .map(|(row, (adi, pipeline))| Worst {
+                row: *row,
+                pipeline: (*pipeline).to_owned(),
+                adi_m: [before(row), Some(*adi)],
+            });
+        worst.collect()
     }
 
     /// Returns the comparison as Markdown; the table of all objects comes first.
@@ -167,13 +210,27 @@ impl Comparison {
         text
     }
 
-    /// Returns the comparison as one page.
-    pub(super) fn html(&self) -> String {
+    /// Returns the comparison as one page. `pictures` shows the worst rows, as HTML.
+    pub(super) fn html(&self, pictures: &str) -> String {
         let subject = html_escaped(&self.subject());
-        let mut body = format!("<p>{subject}</p>\n<p>{EXPLAINED}</p>\n");
+        let values = |figure: Figure<Entry>| -> Vec<(&str, f64)> {
+            let entries = self.entries.iter();
+            entries
+                .filter_map(|e| Some((&*e.name, figure(e)?)))
+                .collect()
+        };
+        let ar = dot_plot("AR", &values(|e| Some(e.all.ar)), Some(1.0), 3);
+        let adi = dot_plot("Median ADI, mm", &values(|e| e.all.median_adi_mm), None, 2);
+        let mut body = format!("<p>{subject}</p>\n<div class=\"pictures\">\n{ar}{adi}</div>\n");
         let overall = [("All objects", self.overall())];
         for (title, table) in overall.into_iter().chain(self.objects()) {
-            body.push_str(&format!("<h2>{title}</h2>\n{}", table.html()));
+            let table = table.html();
+            body += &format!("<h2>{title}</h2>\n<figure class=\"numbers\">{table}</figure>\n");
+        }
+        body += &format!("<p>{EXPLAINED} The best figures are bold.</p>\n");
+        if !pictures.is_empty() {
+            body += "<h2>The largest ADI after a pipeline</h2>\n";
+            body += &format!("<div class=\"pictures\">\n{pictures}</div>\n");
         }
         html_page("Pipelines compared", &body)
     }
@@ -187,6 +244,21 @@ impl Comparison {
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"))
+}
+
+/// Makes the best of some cells bold, by their printed figures, unless all are equal.
+fn mark_best(table: &mut Table, sign: f64, cells: impl Iterator<Item = (usize, usize)>) {
+    let figure = |&(row, column): &(usize, usize)| table.rows[row][column].parse::<f64>().ok();
+    let figures = cells.filter_map(|cell| Some((sign * figure(&cell)?, cell)));
+    let figures: Vec<_> = figures.collect();
+    let best = figures
+        .iter()
+        .map(|(figure, _)| *figure)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let (best, others): (Vec<_>, Vec<_>) = figures.into_iter().partition(|(f, _)| *f == best);
+    if !others.is_empty() {
+        table.bold.extend(best.into_iter().map(|(_, cell)| cell));
+    }
 }
 
 /// Returns the shares of the estimates in both evaluations whose ADI fell and rose.

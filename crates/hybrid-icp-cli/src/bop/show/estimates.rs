@@ -33,7 +33,7 @@ pub(super) struct PoseError {
     pub(super) near: bool,
 }
 
-/// What the estimates of an image are compared with.
+/// An image and everything that its estimates are compared with.
 pub(super) struct Inspection<'a> {
     pub(super) scenes: &'a Scenes,
     pub(super) image: &'a Image,
@@ -56,7 +56,7 @@ pub(super) struct Estimates {
     pub(super) file: String,
     /// The estimates that are shown: by object, those with the best scores first.
     pub(super) shown: Vec<Estimate>,
-    /// The number of rows of the image that are not shown because others of their object have better scores.
+    /// The number of rows that are not shown because others of their object have better scores.
     pub(super) beyond: usize,
     /// Files that could not be used.
     pub(super) faults: Vec<Fault>,

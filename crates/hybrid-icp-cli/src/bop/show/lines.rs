@@ -1,4 +1,4 @@
-//! The lines of the legend of `bop show`: the estimates of both files by object, with their figures.
+//! The lines of the legend of `bop show`: the estimates of both files by object.
 
 use super::estimates::{Estimate, Estimates};
 
@@ -11,9 +11,10 @@ pub(super) struct Line {
     pub(super) estimates: [Option<usize>; 2],
 }
 
-/// Pairs the estimates of every object, the nearest first; the remaining ones have a line each.
+/// Pairs the estimates of every object, the nearest first. The remaining ones have a line each.
 ///
-/// `wanted` lists the objects that should be there, an entry per instance. Instances without an estimate get an empty line.
+/// `wanted` lists the objects that should be there, an entry per instance. Instances without an
+/// estimate get an empty line.
 pub(super) fn lines(files: &[Estimates], wanted: &[u32]) -> Vec<Line> {
     let of_file = |file: usize| files.get(file).map_or(&[][..], |found| &found.shown[..]);
     let (first, second) = (of_file(0), of_file(1));
@@ -132,12 +133,12 @@ mod tests {
             ..Estimates::default()
         });
         let lines = lines(&files, &[4, 4, 4, 9, 7]);
-        let told: Vec<_> = lines
+        let found: Vec<_> = lines
             .iter()
             .map(|line| (line.tag.as_str(), line.estimates))
             .collect();
         assert_eq!(
-            told,
+            found,
             [
                 ("2", [None, Some(2)]),
                 ("4a", [Some(0), Some(1)]),

@@ -16,7 +16,7 @@ use self::estimates::{Estimates, Inspection};
 use self::lines::{grid, lines};
 use self::picture::{Scenery, outlines, with_legend};
 use super::eval::DELTA_MM;
-use super::options::DatasetOptions;
+use super::options::{DatasetOptions, file_name};
 use super::{faults, models};
 use crate::limits::limits;
 use crate::options::positive;
@@ -24,14 +24,16 @@ use crate::outputs::Files;
 use crate::picture::Picture;
 use crate::terminal::{say, table, warn};
 
-/// Draw the estimates of an image: the outlines of the models at their poses, with their scores and errors.
+/// Draw the estimates of an image: outlines of the models, with their scores and errors.
 ///
-/// The picture is the color or gray image, or the depth if there is neither. Outlines are faint where something that was
-/// measured, or another model of the same file, is in front. The legend below has, per object, the score of the file, the MVE
-/// in the mask that `bop refine` takes, and if the dataset has ground truth, ADI and VSD (mean over the ten
-/// tolerances) against the nearest instance. The same table is printed.
+/// The picture is the color or gray image, or the depth if there is neither. Outlines are faint
+/// where a measured surface, or another model of the same file, is in front. The legend has the
+/// score of every estimate and its MVE in the mask that `bop refine` takes. If the dataset has
+/// ground truth, it also has ADI and VSD (mean over the ten tolerances) against the nearest
+/// instance. The same table is printed.
 ///
-/// The exit code is 0 with warnings about missing files, and 1 if a file is damaged or there is nothing to show.
+/// The exit code is 0 with warnings about missing files, and 1 if a file is damaged or there is
+/// nothing to show.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -52,11 +54,12 @@ pub(crate) struct Arguments {
     /// The picture.
     #[arg(long, value_name = "FILE.png")]
     out: PathBuf,
-    /// Show N estimates of every object, those with the best scores; by default as many as it has instances in the
-    /// ground truth, and one without ground truth.
+    /// Show the N estimates of every object that have the best scores; by default as many as it has
+    /// instances in the ground truth, and one without ground truth.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     top: Option<u16>,
-    /// Take the masks of the MVE from a detections file (JSON with RLE segmentations) instead of mask_visib.
+    /// Take the masks of the MVE from a detections file (JSON with RLE segmentations) instead of
+    /// mask_visib.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
     /// Draw on the depth image even where there is a color or gray one.
@@ -107,7 +110,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         top: arguments.top.map(usize::from),
     };
     let estimates = files.iter();
-    let estimates = estimates.map(|(path, rows)| inspection.estimates(name(path), rows));
+    let estimates = estimates.map(|(path, rows)| inspection.estimates(file_name(path), rows));
     let estimates: Vec<Estimates> = estimates.collect();
     let missing = models
         .iter()
@@ -194,8 +197,7 @@ impl Arguments {
     }
 
     fn title(&self) -> String {
-        let root = &self.dataset.root;
-        let dataset = name(&root.canonicalize().unwrap_or_else(|_| root.clone()));
+        let dataset = self.dataset.name();
         let (split, scene, image) = (&self.dataset.split, self.scene, self.image);
         format!("{dataset}/{split} · scene {scene} · image {image}")
     }
@@ -214,7 +216,7 @@ impl Arguments {
         Ok(MaskSource::detections(detections))
     }
 
-    /// Returns the picture to draw on: the color or gray image if it is a PNG file of the depth image's size, else the depth.
+    /// Returns the picture to draw on: the color or gray image if it is a PNG file, else the depth.
     fn background(&self, image: &Image) -> anyhow::Result<Picture> {
         let path = image.scene.color_path(image.im_id);
         let mut path = path.filter(|_| !self.depth);
@@ -239,9 +241,4 @@ impl Arguments {
         }
         Ok(Picture { width, height, rgb })
     }
-}
-
-fn name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
 }

@@ -7,26 +7,18 @@ use hybrid_icp::score::VISIBILITY_TOLERANCE_METERS;
 
 use super::estimates::{Estimate, Estimates};
 use super::lines::{HEADS, Line, cells};
-use crate::picture::text::{Align, Text, fitted};
-use crate::picture::{self, AFTER, BEFORE, Ink, Picture, Rgb};
+use crate::picture::legend::{BLACK, GRAY, LEFT, Legend, RED, font};
+use crate::picture::text::{Align, Text};
+use crate::picture::{self, AGAINST, Ink, Picture, RESULT};
 
-/// What the outlines are drawn with.
+/// The image and the models of a picture.
 pub(super) struct Scenery<'a> {
     pub(super) image: &'a Image,
     pub(super) models: &'a Models,
 }
 
 /// The first file's lines, and the second's.
-const STYLES: [picture::Line; 2] = [
-    picture::Line {
-        color: AFTER,
-        dashed: false,
-    },
-    picture::Line {
-        color: BEFORE,
-        dashed: true,
-    },
-];
+const STYLES: [picture::Line; 2] = [RESULT, AGAINST];
 
 /// Draws the outlines of all estimates, and the tag of every object in its middle.
 pub(super) fn outlines(
@@ -82,7 +74,7 @@ impl Scenery<'_> {
         estimates.iter().map(view).collect()
     }
 
-    /// Returns whether a measured surface hides a model's surface. Nothing inside the object's own mask does.
+    /// Returns whether a measured surface hides a model's surface. No pixel of its mask does.
     fn hides(&self, u: u32, v: u32, model: f32, mask: Option<&Mask>) -> bool {
         let measured = self.image.depth.get(u, v).unwrap_or(0.0);
         let own = mask.is_some_and(|mask| mask.get(u, v) == Some(true));
@@ -90,25 +82,9 @@ impl Scenery<'_> {
     }
 }
 
-/// Half the height of the font in a picture 640 pixels wide. Letters of fonts of odd heights do not align.
-const HALF_FONT: i32 = 7;
-const WHITE: Rgb = [255; 3];
-const BLACK: Rgb = [20; 3];
-const GRAY: Rgb = [110; 3];
-const RED: Rgb = [200, 30, 30];
-
-/// Returns the pixels of a length in a picture 640 pixels wide.
-fn scaled(length: i32, width: u32) -> i32 {
-    let scale = (f64::from(width) / 640.0).max(1.0);
-    (f64::from(length) * scale).round() as i32
-}
-
-/// Returns the height of the font.
-fn font(width: u32) -> i32 {
-    2 * scaled(HALF_FONT, width)
-}
-
-/// Returns the object's tag in the middle of its silhouette, or below another tag; `None` if nothing is visible.
+/// Returns the object's tag in the middle of its silhouette, or below another tag.
+///
+/// If nothing of the silhouette is visible, returns `None`.
 fn tag(tag: &str, view: &RenderedView, picture: &Picture, others: &[Text]) -> Option<Text> {
     let shown: Vec<(u32, u32)> = covered_pixels(view).collect();
     let mean = |axis: fn(&(u32, u32)) -> u32| {
@@ -127,7 +103,7 @@ fn tag(tag: &str, view: &RenderedView, picture: &Picture, others: &[Text]) -> Op
         at,
         align: Align::Center,
         size,
-        color: WHITE,
+        color: [255; 3],
     })
 }
 
@@ -145,8 +121,6 @@ fn shade(tag: &Text) -> impl Iterator<Item = Text> {
 
 /// Rows of the legend except those of the objects: title, files, heads, and notes.
 const OTHER_ROWS: i32 = 4;
-/// Height of a row in a picture 640 pixels wide.
-const ROW: i32 = 19;
 /// Left end of the columns of the first file, and the distance to those of the second.
 const COLUMNS: i32 = 88;
 const NEXT: i32 = 276;
@@ -160,55 +134,30 @@ pub(super) fn with_legend(
     files: &[Estimates],
     lines: &[Line],
 ) -> anyhow::Result<Picture> {
-    let width = picture.width.max(640);
-    let s = |length: i32| scaled(length, width);
     let n_rows = i32::try_from(lines.len())? + OTHER_ROWS;
-    let top = i32::try_from(picture.height)?;
-    let middle_of = |row: i32| top + s(6 + ROW * row + ROW / 2);
-    let mut canvas = picture.above(width, u32::try_from(s(ROW * n_rows + 12))?);
-
-    let size = font(width);
-    let text = |text: String, (x, row): (i32, i32), align: Align, color: Rgb| Text {
-        text,
-        at: (s(x), middle_of(row)),
-        align,
-        size,
-        color,
-    };
-    let title = fitted(title, size, width * 9 / 10);
-    let mut texts = vec![
-        text(title, (12, 0), Align::Left, BLACK),
-        text(notes(files, lines), (12, n_rows - 1), Align::Left, GRAY),
-    ];
-    texts.push(text("object".to_owned(), (12, 2), Align::Left, GRAY));
-    let tags = (3..)
-        .zip(lines)
-        .map(|(row, line)| (line.tag.clone(), (12, row)));
-    texts.extend(tags.map(|(tag, at)| text(tag, at, Align::Left, BLACK)));
+    let mut legend = Legend::below(picture, n_rows)?;
+    legend.text(title, (LEFT, 0), Align::Left, BLACK);
+    legend.text("object", (LEFT, 2), Align::Left, GRAY);
+    for (row, line) in (3..).zip(lines) {
+        legend.text(&line.tag, (LEFT, row), Align::Left, BLACK);
+    }
     for ((place, file), style) in files.iter().enumerate().zip(STYLES) {
         let left = COLUMNS + NEXT * i32::try_from(place)?;
-        canvas.stroke((s(left), middle_of(1)), s(32), s(2), style);
-        let name = fitted(&file.file, size, u32::try_from(s(NEXT - 52))?);
-        texts.push(text(name, (left + 40, 1), Align::Left, BLACK));
+        legend.line(&file.file, (left, 1), NEXT - 12, style);
         let heads = (2, HEADS.map(str::to_owned), GRAY);
         let figures = (3..).zip(lines).map(|(row, line)| {
             let estimate = line.estimates[place].map(|index| &file.shown[index]);
-            let color = if estimate.is_some_and(is_far) {
-                RED
-            } else {
-                BLACK
-            };
-            (row, cells(estimate), color)
+            let far = estimate.is_some_and(is_far);
+            (row, cells(estimate), if far { RED } else { BLACK })
         });
         for (row, cells, color) in std::iter::once(heads).chain(figures) {
-            let cells = cells.into_iter().zip(ENDS);
-            texts.extend(
-                cells.map(|(cell, end)| text(cell, (left + end, row), Align::Right, color)),
-            );
+            for (cell, end) in cells.iter().zip(ENDS) {
+                legend.text(cell, (left + end, row), Align::Right, color);
+            }
         }
     }
-    canvas.write_texts(&texts)?;
-    Ok(canvas)
+    legend.text(&notes(files, lines), (LEFT, n_rows - 1), Align::Left, GRAY);
+    legend.finish()
 }
 
 fn is_far(estimate: &Estimate) -> bool {
