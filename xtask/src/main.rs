@@ -34,7 +34,6 @@ cargo xtask COMMAND
 
   ci        everything that must pass before a change lands
   tidy      layer table, import cycles, confined libraries, crate documentation, open ends, docs/deviations.md
-  prose     every finding about the style of comments and Markdown
   licenses  licenses and sources of all dependencies, against deny.toml
   bless     writes docs/deviations.md from the `// Deviation:` comments in the code
 
@@ -89,7 +88,6 @@ fn dispatch(words: &[&str]) -> Result<()> {
     match words {
         ["ci"] => ci::run(),
         ["tidy"] => tidy::run(),
-        ["prose"] => prose::check(true).map(|_| ()),
         ["book"] => book::build(),
         ["pictures"] => pictures::draw(),
         ["pictures", "--data"] => pictures::draw_data(),

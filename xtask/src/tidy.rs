@@ -60,7 +60,7 @@ pub(crate) fn run() -> Result<()> {
     }
     left_open(&mut findings)?;
     findings.extend(deviations::check()?);
-    findings.extend(prose::check(false)?);
+    findings.extend(prose::check()?);
     ensure!(findings.is_empty(), "{}", findings.join("\nxtask: "));
     Ok(())
 }
