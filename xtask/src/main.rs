@@ -33,7 +33,8 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   ci        everything that must pass before a change lands
-  tidy      layer table, import cycles, confined libraries, crate documentation, open ends, docs/deviations.md
+  tidy      layer table, import cycles, confined libraries, crate documentation, open ends,
+            docs/deviations.md, style of comments and Markdown
   licenses  licenses and sources of all dependencies, against deny.toml
   bless     writes docs/deviations.md from the `// Deviation:` comments in the code
 

@@ -20,6 +20,7 @@
 //!
 //! Combinations without meaning are left out:
 //!
+//! - The selection `none` with associations that start from the selected points.
 //! - Selections with associations that start from the observation, which ignore the selection.
 //! - Filters on the observed surface: if the association searches the observation, every point is
 //!   paired with itself, so that one line is enough.
@@ -156,7 +157,9 @@ fn lines() -> Vec<([&'static str; 3], [String; 3])> {
     let mut filters = vec![("none", String::new())];
     filters.extend(parts(PartKind::Filter));
     let mut lines = Vec::new();
-    for (selection, selection_text) in parts(PartKind::Selection) {
+    let mut selections = parts(PartKind::Selection);
+    selections.retain(|(selection, _)| *selection != "none");
+    for (selection, selection_text) in selections {
         for (association, association_text) in parts(PartKind::Association) {
             let usual = selection == "visible-surface";
             if !usual && FROM_OBSERVATION.contains(&association) {
