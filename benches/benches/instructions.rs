@@ -18,14 +18,12 @@ use hicp_sim::Household;
 use hybrid_icp::association::{
     AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
 };
-use hybrid_icp::core::Iteration;
 use hybrid_icp::core::{
-    Correspondences, DepthImage, Isometry3, Mask, Observation, PinholeCamera, Problem,
+    Correspondences, DepthImage, Isometry3, Iteration, Mask, Observation, PinholeCamera, Problem,
     RenderedView, Renderer, Surfel,
 };
 use hybrid_icp::icp::Workspace;
-use hybrid_icp::metric::Minimize;
-use hybrid_icp::metric::{ErrorMetric, PointToPlane, PointToPoint, Step};
+use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint, Step};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, Score};
 use hybrid_icp::{Preset, Refinement, Refiner};
