@@ -16,7 +16,7 @@ pub(crate) struct Axes {
     pub(crate) title: &'static str,
     pub(crate) x: (&'static str, Range<f64>, Vec<f64>),
     pub(crate) y: (&'static str, Range<f64>, Vec<f64>),
-    /// Whether the y axis is logarithmic.
+    /// If `true`, the y axis is logarithmic.
     pub(crate) log: bool,
 }
 

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+
 /// A point of a picture: x to the right, y down.
 pub(crate) type Place = (f64, f64);
 
@@ -93,7 +95,7 @@ impl Svg {
         hicp_io::write_rgb_png(&file, size.0, size.1, &rgb)?;
         let bytes = std::fs::read(&file).unwrap_or_default();
         let _ = std::fs::remove_file(&file);
-        let data = base64(&bytes);
+        let data = BASE64_STANDARD.encode(bytes);
         self.add(&format!(
             r#"<image x="{x}" y="{y}" width="{w}" height="{h}" href="data:image/png;base64,{data}"/>"#
         ));
@@ -112,23 +114,4 @@ impl Svg {
             ),
         )
     }
-}
-
-/// Returns bytes in base 64, padded.
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for chunk in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for place in 0..4 {
-            let letter = LETTERS[(bits >> (18 - 6 * place) & 63) as usize];
-            text.push(if place <= chunk.len() {
-                letter as char
-            } else {
-                '='
-            });
-        }
-    }
-    text
 }
