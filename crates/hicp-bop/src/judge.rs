@@ -22,7 +22,7 @@ pub struct EvaluatedObject<'a> {
     pub model: &'a Model,
     /// Its vertices and symmetries.
     pub points: ModelPoints,
-    /// Whether the error AD is ADI, the one for symmetric objects.
+    /// `true` if the error AD is ADI, the error for symmetric objects.
     pub symmetric: bool,
 }
 

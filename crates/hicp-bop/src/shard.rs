@@ -44,7 +44,7 @@ impl fmt::Display for Shard {
 pub struct Part {
     /// The shard's rows, in the order of the file.
     pub rows: Vec<ResultRow>,
-    /// Whether the rows of every image are adjacent in the whole file.
+    /// `true` if the rows of every image are adjacent in the whole file.
     ///
     /// If so, the concatenated shards have the order of the file.
     pub contiguous: bool,

@@ -2,7 +2,7 @@
 
 use crate::analysis::{Analysis, Interval, Metric};
 
-/// Whether a claim holds in a study.
+/// The verdict on a claim in a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClaimVerdict {
     /// The claim holds, and the intervals exclude the opposite.

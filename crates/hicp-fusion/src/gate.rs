@@ -59,7 +59,7 @@ impl Default for Gate {
 pub struct Gated<F> {
     inner: F,
     gate: Gate,
-    /// Whether the held estimate failed the gate.
+    /// `true` if the held estimate failed the gate.
     provisional: bool,
     /// Number of consecutive estimates that were too far away.
     contradictions: usize,

@@ -35,7 +35,7 @@ pub struct Solution {
     ///
     /// For K estimates whose covariances are right, it is about 3(K − 1).
     pub cost: f64,
-    /// Whether the last step was shorter than the tolerance.
+    /// `true` if the last step was shorter than the tolerance.
     ///
     /// Otherwise the pose is the best evaluated one.
     pub converged: bool,

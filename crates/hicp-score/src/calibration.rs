@@ -6,7 +6,7 @@
 pub struct LabeledScore {
     /// Confidence; higher is better.
     pub score: f64,
-    /// Whether the estimate is correct, by any rule.
+    /// `true` if the estimate is correct, by any rule.
     pub correct: bool,
 }
 

@@ -51,7 +51,7 @@ pub struct TargetErrors {
     pub diameter_m: f64,
     /// Width of the test image, pixels.
     pub image_width: u32,
-    /// Whether AD means ADI for this object, and not ADD.
+    /// `true` if AD means ADI for this object, `false` for ADD.
     pub symmetric: bool,
     /// Number of instances to find.
     pub instances: usize,

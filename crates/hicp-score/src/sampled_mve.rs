@@ -161,7 +161,7 @@ impl Score for SampledMve {
 /// The samples of a model.
 struct Surface {
     surfels: Vec<Surfel>,
-    /// Whether normals are certain to point out of the object.
+    /// `true` if normals are certain to point out of the object.
     oriented: bool,
 }
 

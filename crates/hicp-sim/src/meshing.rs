@@ -188,8 +188,8 @@ impl Edge {
 struct Polygon {
     /// The edges on which its corners lie. A fan starts at the first.
     edges: Vec<Edge>,
-    /// Whether every fan would have a diagonal in a face, in which the neighbor might have one,
-    /// too.
+    /// `true` if every fan would have a diagonal in a face. The neighboring cell might have a
+    /// diagonal there, too.
     around_center: bool,
 }
 

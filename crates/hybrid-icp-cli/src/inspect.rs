@@ -45,7 +45,7 @@ struct Report {
     triangles: usize,
     vertices: usize,
     diameter_m: f64,
-    /// Whether every edge has exactly two triangles.
+    /// `true` if every edge has exactly two triangles.
     closed: bool,
     warnings: Vec<String>,
     bounding_box_m: [[f32; 3]; 2],

@@ -81,7 +81,7 @@ impl PyResultOf {
         events::name(self.refinement.outcome.verdict)
     }
 
-    /// Whether the pose was refined. If not, it is the initial pose.
+    /// `True` if the pose was refined. If not, it is the initial pose.
     #[getter]
     fn refined(&self) -> bool {
         self.refinement.outcome.verdict == Verdict::Refined

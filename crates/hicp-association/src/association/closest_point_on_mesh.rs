@@ -31,7 +31,7 @@ use crate::stride::Stride;
 pub struct ClosestPointOnMesh {
     /// The observed pixels to pair.
     pub stride: Stride,
-    /// Whether to skip triangles of a closed mesh that face away from the camera.
+    /// If `true`, skips triangles of a closed mesh that face away from the camera.
     ///
     /// The camera cannot have measured them.
     pub visible_only: bool,
@@ -84,7 +84,7 @@ const LEAF_SIZE: usize = 4;
 struct MeshFaces {
     tree: BoxTree<LEAF_SIZE>,
     faces: Vec<Face>,
-    /// Whether normals are certain to point out of the object.
+    /// `true` if normals are certain to point out of the object.
     oriented: bool,
 }
 

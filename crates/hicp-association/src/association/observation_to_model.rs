@@ -38,7 +38,7 @@ pub struct ObservationToModel {
     pub stride: Stride,
     /// Number of points of the model. 0 pairs nothing.
     pub samples: usize,
-    /// Whether to skip samples of a closed mesh that face away from the camera.
+    /// If `true`, skips samples of a closed mesh that face away from the camera.
     ///
     /// The camera cannot have measured them.
     pub visible_only: bool,
@@ -91,7 +91,7 @@ impl DataAssociation for ObservationToModel {
 struct ModelPoints {
     surfels: Vec<Surfel>,
     tree: PointTree,
-    /// Whether normals are certain to point out of the object.
+    /// `true` if normals are certain to point out of the object.
     oriented: bool,
 }
 

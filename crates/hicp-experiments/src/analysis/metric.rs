@@ -14,11 +14,11 @@ pub const ADD_SHARE: f64 = 0.1;
 pub enum Metric {
     /// Mean VSD of the returned pose.
     Vsd,
-    /// Whether the mean VSD is above [`FAILURE_VSD`].
+    /// 1 if the mean VSD is above [`FAILURE_VSD`], else 0.
     Failure,
     /// Processor time, milliseconds.
     CpuMs,
-    /// Whether the mean VSD exceeds that of the initial pose by more than [`WORSE_VSD`].
+    /// 1 if the mean VSD exceeds that of the initial pose by more than [`WORSE_VSD`], else 0.
     Worse,
 }
 

@@ -5,8 +5,8 @@ use hicp_sim::{Corruption, DepthNoise, RelativeGaussian};
 /// The conditions under which a case is presented.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// Whether initial poses are drawn into bins of the initial VSD (§VI-B.1). Otherwise they are
-    /// 6.2 mm and 9.5° off.
+    /// If `true`, initial poses are drawn into bins of the initial VSD (§VI-B.1). If `false`, they
+    /// are 6.2 mm and 9.5° off.
     pub binned: bool,
     /// The imperfections of the image and the mask.
     pub corruption: Corruption,

@@ -23,7 +23,7 @@ pub struct Config {
     pub seed: u64,
     /// Cases per object.
     pub poses: u64,
-    /// Whether times are measured.
+    /// If `true`, measures times.
     pub times: bool,
     /// Number of bins of the initial VSD, if cases are binned.
     pub bins: usize,

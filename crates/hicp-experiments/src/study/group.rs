@@ -26,7 +26,7 @@ pub struct Group {
     pub levels: Vec<usize>,
     /// The bins; `None` for all.
     pub bins: Option<Range<usize>>,
-    /// Whether it is a single level or bin, which is a point of the figure.
+    /// `true` for a single level or bin, which is a point of the figure.
     pub single: bool,
 }
 

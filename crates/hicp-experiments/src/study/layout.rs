@@ -22,9 +22,9 @@ pub struct Layout<'a> {
     pub cases: u64,
     /// Number of bins of the initial VSD. Binned cases cycle through them.
     pub bins: usize,
-    /// Whether the cases of each setting are binned.
+    /// `true` if the cases of each setting are binned.
     pub is_binned: Vec<bool>,
-    /// Whether a run evaluates one case of every object before the next case of any object.
+    /// If `true`, a run evaluates one case of every object before the next case of any object.
     /// Otherwise it finishes one object after another.
     pub is_interleaved: bool,
 }

@@ -30,7 +30,7 @@ pub struct ObjectRecord {
     pub triangles: usize,
     /// Diameter, millimeters.
     pub diameter_mm: f64,
-    /// Whether symmetries are declared, so that ADI replaces ADD.
+    /// `true` if symmetries are declared, so that ADI replaces ADD.
     pub symmetric: bool,
     /// A hash of the mesh.
     pub fingerprint: String,

@@ -21,7 +21,7 @@ use crate::subject::Subject;
 pub struct RunOptions {
     /// Number of threads; 0 counts as 1.
     pub threads: usize,
-    /// Whether to continue the study in the folder.
+    /// If `true`, continues the study in the folder.
     pub resume: bool,
     /// Limits on the files that are read from the folder.
     pub limits: ReadLimits,

@@ -36,7 +36,7 @@ pub(crate) struct EvalJob<'a> {
     pub(crate) json: Option<&'a Path>,
     /// The file for the errors of every estimate.
     pub(crate) errors: Option<&'a Path>,
-    /// Whether to report if the scores rank correct poses first.
+    /// If `true`, reports how well the scores rank correct poses first.
     pub(crate) calibration: bool,
     pub(crate) threads: ThreadOptions,
 }

@@ -23,10 +23,10 @@ pub(crate) struct RefineJob<'a> {
     /// The file for the status of every row.
     pub(crate) rows: Option<&'a Path>,
     pub(crate) threads: ThreadOptions,
-    /// Whether to write times.
+    /// If `true`, writes times.
     pub(crate) timed: bool,
     pub(crate) rescore: Rescore,
-    /// Whether to continue an existing journal.
+    /// If `true`, continues an existing journal.
     pub(crate) resume: bool,
     /// The option that continues an interrupted run, for messages.
     pub(crate) resumed_by: &'static str,

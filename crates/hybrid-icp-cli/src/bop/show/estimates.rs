@@ -29,7 +29,7 @@ pub(super) struct PoseError {
     pub(super) adi_m: f64,
     /// Mean over BOP's ten tolerances.
     pub(super) vsd: f64,
-    /// Whether ADI is below a tenth of the diameter.
+    /// `true` if ADI is below a tenth of the diameter.
     pub(super) near: bool,
 }
 
