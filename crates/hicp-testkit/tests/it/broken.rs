@@ -16,7 +16,7 @@ use hybrid_icp::core::{
 };
 use hybrid_icp::icp::Judgment;
 use hybrid_icp::icp::{
-    Outcome, Progress, Regime, RegimeEvent, Session, Stage, StopRule, Termination, Verdict,
+    Outcome, Progress, Regime, RegimeEvent, Session, Stage, StopRule, Termination,
 };
 use hybrid_icp::metric::Minimize;
 use hybrid_icp::metric::{ErrorMetric, NormalEquations, PointToPlane, PointToPoint, Step};
@@ -426,12 +426,11 @@ impl Stage for Rash {
             (false, false) => Isometry3::translation(0.0, 0.0, 1e-3) * init,
             _ => *init,
         };
-        let mut outcome = Outcome::kept(init, Termination::NoPairs);
-        outcome.camera_from_object = pose;
-        if !self.kept {
-            outcome.verdict = Verdict::Refined;
+        if self.kept {
+            Outcome::kept(&pose, Termination::NoPairs)
+        } else {
+            Outcome::refined(pose, Termination::NoPairs)
         }
-        outcome
     }
 }
 
