@@ -81,7 +81,7 @@ impl PyResultOf {
         events::name(self.refinement.outcome.verdict)
     }
 
-    /// `True` if the pose was refined. If not, it is the initial pose.
+    /// Returns `True` if the pose was refined. If not, the pose is the initial one.
     #[getter]
     fn refined(&self) -> bool {
         self.refinement.outcome.verdict == Verdict::Refined
