@@ -5,6 +5,7 @@ pub mod fuzz;
 pub mod nees;
 pub mod room;
 pub mod starts;
+pub mod tabletop;
 pub mod ycbv;
 
 use std::sync::Arc;

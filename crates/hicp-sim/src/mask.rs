@@ -15,6 +15,14 @@ pub struct MaskDefects {
     pub erosion_pixels: u32,
     /// Radius of the disc by which the mask is dilated, pixels.
     pub dilation_pixels: u32,
+    /// Number of cells across the longer side of the mask's box, as a network predicts them.
+    ///
+    /// Each cell holds its covered share, which is interpolated between cells. 0 keeps the mask.
+    pub soft_cells: u32,
+    /// The interpolated share above which a pixel of a soft mask is set.
+    pub soft_threshold: f64,
+    /// Whether the mask is replaced by its bounding box.
+    pub boxed: bool,
 }
 
 /// Largest radius of an erosion or dilation, pixels.
@@ -28,6 +36,7 @@ impl MaskDefects {
     /// [`SimError::Parameter`] if the share is not in [0, 1] or a radius is above 256 pixels.
     pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, mask: &Mask) -> Result<Mask, SimError> {
         check_range("missing share of the mask", self.missing_share, 0.0..=1.0)?;
+        check_range("threshold of the soft mask", self.soft_threshold, 0.0..=1.0)?;
         for (what, radius) in [
             ("erosion in pixels", self.erosion_pixels),
             ("dilation in pixels", self.dilation_pixels),
@@ -45,6 +54,13 @@ impl MaskDefects {
         }
         if self.dilation_pixels > 0 {
             mask = grow(&mask, self.dilation_pixels, true)?;
+        }
+        if self.soft_cells > 0 {
+            mask = soften(&mask, self.soft_cells, self.soft_threshold)?;
+        }
+        if self.boxed {
+            let region = mask.bounding_region();
+            mask = map_mask(&mask, |u, v, _| region.contains(u, v))?;
         }
         Ok(mask)
     }
@@ -113,6 +129,42 @@ pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> +
     (v_min..v_max).flat_map(move |v| (u_min..u_max).map(move |u| (u, v)))
 }
 
+/// Averages a mask over square cells, interpolates between their centers, and thresholds.
+fn soften(mask: &Mask, cells: u32, threshold: f64) -> Result<Mask, SimError> {
+    let region = mask.bounding_region();
+    let side = region.width().max(region.height()) as f64 / f64::from(cells);
+    if side <= 0.0 {
+        return Ok(mask.clone());
+    }
+    // A border of empty cells lets the interpolation fall to zero outside of the box.
+    let count = cells as usize + 2;
+    let mut sums = vec![(0.0, 0.0); count * count];
+    let cell = |pixel: u32, first: u32| (f64::from(pixel) - f64::from(first) + 0.5) / side + 1.0;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // At least 0, and clamped to the cells.
+    let index = |x: f64| (x as usize).min(count - 1);
+    for (u, v) in pixels(&region) {
+        let at = index(cell(v, region.v_min)) * count + index(cell(u, region.u_min));
+        sums[at].0 += f64::from(u8::from(mask.get(u, v) == Some(true)));
+        sums[at].1 += 1.0;
+    }
+    let share = |x: usize, y: usize| {
+        let (sum, n) = sums[y.min(count - 1) * count + x.min(count - 1)];
+        if n > 0.0 { sum / n } else { 0.0 }
+    };
+    let reach = 0.0..count as f64 - 0.5;
+    map_mask(mask, |u, v, _| {
+        let (x, y) = (cell(u, region.u_min) - 0.5, cell(v, region.v_min) - 0.5);
+        if !(reach.contains(&x) && reach.contains(&y)) {
+            return false;
+        }
+        let (i, j) = (index(x), index(y));
+        let (a, b) = (x - i as f64, y - j as f64);
+        let row = |j| share(i, j) * (1.0 - a) + share(i + 1, j) * a;
+        row(j) * (1.0 - b) + row(j + 1) * b > threshold
+    })
+}
+
 /// Spreads the pixels of one value over a disc: set pixels to dilate, unset pixels to erode.
 fn grow(mask: &Mask, radius: u32, value: bool) -> Result<Mask, SimError> {
     let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
@@ -172,6 +224,7 @@ mod tests {
             missing_share,
             erosion_pixels,
             dilation_pixels,
+            ..MaskDefects::default()
         };
         defects.apply(&mut rng(4), mask).unwrap()
     }
@@ -226,6 +279,34 @@ mod tests {
                 .zip(small.pixels())
                 .all(|(l, s)| !l || *s)
         );
+    }
+
+    #[test]
+    fn soft_masks_follow_the_threshold_and_boxes_fill_the_corners() {
+        let full = disc(30.0);
+        let soft = |soft_cells, soft_threshold| {
+            let defects = MaskDefects {
+                soft_cells,
+                soft_threshold,
+                ..MaskDefects::default()
+            };
+            defects.apply(&mut rng(4), &full).unwrap()
+        };
+        let (small, half, large) = (soft(14, 0.9), soft(14, 0.5), soft(14, 0.0));
+        assert!(count(&small) < count(&half) && count(&half) < count(&large));
+        let changed = half.pixels().iter().zip(full.pixels());
+        let changed = changed.filter(|(a, b)| a != b).count();
+        assert!(changed > 0 && changed < count(&full) / 10, "{changed}");
+        let reach = large.bounding_region();
+        assert!(reach.width() <= 61 + 2 * 5 && reach.width() > 61);
+
+        let boxed = MaskDefects {
+            boxed: true,
+            ..MaskDefects::default()
+        };
+        let boxed = boxed.apply(&mut rng(4), &full).unwrap();
+        assert_eq!(boxed.bounding_region(), full.bounding_region());
+        assert_eq!(count(&boxed), full.bounding_region().area());
     }
 
     #[test]

@@ -301,7 +301,7 @@ fn corruptions_are_seeded_and_paired_and_do_not_change_the_case() {
     let defects = MaskDefects {
         missing_share: 0.2,
         erosion_pixels: 1,
-        dilation_pixels: 0,
+        ..MaskDefects::default()
     };
     let both = Corruption {
         mask: defects,

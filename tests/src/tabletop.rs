@@ -1,0 +1,242 @@
+//! Simulated cases with the troubles of a robot cell: objects on a table that hide each other,
+//! boards in front of them, depth noise and imperfect masks.
+
+use std::sync::Arc;
+
+use hicp_sim::{
+    Case, Clutter, Corruption, DepthNoise, DepthSensor, Household, MaskDefects, Proportions,
+    RelativeGaussian, SimError, SimRng, perturb, rotation, stream,
+};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera};
+use rand::RngExt;
+
+use crate::camera;
+
+/// Fewest visible pixels of an object that is a case.
+const LEAST_PIXELS: usize = 1000;
+/// Smallest visible share of an object that is a case.
+const LEAST_VISIBLE: f64 = 0.3;
+/// Objects in a scene.
+const OBJECTS: usize = 5;
+
+/// A defect of a mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaskKind {
+    /// The visible pixels.
+    Exact,
+    /// Dilated by a disc of this radius, pixels.
+    Dilated(u32),
+    /// Eroded by a disc of this radius, pixels.
+    Eroded(u32),
+    /// 28 cells across the box, interpolated and cut at a half, as networks predict masks.
+    Soft,
+    /// As [`MaskKind::Soft`], but every pixel above zero is set, as readers of soft masks do.
+    SoftAboveZero,
+    /// The bounding box.
+    Box,
+}
+
+impl MaskKind {
+    /// The kinds that the tables show.
+    pub const ALL: [Self; 8] = [
+        Self::Exact,
+        Self::Dilated(4),
+        Self::Dilated(8),
+        Self::Dilated(16),
+        Self::Eroded(4),
+        Self::Soft,
+        Self::SoftAboveZero,
+        Self::Box,
+    ];
+
+    /// Returns the name in tables.
+    pub fn name(self) -> String {
+        match self {
+            Self::Exact => "exact".into(),
+            Self::Dilated(pixels) => format!("dilated {pixels} px"),
+            Self::Eroded(pixels) => format!("eroded {pixels} px"),
+            Self::Soft => "soft, above a half".into(),
+            Self::SoftAboveZero => "soft, above zero".into(),
+            Self::Box => "box".into(),
+        }
+    }
+
+    fn defects(self) -> MaskDefects {
+        let mut defects = MaskDefects::default();
+        match self {
+            Self::Exact => {}
+            Self::Dilated(pixels) => defects.dilation_pixels = pixels,
+            Self::Eroded(pixels) => defects.erosion_pixels = pixels,
+            Self::Soft => (defects.soft_cells, defects.soft_threshold) = (28, 0.5),
+            Self::SoftAboveZero => defects.soft_cells = 28,
+            Self::Box => defects.boxed = true,
+        }
+        defects
+    }
+}
+
+/// The models from which scenes are drawn.
+#[derive(Debug)]
+pub struct Tabletop {
+    /// The models, with their names.
+    pub objects: Vec<(String, Model)>,
+    models: Vec<Model>,
+    camera: PinholeCamera,
+}
+
+/// An object in a noisy image, before segmentation.
+#[derive(Debug)]
+pub struct Seen {
+    /// Index into [`Tabletop::objects`].
+    pub model: usize,
+    /// The true pose, camera from object, meters.
+    pub truth: Isometry3<f64>,
+    /// The noisy depth image, meters.
+    pub depth: Arc<DepthImage>,
+    /// The visible pixels of the object.
+    pub visible: Mask,
+    /// Their share of the pixels that the object would cover alone.
+    pub visible_share: f64,
+    /// Standard deviation of the depth noise, percent of the depth.
+    pub noise_percent: f64,
+    camera: PinholeCamera,
+}
+
+impl Tabletop {
+    /// Creates the scenes of some household objects.
+    ///
+    /// # Errors
+    ///
+    /// If a model cannot be built.
+    pub fn new(objects: &[Household]) -> Result<Self, SimError> {
+        let named = objects
+            .iter()
+            .map(|object| Ok((object.name().to_owned(), object.model()?)));
+        Ok(Self::of(named.collect::<Result<_, SimError>>()?))
+    }
+
+    /// Creates the scenes of any models.
+    pub fn of(objects: Vec<(String, Model)>) -> Self {
+        Self {
+            models: objects.iter().map(|(_, model)| model.clone()).collect(),
+            objects,
+            camera: camera(),
+        }
+    }
+
+    /// Returns the visible objects of a scene: five on a table, with noise of 0 to 3 %.
+    ///
+    /// In front of every second object stands a board that hides up to half of what is visible.
+    ///
+    /// # Errors
+    ///
+    /// If there is no model.
+    pub fn scene(&self, seed: u64) -> Result<Vec<Seen>, SimError> {
+        let mut random = stream(seed, &["tabletop"], 0);
+        let clutter = Clutter::draw(&mut random, &self.models, OBJECTS)?;
+        let perfect = DepthSensor::default();
+        let view = clutter.view(&mut random, &self.models, &self.camera, &perfect)?;
+        let noise_percent = 3.0 * random.random::<f64>();
+        let mut seen = Vec::new();
+        for (index, object) in (0..).zip(&view.instances) {
+            let occluded_share = match index % 2 {
+                0 => 0.0,
+                _ => 0.5 * random.random::<f64>(),
+            };
+            let case = Case {
+                object: self.objects[object.model].0.clone(),
+                seed,
+                index,
+                camera: self.camera,
+                camera_from_object: object.camera_from_object,
+                init: object.camera_from_object,
+                bin: None,
+                vsd_initial: 0.0,
+                tries: 1,
+                depth: view.depth.clone(),
+                mask: object.visible.clone(),
+            };
+            if count(&case.mask) < LEAST_PIXELS {
+                continue;
+            }
+            let corruption = Corruption {
+                occluded_share,
+                sensor: DepthSensor {
+                    noise: DepthNoise::Relative(RelativeGaussian {
+                        percent: noise_percent,
+                    }),
+                    ..DepthSensor::default()
+                },
+                ..Corruption::default()
+            };
+            let (depth, visible) = corruption.apply(&case)?;
+            let visible_share = count(&visible) as f64 / count(&object.silhouette) as f64;
+            if count(&visible) < LEAST_PIXELS || visible_share < LEAST_VISIBLE {
+                continue;
+            }
+            seen.push(Seen {
+                model: object.model,
+                truth: object.camera_from_object,
+                depth: Arc::new(depth),
+                visible,
+                visible_share,
+                noise_percent,
+                camera: self.camera,
+            });
+        }
+        Ok(seen)
+    }
+
+    /// Returns the same objects in other proportions, which look alike but are wrong.
+    ///
+    /// # Errors
+    ///
+    /// If a model cannot be built.
+    pub fn look_alikes(objects: &[Household]) -> Result<Self, SimError> {
+        let others = Proportions {
+            width: 1.12,
+            height: 0.92,
+        };
+        let named = objects
+            .iter()
+            .map(|object| Ok((object.name().to_owned(), object.model_with(others)?)));
+        Ok(Self::of(named.collect::<Result<_, SimError>>()?))
+    }
+}
+
+impl Seen {
+    /// Returns the observation with a kind of mask.
+    ///
+    /// # Errors
+    ///
+    /// Never with the sizes of a scene.
+    pub fn observe(&self, kind: MaskKind) -> Result<Observation, SimError> {
+        let mask = kind
+            .defects()
+            .apply(&mut stream(0, &["mask"], 0), &self.visible)?;
+        Ok(Observation::new(
+            Arc::clone(&self.depth),
+            mask,
+            self.camera,
+        )?)
+    }
+
+    /// Returns a start at the mean error of an estimator (6.2 mm, 9.5°), times a factor.
+    pub fn near(&self, random: &mut SimRng, factor: f64) -> Isometry3<f64> {
+        let (meters, degrees) = (0.0062 * factor, 9.5 * factor);
+        perturb(random, &self.truth, meters, degrees.to_radians())
+    }
+
+    /// Returns a start with a random rotation, and the center of `model` at that of the object.
+    ///
+    /// `own` is the model of the object. `model` may be that of a wrong class.
+    pub fn turned(&self, random: &mut SimRng, own: &Model, model: &Model) -> Isometry3<f64> {
+        let turn = rotation(random);
+        let center = self.truth * own.center();
+        Isometry3::from_parts((center - turn * model.center()).into(), turn)
+    }
+}
+
+fn count(mask: &Mask) -> usize {
+    mask.pixels().iter().filter(|on| **on).count()
+}
