@@ -174,42 +174,17 @@ impl Clutter {
         camera: &PinholeCamera,
         sensor: &DepthSensor,
     ) -> Result<ClutterView, SimError> {
-        let table = render_depth_image(&table()?, camera, &camera_from_world);
-        let mut nearest = table.pixels().to_vec();
-        let mut owner = vec![usize::MAX; nearest.len()];
-        let mut seen = Vec::with_capacity(self.objects.len());
-        for (index, object) in self.objects.iter().enumerate() {
-            let camera_from_object = camera_from_world * object.world_from_object;
-            let mesh = models[object.model].mesh();
-            let alone = render_depth_image(mesh, camera, &camera_from_object);
-            for ((z, near), owner) in alone.pixels().iter().zip(&mut nearest).zip(&mut owner) {
-                if *z > 0.0 && (*near <= 0.0 || z < near) {
-                    (*near, *owner) = (*z, index);
-                }
-            }
-            let silhouette = alone.pixels().iter().map(|z| *z > 0.0).collect();
-            seen.push((object.model, camera_from_object, silhouette));
-        }
-        let (width, height) = (camera.width(), camera.height());
-        let instances = seen
-            .into_iter()
-            .enumerate()
-            .map(|(index, (model, camera_from_object, silhouette))| {
-                let visible = owner.iter().map(|owner| *owner == index).collect();
-                Ok(SeenObject {
-                    model,
-                    camera_from_object,
-                    silhouette: Mask::new(width, height, silhouette)?,
-                    visible: Mask::new(width, height, visible)?,
-                })
-            })
-            .collect::<Result<_, SimError>>()?;
-        let perfect = DepthImage::from_meters(width, height, nearest)?;
-        Ok(ClutterView {
+        let objects = self.objects.iter();
+        let objects = objects.map(|o| (o.model, camera_from_world * o.world_from_object));
+        compose(
+            rng,
             camera_from_world,
-            depth: sensor.measure(rng, &perfect, camera)?,
-            instances,
-        })
+            objects,
+            None,
+            models,
+            camera,
+            sensor,
+        )
     }
 
     fn look<R: Rng + ?Sized>(&self, rng: &mut R, camera: &PinholeCamera) -> Isometry3<f64> {
@@ -232,19 +207,80 @@ impl Clutter {
         // Half the width of the image at a distance of 1 m.
         let half_width = 0.5 * f64::from(camera.width()) / camera.fx();
         let distance = self.extent * (1.0 + 1.0 / half_width) * factor;
-        let toward = Vector3::new(
-            elevation.cos() * azimuth.cos(),
-            elevation.cos() * azimuth.sin(),
-            elevation.sin(),
-        );
-        let eye = Point3::from(toward * distance);
-        // Converts a camera that looks along -z with y up to one that looks along z with y down.
-        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        half_turn * Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z())
+        looking_at_center(elevation, azimuth, distance)
     }
 }
 
-fn within<R: Rng + ?Sized>(rng: &mut R, range: &std::ops::Range<f64>) -> f64 {
+/// Returns the pose of the world for a camera that looks at the center of the table.
+///
+/// Angles are in radians and the distance in meters.
+pub(crate) fn looking_at_center(elevation: f64, azimuth: f64, distance: f64) -> Isometry3<f64> {
+    let toward = Vector3::new(
+        elevation.cos() * azimuth.cos(),
+        elevation.cos() * azimuth.sin(),
+        elevation.sin(),
+    );
+    let eye = Point3::from(toward * distance);
+    // Converts a camera that looks along -z with y up to one that looks along z with y down.
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    half_turn * Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z())
+}
+
+/// Observes objects on the table, given as indices of models with poses in the camera frame.
+///
+/// A mesh in the camera frame can hide them; it is not one of the instances.
+pub(crate) fn compose<R: Rng + ?Sized>(
+    rng: &mut R,
+    camera_from_world: Isometry3<f64>,
+    objects: impl Iterator<Item = (usize, Isometry3<f64>)>,
+    hiding: Option<(&TriMesh, Isometry3<f64>)>,
+    models: &[Model],
+    camera: &PinholeCamera,
+    sensor: &DepthSensor,
+) -> Result<ClutterView, SimError> {
+    let table = render_depth_image(&table()?, camera, &camera_from_world);
+    let mut nearest = table.pixels().to_vec();
+    let mut owner = vec![usize::MAX; nearest.len()];
+    let mut put = |alone: &DepthImage, index| {
+        for ((z, near), owner) in alone.pixels().iter().zip(&mut nearest).zip(&mut owner) {
+            if *z > 0.0 && (*near <= 0.0 || z < near) {
+                (*near, *owner) = (*z, index);
+            }
+        }
+    };
+    let mut seen = Vec::new();
+    for (index, (model, camera_from_object)) in objects.enumerate() {
+        let alone = render_depth_image(models[model].mesh(), camera, &camera_from_object);
+        put(&alone, index);
+        let silhouette = alone.pixels().iter().map(|z| *z > 0.0).collect();
+        seen.push((model, camera_from_object, silhouette));
+    }
+    if let Some((mesh, pose)) = hiding {
+        put(&render_depth_image(mesh, camera, &pose), usize::MAX);
+    }
+    let (width, height) = (camera.width(), camera.height());
+    let instances = seen
+        .into_iter()
+        .enumerate()
+        .map(|(index, (model, camera_from_object, silhouette))| {
+            let visible = owner.iter().map(|owner| *owner == index).collect();
+            Ok(SeenObject {
+                model,
+                camera_from_object,
+                silhouette: Mask::new(width, height, silhouette)?,
+                visible: Mask::new(width, height, visible)?,
+            })
+        })
+        .collect::<Result<_, SimError>>()?;
+    let perfect = DepthImage::from_meters(width, height, nearest)?;
+    Ok(ClutterView {
+        camera_from_world,
+        depth: sensor.measure(rng, &perfect, camera)?,
+        instances,
+    })
+}
+
+pub(crate) fn within<R: Rng + ?Sized>(rng: &mut R, range: &std::ops::Range<f64>) -> f64 {
     range.start + (range.end - range.start) * rng.random::<f64>()
 }
 

@@ -25,9 +25,11 @@ mod clutter;
 mod components;
 mod corruption;
 mod error;
+mod hand;
 mod household;
 mod mask;
 mod meshing;
+mod moving;
 mod noise;
 mod profile;
 mod reconstruction;
@@ -36,6 +38,7 @@ mod sensor;
 mod shapes;
 mod solid;
 mod stream;
+mod trajectory;
 mod tsdf;
 
 pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
@@ -46,6 +49,7 @@ pub use error::SimError;
 pub use household::{Household, Proportions};
 pub use mask::MaskDefects;
 pub use meshing::ScalarGrid;
+pub use moving::{Hand, MovingConfig, MovingScene};
 pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise};
 pub use sampling::{
@@ -55,6 +59,7 @@ pub use sampling::{
 pub use sensor::{DEPTH_EDGE_METERS, DepthSensor, Dropout};
 pub use solid::Solid;
 pub use stream::stream;
+pub use trajectory::Trajectory;
 pub use tsdf::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
 
 /// The random generator of all simulations: small, fast, and the same on every machine and in every
