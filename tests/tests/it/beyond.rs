@@ -13,7 +13,7 @@ use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, scene};
 use hybrid_icp::core::{Isometry3, Observation, Point3, Problem, UnitQuaternion, Vector3, se3};
 use hybrid_icp::icp::{
-    Bound, HypothesisSearch, Rotations, SearchOptions, Termination, Verdict, Workspace,
+    Bound, HypothesisSearch, Rotations, SearchOptions, Start, Termination, Verdict, Workspace,
 };
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
@@ -204,6 +204,34 @@ fn a_search_finds_any_equivalent_pose_inside_its_bound() {
         elsewhere["search"] >= 4 && elsewhere["auto"] >= 2,
         "{elsewhere:?}"
     );
+}
+
+/// A search that ignores its initial pose finds the object from the image alone.
+#[test]
+fn a_search_without_an_initial_pose_finds_the_object() {
+    for (seed, object) in (0..).zip([Household::Iron, Household::Car, Household::Bracket]) {
+        let scene = scene(object, 0.3, &mut rng(seed));
+        let options = SearchOptions {
+            start: Start::Ignored,
+            ..SearchOptions::default()
+        };
+        let found = |init: &Isometry3<f64>| {
+            let mut refiner = Refiner::new(presets::search_with(options));
+            let refined = refiner.refine(&scene.model, &scene.observation, init);
+            assert_eq!(refined.outcome.verdict, Verdict::Refined, "{object:?}");
+            refined.outcome.camera_from_object
+        };
+        let pose = found(&Isometry3::identity());
+        assert_eq!(pose, found(&Isometry3::translation(0.0, 0.0, -9.0)));
+        let points: Vec<_> = scene.model.samples().iter().map(|s| s.point).collect();
+        let error = mssd(
+            &pose,
+            &scene.truth,
+            &points,
+            &scene.model.symmetries().motions(),
+        );
+        assert!(error < 0.005, "{object:?}: {error}");
+    }
 }
 
 /// Without any time, the search returns the local pose and reports the deadline.

@@ -15,5 +15,5 @@ pub use guard::{Guard, KeepBest};
 pub use hypotheses::Rotations;
 pub use icp::{Icp, MAX_ITERATIONS};
 pub use resolution::AtResolution;
-pub use search::{HypothesisSearch, SearchOptions};
+pub use search::{HypothesisSearch, SearchOptions, Start};
 pub use stage_trait::{BoxedStage, Stage};

@@ -11,11 +11,27 @@ use crate::stage::hypotheses::{Hypotheses, Rotations};
 use crate::stage::stage_trait::Stage;
 use crate::stop::motion::Bound;
 
+/// The use of the initial pose by a [`HypothesisSearch`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Start {
+    /// The local stage refines it, and the search starts if the score stays bad.
+    #[default]
+    Refined,
+    /// It is ignored: the search always runs, and all hypotheses come from the image.
+    ///
+    /// It may be any finite pose, for example the identity. It is returned only if nothing was
+    /// observed or nothing was found. A bound, and other rotations than [`Rotations::Even`], still
+    /// refer to it.
+    Ignored,
+}
+
 /// The range, budget and conditions of a [`HypothesisSearch`].
 ///
 /// Any value is valid: with a value out of range, nothing is searched or nothing better is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchOptions {
+    /// The use of the initial pose.
+    pub start: Start,
     /// The score above which the search starts.
     ///
     /// If the local stage ends at or below it, no hypotheses are tried.
@@ -52,6 +68,7 @@ impl Default for SearchOptions {
     /// The search starts above a score of 0.15, and a hypothesis must be better by 0.03.
     fn default() -> Self {
         Self {
+            start: Start::Refined,
             threshold: 0.15,
             good_enough: 0.05,
             min_gain: 0.03,
@@ -184,9 +201,14 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
         let options = self.options;
         // One more, for the hypothesis that is removed again.
         self.ranked.reserve(options.refined.min(MAX_REFINED) + 1);
-        let hypotheses = from
-            .neighbors(init)
-            .chain(from.neighbors(local))
+        let near = match options.start {
+            Start::Refined => [Some(init), Some(local)],
+            Start::Ignored => [None; 2],
+        };
+        let hypotheses = near
+            .into_iter()
+            .flatten()
+            .flat_map(|pose| from.neighbors(pose))
             .map(Some)
             .chain(from.of(options.rotations, options.hypotheses));
         for pose in hypotheses {
@@ -221,6 +243,11 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
             let (_, start) = self.ranked[index];
             let outcome = self.explore.run(problem, &start, session);
             iterations += outcome.iterations;
+            // A hypothesis that the stage keeps is still another pose than the initial one.
+            let outcome = Outcome {
+                verdict: Verdict::Refined,
+                ..outcome
+            };
             if let Some(found) = self.found(problem, init, outcome, session)
                 && best.is_none_or(|best| found.score < best.score)
             {
@@ -273,7 +300,12 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
         session: &mut Session<'_>,
     ) -> Outcome {
         let clock = Clock::start(self.options.time_limit);
-        let mut local = self.stage.run(problem, init, session);
+        let ignored = self.options.start == Start::Ignored;
+        let mut local = if ignored {
+            Outcome::kept(init, Termination::NoPairs)
+        } else {
+            self.stage.run(problem, init, session)
+        };
         if !se3::is_finite(init)
             || problem
                 .observation()
@@ -287,13 +319,17 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
         if found.is_none() && local.verdict == Verdict::Refined {
             local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        let score = found.map_or_else(
-            || {
-                let mut context = session.workspace.context(problem);
-                self.score.score(&mut context, init)
-            },
-            |found| found.score,
-        );
+        let score = if ignored {
+            f64::INFINITY
+        } else {
+            found.map_or_else(
+                || {
+                    let mut context = session.workspace.context(problem);
+                    self.score.score(&mut context, init)
+                },
+                |found| found.score,
+            )
+        };
         if score > self.options.threshold && !stopped {
             let start = local.camera_from_object;
             self.rank(problem, init, &start, &clock, session);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use hicp_icp::{
     Anderson, AtResolution, Bound, BoxedStage, Cascade, Guard, HypothesisSearch, Icp, KeepBest,
-    MAX_ITERATIONS, Repeat, Rotations, SearchOptions,
+    MAX_ITERATIONS, Repeat, Rotations, SearchOptions, Start,
 };
 use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
 
@@ -181,6 +181,7 @@ pub(super) fn add(catalog: &mut Catalog) {
 }
 
 fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError> {
+    let starts = [("refined", Start::Refined), ("ignored", Start::Ignored)];
     let rotations = [
         ("even", Rotations::Even),
         ("view-axis", Rotations::ViewAxis),
@@ -188,7 +189,9 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     ];
     let tried = "rotations to try: of SO(3), around the viewing ray, or the declared symmetries";
     let least = "least angle between those; of two that are nearer the better ranked is refined";
+    let used = "use of the initial pose; if ignored, the search always runs";
     let options = SearchOptions {
+        start: p.word("start", &starts, used)?,
         threshold: p.number("threshold", FACTOR, 0.15, "searches above this score")?,
         good_enough: p.number("good_enough", FACTOR, 0.05, "score that ends it")?,
         min_gain: p.number("min_gain", FACTOR, 0.03, "gain that leaves the local pose")?,
