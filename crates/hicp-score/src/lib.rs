@@ -2,6 +2,7 @@
 //!
 //! - [`Score`]: the trait. [`MeanVsd`] (the paper's MVE) scores a pose against the live image,
 //!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
+//! - [`Evidence`]: what agrees with a pose, what contradicts it, and how well the mask fits.
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
 //!   benchmark.
@@ -29,6 +30,8 @@
 mod agreement;
 mod bop_vsd;
 mod calibration;
+mod evidence;
+mod evidence_grid;
 mod flatness;
 mod mean_vsd;
 mod model_points;
@@ -43,6 +46,7 @@ mod vsd;
 
 pub use bop_vsd::{bop_vsd, spheres_overlap};
 pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
+pub use evidence::Evidence;
 pub use flatness::Flatness;
 pub use hicp_core;
 pub use mean_vsd::MeanVsd;

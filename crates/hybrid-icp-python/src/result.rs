@@ -1,5 +1,7 @@
 //! `Result`.
 
+use std::collections::BTreeMap;
+
 use hybrid_icp::icp::{Quality, Verdict};
 use hybrid_icp::{Refinement, StageRecord};
 use pyo3::prelude::*;
@@ -61,6 +63,25 @@ impl PyResultOf {
     #[getter]
     fn mve_initial(&self) -> f64 {
         self.refinement.mve_initial
+    }
+
+    /// Evidence for and against the returned pose, from one render; a dict of float by name.
+    ///
+    /// The shares of the rendered pixels add up to 1:
+    ///
+    /// - `agrees`: the measured surface is within 10 % of the diameter of the rendered one.
+    /// - `seen_through`: it is farther; the camera looks through the object.
+    /// - `inside`: it is nearer and continues an agreeing surface; the object is in a table or wall.
+    /// - `hidden`: it is nearer and ends in a step; something stands in front.
+    /// - `unmeasured`: no depth was measured.
+    ///
+    /// The others are `pixels` (rendered), `unexplained` (share of the mask at which the model does
+    /// not agree), `residual` and `noise` (medians, diameters), `contour` (share of the contour at
+    /// which the measured surface ends), `mask_extra` and `mask_missing` (shares by which the mask
+    /// is too large and too small) and `mask_growth_pixels` (negative if it is too small).
+    #[getter]
+    fn evidence(&self) -> BTreeMap<&'static str, f64> {
+        BTreeMap::from(self.refinement.evidence.named())
     }
 
     /// Reasons not to trust the pose, as sentences; empty if there are none.
@@ -170,6 +191,7 @@ impl PyResultOf {
             "T_co",
             "mve",
             "mve_initial",
+            "evidence",
             "warnings",
             "outcome",
             "termination",

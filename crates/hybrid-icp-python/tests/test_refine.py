@@ -73,6 +73,8 @@ def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
     attributes = {name for name in dir(hi.Result) if not name.startswith("_")}
     assert set(known) == attributes - {"to_dict", "refined"}
     assert np.array_equal(known["T_co"], result.T_co)
+    evidence = known["evidence"]
+    assert evidence["agrees"] > 0.9 and evidence["seen_through"] + evidence["inside"] < 0.1
     assert known["stages"][0]["regime"] in ("aligned", "misaligned")
     assert repr(result).startswith("Result(refined, mve 0.")
 

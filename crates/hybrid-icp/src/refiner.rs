@@ -3,7 +3,7 @@
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
 use hicp_icp::{BoxedStage, Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
-use hicp_score::{Flatness, MeanVsd, Score};
+use hicp_score::{Evidence, Flatness, MeanVsd, Score};
 
 use crate::checks::warnings_of_result;
 use crate::preset::Preset;
@@ -28,6 +28,8 @@ pub struct Refinement {
     /// Flatness of the measured and the rendered surface at the returned pose, which tells whether
     /// a plane would explain the depth better. `None` if fewer than 64 pixels show both.
     pub flatness: Option<Flatness>,
+    /// The evidence for and against the returned pose, and how well the mask fits it.
+    pub evidence: Evidence,
 }
 
 impl Refinement {
@@ -157,11 +159,14 @@ impl<S: Stage> Refiner<S> {
             &mut Session::new(&mut self.workspace, observer),
         );
         let pose = &outcome.camera_from_object;
+        let mve = self.mve(model, observation, pose);
+        let mut context = self.workspace.context(&problem);
         Refinement {
             outcome,
             mve_initial,
-            mve: self.mve(model, observation, pose),
-            flatness: Flatness::at(&mut self.workspace.context(&problem), pose),
+            mve,
+            flatness: Flatness::at(&mut context, pose),
+            evidence: Evidence::at(&mut context, pose).unwrap_or_default(),
         }
     }
 

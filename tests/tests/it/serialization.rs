@@ -52,6 +52,14 @@ fn results_are_serialized_with_their_names_and_numbers() {
         refiner.refine_observed(&scene.model, &scene.observation, &scene.truth, &mut trace);
     let json = serde_json::to_value(result).unwrap();
     assert_eq!(json["mve"], result.mve);
+    assert_eq!(json["evidence"]["agrees"], result.evidence.agrees);
+    round_trip(&result.evidence);
+    // The list of names follows the fields.
+    let fields = json["evidence"].as_object().unwrap();
+    assert_eq!(fields.len(), result.evidence.named().len());
+    for (name, value) in result.evidence.named() {
+        assert_eq!(fields[name].as_f64(), Some(value), "{name}");
+    }
     assert_eq!(
         json["outcome"]["termination"],
         result.outcome.termination.name()

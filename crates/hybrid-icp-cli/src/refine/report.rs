@@ -1,5 +1,7 @@
 //! The report of a refinement: JSON for programs, lines for people.
 
+use std::collections::BTreeMap;
+
 use hicp_io::PoseFile;
 use hybrid_icp::icp::Verdict;
 use hybrid_icp::{Refinement, StageRecord};
@@ -21,6 +23,8 @@ pub(crate) struct Report {
     termination: &'static str,
     mve_initial: f64,
     mve: f64,
+    /// The evidence for and against the pose, by the names of its fields.
+    evidence: BTreeMap<&'static str, f64>,
     iterations: usize,
     n_pairs: usize,
     time_ms: f64,
@@ -78,6 +82,7 @@ impl Report {
             termination: outcome.termination.name(),
             mve_initial: refined.mve_initial,
             mve: refined.mve,
+            evidence: BTreeMap::from(refined.evidence.named()),
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
             time_ms,

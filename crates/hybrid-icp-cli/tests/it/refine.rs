@@ -35,6 +35,12 @@ fn the_result_has_every_key_in_its_type() {
         assert!(result[key].as_f64().unwrap() > 0.0, "{key}");
     }
     assert!(result["mve"].as_f64() < result["mve_initial"].as_f64());
+    let evidence = &result["evidence"];
+    assert!(evidence["agrees"].as_f64().unwrap() > 0.9, "{evidence}");
+    assert!(
+        evidence["seen_through"].as_f64().unwrap() < 0.1,
+        "{evidence}"
+    );
     for key in ["iterations", "n_pairs"] {
         assert!(result[key].as_u64().unwrap() > 0, "{key}");
     }
