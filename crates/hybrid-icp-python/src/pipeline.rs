@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{Preset, Refiner, Warning, warning_of_distance};
+use hybrid_icp::{Preset, Refiner, Trace, Warning, warning_of_distance};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
@@ -238,6 +238,63 @@ impl PyPipeline {
         });
         self.put_back([refiner]);
         Ok(PyResultOf::new(&init, refinement, watch.finish()?.stages))
+    }
+
+    /// Finds the pose of an object in its mask, without an initial pose.
+    ///
+    /// The pipeline refines the best poses that a search over all rotations finds. The result is
+    /// deterministic. Data never causes an exception. The call releases the GIL.
+    ///
+    /// Parameters
+    /// ----------
+    /// model : Model
+    ///     The object.
+    /// observation : Observation
+    ///     The image. Its mask shows one instance of the object.
+    ///
+    /// Returns
+    /// -------
+    /// Result
+    ///     Its `mve_initial` equals `mve`, because there is no initial pose. If no surface was
+    ///     measured inside the mask, `outcome` is "kept_initial" and `T_co` is the identity.
+    ///
+    /// Examples
+    /// --------
+    /// A plate is 0.5 m in front of the camera:
+    ///
+    /// >>> import numpy as np
+    /// >>> from hybrid_icp import Camera, Model, Observation, Pipeline, render_depth
+    /// >>> corners = [[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]]
+    /// >>> model = Model(corners, [[0, 2, 1], [0, 3, 2]])
+    /// >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
+    /// >>> true = np.eye(4); true[2, 3] = 0.5
+    /// >>> depth = render_depth(model, camera, true)
+    /// >>> result = Pipeline("local").estimate(model, Observation(depth, depth > 0, camera))
+    /// >>> bool(result.mve < 0.1 and abs(result.T_co[2, 3] - 0.5) < 1e-3)
+    /// True
+    fn estimate(
+        &self,
+        py: Python<'_>,
+        model: &Bound<'_, PyModel>,
+        observation: &Bound<'_, PyObservation>,
+    ) -> PyResult<PyResultOf> {
+        let (model, observation) = (model.get(), observation.get());
+        let mut refiner = self.take()?;
+        let (refinement, trace) = py.detach(|| {
+            let mut trace = Trace::new();
+            let (model, observation) = (&model.model, &observation.observation);
+            (
+                refiner.estimate_observed(model, observation, &mut trace),
+                trace,
+            )
+        });
+        self.put_back([refiner]);
+        let identity = Isometry3::identity();
+        let start = Motion {
+            isometry: identity,
+            matrix: array::to_matrix(&identity),
+        };
+        Ok(PyResultOf::new(&start, refinement, trace.stages))
     }
 
     /// Refines many poses of one object in one image, on several threads.

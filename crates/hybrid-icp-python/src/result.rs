@@ -59,7 +59,7 @@ impl PyResultOf {
         self.refinement.mve
     }
 
-    /// Mean VSD estimate of the initial pose.
+    /// Mean VSD estimate of the initial pose; equal to `mve` after `Pipeline.estimate`.
     #[getter]
     fn mve_initial(&self) -> f64 {
         self.refinement.mve_initial

@@ -79,6 +79,23 @@ def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
     assert repr(result).startswith("Result(refined, mve 0.")
 
 
+def test_an_object_is_found_without_an_initial_pose(scene):
+    result = hi.Pipeline().estimate(scene.model, scene.observation)
+    assert hi.add(result.T_co, scene.true, scene.model) < 0.001
+    assert result.refined and result.mve < 0.05 and result.mve_initial == result.mve
+    assert result.warnings == [] and result.stages
+    again = hi.Pipeline().estimate(scene.model, scene.observation)
+    assert again.to_dict() == result.to_dict()
+
+
+def test_nothing_is_found_in_an_empty_mask(scene):
+    empty = hi.Observation(scene.depth, np.zeros_like(scene.mask), scene.camera)
+    result = hi.Pipeline().estimate(scene.model, empty)
+    assert (result.outcome, result.termination) == ("kept_initial", "no_pairs")
+    assert np.array_equal(result.T_co, np.eye(4)) and result.mve == 1.0
+    assert result.warnings == ["MVE 1.000: the pose does not explain the image, do not trust it"]
+
+
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
 def test_a_batch_has_the_bits_of_single_calls_in_order(scene, threads):
     poses = many(scene, 12)

@@ -46,7 +46,7 @@ mod beyond;
 
 pub use beyond::{
     CloudToModelIcp, Explore, Far, GatedIcp, HybridVisible, Local, Near, Search, auto,
-    hybrid_visible, local, search, search_with,
+    estimate_with, hybrid_visible, local, search, search_with,
 };
 
 use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};

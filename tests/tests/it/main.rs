@@ -27,6 +27,7 @@ mod custom_stop_rule;
 mod custom_switcher;
 mod degeneracy_scenes;
 mod determinism;
+mod estimate;
 mod facade;
 mod fuzz_regressions;
 mod hostile;

@@ -181,6 +181,7 @@ class Pipeline:
         T_co: npt.ArrayLike,
         observer: _Observer | None = None,
     ) -> Result: ...
+    def estimate(self, model: Model, observation: Observation) -> Result: ...
     def refine_batch(
         self,
         model: Model,

@@ -11,7 +11,7 @@ use hicp_association::{
 };
 use hicp_icp::{
     Cascade, Convergence, Divergence, Guard, HypothesisSearch, Icp, IterationLimit, Repeat,
-    SearchOptions,
+    SearchOptions, Start,
 };
 use hicp_metric::{PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
@@ -182,6 +182,23 @@ fn explore() -> Explore {
         min_gain: 0.01,
         good_enough: 0.02,
     }
+}
+
+/// A search without an initial pose that ends with `stage`, as in
+/// [`Refiner::estimate`](crate::Refiner::estimate).
+#[must_use]
+pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, MeanVsd> {
+    HypothesisSearch::new(
+        stage,
+        explore(),
+        SampledMve::lenient(),
+        MeanVsd::lenient(),
+        SearchOptions {
+            start: Start::Ignored,
+            good_enough: 0.15,
+            ..SearchOptions::default()
+        },
+    )
 }
 
 /// [`local`], followed by a search if its MVE stays above a threshold.
