@@ -71,6 +71,7 @@
 
 mod calibration;
 mod checks;
+mod mask_in_box;
 mod preset;
 pub mod presets;
 mod refiner;
@@ -97,6 +98,7 @@ pub use checks::{
     warnings_of_result,
 };
 pub use hicp_icp::BoxedStage;
+pub use mask_in_box::mask_in_box;
 pub use preset::{Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;

@@ -195,7 +195,7 @@ pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, Me
         MeanVsd::lenient(),
         SearchOptions {
             start: Start::Ignored,
-            good_enough: 0.15,
+            good_enough: 0.02,
             ..SearchOptions::default()
         },
     )
