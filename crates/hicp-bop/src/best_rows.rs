@@ -1,5 +1,6 @@
 //! Selection of the best rows per image and object.
 
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 
 use hicp_io::bop::ResultRow;
@@ -12,7 +13,7 @@ use crate::frames::Targets;
 /// With `targets`, rows without a target are dropped, and `inst_count` rows of every target are
 /// kept, as in the benchmark's toolkit. The result contains exactly the rows that an evaluation
 /// uses. With `top`, at most `top` rows per image and object are kept. Of equal scores, the first
-/// is kept. With neither, all rows are kept.
+/// is kept. With neither, all rows are kept. A row may be a value that contains a [`ResultRow`].
 ///
 /// Cost: O(n log n).
 ///
@@ -29,16 +30,16 @@ use crate::frames::Targets;
 /// assert_eq!(kept, [row(5, 0.9), row(7, 0.1)]);
 /// ```
 #[must_use]
-pub fn best_rows(
-    rows: Vec<ResultRow>,
+pub fn best_rows<T: Borrow<ResultRow>>(
+    rows: Vec<T>,
     top: Option<usize>,
     targets: Option<&Targets>,
-) -> Vec<ResultRow> {
+) -> Vec<T> {
     if top.is_none() && targets.is_none() {
         return rows;
     }
     let mut groups: BTreeMap<(u32, u32, u32), Vec<usize>> = BTreeMap::new();
-    for (index, row) in rows.iter().enumerate() {
+    for (index, row) in rows.iter().map(Borrow::borrow).enumerate() {
         let group = (row.scene_id, row.im_id, row.obj_id);
         groups.entry(group).or_default().push(index);
     }
@@ -49,7 +50,10 @@ pub fn best_rows(
             let count = of_frame.and_then(|objects| objects.get(&obj_id));
             count.map_or(0, |count| *count as usize)
         });
-        let scores: Vec<f64> = indices.iter().map(|index| rows[*index].score).collect();
+        let scores: Vec<f64> = indices
+            .iter()
+            .map(|index| rows[*index].borrow().score)
+            .collect();
         for best in top_estimates(&scores, wanted.min(top.unwrap_or(usize::MAX))) {
             kept[indices[best]] = true;
         }

@@ -1,5 +1,6 @@
 //! The masks of an image, and its observations with them.
 
+use hicp_io::bop::Detection;
 use hybrid_icp::Refiner;
 use hybrid_icp::core::{Isometry3, Mask, Model, Observation};
 
@@ -172,6 +173,31 @@ impl<'a> BopImage<'a> {
         let mask = by.mask(view, (depth, camera), model, pose);
         let mask = mask.ok_or(RowStatus::NothingMeasured)?;
         self.image.observe(mask).map_err(|_| RowStatus::Damaged)
+    }
+
+    /// Creates an observation with the mask of a detection, or with its box if it has no mask
+    /// ([`hybrid_icp::mask_in_box`]).
+    ///
+    /// # Errors
+    ///
+    /// [`RowStatus::NoMask`] without both, [`RowStatus::Damaged`] if the mask has another size than
+    /// the depth image.
+    pub fn observe_detection(&mut self, detection: &Detection) -> Result<Observation, RowStatus> {
+        let source = match (&detection.segmentation, detection.bbox) {
+            (Some(code), _) => Source::Code(code),
+            (None, Some(bbox)) => Source::Box(bbox),
+            (None, None) => return Err(RowStatus::NoMask),
+        };
+        let mask = source.read(&self.image);
+        let observation = mask.and_then(|mask| {
+            let observation = self.image.observe(mask);
+            observation.map_err(|error| Fault::damaged(error.to_string()))
+        });
+        observation.map_err(|fault| {
+            let status = RowStatus::from(&fault);
+            self.faults.push(fault);
+            status
+        })
     }
 
     /// Reads a mask that is not held. Releases all other masks if the memory would be exceeded.

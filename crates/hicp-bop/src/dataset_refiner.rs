@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use hicp_io::bop::ResultRow;
-use hybrid_icp::core::{Isometry3, Model, Observation};
+use hicp_io::bop::{Detection, ResultRow};
+use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{Refiner, warnings};
+use hybrid_icp::{Refinement, Refiner, warnings};
 
 use crate::bop_image::BopImage;
 use crate::frames::FrameKey;
@@ -34,7 +34,8 @@ impl DatasetRefiner {
     ///
     /// `indices` are the positions of these rows in `rows`, ascending ([`crate::frames_of`]). The
     /// rows of an object compete for its masks ([`crate::assign_masks`]). Without segmentation,
-    /// each row has a separate mask ([`crate::BoxMask`]).
+    /// each row has a separate mask ([`crate::BoxMask`]). With [`MaskSource::OfRows`], the poses of
+    /// the rows are ignored and estimated.
     ///
     /// Never fails: a row that cannot be refined has a [`RowStatus`] with the reason, and missing
     /// or damaged files are listed in the faults. Except for the time, the result depends only on
@@ -83,12 +84,15 @@ impl DatasetRefiner {
                         let observed = work.frame.observe_box(work.refiner, model, &init, by);
                         match observed {
                             Ok(observed) => {
-                                let row = refine(work.refiner, model, &observed, (index, &init));
-                                work.done(start, row);
+                                let refined = work.refiner.refine(model, &observed, &init);
+                                work.done(start, row_of(index, &refined));
                             }
                             Err(status) => work.leave(&[(index, init)], status),
                         }
                     }
+                }
+                (Some(model), MaskSource::OfRows(detections)) => {
+                    work.estimate(model, obj_id, &of_object, detections);
                 }
                 (Some(model), _) => work.in_masks(model, obj_id, &of_object),
             }
@@ -121,10 +125,37 @@ impl Work<'_, '_> {
                         let warnings = warnings(model, observation, init).into_iter();
                         self.result.warnings.extend(warnings.map(|d| (obj_id, d)));
                     }
-                    let row = refine(self.refiner, model, observation, (*index, init));
-                    self.done(start, row);
+                    let refined = self.refiner.refine(model, observation, init);
+                    self.done(start, row_of(*index, &refined));
                     // Only the first refined row includes the time of the choice.
                     start = Instant::now();
+                }
+                Err(status) => self.leave(&[(*index, *init)], status),
+            }
+        }
+    }
+
+    /// Estimates the rows of an object, each in the mask of its detection.
+    fn estimate(
+        &mut self,
+        model: &Model,
+        obj_id: u32,
+        rows: &[(usize, Isometry3<f64>)],
+        detections: &[Detection],
+    ) {
+        let mut looked = false;
+        for (index, init) in rows {
+            let start = Instant::now();
+            let detection = detections.get(*index).ok_or(RowStatus::NoMask);
+            match detection.and_then(|detection| self.frame.observe_detection(detection)) {
+                Ok(observation) => {
+                    let found = self.refiner.estimate(model, &observation);
+                    self.done(start, row_of(*index, &found));
+                    if !std::mem::replace(&mut looked, true) {
+                        let pose = &found.outcome.camera_from_object;
+                        let warnings = warnings(model, &observation, pose).into_iter();
+                        self.result.warnings.extend(warnings.map(|d| (obj_id, d)));
+                    }
                 }
                 Err(status) => self.leave(&[(*index, *init)], status),
             }
@@ -144,14 +175,8 @@ impl Work<'_, '_> {
     }
 }
 
-/// Refines a row with an observation.
-fn refine(
-    refiner: &mut Refiner,
-    model: &Model,
-    observation: &Observation,
-    (index, init): (usize, &Isometry3<f64>),
-) -> RowResult {
-    let refinement = refiner.refine(model, observation, init);
+/// Returns the result of a row.
+fn row_of(index: usize, refinement: &Refinement) -> RowResult {
     let outcome = &refinement.outcome;
     let (status, pose) = match outcome.verdict {
         Verdict::Refined => (RowStatus::Refined, Some(outcome.camera_from_object)),

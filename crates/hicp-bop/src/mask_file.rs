@@ -1,7 +1,8 @@
-//! The storage of a mask: an image file or a run-length code.
+//! The storage of a mask: an image file, a run-length code or a box.
 
 use hicp_io::bop::Rle;
 use hybrid_icp::core::Mask;
+use hybrid_icp::mask_in_box;
 
 use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;
@@ -13,6 +14,8 @@ pub(crate) enum Source<'a> {
     Instance(usize),
     /// The run-length code of a detection.
     Code(&'a Rle),
+    /// The box of a detection: x, y, width and height, pixels.
+    Box([f64; 4]),
 }
 
 impl Source<'_> {
@@ -36,6 +39,7 @@ impl Source<'_> {
                     found => Err(wrong_size(&path.display().to_string(), found, image)),
                 }
             }
+            Self::Box(bbox) => Ok(mask_in_box(&image.depth, &image.camera, bbox)),
             // A short code may describe a huge mask, so its size is checked before decoding.
             Self::Code(code) => match (code.width(), code.height()) {
                 found if found == expected => Ok(code.to_mask()),

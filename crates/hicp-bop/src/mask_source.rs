@@ -22,6 +22,10 @@ pub enum MaskSource {
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
     /// No segmentation: the mask of a row consists of all measured points in a box around its pose.
     Box(BoxMask),
+    /// One detection per row, in the order of the rows: the mask of a row is that of its detection.
+    ///
+    /// The rows have no pose yet. It is estimated ([`hybrid_icp::Refiner::estimate`]).
+    OfRows(Vec<Detection>),
 }
 
 impl MaskSource {
@@ -54,7 +58,7 @@ impl MaskSource {
                     }
                 }
             }
-            Self::Box(_) => {}
+            Self::Box(_) | Self::OfRows(_) => {}
         }
         BopImage::new(image, masks, faults)
     }

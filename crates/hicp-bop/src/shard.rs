@@ -1,5 +1,6 @@
 //! Parts of a result file, for refining it on several machines.
 
+use std::borrow::Borrow;
 use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
@@ -41,9 +42,9 @@ impl fmt::Display for Shard {
 
 /// The result of [`Shard::take`].
 #[derive(Debug)]
-pub struct Part {
+pub struct Part<T = ResultRow> {
     /// The shard's rows, in the order of the file.
-    pub rows: Vec<ResultRow>,
+    pub rows: Vec<T>,
     /// `true` if the rows of every image are adjacent in the whole file.
     ///
     /// If so, the concatenated shards have the order of the file.
@@ -60,13 +61,13 @@ impl Shard {
     ///
     /// Cost: O(rows).
     #[must_use]
-    pub fn take(self, rows: Vec<ResultRow>) -> Part {
+    pub fn take<T: Borrow<ResultRow>>(self, rows: Vec<T>) -> Part<T> {
         let image = |row: &ResultRow| (row.scene_id, row.im_id);
         let mut ranks: HashMap<(u32, u32), usize> = HashMap::new();
         let mut counts: Vec<u64> = Vec::new();
         let mut contiguous = true;
         let mut last = None;
-        for row in &rows {
+        for row in rows.iter().map(Borrow::borrow) {
             let rank = *ranks.entry(image(row)).or_insert(counts.len());
             if rank == counts.len() {
                 counts.push(0);
@@ -89,7 +90,9 @@ impl Shard {
             .collect();
         let rows = rows.into_iter();
         Part {
-            rows: rows.filter(|row| mine[ranks[&image(row)]]).collect(),
+            rows: rows
+                .filter(|row| mine[ranks[&image(row.borrow())]])
+                .collect(),
             contiguous,
         }
     }

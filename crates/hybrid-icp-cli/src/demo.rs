@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let caption = format!("{when}: {degrees:.2} deg and {mm:.2} mm off, MVE {mve:.3}");
         (pose, caption)
     });
-    Picture::before_and_after(&model, &observation, captioned)?.write(&arguments.picture)?;
+    Picture::before_and_after(&model, &observation, &captioned)?.write(&arguments.picture)?;
 
     let reason = warnings::reason(&refined, &model, &observation, &init);
     say(format_args!(

@@ -42,6 +42,8 @@ Examples:
   hybrid-icp demo
   hybrid-icp refine --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
+  hybrid-icp estimate --model mug.ply --model-unit mm --depth depth.png \\
+      --depth-scale 0.1 --mask mask.png --camera camera.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp bop show --dataset bop/ycbv --scene 50 --image 1 \\
@@ -60,6 +62,7 @@ and `experiment` then continue with --resume, `bop compare` without it.";
 enum Command {
     Demo(demo::Arguments),
     Refine(refine::Arguments),
+    Estimate(refine::estimate::Arguments),
     Replay(refine::replay::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
@@ -78,6 +81,7 @@ fn main() -> ExitCode {
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
+        Command::Estimate(arguments) => refine::estimate::run(&arguments),
         Command::Replay(arguments) => refine::replay::run(&arguments),
         Command::Bop(command) => bop::run(&command),
         Command::Inspect(arguments) => inspect::run(&arguments),

@@ -2,6 +2,7 @@
 
 mod advice;
 mod compare;
+mod estimate;
 mod eval;
 mod faults;
 mod generate;
@@ -19,6 +20,7 @@ use clap::Subcommand;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Refine(refine::Arguments),
+    Estimate(estimate::Arguments),
     Eval(eval::Arguments),
     Generate(generate::Arguments),
     Compare(compare::Arguments),
@@ -30,6 +32,7 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Refine(arguments) => refine::run(arguments),
+        Command::Estimate(arguments) => estimate::run(arguments),
         Command::Eval(arguments) => eval::run(arguments),
         Command::Generate(arguments) => generate::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),

@@ -16,18 +16,21 @@ const LEAST: [u32; 2] = [320, 160];
 const MOST_ENLARGED: usize = 1000;
 
 impl Picture {
-    /// Shows the depth around an object with the model's outlines at two poses, and their captions.
+    /// Shows the depth around an object with the model's outlines at some poses, and their
+    /// captions.
     ///
-    /// The picture contains the mask and both silhouettes, with a margin.
+    /// The last pose is the result; there may be one before it.
+    ///
+    /// The picture contains the mask and all silhouettes, with a margin.
     pub(crate) fn before_and_after(
         model: &Model,
         observation: &Observation,
-        poses: [(&Isometry3<f64>, String); 2],
+        poses: &[(&Isometry3<f64>, String)],
     ) -> anyhow::Result<Self> {
         let camera = observation.camera();
         let (mut rasterizer, mut view) = (Rasterizer::default(), RenderedView::default());
         let mut shown = observation.mask().pixels().to_vec();
-        for (pose, _) in &poses {
+        for (pose, _) in poses {
             rasterizer.render(model.mesh(), camera, pose, &camera.region(), &mut view);
             for (u, v) in covered_pixels(&view) {
                 shown[v as usize * camera.width() as usize + u as usize] = true;
@@ -49,13 +52,14 @@ impl Picture {
 
         let mut picture = Self::of_depth(&depth);
         let mut ink = Ink::of(&picture);
-        let lines = poses.iter().zip([AGAINST, RESULT]);
+        let kinds = [AGAINST, RESULT].into_iter();
+        let lines = poses.iter().zip(kinds.skip(usize::from(poses.len() < 2)));
         for ((pose, _), line) in lines.clone() {
             rasterizer.render(model.mesh(), &camera, pose, &camera.region(), &mut view);
             ink.outline(&view, line, |_, _, _| false);
         }
         picture.draw(&ink);
-        let mut legend = Legend::below(&picture, 2)?;
+        let mut legend = Legend::below(&picture, i32::try_from(poses.len())?)?;
         for (row, ((_, caption), line)) in (0..).zip(lines) {
             legend.line(caption, (LEFT, row), WIDTH - 2 * LEFT, line);
         }

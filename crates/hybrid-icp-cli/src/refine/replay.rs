@@ -7,7 +7,7 @@ use clap::Args;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::inputs::Inputs;
+use super::inputs::{ImageFiles, Inputs, Region};
 use super::trace::TraceLines;
 use crate::choice::Pipeline;
 use crate::limits::limits;
@@ -15,8 +15,9 @@ use crate::terminal::{say, warn};
 
 /// Run a trace again and compare every iteration.
 ///
-/// A trace (`hybrid-icp refine --trace FILE`) contains its pipeline and the names of its files. The
-/// same files give the same iterations to the last digit. If a line differs, the exit code is 1.
+/// A trace (`hybrid-icp refine --trace FILE` or `estimate`) contains its pipeline and the names of
+/// its files. The same files give the same iterations to the last digit. If a line differs, the
+/// exit code is 1.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The trace file.
@@ -83,20 +84,33 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
     let pipeline = Pipeline::parse(&origin, header.text("toml")?, &overrides)?;
     let unit = header.text("model_unit")?.parse();
     let inputs = Inputs {
-        model: header.text("model")?.into(),
-        model_unit: unit.map_err(|_| header.refuse("model_unit", "m, mm or cm"))?,
-        depth: header.text("depth")?.into(),
-        depth_scale: Some(header.get("depth_scale", "a number")?),
-        mask: header.text("mask")?.into(),
-        camera: header.text("camera")?.into(),
-        init: header.text("init")?.into(),
+        files: ImageFiles {
+            model: header.text("model")?.into(),
+            model_unit: unit.map_err(|_| header.refuse("model_unit", "m, mm or cm"))?,
+            depth: header.text("depth")?.into(),
+            depth_scale: Some(header.get("depth_scale", "a number")?),
+            camera: header.text("camera")?.into(),
+        },
+        region: match header.line.get("bbox") {
+            Some(_) => Region::Box(header.get("bbox", "four numbers")?),
+            None => Region::Mask(header.text("mask")?.into()),
+        },
+        init: match header.line.get("init") {
+            Some(_) => Some(header.text("init")?.into()),
+            None => None,
+        },
     };
     let read = inputs.read()?;
-    let init = read.init.camera_from_object;
     let observation = inputs.observe(read.depth, read.mask, read.camera)?;
     let mut trace = TraceLines::new(Some(header.line.clone()));
     let mut refiner = pipeline.refiner();
-    refiner.refine_observed(&read.model, &observation, &init, &mut trace);
+    match &read.init {
+        Some(init) => {
+            let init = &init.camera_from_object;
+            refiner.refine_observed(&read.model, &observation, init, &mut trace)
+        }
+        None => refiner.estimate_observed(&read.model, &observation, &mut trace),
+    };
     // Convert through text as the old lines were; numbers in JSON are read back exactly.
     let lines = trace.lines().iter();
     lines

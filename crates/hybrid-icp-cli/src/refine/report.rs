@@ -12,16 +12,19 @@ use crate::terminal::table;
 /// The JSON report of a refinement; lengths in millimeters as in BOP, losses in m².
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
-    #[serde(rename = "cam_R_m2c")]
-    rotation: [f64; 9],
-    #[serde(rename = "cam_t_m2c")]
-    translation_mm: [f64; 3],
+    /// `None` if no pose was found.
+    #[serde(rename = "cam_R_m2c", skip_serializing_if = "Option::is_none")]
+    rotation: Option<[f64; 9]>,
+    #[serde(rename = "cam_t_m2c", skip_serializing_if = "Option::is_none")]
+    translation_mm: Option<[f64; 3]>,
     pipeline: String,
     outcome: &'static str,
     /// The reason of the outcome in words.
     reason: String,
     termination: &'static str,
-    mve_initial: f64,
+    /// `None` without an initial pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mve_initial: Option<f64>,
     mve: f64,
     /// The evidence for and against the pose, by the names of its fields.
     evidence: BTreeMap<&'static str, f64>,
@@ -60,7 +63,7 @@ struct StageReport {
 impl Report {
     pub(crate) fn new(
         pipeline: &str,
-        init: &PoseFile,
+        init: Option<&PoseFile>,
         refined: &Refinement,
         reason: String,
         warnings: Vec<String>,
@@ -69,18 +72,23 @@ impl Report {
     ) -> Self {
         let outcome = &refined.outcome;
         let (rotation, translation_mm) = match outcome.verdict {
-            Verdict::Refined => hicp_io::pose_to_bop(&outcome.camera_from_object),
+            Verdict::Refined => Some(hicp_io::pose_to_bop(&outcome.camera_from_object)),
             // The rotation in the file may be orthogonal only to its number of digits.
-            Verdict::KeptInitial(_) => (init.rotation, init.translation_mm),
-        };
+            Verdict::KeptInitial(_) => init.map(|init| (init.rotation, init.translation_mm)),
+        }
+        .unzip();
         Self {
             rotation,
             translation_mm,
             pipeline: pipeline.to_owned(),
-            outcome: verdict(outcome.verdict),
+            outcome: match (init, outcome.verdict) {
+                (Some(_), kind) => verdict(kind),
+                (None, Verdict::Refined) => "estimated",
+                (None, Verdict::KeptInitial(_)) => "not_found",
+            },
             reason,
             termination: outcome.termination.name(),
-            mve_initial: refined.mve_initial,
+            mve_initial: init.map(|_| refined.mve_initial),
             mve: refined.mve,
             evidence: BTreeMap::from(refined.evidence.named()),
             iterations: outcome.iterations,
@@ -150,6 +158,19 @@ pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
         ]
     }));
     table(&rows, 5)
+}
+
+/// Returns a one-line summary of an estimate.
+pub(crate) fn summary_of_estimate(found: &Refinement, reason: &str) -> String {
+    let (outcome, mve) = (&found.outcome, found.mve);
+    match outcome.verdict {
+        Verdict::Refined => format!(
+            "estimated: MVE {mve:.3}, {} pairs, {} iterations; ended because {reason}",
+            outcome.n_pairs(),
+            outcome.iterations,
+        ),
+        Verdict::KeptInitial(_) => format!("found no pose: {reason}"),
+    }
 }
 
 /// Returns a one-line summary of the refinement.

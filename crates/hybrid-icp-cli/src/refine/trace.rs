@@ -9,7 +9,7 @@ use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
 use serde_json::{Value, json};
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, Region};
 use crate::choice::Pipeline;
 use crate::pose_json::add_pose;
 
@@ -69,8 +69,11 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
         "pipeline": pipeline.name,
         "toml": pipeline.toml,
         "set": pipeline.overrides,
-        "model_unit": inputs.model_unit.to_string(),
+        "model_unit": inputs.files.model_unit.to_string(),
     });
+    if let Region::Box(bbox) = &inputs.region {
+        line["bbox"] = json!(bbox);
+    }
     for (option, path) in inputs.files() {
         let text = path.to_str().ok_or_else(|| {
             anyhow!(

@@ -38,37 +38,45 @@ pub(crate) fn reason(
 }
 
 /// Returns warnings about units that do not fit together, with the files and options to check.
+///
+/// `pose` is the initial pose, or the estimated one if there is none.
 pub(super) fn about_units(
     model: &Model,
     observation: &Observation,
-    init: &Isometry3<f64>,
+    pose: &Isometry3<f64>,
     inputs: &Inputs,
     depth_scale: f64,
 ) -> Vec<String> {
-    let warnings = hybrid_icp::warnings(model, observation, init).into_iter();
-    let (unit, depth, mask) = (inputs.model_unit, &inputs.depth, inputs.mask.display());
-    let in_words = |warning| {
-        let (file, advice) = match warning {
-            Warning::Diameter { .. } => (&inputs.model, format!(", check --model-unit {unit}")),
-            Warning::BehindCamera { .. } => (&inputs.init, String::new()),
-            Warning::NoDepth => (
-                depth,
-                format!(
-                    " at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): check --depth-scale \
-                     and {mask}"
-                ),
-            ),
-            Warning::Depth { .. } => (
-                depth,
-                format!(": check --depth-scale (now {depth_scale} mm per unit) and cam_t_m2c (mm)"),
-            ),
-            Warning::Mask { .. } | Warning::Sliver { .. } => (
-                &inputs.mask,
-                format!(": check --model-unit {unit} and cam_t_m2c (mm)"),
-            ),
-            _ => (&inputs.model, String::new()),
-        };
-        format!("{}: {warning}{advice}", file.display())
+    let warnings = hybrid_icp::warnings(model, observation, pose).into_iter();
+    // If nothing was found, there is no pose to warn of.
+    let warnings = warnings.filter(|warning| {
+        inputs.init.is_some() || !matches!(warning, Warning::BehindCamera { .. })
+    });
+    let files = &inputs.files;
+    let (unit, model, depth) = (
+        files.model_unit,
+        files.model.display(),
+        files.depth.display(),
+    );
+    let mask = inputs.mask_name();
+    let (init, pose_unit) = match &inputs.init {
+        Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),
+        None => (String::new(), ""),
+    };
+    let in_words = |warning| match warning {
+        Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
+        Warning::BehindCamera { .. } => format!("{init}: {warning}"),
+        Warning::NoDepth => format!(
+            "{depth}: {warning} at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): \
+             check --depth-scale and {mask}"
+        ),
+        Warning::Depth { .. } => format!(
+            "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}"
+        ),
+        Warning::Mask { .. } | Warning::Sliver { .. } => {
+            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}")
+        }
+        _ => format!("{model}: {warning}"),
     };
     warnings.map(in_words).collect()
 }

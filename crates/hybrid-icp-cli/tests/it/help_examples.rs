@@ -7,6 +7,8 @@ use std::process::Command;
 
 use hicp_io::LengthUnit;
 
+use serde_json::json;
+
 use crate::common::*;
 
 /// Returns the lines below a heading of a help text, up to the next empty line.
@@ -43,6 +45,13 @@ fn dataset(folder: &Path) {
     std::fs::remove_file(root.join("test_targets_bop19.json")).unwrap();
     let rows = std::fs::read_to_string(root.join("initial_synthetic-test.csv")).unwrap();
     std::fs::write(folder.join("rows.csv"), rows.replace("\n1,", "\n50,")).unwrap();
+    // A box in every image is a detection.
+    let detection = |image: u32| {
+        json!({"scene_id": 50, "image_id": image, "category_id": 1, "score": 0.5,
+               "bbox": [200, 150, 240, 180]})
+    };
+    let detections = json!([detection(1), detection(2)]);
+    std::fs::write(folder.join("detections.json"), detections.to_string()).unwrap();
 }
 
 #[test]
@@ -60,7 +69,9 @@ fn the_examples_of_all_help_texts_run() {
         let scene = Scene::new();
         hicp_io::write_ply(scene.path("mug.ply"), &car(), LengthUnit::Millimeters).unwrap();
         std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
-        symlink(shared.path().join("bop"), scene.path("bop")).unwrap();
+        for name in ["bop", "detections.json"] {
+            symlink(shared.path().join(name), scene.path(name)).unwrap();
+        }
         for name in ["in.csv", "cosypose_ycbv-test.csv", "refined_ycbv-test.csv"] {
             std::fs::copy(shared.path().join("rows.csv"), scene.path(name)).unwrap();
         }

@@ -24,6 +24,7 @@ mod bop_warnings;
 mod command_line;
 mod common;
 mod demo;
+mod estimate;
 mod experiment;
 mod faults;
 mod help_examples;

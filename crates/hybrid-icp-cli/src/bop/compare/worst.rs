@@ -62,7 +62,7 @@ pub(super) fn pictures(
             (&poses[0], caption("initial", &mm[0])),
             (&poses[1], caption(&worst.pipeline, &mm[1])),
         ];
-        let picture = Picture::before_and_after(model, &observation, captioned)?;
+        let picture = Picture::before_and_after(model, &observation, &captioned)?;
         let png = BASE64_STANDARD.encode(picture.png()?);
         let (object, image, scene) = (row.obj_id, row.im_id, row.scene_id);
         let place = format!("Object {object} in image {image} of scene {scene}");

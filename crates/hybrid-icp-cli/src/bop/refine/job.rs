@@ -1,12 +1,93 @@
 //! The refinement of a result file, for every command that needs one.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use hicp_bop::{MaskSource, Rescore};
 
 use super::row_options::RowOptions;
 use crate::bop::options::{DatasetOptions, ThreadOptions};
-use crate::choice::Pipeline;
+use crate::choice::{Pipeline, PipelineArguments};
+use crate::outputs::{Files, journal_of};
+
+/// The options of the commands that write a result file.
+#[derive(Debug, Args)]
+pub(crate) struct JobOptions {
+    /// The result file to write.
+    #[arg(long, value_name = "OUT.csv")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) pipeline: PipelineArguments,
+    #[command(flatten)]
+    threads: ThreadOptions,
+    /// Write -1 to the time column, so that the same input gives the same bytes.
+    #[arg(long)]
+    no_time: bool,
+    #[command(flatten)]
+    pub(crate) choice: RowOptions,
+    /// Replace the score, so that poses can be ranked without ground truth. With mve, the score is
+    /// 1 - MVE of the row's pose in the output, and 0 for a row without an MVE.
+    #[arg(long, value_name = "BY", value_parser = ["mve"])]
+    rescore: Option<String>,
+    /// Also write the status of every row as CSV, with its MVE before and after, and the reasons
+    /// not to trust its pose.
+    #[arg(long, value_name = "ROWS.csv")]
+    rows: Option<PathBuf>,
+    /// Continue a killed run with the same options. If it left no journal, start from the
+    /// beginning.
+    #[arg(long)]
+    resume: bool,
+}
+
+impl JobOptions {
+    /// Adds the files that the job reads and writes to those of a command, and checks them.
+    ///
+    /// The output may replace the input of the option `replaceable`.
+    pub(crate) fn check_files(
+        &self,
+        files: Files<'_>,
+        replaceable: &str,
+        dataset: &DatasetOptions,
+    ) -> anyhow::Result<()> {
+        let journal = journal_of(&self.output);
+        let files = files
+            .reads("--pipeline", self.pipeline.file())
+            .reads("--targets", &self.choice.targets)
+            .writes("--output", [&self.output])
+            .writes("the journal of --output", &journal)
+            .writes("--rows", &self.rows);
+        files.check_in_place("--output", replaceable)?;
+        files.spare_dataset(&dataset.root, &dataset.split)
+    }
+
+    /// Returns the job for the rows of a file.
+    pub(crate) fn job<'a>(
+        &'a self,
+        dataset: &'a DatasetOptions,
+        results: &'a Path,
+        masks: MaskSource,
+        pipeline: Pipeline,
+    ) -> RefineJob<'a> {
+        RefineJob {
+            dataset,
+            results,
+            choice: self.choice.clone(),
+            masks,
+            pipeline,
+            output: &self.output,
+            rows: self.rows.as_deref(),
+            threads: self.threads,
+            timed: !self.no_time,
+            rescore: match self.rescore {
+                Some(_) => Rescore::Mve,
+                None => Rescore::Keep,
+            },
+            resume: self.resume,
+            resumed_by: "--resume",
+            listed_by: Some("--rows"),
+        }
+    }
+}
 
 /// A refinement of the rows of a result file.
 pub(crate) struct RefineJob<'a> {
@@ -32,4 +113,11 @@ pub(crate) struct RefineJob<'a> {
     pub(crate) resumed_by: &'static str,
     /// The option that lists the status of every row, for messages.
     pub(crate) listed_by: Option<&'static str>,
+}
+
+impl RefineJob<'_> {
+    /// Returns whether the rows have no poses, so that they are estimated.
+    pub(super) fn estimates(&self) -> bool {
+        matches!(self.masks, MaskSource::OfRows(_))
+    }
 }

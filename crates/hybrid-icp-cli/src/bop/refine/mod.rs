@@ -13,15 +13,14 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
-use hicp_bop::{BoxMask, MaskSource, Rescore};
+use hicp_bop::{BoxMask, MaskSource};
 use hicp_io::bop::ResultRow;
 
-pub(crate) use self::job::RefineJob;
+pub(crate) use self::job::{JobOptions, RefineJob};
 pub(crate) use self::row_options::RowOptions;
-use super::options::{DatasetOptions, ThreadOptions};
-use crate::choice::PipelineArguments;
+use super::options::DatasetOptions;
 use crate::limits::limits;
-use crate::outputs::{self, Files, journal_of};
+use crate::outputs::{self, Files};
 
 /// Refine every row of a result file.
 ///
@@ -45,9 +44,6 @@ pub(crate) struct Arguments {
     /// The result file to refine: CSV with scene_id, im_id, obj_id, score, R, t and time.
     #[arg(long, value_name = "IN.csv")]
     results: PathBuf,
-    /// The refined result file to write.
-    #[arg(long, value_name = "OUT.csv")]
-    output: PathBuf,
     /// Use the masks of a detections file (JSON with RLE segmentations) instead of mask_visib.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
@@ -61,26 +57,7 @@ pub(crate) struct Arguments {
     )]
     mask: MaskKind,
     #[command(flatten)]
-    pipeline: PipelineArguments,
-    #[command(flatten)]
-    threads: ThreadOptions,
-    /// Write -1 to the time column, so that the same input gives the same bytes.
-    #[arg(long)]
-    no_time: bool,
-    #[command(flatten)]
-    choice: RowOptions,
-    /// Replace the score, so that poses can be ranked without ground truth. With mve, the score is
-    /// 1 - MVE of the row's pose in the output, and 0 for a row without an MVE.
-    #[arg(long, value_name = "BY", value_parser = ["mve"])]
-    rescore: Option<String>,
-    /// Also write the status of every row as CSV, with its MVE before and after, and the reasons
-    /// not to trust its pose.
-    #[arg(long, value_name = "ROWS.csv")]
-    rows: Option<PathBuf>,
-    /// Continue a killed run with the same options. If it left no journal, start from the
-    /// beginning.
-    #[arg(long)]
-    resume: bool,
+    job: JobOptions,
 }
 
 /// The kind of mask.
@@ -110,60 +87,35 @@ SIGTERM), and the journal has the finished images for --resume.";
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.check_files()?;
-    let pipeline = arguments.pipeline.choose()?;
+    let Arguments {
+        dataset, results, ..
+    } = arguments;
+    let files = Files::default()
+        .reads("--results", [results])
+        .reads("--detections", &arguments.detections);
+    arguments.job.check_files(files, "--results", dataset)?;
+    let pipeline = arguments.job.pipeline.choose()?;
     let rows = arguments.read_rows()?;
-    let job = RefineJob {
-        dataset: &arguments.dataset,
-        results: &arguments.results,
-        choice: arguments.choice.clone(),
-        masks: match (&arguments.detections, arguments.mask) {
-            (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),
-            (None, MaskKind::Visible) => MaskSource::Visible,
-            (None, MaskKind::None) => MaskSource::Box(BoxMask::default()),
-        },
-        pipeline,
-        output: &arguments.output,
-        rows: arguments.rows.as_deref(),
-        threads: arguments.threads,
-        timed: !arguments.no_time,
-        rescore: match arguments.rescore {
-            Some(_) => Rescore::Mve,
-            None => Rescore::Keep,
-        },
-        resume: arguments.resume,
-        resumed_by: "--resume",
-        listed_by: Some("--rows"),
+    let masks = match (&arguments.detections, arguments.mask) {
+        (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),
+        (None, MaskKind::Visible) => MaskSource::Visible,
+        (None, MaskKind::None) => MaskSource::Box(BoxMask::default()),
     };
+    let job = arguments.job.job(dataset, results, masks, pipeline);
     job.run(rows).map(|_| ())
 }
 
 impl Arguments {
-    /// Checks that the outputs can be written and that they replace no input but the result file.
-    fn check_files(&self) -> anyhow::Result<()> {
-        let journal = journal_of(&self.output);
-        let files = Files::default()
-            .reads("--results", [&self.results])
-            .reads("--pipeline", self.pipeline.file())
-            .reads("--detections", &self.detections)
-            .reads("--targets", &self.choice.targets)
-            .writes("--output", [&self.output])
-            .writes("the journal of --output", &journal)
-            .writes("--rows", &self.rows);
-        files.check_in_place("--output", "--results")?;
-        files.spare_dataset(&self.dataset.root, &self.dataset.split)
-    }
-
     /// Reads the rows to refine. Fails if a run in place would lose the other rows.
     fn read_rows(&self) -> anyhow::Result<Vec<ResultRow>> {
         let rows = limits().read_results(&self.results)?;
         let count = rows.len();
-        let rows = self.choice.choose(rows, &self.results)?;
-        if rows.len() < count && outputs::same_file(&self.output, &self.results) {
+        let rows = self.job.choice.choose(rows, &self.results)?;
+        if rows.len() < count && outputs::same_file(&self.job.output, &self.results) {
             bail!(
                 "--output and --results both name {}, and {} leaves out {} of its {count} rows, which would be lost: expected different files",
-                self.output.display(),
-                self.choice.given().join(" with "),
+                self.job.output.display(),
+                self.job.choice.given().join(" with "),
                 count - rows.len()
             );
         }

@@ -1,5 +1,6 @@
 //! The options that choose rows of a result file.
 
+use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -28,7 +29,7 @@ pub(crate) struct RowOptions {
     /// Refine and write only the rows of the targets in this file. Of each target, these are the
     /// inst_count rows with the best scores, which an evaluation uses.
     #[arg(long, value_name = "FILE.json")]
-    pub(super) targets: Option<PathBuf>,
+    pub(crate) targets: Option<PathBuf>,
 }
 
 impl RowOptions {
@@ -51,12 +52,12 @@ impl RowOptions {
             .collect()
     }
 
-    /// Keeps the chosen rows of `file`.
-    pub(super) fn choose(
+    /// Keeps the chosen rows of `file`, or values that contain rows.
+    pub(crate) fn choose<T: Borrow<ResultRow>>(
         &self,
-        mut rows: Vec<ResultRow>,
+        mut rows: Vec<T>,
         file: &Path,
-    ) -> anyhow::Result<Vec<ResultRow>> {
+    ) -> anyhow::Result<Vec<T>> {
         rows.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
         let targets = self.targets.as_deref().map(targets::read).transpose()?;
         let rows = best_rows(rows, self.top_k.map(|top| top as usize), targets.as_ref());

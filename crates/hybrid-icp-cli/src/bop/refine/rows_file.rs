@@ -20,23 +20,29 @@ const HEADER: [&str; 8] = [
 /// Writes one line per row of the output, in the order of the output.
 ///
 /// A line has the status, the MVE before and after, and the warnings. The MVE is empty for a row
-/// that did not reach the pipeline. `row` counts from 0, as in the errors of `bop eval`.
+/// that did not reach the pipeline. `row` counts the rows of the output from 0, as in the errors of
+/// `bop eval`. If poses are estimated, a row without a pose is not in the output, and its `row` is
+/// empty.
 pub(super) fn write(
     path: &Path,
     rows: &[ResultRow],
     results: &[FrameResult],
+    estimated: bool,
 ) -> Result<(), IoError> {
     let mut of_rows: Vec<&RowResult> = results.iter().flat_map(|result| &result.rows).collect();
     of_rows.sort_by_key(|result| result.index);
     hicp_io::write_atomically(path, |file| {
         let mut lines = csv::Writer::from_writer(file);
         lines.write_record(HEADER)?;
+        let mut place = 0..;
         for result in of_rows {
             let row = &rows[result.index];
             let warnings: Vec<String> = result.warnings().iter().map(ToString::to_string).collect();
             let (before, after) = result.mve.unzip();
+            let is_written = !estimated || result.pose.is_some();
+            let written = is_written.then(|| place.next()).flatten();
             lines.serialize((
-                (row.scene_id, row.im_id, row.obj_id, result.index),
+                (row.scene_id, row.im_id, row.obj_id, written),
                 result.status.to_string(),
                 [before, after].map(|mve| mve.map(|mve| mve.to_string())),
                 warnings.join("; "),
@@ -86,7 +92,7 @@ mod tests {
         ];
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rows.csv");
-        write(&path, &rows, &results).unwrap();
+        write(&path, &rows, &results, false).unwrap();
         assert_eq!(
             std::fs::read_to_string(path).unwrap(),
             "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings\n\

@@ -15,7 +15,7 @@ use super::{rows_file, settings, warnings};
 use crate::bop::models;
 use crate::interrupt;
 use crate::outputs::journal_of;
-use crate::terminal::{progress_bar, say};
+use crate::terminal::{progress_bar, say, warn};
 
 impl RefineJob<'_> {
     /// Refines the rows, writes the output and reports what happened.
@@ -64,10 +64,19 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
+        let poses = (!self.estimates()).then_some("--results");
+        let images = warnings::about_images(&results, &rows, poses);
         // The output may replace the input. Write it last, so that a run that fails before can be
         // continued.
         if let Some(path) = self.rows {
-            rows_file::write(path, &rows, &results)?;
+            rows_file::write(path, &rows, &results, self.estimates())?;
+        }
+        if self.estimates() {
+            let found = results.iter().flat_map(|result| &result.rows);
+            let found = found.filter(|row| row.pose.is_some());
+            let found: BTreeSet<usize> = found.map(|row| row.index).collect();
+            let mut index = 0..;
+            rows.retain(|_| index.next().is_some_and(|index| found.contains(&index)));
         }
         hicp_io::bop::write_results(self.output, &rows)?;
         journal.map_or(Ok(()), Journal::remove)?;
@@ -84,10 +93,10 @@ impl RefineJob<'_> {
         if resumed > 0 {
             text.push_str(&format!(", {resumed} frames from the journal"));
         }
-        text.push_str(&summary(&results, &shared.models, &distrust));
+        text.push_str(&summary(self, &results, &shared.models, &distrust));
         // Warnings go to standard error even if standard output fails.
         let said = say(text);
-        warnings::about_images(&results, &rows);
+        images.iter().for_each(warn);
         distrust.warn(self);
         report_faults(self, (&shared.models, &models_dir), &results)?;
         said?;

@@ -18,14 +18,24 @@ fn rows_of(results: &[FrameResult]) -> impl Iterator<Item = &RowResult> {
 }
 
 /// Counts the rows by status, one line each.
-pub(super) fn summary(results: &[FrameResult], models: &Models, distrust: &Distrust) -> String {
+pub(super) fn summary(
+    job: &RefineJob<'_>,
+    results: &[FrameResult],
+    models: &Models,
+    distrust: &Distrust,
+) -> String {
     let mut text = String::new();
     let mut counts: BTreeMap<RowStatus, usize> = BTreeMap::new();
     for row in rows_of(results) {
         *counts.entry(row.status).or_default() += 1;
     }
     for (status, count) in &counts {
-        text.push_str(&format!("\n  {count:>7}  {status}"));
+        let status_text = match (job.estimates(), status) {
+            (true, RowStatus::Refined) => "estimated".to_owned(),
+            (true, _) => status.to_string().replacen("kept", "left out", 1),
+            _ => status.to_string(),
+        };
+        text.push_str(&format!("\n  {count:>7}  {status_text}"));
         if *status == RowStatus::MissingModel {
             text.push_str(&format!(" (object {})", models::ids(&models.missing)));
         }
@@ -33,7 +43,10 @@ pub(super) fn summary(results: &[FrameResult], models: &Models, distrust: &Distr
     let (mut before, mut after): (Vec<f64>, Vec<f64>) =
         rows_of(results).filter_map(|row| row.mve).unzip();
     if let (Some(before), Some(after)) = (median(&mut before), median(&mut after)) {
-        text.push_str(&format!("\n  median MVE {before:.3} -> {after:.3}"));
+        text.push_str(&match job.estimates() {
+            true => format!("\n  median MVE {after:.3}"),
+            false => format!("\n  median MVE {before:.3} -> {after:.3}"),
+        });
     }
     if distrust.unexplained > 0 {
         let count = distrust.unexplained;
@@ -116,14 +129,18 @@ pub(super) fn report_faults(
     (models, models_dir): (&Models, &Path),
     results: &[FrameResult],
 ) -> anyhow::Result<()> {
+    let unused = match job.estimates() {
+        true => "left out",
+        false => "unchanged",
+    };
     if let Some(text) = models::missing(models, models_dir) {
-        warn(format_args!("{text}; its rows are unchanged"));
+        warn(format_args!("{text}; its rows are {unused}"));
     }
     let faults = results.iter().flat_map(|result| &result.faults);
     let damaged = faults::report(faults, models.broken.values());
     if damaged > 0 {
         bail!(
-            "{damaged} files could not be used; their rows are unchanged in {}",
+            "{damaged} files could not be used; their rows are {unused} in {}",
             job.output.display()
         );
     }

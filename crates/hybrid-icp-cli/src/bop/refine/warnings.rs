@@ -35,10 +35,15 @@ pub(super) fn about_models(models: &Models, models_dir: &Path) {
 /// A scene, its number of images with the warning, its number of images, and the first warning.
 type OfScene = (u32, usize, usize, Warning);
 
-/// Warns of flaws in most images of an object in a scene, because each scene has its own files.
+/// Returns warnings about flaws in most images of an object in a scene.
 ///
+/// Each scene has its own files. `poses` is the option that names the poses, if there are any.
 /// If only a few images have the flaw, their poses are wrong, and the files are right.
-pub(super) fn about_images(results: &[FrameResult], rows: &[ResultRow]) {
+pub(super) fn about_images(
+    results: &[FrameResult],
+    rows: &[ResultRow],
+    poses: Option<&str>,
+) -> Vec<String> {
     let mut images: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     // The advice identifies the kind of warning.
     let mut warned: BTreeMap<(u32, String, u32), (usize, Warning)> = BTreeMap::new();
@@ -53,7 +58,7 @@ pub(super) fn about_images(results: &[FrameResult], rows: &[ResultRow]) {
             *images.entry((obj_id, scene_id)).or_default() += 1;
         }
         for (obj_id, warning) in &result.warnings {
-            if let Some(advice) = advice(warning, "--results") {
+            if let Some(advice) = advice(warning, poses) {
                 let of_scene = warned.entry((*obj_id, advice, scene_id));
                 of_scene.or_insert((0, *warning)).0 += 1;
             }
@@ -67,16 +72,15 @@ pub(super) fn about_images(results: &[FrameResult], rows: &[ResultRow]) {
             of_object.push((scene_id, count, all, first));
         }
     }
-    for ((obj_id, advice), scenes) in by_object {
+    let in_words = |((obj_id, advice), scenes): ((u32, String), Vec<OfScene>)| {
         let first = scenes[0].3;
         let count: usize = scenes.iter().map(|(_, count, ..)| count).sum();
         let all: usize = scenes.iter().map(|(_, _, all, _)| all).sum();
         let scenes: Vec<u32> = scenes.iter().map(|(scene_id, ..)| *scene_id).collect();
         let scenes = name_scenes(&scenes);
-        warn(format_args!(
-            "object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}"
-        ));
-    }
+        format!("object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}")
+    };
+    by_object.into_iter().map(in_words).collect()
 }
 
 /// Names scenes by their ids, the first few of many.

@@ -154,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for warning in warnings {
         // One warning about the same number is enough.
         if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
-            let advice = advice(&warning, "--init").unwrap_or_else(|| match warning {
+            let advice = advice(&warning, Some("--init")).unwrap_or_else(|| match warning {
                 Warning::BehindCamera { .. } => format!("check {}", arguments.init.display()),
                 _ => format!("check that {} is in mm", models_dir.display()),
             });

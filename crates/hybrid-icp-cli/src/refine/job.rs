@@ -1,0 +1,124 @@
+//! One refinement or estimate, from its files to its report.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use hybrid_icp::icp::Verdict;
+
+use super::inputs::{Inputs, Read};
+use super::report::{self, Report};
+use super::trace::{self, TraceLines};
+use super::warnings;
+use crate::choice::PipelineArguments;
+use crate::outputs::Files;
+use crate::picture::Picture;
+use crate::terminal::{say, warn};
+
+/// The pipeline and the outputs.
+#[derive(Debug, Args)]
+pub(crate) struct JobOptions {
+    #[command(flatten)]
+    pipeline: PipelineArguments,
+    /// The file for the JSON result; standard output if not given.
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// A PNG file for a picture: the depth around the object, with the model's outline at the
+    /// initial pose (orange, dashed) and at the result (blue), and their MVE.
+    #[arg(long, value_name = "FILE")]
+    overlay: Option<PathBuf>,
+    /// A file for the trace: one JSON object per iteration and line, with its pose as in a pose
+    /// file. `hybrid-icp replay` runs it again.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+}
+
+impl JobOptions {
+    /// Refines the initial pose of the inputs, or estimates a pose if there is none.
+    pub(super) fn run(&self, inputs: &Inputs) -> anyhow::Result<()> {
+        self.check_files(inputs)?;
+        let pipeline = self.pipeline.choose()?;
+        let trace_path = self.trace.as_ref();
+        let mut header = trace_path
+            .map(|_| trace::header(inputs, &pipeline))
+            .transpose()?;
+        let Read {
+            model,
+            depth,
+            mask,
+            camera,
+            init: init_file,
+            depth_scale,
+        } = inputs.read()?;
+        let init = init_file.as_ref().map(|file| file.camera_from_object);
+
+        let mut refiner = pipeline.refiner();
+        if let Some(header) = &mut header {
+            header["depth_scale"] = depth_scale.into();
+        }
+        let mut trace = TraceLines::new(header);
+        let start = Instant::now();
+        let observation = inputs.observe(depth, mask, camera)?;
+        let refined = match &init {
+            Some(init) => refiner.refine_observed(&model, &observation, init, &mut trace),
+            None => refiner.estimate_observed(&model, &observation, &mut trace),
+        };
+        let time_ms = start.elapsed().as_secs_f64() * 1e3;
+
+        let found = refined.outcome.camera_from_object;
+        let from = init.unwrap_or(found);
+        let reason = warnings::reason(&refined, &model, &observation, &from);
+        let summary = match init {
+            Some(_) => report::summary(&refined, &reason),
+            None => report::summary_of_estimate(&refined, &reason),
+        };
+        let mut warnings = warnings::about_units(&model, &observation, &from, inputs, depth_scale);
+        warnings.extend(warnings::about_result(&refined));
+        let report = Report::new(
+            &pipeline.name,
+            init_file.as_ref(),
+            &refined,
+            reason,
+            warnings,
+            &trace.trace.stages,
+            time_ms,
+        );
+        let json = serde_json::to_string_pretty(&report)?;
+        if let Some(path) = &self.output {
+            hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+        }
+        if let Some(path) = trace_path {
+            trace.write(path)?;
+        }
+        if let Some(path) = &self.overlay {
+            let after = match (&init, refined.outcome.verdict) {
+                (None, _) => "estimated",
+                (_, Verdict::Refined) => "after",
+                (_, Verdict::KeptInitial(_)) => "after, the same pose",
+            };
+            let before = format!("before: MVE {:.3}", refined.mve_initial);
+            let mut poses: Vec<_> = init.iter().map(|init| (init, before.clone())).collect();
+            poses.push((&found, format!("{after}: MVE {:.3}", refined.mve)));
+            Picture::before_and_after(&model, &observation, &poses)?.write(path)?;
+        }
+        report.warnings.iter().for_each(warn);
+        match self.output {
+            Some(_) => say(summary),
+            None => say(json),
+        }
+    }
+
+    fn check_files(&self, inputs: &Inputs) -> anyhow::Result<()> {
+        let mut files = Files::default()
+            .writes("--output", &self.output)
+            .writes("--overlay", &self.overlay)
+            .writes("--trace", &self.trace);
+        for (option, path) in inputs.files() {
+            files = files.reads(option, [path]);
+        }
+        // A pose can be refined in place, because the result has the keys of a pose file.
+        files
+            .reads("--pipeline", self.pipeline.file())
+            .check_in_place("--output", "--init")
+    }
+}

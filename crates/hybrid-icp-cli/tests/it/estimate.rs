@@ -1,0 +1,185 @@
+//! `hybrid-icp estimate` and `hybrid-icp bop estimate`.
+
+use crate::common::*;
+use crate::world::*;
+use hicp_io::bop::{ResultRow, Rle, read_results};
+use hicp_io::read_mask_png;
+use hicp_sim::Household;
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::score::ModelPoints;
+use serde_json::{Value, json};
+
+/// Runs `estimate` on a scene, and returns the run.
+fn estimate(scene: &Scene, region: &str) -> Run {
+    let words = format!(
+        "estimate --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 \
+         --camera camera.json --output out.json --overlay overlay.png --trace trace.jsonl {region}"
+    );
+    run(scene.folder.path(), words.split_whitespace())
+}
+
+fn result(scene: &Scene) -> Value {
+    let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn an_object_is_found_in_its_mask_or_box() {
+    let scene = Scene::new();
+    let mask = read_mask_png(scene.path("mask.png")).unwrap();
+    let shown = mask.bounding_region();
+    let (left, top) = (shown.u_min, shown.v_min);
+    let bbox = format!("--bbox {left},{top},{}.5,{}", shown.width(), shown.height());
+    for region in ["--mask mask.png", &bbox] {
+        let told = estimate(&scene, region).exits(0);
+        assert!(told.out.starts_with("estimated: MVE 0.0"), "{}", told.out);
+        assert_eq!(told.err, "");
+        let result = result(&scene);
+        assert!(error(CAR, &pose_of(&result), &truth()) < 0.001);
+        assert_eq!(result["outcome"], "estimated");
+        assert!(result["mve"].as_f64().unwrap() < 0.05);
+        assert!(result.get("mve_initial").is_none());
+        assert!(!result["trace"].as_array().unwrap().is_empty());
+        let (width, _, rgb) = hicp_io::read_rgb_png(scene.path("overlay.png")).unwrap();
+        let has = |color: [u8; 3]| rgb.chunks_exact(3).any(|pixel| pixel == color);
+        assert!(width == 640 && has([86, 180, 233]) && !has([230, 159, 0]));
+        let told = run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
+        assert!(told.out.contains("all equal"), "{}", told.out);
+    }
+}
+
+#[test]
+fn an_estimate_that_finds_nothing_has_no_pose() {
+    let scene = Scene::new();
+    let told = estimate(&scene, "--bbox 0,0,20,20").exits(0);
+    assert!(told.out.starts_with("found no pose: "), "{}", told.out);
+    let result = result(&scene);
+    assert_eq!(result["outcome"], "not_found");
+    assert!(result.get("cam_R_m2c").is_none() && result.get("cam_t_m2c").is_none());
+    for (region, parts) in [
+        ("", &["--bbox"][..]),
+        ("--mask mask.png --bbox 1,2,3,4", &["--bbox", "--mask"]),
+        ("--bbox 1,2,3", &["--bbox", "x,y,width,height"]),
+        ("--bbox 1,2,3,-4", &["--bbox", "above 0"]),
+        ("--bbox 1,2,3,nan", &["--bbox", "above 0"]),
+    ] {
+        estimate(&scene, region).exits(2).complains(parts);
+    }
+}
+
+/// Returns the visible masks as detections; the last of every image has only a box.
+fn detections(world: &World) -> Vec<Value> {
+    let mut detections = Vec::new();
+    for ((scene, image), truths) in &world.truths {
+        for (index, (id, _)) in truths.iter().enumerate() {
+            let mask = read_mask_png(world.mask_path(*scene, *image, index)).unwrap();
+            let (code, region) = (Rle::of_mask(&mask), mask.bounding_region());
+            let counts = match index {
+                0 => json!(code.counts()),
+                _ => json!(code.to_compressed()),
+            };
+            let (left, top) = (region.u_min, region.v_min);
+            let mut detection = json!({
+                "scene_id": scene, "image_id": image, "category_id": id,
+                "score": 0.5 + 0.1 * index as f64, "time": 0.25,
+                "bbox": [left, top, region.width(), region.height()],
+            });
+            if index + 1 < truths.len() {
+                detection["segmentation"] = json!({"size": [240, 320], "counts": counts});
+            }
+            detections.push(detection);
+        }
+    }
+    detections
+}
+
+fn bop_estimate(world: &World, options: &str) -> (Run, Vec<ResultRow>) {
+    let words =
+        format!("bop estimate --dataset . --detections found.json --output out.csv {options}");
+    let run = run(world.folder.path(), words.split_whitespace());
+    let rows = read_results(world.path("out.csv")).unwrap_or_default();
+    (run, rows)
+}
+
+/// Returns the ADI error in meters, because the car looks alike from the front and the back.
+fn error(obj_id: u32, pose: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
+    let object = match obj_id {
+        CAR => Household::Car,
+        _ => Household::Hammer,
+    };
+    ModelPoints::new(&object.model().unwrap()).adi(pose, truth)
+}
+
+#[test]
+fn every_detection_becomes_a_row_with_its_score_and_its_time() {
+    let world = World::new();
+    let mut found = detections(&world);
+    std::fs::write(world.path("found.json"), json!(found).to_string()).unwrap();
+    let (run, rows) = bop_estimate(&world, "--rows rows.csv");
+    let run = run.exits(0);
+    assert!(run.out.contains("10  estimated"), "{}", run.out);
+    assert_eq!((run.err.as_str(), rows.len()), ("", 10));
+    let truths = world.truths.values().flatten();
+    for ((row, detection), (id, truth)) in rows.iter().zip(&found).zip(truths) {
+        assert_eq!(
+            (row.obj_id, row.score),
+            (*id, detection["score"].as_f64().unwrap())
+        );
+        assert!(row.time_s.unwrap() > 0.25);
+        assert!(
+            error(*id, &row.camera_from_object(), truth) < 0.004,
+            "{row}"
+        );
+    }
+
+    // Without times, the bytes do not depend on threads, shards or interruptions.
+    let (run, _) = bop_estimate(&world, "--no-time --threads 1");
+    run.exits(0);
+    let output = || std::fs::read_to_string(world.path("out.csv")).unwrap();
+    let whole = output();
+    let mut parts = String::new();
+    for shard in ["1/2", "2/2"] {
+        let (run, _) = bop_estimate(&world, &format!("--no-time --threads 2 --shard {shard}"));
+        run.exits(0);
+        let part = output();
+        let start = if parts.is_empty() {
+            0
+        } else {
+            part.find('\n').unwrap() + 1
+        };
+        parts.push_str(&part[start..]);
+    }
+    assert_eq!(parts, whole);
+
+    // The rows of targets are those with the best scores.
+    let targets = json!([{"scene_id": 12, "im_id": 40, "obj_id": CAR, "inst_count": 1}]);
+    std::fs::write(world.path("targets.json"), targets.to_string()).unwrap();
+    let (run, rows) = bop_estimate(&world, "--targets targets.json --rescore mve");
+    run.exits(0);
+    let truth = world.truths[&(12, 40)][2].1;
+    assert!(rows.len() == 1 && rows[0].score > 0.9);
+    assert!(error(CAR, &rows[0].camera_from_object(), &truth) < 0.004);
+
+    // Detections without a pose are left out, and the rows count those that are written.
+    found[0]["category_id"] = json!(ABSENT);
+    found[1].as_object_mut().unwrap().remove("bbox");
+    found[2]["segmentation"] = json!({"size": [1, 7], "counts": [0, 7]});
+    std::fs::write(world.path("found.json"), json!(found).to_string()).unwrap();
+    let (run, rows) = bop_estimate(&world, "--no-time --rows rows.csv");
+    let run = run
+        .exits(1)
+        .complains(&["7x1", "320x240", "left out in out.csv"]);
+    assert_eq!(rows.len(), 7);
+    for line in [
+        "7  estimated",
+        "1  left out: missing model (object 9)",
+        "1  left out: no mask of the object",
+        "1  left out: damaged file",
+    ] {
+        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
+    }
+    let status = std::fs::read_to_string(world.path("rows.csv")).unwrap();
+    let status: Vec<&str> = status.lines().collect();
+    assert_eq!(status[1], "3,0,9,,kept: missing model,,,");
+    assert!(status[4].starts_with("3,40,2,0,refined,"), "{}", status[4]);
+}
