@@ -78,6 +78,7 @@ mod refiner;
 mod sequential;
 mod sequential_step;
 mod trace;
+mod tracker;
 mod warning;
 
 pub use hicp_association as association;
@@ -104,6 +105,7 @@ pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
 pub use trace::{StageRecord, Trace};
+pub use tracker::{TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::Warning;
 
 /// The names that most programs need: `use hybrid_icp::prelude::*;`.

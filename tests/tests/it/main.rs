@@ -45,6 +45,7 @@ mod sequential;
 mod serialization;
 mod stages;
 mod starts;
+mod tracker;
 mod ycbv;
 
 #[global_allocator]

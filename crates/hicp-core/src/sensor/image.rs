@@ -218,6 +218,61 @@ impl Mask {
         Ok(Self(raster, region))
     }
 
+    /// Creates a mask whose pixels outside of a region are not set.
+    ///
+    /// `is_set` returns whether pixel (u, v) of the region belongs to the object. Parts of the
+    /// region outside of the image are ignored. Cost: that of zeroed memory for the image, and
+    /// O(pixels of the region).
+    ///
+    /// # Panics
+    ///
+    /// If memory cannot hold `width * height` bytes. No camera has sides above
+    /// [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
+    ///
+    /// ```
+    /// use hicp_core::{Mask, PixelRegion};
+    /// let region = PixelRegion { u_min: 1, v_min: 0, u_max: 9, v_max: 2 };
+    /// let mask = Mask::in_region(4, 3, &region, |u, v| u != v);
+    /// assert_eq!(mask.get(1, 1), Some(false));
+    /// assert_eq!(mask.get(3, 1), Some(true));
+    /// assert_eq!(mask.bounding_region(), PixelRegion { u_min: 1, v_min: 0, u_max: 4, v_max: 2 });
+    /// ```
+    #[must_use]
+    pub fn in_region(
+        width: u32,
+        height: u32,
+        region: &PixelRegion,
+        mut is_set: impl FnMut(u32, u32) -> bool,
+    ) -> Self {
+        let mut pixels = vec![false; width as usize * height as usize];
+        let region = region.intersection(&PixelRegion::of_image(width, height));
+        let mut bounds: Option<PixelRegion> = None;
+        for v in region.v_min..region.v_max {
+            let start = v as usize * width as usize;
+            for u in region.u_min..region.u_max {
+                if !is_set(u, v) {
+                    continue;
+                }
+                pixels[start + u as usize] = true;
+                let found = bounds.get_or_insert(PixelRegion {
+                    u_min: u,
+                    v_min: v,
+                    u_max: u,
+                    v_max: v,
+                });
+                found.u_min = found.u_min.min(u);
+                found.u_max = found.u_max.max(u + 1);
+                found.v_max = v + 1;
+            }
+        }
+        let raster = Raster {
+            width,
+            height,
+            pixels,
+        };
+        Self(raster, bounds.unwrap_or_default())
+    }
+
     /// Creates a mask from bytes, row by row: every pixel that is not 0 belongs to the object.
     ///
     /// # Errors

@@ -1,0 +1,115 @@
+//! The search for a lost object.
+
+use std::sync::Arc;
+
+use hicp_core::{
+    DepthImage, ImageError, Isometry3, Mask, Observation, Translation3, UnitQuaternion, Vector3,
+};
+
+use super::extent::DIFFERENT_DIAMETERS;
+use super::found::Found;
+use super::matcher::{Matcher, run};
+use super::motion::Motion;
+use super::segments::{Sphere, segments};
+
+/// Difference in merit by which a pose is clearly better than another one.
+pub(super) const CLEARLY: f64 = 0.03;
+/// Difference of the logarithms of two probabilities for the same.
+const CLEAR_ODDS: f64 = 2.5;
+/// Number of surfaces that are searched in an image.
+const SEGMENTS: usize = 4;
+
+impl Matcher {
+    /// Searches for the object around its predicted place.
+    pub(super) fn find(
+        &mut self,
+        depth: &Arc<DepthImage>,
+        mask: Option<&Mask>,
+        motion: &Motion,
+    ) -> Result<Option<Found>, ImageError> {
+        let (model, camera) = (Arc::clone(&self.model), self.camera);
+        let translation = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
+        let deviation = translation.symmetric_eigenvalues().max().max(0.0).sqrt();
+        let sphere = Sphere {
+            center: motion.center(),
+            radius: 3.0 * deviation + model.radius(),
+        };
+        let mut best: Option<Found> = None;
+        for segment in segments(depth, &camera, &sphere, model.diameter(), mask)
+            .into_iter()
+            .take(SEGMENTS)
+        {
+            let behind = 0.25 * model.diameter() / segment.mean.coords.norm();
+            let center = segment.mean.coords * (1.0 + behind);
+            let rotation = motion.pose().rotation;
+            let shift = center - rotation * model.center().coords;
+            let init = Isometry3::from_parts(Translation3::from(shift), rotation);
+            let observation = Observation::new(Arc::clone(depth), segment.mask, camera)?;
+            let outcome = run(
+                &mut self.search,
+                &mut self.workspace,
+                &model,
+                &observation,
+                &init,
+            );
+            let pose = outcome.camera_from_object;
+            let observation =
+                self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
+            let found = self.register(&observation, &pose);
+            if let Some(found) = found.filter(Found::stands_alone)
+                && best.is_none_or(|best| best.merit() < found.merit())
+            {
+                best = Some(found);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Compares a pose with its half turns around the axes of the object frame.
+    ///
+    /// Returns the most probable pose, and whether another one is as probable. Without a motion,
+    /// all are equally probable before the image.
+    pub(super) fn settle(
+        &mut self,
+        depth: &Arc<DepthImage>,
+        mask: Option<&Mask>,
+        found: Found,
+        motion: Option<&Motion>,
+    ) -> Result<(Found, bool), ImageError> {
+        let model = Arc::clone(&self.model);
+        let mut rivals = vec![found];
+        for axis in [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()] {
+            let turn = UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI);
+            let turned = found.pose
+                * Translation3::from(model.center().coords)
+                * turn
+                * Translation3::from(-model.center().coords);
+            if !self.is_new(&turned, &rivals) {
+                continue;
+            }
+            let meters = DIFFERENT_DIAMETERS * model.diameter();
+            let observation = self.observe(depth, mask, &turned, meters)?;
+            let rival = self.register(&observation, &turned);
+            if let Some(rival) = rival.filter(|rival| self.is_new(&rival.pose, &rivals)) {
+                rivals.push(rival);
+            }
+        }
+        let odds = |rival: &Found| {
+            let away = motion.map_or(0.0, |motion| {
+                self.extent.distance(&rival.pose, motion.pose()) / self.extent.deviation(motion)
+            });
+            CLEAR_ODDS / CLEARLY * rival.merit() - 0.5 * away * away
+        };
+        rivals.sort_by(|a, b| odds(b).total_cmp(&odds(a)));
+        let ambiguous = rivals
+            .get(1)
+            .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
+        Ok((rivals[0], ambiguous))
+    }
+
+    /// Returns whether a pose differs from others.
+    fn is_new(&self, pose: &Isometry3<f64>, others: &[Found]) -> bool {
+        let mut others = others.iter();
+        others.all(|other| self.extent.differ(pose, &other.pose))
+    }
+}

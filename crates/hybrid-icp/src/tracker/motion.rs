@@ -1,0 +1,234 @@
+//! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
+
+use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
+
+/// Largest speed (m/s and rad/s) and time constant (seconds).
+const MAX: f64 = 1e3;
+/// Smallest time constant, seconds.
+const MIN_SECONDS: f64 = 1e-3;
+
+/// A filter over the pose and the velocity of an object, in the camera frame.
+///
+/// Translation is that of the object's center, so that a rotation of the object does not move it.
+/// Velocities decay with a time constant and have random accelerations (an Ornstein–Uhlenbeck
+/// process): the object is predicted to move on at constant velocity for a short time, and to come
+/// to rest in a long one. All vectors are [translation; rotation], meters and radians.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    /// Center of the object in its own frame, meters.
+    center: Point3<f64>,
+    /// Standard deviations of the velocity in the long run, squared.
+    speeds: Vector6<f64>,
+    /// The time in which a velocity decays, seconds.
+    memory: f64,
+    pose: Isometry3<f64>,
+    velocity: Vector6<f64>,
+    /// Covariance of the pose, of pose and velocity, and of the velocity.
+    of_pose: Matrix6<f64>,
+    of_both: Matrix6<f64>,
+    of_velocity: Matrix6<f64>,
+}
+
+impl Motion {
+    /// Creates the filter at a pose known up to `deviations` (meters, radians).
+    pub(super) fn new(
+        center: Point3<f64>,
+        pose: &Isometry3<f64>,
+        deviations: [f64; 2],
+        speeds: [f64; 2],
+        memory: f64,
+    ) -> Self {
+        let usable = |x: f64| {
+            if x.is_finite() {
+                x.clamp(0.0, MAX)
+            } else {
+                MAX
+            }
+        };
+        let speeds = squares(speeds.map(usable));
+        Self {
+            center,
+            speeds,
+            memory: usable(memory).max(MIN_SECONDS),
+            pose: *pose,
+            velocity: Vector6::zeros(),
+            of_pose: Matrix6::from_diagonal(&squares(deviations)),
+            of_both: Matrix6::zeros(),
+            of_velocity: Matrix6::from_diagonal(&speeds),
+        }
+    }
+
+    /// Returns the pose, `camera_from_object`.
+    pub(super) fn pose(&self) -> &Isometry3<f64> {
+        &self.pose
+    }
+
+    /// Returns the center of the object in the camera frame, meters.
+    pub(super) fn center(&self) -> Point3<f64> {
+        self.pose * self.center
+    }
+
+    /// Returns the covariance of the pose.
+    pub(super) fn covariance(&self) -> &Matrix6<f64> {
+        &self.of_pose
+    }
+
+    /// Moves the pose by a time in seconds.
+    pub(super) fn predict(&mut self, seconds: f64) {
+        let share = seconds / self.memory;
+        let decay = (-share).exp();
+        let reach = self.memory * (1.0 - decay);
+        self.apply(&(self.velocity * reach));
+        self.velocity *= decay;
+        let noise = |factor: f64| Matrix6::from_diagonal(&(self.speeds * factor));
+        let squared = self.memory * self.memory;
+        self.of_pose += (self.of_both + self.of_both.transpose()) * reach
+            + self.of_velocity * (reach * reach)
+            + noise(squared * (2.0 * share - 3.0 + 4.0 * decay - decay * decay));
+        self.of_both = (self.of_both + self.of_velocity * reach) * decay
+            + noise(self.memory * (1.0 - decay).powi(2));
+        self.of_velocity = self.of_velocity * (decay * decay) + noise(1.0 - decay * decay);
+    }
+
+    /// Combines the prediction with a measured pose of a covariance.
+    pub(super) fn update(&mut self, measured: &Isometry3<f64>, covariance: &Matrix6<f64>) {
+        let Some(inverse) = (self.of_pose + covariance).try_inverse() else {
+            return;
+        };
+        let difference = difference(measured, &self.pose, &self.center);
+        let (of_pose, of_velocity) = (self.of_pose * inverse, self.of_both.transpose() * inverse);
+        self.apply(&(of_pose * difference));
+        self.velocity += of_velocity * difference;
+        self.of_velocity -= of_velocity * self.of_both;
+        self.of_both -= of_pose * self.of_both;
+        self.of_pose -= of_pose * self.of_pose;
+        for covariance in [&mut self.of_pose, &mut self.of_velocity] {
+            *covariance = (*covariance + covariance.transpose()) * 0.5;
+        }
+    }
+
+    /// Moves the center and rotates the object around it.
+    fn apply(&mut self, step: &Vector6<f64>) {
+        let center = self.center() + step.fixed_rows::<3>(0);
+        let mut rotation = so3::exp(&step.fixed_rows::<3>(3).into_owned()) * self.pose.rotation;
+        rotation.renormalize();
+        let shift = center - rotation * self.center;
+        self.pose = Isometry3::from_parts(Translation3::from(shift), rotation);
+    }
+}
+
+/// Returns the covariance of a pose around the object's center from that of its registration.
+///
+/// `information` is for the twist around the camera's origin. Directions without information get a
+/// large covariance. `scale` is the variance of a residual, and `floor` is added.
+pub(super) fn registered(
+    information: &Matrix6<f64>,
+    center: &Point3<f64>,
+    scale: f64,
+    floor: [f64; 2],
+    unknown: [f64; 2],
+) -> Matrix6<f64> {
+    let mut change = Matrix6::identity();
+    let arm: Matrix3<f64> = so3::hat(&center.coords);
+    change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
+    let prior = Matrix6::from_diagonal(&squares(unknown).map(|x| 1.0 / x));
+    let information = change.transpose() * information * change / scale + prior;
+    let covariance = information.try_inverse();
+    let floor = Matrix6::from_diagonal(&squares(floor));
+    covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
+}
+
+/// Returns the displacement from pose `b` to pose `a` around an object's center.
+pub(super) fn difference(
+    a: &Isometry3<f64>,
+    b: &Isometry3<f64>,
+    center: &Point3<f64>,
+) -> Vector6<f64> {
+    let turn = so3::log(&(a.rotation * b.rotation.inverse()));
+    joined(&(a * center - b * center), &turn)
+}
+
+fn squares([translation, rotation]: [f64; 2]) -> Vector6<f64> {
+    joined(
+        &Vector3::repeat(translation * translation),
+        &Vector3::repeat(rotation * rotation),
+    )
+}
+
+fn joined(translation: &Vector3<f64>, rotation: &Vector3<f64>) -> Vector6<f64> {
+    let mut both = Vector6::zeros();
+    both.fixed_rows_mut::<3>(0).copy_from(translation);
+    both.fixed_rows_mut::<3>(3).copy_from(rotation);
+    both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion() -> Motion {
+        let center = Point3::new(0.1, 0.0, 0.05);
+        let pose = Isometry3::translation(0.0, 0.1, 0.8);
+        Motion::new(center, &pose, [0.02, 0.2], [0.3, 1.5], 0.5)
+    }
+
+    #[test]
+    fn constant_velocities_are_predicted_after_a_few_measurements() {
+        let (mut motion, seconds) = (motion(), 1.0 / 30.0);
+        let (center, start) = (motion.center, motion.pose);
+        let precise = Matrix6::identity() * 1e-8;
+        let truth = |frame: i32| {
+            let time = f64::from(frame) * seconds;
+            let rotation = so3::exp(&(Vector3::new(0.5, -1.0, 0.3) * time)) * start.rotation;
+            let at = start * center + Vector3::new(0.2, -0.1, 0.1) * time;
+            let shift = at - rotation * center;
+            Isometry3::from_parts(Translation3::from(shift), rotation)
+        };
+        for frame in 1..30 {
+            motion.predict(seconds);
+            let off = difference(&truth(frame), motion.pose(), &center);
+            if frame > 10 {
+                // The decay of the velocity costs 3 % of a frame's motion.
+                assert!(off.norm() < 0.003, "{frame}: {off}");
+            }
+            motion.update(&truth(frame), &precise);
+        }
+    }
+
+    #[test]
+    fn predictions_add_up_and_become_less_certain() {
+        let (mut once, mut often) = (motion(), motion());
+        once.velocity = Vector6::new(0.1, 0.0, 0.2, 0.0, 0.0, 0.4);
+        often.velocity = once.velocity;
+        let before = once.of_pose.trace();
+        once.predict(0.3);
+        for _ in 0..30 {
+            often.predict(0.01);
+        }
+        assert!(difference(once.pose(), often.pose(), &once.center).norm() < 1e-9);
+        assert!((once.of_pose - often.of_pose).norm() < 1e-9);
+        assert!((once.of_velocity - often.of_velocity).norm() < 1e-9);
+        assert!(once.of_pose.trace() > before);
+    }
+
+    #[test]
+    fn directions_without_information_stay_uncertain() {
+        let mut motion = motion();
+        let at = motion.center();
+        // Rows of a plane z = const: x, y and the rotation around z are not determined.
+        let mut information = Matrix6::zeros();
+        for (x, y) in [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.1), (0.1, 0.1)] {
+            let point = at.coords + Vector3::new(x, y, 0.0);
+            let row = joined(&Vector3::z(), &point.cross(&Vector3::z()));
+            information += row * row.transpose();
+        }
+        let covariance = registered(&information, &at, 1e-6, [0.0; 2], [0.1, 1.0]);
+        let pose = *motion.pose();
+        motion.update(&pose, &covariance);
+        let deviations = motion.covariance().diagonal().map(f64::sqrt);
+        for determined in [2, 3, 4] {
+            assert!(deviations[determined] < 0.01, "{deviations}");
+        }
+        assert!(deviations[0] > 0.019 && deviations[1] > 0.019 && deviations[5] > 0.19);
+    }
+}

@@ -1,0 +1,137 @@
+//! The tracker on simulated sequences.
+
+use std::sync::Arc;
+
+use hicp_sim::{DepthSensor, Hand, Household, MovingConfig, MovingScene, stream};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, PinholeCamera, se3};
+use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
+
+const SECONDS: f64 = 1.0 / 30.0;
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::new(285.0, 285.0, 159.5, 119.5, 320, 240).unwrap()
+}
+
+struct Sequence {
+    model: Model,
+    scene: MovingScene,
+    depths: Vec<Arc<DepthImage>>,
+}
+
+fn sequence(object: Household, hand: Hand, frames: usize) -> Sequence {
+    let models = [object.model().unwrap(), Household::Carton.model().unwrap()];
+    let mut rng = stream(4, &["tracker", object.name()], 0);
+    let config = MovingConfig {
+        frames,
+        hand,
+        standing: 1,
+        ..MovingConfig::default()
+    };
+    let scene = MovingScene::draw(&mut rng, &models, 0, &config).unwrap();
+    let mut image = |frame| {
+        let sensor = DepthSensor::default();
+        let view = scene.view(&mut rng, frame, &models, &camera(), &sensor);
+        Arc::new(view.unwrap().depth)
+    };
+    Sequence {
+        depths: (0..frames).map(&mut image).collect(),
+        model: models[0].clone(),
+        scene,
+    }
+}
+
+impl Sequence {
+    fn track(&self) -> Vec<Tracked> {
+        let mut tracker = Tracker::new(self.model.clone(), camera(), TrackerConfig::default());
+        tracker.start(&self.scene.poses[0]);
+        let depths = self.depths.iter();
+        depths
+            .map(|depth| tracker.step(depth, SECONDS, None).unwrap())
+            .collect()
+    }
+
+    /// Returns the distance of the object's center from the truth in diameters, and the angle.
+    fn errors(&self, frame: usize, tracked: &Tracked) -> (f64, f64) {
+        let truth = self.scene.poses[frame];
+        let center = self.model.center();
+        let away = tracked.camera_from_object * center - truth * center;
+        let (angle, _) = se3::pose_distance(&tracked.camera_from_object, &truth);
+        (away.norm() / self.model.diameter(), angle.to_degrees())
+    }
+}
+
+#[test]
+fn a_moving_object_is_tracked_without_masks() {
+    let sequence = sequence(Household::Teapot, Hand::Absent, 40);
+    let tracked = sequence.track();
+    for (frame, tracked) in tracked.iter().enumerate() {
+        let (shift, angle) = sequence.errors(frame, tracked);
+        assert_eq!(tracked.state, TrackState::Tracking, "{frame}");
+        assert!(shift < 0.03 && angle < 5.0, "{frame}: {shift} {angle}");
+    }
+    let poses = &sequence.scene.poses;
+    let center = sequence.model.center();
+    let moved = (poses[39] * center - poses[0] * center).norm();
+    assert!(moved > 0.04, "{moved}");
+    assert_eq!(tracked, sequence.track());
+}
+
+#[test]
+fn a_hidden_object_is_lost_and_found_again() {
+    let sequence = sequence(Household::Teapot, Hand::Covering(1.0..1.1), 80);
+    let tracked = sequence.track();
+    let hidden = sequence.scene.hidden.clone();
+    for frame in hidden.clone() {
+        assert_ne!(tracked[frame].state, TrackState::Tracking, "{frame}");
+    }
+    assert_eq!(tracked[hidden.end - 1].state, TrackState::Lost);
+    // The hand leaves within nine frames.
+    for frame in hidden.end + 10..80 {
+        let (shift, angle) = sequence.errors(frame, &tracked[frame]);
+        assert_eq!(tracked[frame].state, TrackState::Tracking, "{frame}");
+        assert!(shift < 0.03 && angle < 5.0, "{frame}: {shift} {angle}");
+    }
+}
+
+#[test]
+fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() {
+    let model = Household::Mug.model().unwrap();
+    let empty = Arc::new(DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap());
+    let wall = Arc::new(DepthImage::from_meters(320, 240, vec![0.7; 320 * 240]).unwrap());
+    let nothing = Mask::new(320, 240, vec![false; 320 * 240]).unwrap();
+    for (start, depth, mask) in [
+        (Isometry3::translation(0.0, 0.0, 0.7), &empty, None),
+        (Isometry3::translation(0.0, 0.0, 0.7), &wall, None),
+        (Isometry3::translation(0.0, 0.0, 0.7), &wall, Some(&nothing)),
+        (Isometry3::translation(0.0, 0.0, -0.7), &wall, None),
+        (Isometry3::translation(1e9, 0.0, 1e9), &wall, None),
+        (Isometry3::translation(f64::NAN, 0.0, 0.7), &wall, None),
+    ] {
+        for seconds in [SECONDS, 0.0, 1e9, -1.0, f64::NAN] {
+            let config = TrackerConfig {
+                meters_per_second: seconds,
+                memory_seconds: seconds,
+                ..TrackerConfig::default()
+            };
+            for config in [config, TrackerConfig::default()] {
+                let mut tracker = Tracker::new(model.clone(), camera(), config);
+                tracker.start(&start);
+                for _ in 0..4 {
+                    let tracked = tracker.step(depth, seconds, mask).unwrap();
+                    assert_ne!(tracked.state, TrackState::Tracking, "{start:?} {seconds}");
+                    assert!(se3::is_finite(&tracked.camera_from_object));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn images_of_another_size_are_refused() {
+    let model = Household::Mug.model().unwrap();
+    let mut tracker = Tracker::new(model, camera(), TrackerConfig::default());
+    let small = Arc::new(DepthImage::from_meters(8, 8, vec![0.7; 64]).unwrap());
+    tracker.start(&Isometry3::translation(0.0, 0.0, 0.7));
+    let error = tracker.step(&small, SECONDS, None).unwrap_err();
+    assert!(error.to_string().contains("8x8"), "{error}");
+}
