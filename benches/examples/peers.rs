@@ -15,7 +15,6 @@ use hicp_benches::forget_renders;
 use hicp_benches::fused::Fused;
 use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
 use hicp_benches::stages::{GATE_METERS, STOP};
-use hybrid_icp::Preset;
 use hybrid_icp::association::{
     DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection, Projective,
     Stride, VisibleSurface,
@@ -28,6 +27,7 @@ use hybrid_icp::icp::{Icp, Session, Stage, Workspace};
 use hybrid_icp::metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::{Preset, presets};
 use serde_json::{Value, json};
 
 type Failure = Box<dyn std::error::Error>;
@@ -216,9 +216,12 @@ impl Bench {
             "nn-point-to-point" => self.icp(loaded, source, nearest, gate, PointToPoint),
             "nn-point-to-plane" => self.icp(loaded, source, nearest, gate, PointToPlane),
             "nn-generalized" => self.icp(loaded, source, nearest, gate, Generalized::default()),
+            "depth-to-pose/estimate" => {
+                self.depth_to_pose(presets::estimate_with(presets::local()), loaded)
+            }
             _ => {
                 let preset: Preset = row.strip_prefix("depth-to-pose/").unwrap_or(row).parse()?;
-                self.depth_to_pose(preset, loaded)
+                self.depth_to_pose(preset.build(), loaded)
             }
         }
     }
@@ -281,8 +284,7 @@ impl Bench {
     }
 
     /// Refines from the depth image to the pose, including normals, renders, scores and trees.
-    fn depth_to_pose(&mut self, preset: Preset, loaded: &Loaded) -> Result<Value, Failure> {
-        let mut stage = preset.build();
+    fn depth_to_pose(&mut self, mut stage: impl Stage, loaded: &Loaded) -> Result<Value, Failure> {
         let seen = &loaded.instance.scene.observation;
         // The cache must not contain a render of an earlier run.
         let problem = Problem::new(&loaded.instance.scene.model, seen);

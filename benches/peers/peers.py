@@ -223,6 +223,7 @@ OURS = [
     "nn-point-to-plane",
     "nn-generalized",
     "depth-to-pose/hybrid",
+    "depth-to-pose/estimate",
     "depth-to-pose/projective-point-to-plane",
     "depth-to-pose/nn-point-to-point",
 ]
@@ -241,6 +242,7 @@ WHAT = {
     "nn-point-to-plane": "2,000 points against 4,000 pixels, with tree",
     "nn-generalized": "GICP of surfels, 2,000 points against 4,000 pixels, with tree",
     "depth-to-pose/hybrid": "from depth image to pose, everything",
+    "depth-to-pose/estimate": "the same without an initial pose, ended by `local`",
     "depth-to-pose/projective-point-to-plane": "from depth image to pose, everything",
     "depth-to-pose/nn-point-to-point": "from depth image to pose, everything",
     "small_gicp GICP": "2,000 points against every pixel, with tree",
@@ -257,6 +259,7 @@ RATIOS = [
     ("1 traits : hand-fused, per pixel and iteration", "projective-every-pixel", "fused", "iteration", "≤ 3, aim 1.5"),
     ("2 small_gicp ICP : nn-point-to-point", "small_gicp ICP", "nn-point-to-point", None, ""),
     ("3 small_gicp GICP : hybrid from depth to pose", "small_gicp GICP", "depth-to-pose/hybrid", None, "≥ 3"),
+    ("3 small_gicp GICP : estimate from depth to pose", "small_gicp GICP", "depth-to-pose/estimate", None, ""),
     ("3 hybrid : projective point-to-plane, depth to pose", "depth-to-pose/hybrid", "depth-to-pose/projective-point-to-plane", None, "paper 8.9"),
     ("4 Open3D ray casting : render-fine", "Open3D ray casting", "render-fine", None, "≥ 3, aim 5"),
     ("4 render-fine at 1920×1080 : 640×480", "render-fine-1080", "render-fine", None, "≤ 1.1"),

@@ -9,7 +9,7 @@ use std::time::Instant;
 use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
 use hicp_tests::{OBJECTS, median, scene, symmetric_pose_distance};
 use hybrid_icp::core::Problem;
-use hybrid_icp::score::{Score, Vsd};
+use hybrid_icp::score::{ModelPoints, Score, Vsd};
 use hybrid_icp::{Preset, Refiner};
 
 const STARTS_PER_OBJECT: usize = 20;
@@ -22,6 +22,8 @@ struct Column {
     milliseconds: Vec<f64>,
     vsd: Vec<f64>,
     worse: usize,
+    /// Number of poses with an MSSD below a tenth of the diameter.
+    right: usize,
 }
 
 fn main() {
@@ -34,6 +36,7 @@ fn main() {
         let mut rng = rng(seed);
         for _ in 0..STARTS_PER_OBJECT {
             let scene = scene(object, noise, &mut rng);
+            let points = ModelPoints::new(&scene.model);
             let init = perturb(
                 &mut rng,
                 &scene.truth,
@@ -63,14 +66,16 @@ fn main() {
                 );
                 column.vsd.push(after);
                 column.worse += usize::from(after > before);
+                let mssd = points.mssd(&pose, &scene.truth);
+                column.right += usize::from(mssd < 0.1 * points.diameter());
             }
         }
     }
 
     println!(
-        "| pipeline | median rotation error | median translation error | mean VSD | VSD > 0.3 | ends worse than it started | time, ratio of medians | of means |"
+        "| pipeline | median rotation error | median translation error | mean VSD | VSD > 0.3 | ends worse than it started | time, ratio of medians | of means | MSSD < 0.1 d |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
     let baseline = refiners
         .iter_mut()
@@ -82,7 +87,7 @@ fn main() {
         let count = column.vsd.len() as f64;
         let failed = column.vsd.iter().filter(|vsd| **vsd > 0.3).count() as f64;
         println!(
-            "| {preset} | {:.3}° | {:.3} mm | {:.3} | {:.1} % | {:.1} % | {:.2} | {:.2} |",
+            "| {preset} | {:.3}° | {:.3} mm | {:.3} | {:.1} % | {:.1} % | {:.2} | {:.2} | {:.1} % |",
             median(&mut column.angles),
             median(&mut column.distances),
             column.vsd.iter().sum::<f64>() / count,
@@ -90,6 +95,7 @@ fn main() {
             100.0 * column.worse as f64 / count,
             median(&mut column.milliseconds) / baseline.0,
             mean(&column.milliseconds) / baseline.1,
+            100.0 * column.right as f64 / count,
         );
     }
     println!(

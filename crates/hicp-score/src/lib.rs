@@ -54,7 +54,8 @@ pub use model_points::ModelPoints;
 pub use occlusion::{Occlusion, VISIBILITY_TOLERANCE_METERS};
 pub use pose_error::{add, adi, mspd, mssd};
 pub use recall::{
-    N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible, top_estimates,
+    MSSD_MM, N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible,
+    top_estimates,
 };
 pub use sampled_mve::SampledMve;
 pub use score::Score;

@@ -5,6 +5,9 @@ use crate::tolerances::{N_TOLERANCES, tolerances};
 /// Number of thresholds of correctness per error function.
 pub const N_THRESHOLDS: usize = 10;
 
+/// The thresholds of MSSD in millimeters, for robots that need an absolute accuracy.
+pub const MSSD_MM: [f64; N_THRESHOLDS] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0];
+
 /// The image width, in pixels, for which BOP defines its thresholds of MSPD.
 const MSPD_WIDTH: f64 = 640.0;
 
@@ -189,6 +192,10 @@ pub struct Recalls {
     mssd: [usize; N_THRESHOLDS],
     mspd: [usize; N_THRESHOLDS],
     ad: usize,
+    /// Instances of objects that are not symmetric, and those found by ADD.
+    asymmetric: usize,
+    add: usize,
+    mssd_mm: [usize; N_THRESHOLDS],
 }
 
 impl Recalls {
@@ -199,7 +206,8 @@ impl Recalls {
     /// - VSD: 0.05, 0.10, …, 0.50 at each of its tolerances.
     /// - MSSD: the same, times the diameter.
     /// - MSPD: 5, 10, …, 50 pixels in an image 640 pixels wide.
-    /// - AD: a tenth of the diameter.
+    /// - AD and ADD: a tenth of the diameter.
+    /// - MSSD in millimeters: 2, 4, …, 20.
     pub fn count(&mut self, target: &TargetErrors) {
         self.instances += target.instances;
         self.missing += target.instances.saturating_sub(target.estimates.len());
@@ -212,6 +220,13 @@ impl Recalls {
             }
         };
         let mspd_scale = MSPD_WIDTH / f64::from(target.image_width);
+        for (found, mm) in self.mssd_mm.iter_mut().zip(MSSD_MM) {
+            *found += target.found(1e-3 * mm, |e| unless_apart(e, e.mssd_m));
+        }
+        if !target.symmetric {
+            self.asymmetric += target.instances;
+            self.add += target.found(AD_THRESHOLD, |e| unless_apart(e, e.add_m / diameter));
+        }
         for (index, threshold) in tolerances().into_iter().enumerate() {
             for (tolerance, found) in self.vsd.iter_mut().enumerate() {
                 found[index] += target.found(threshold, |e| e.vsd[tolerance]);
@@ -232,6 +247,9 @@ impl Recalls {
         self.instances += other.instances;
         self.missing += other.missing;
         self.ad += other.ad;
+        self.asymmetric += other.asymmetric;
+        self.add += other.add;
+        sum(&mut self.mssd_mm, &other.mssd_mm);
         sum(self.vsd.as_flattened_mut(), other.vsd.as_flattened());
         sum(&mut self.mssd, &other.mssd);
         sum(&mut self.mspd, &other.mspd);
@@ -279,6 +297,27 @@ impl Recalls {
     #[must_use]
     pub fn ad(&self) -> f64 {
         self.mean(&[self.ad])
+    }
+
+    /// Recall of MSSD below a tenth of the diameter.
+    #[must_use]
+    pub fn mssd_below_tenth(&self) -> f64 {
+        // The second of the thresholds 0.05, 0.10, …
+        self.mean(&self.mssd[1..2])
+    }
+
+    /// Recall of ADD below a tenth of the diameter, over the objects that are not symmetric.
+    ///
+    /// `None` without such objects.
+    #[must_use]
+    pub fn add(&self) -> Option<f64> {
+        (self.asymmetric > 0).then(|| self.add as f64 / self.asymmetric as f64)
+    }
+
+    /// Recalls of MSSD below [`MSSD_MM`].
+    #[must_use]
+    pub fn mssd_mm(&self) -> [f64; N_THRESHOLDS] {
+        self.mssd_mm.map(|found| self.mean(&[found]))
     }
 
     fn mean(&self, found: &[usize]) -> f64 {

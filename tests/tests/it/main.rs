@@ -39,6 +39,7 @@ mod pipeline_limits;
 mod pitfalls;
 mod pitfalls_page;
 mod presets;
+mod ray_shift;
 mod resolution;
 mod room;
 mod sequential;

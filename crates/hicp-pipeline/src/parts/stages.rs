@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use hicp_icp::{
     Anderson, AtResolution, Bound, BoxedStage, Cascade, Guard, HypothesisSearch, Icp, KeepBest,
-    MAX_ITERATIONS, Repeat, Rotations, SearchOptions, Start,
+    MAX_ITERATIONS, RayShift, Repeat, Rotations, SearchOptions, Start,
 };
 use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
 
@@ -121,6 +121,11 @@ pub(super) fn add(catalog: &mut Catalog) {
         let total = local.saturating_add(search.options.hypotheses as u64);
         p.takes("refined", total.saturating_add(explored))?;
         Ok(search)
+    });
+    catalog.add_stage("ray-shift", |p| {
+        p.about = "Moves the model along the ray to its center by the median difference of \
+            measured and rendered depth, twice: a baseline. Cost: two renders.";
+        Ok(RayShift::default())
     });
     catalog.add_stage("at-resolution", |p| {
         p.about = "Runs a stage on every n-th pixel, phase-aligned; coarse-to-fine is a cascade \

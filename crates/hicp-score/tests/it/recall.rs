@@ -102,6 +102,28 @@ fn ad_is_adi_for_symmetric_objects() {
 }
 
 #[test]
+fn mssd_counts_at_a_tenth_of_the_diameter_and_in_millimeters() {
+    let mut one = errors(0.06);
+    one.mssd_m = 0.0075;
+    one.add_m = 0.0;
+    let mut other = target(1, vec![vec![one]]);
+    let found = recalls(std::slice::from_ref(&other));
+    assert_eq!(
+        found.mssd_below_tenth(),
+        f64::from(u8::from(0.0075 < 0.1 * DIAMETER))
+    );
+    assert_eq!(found.mssd_mm()[..4], [0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(found.add(), Some(1.0));
+    // ADD says nothing about symmetric objects.
+    other.symmetric = true;
+    assert_eq!(recalls(std::slice::from_ref(&other)).add(), None);
+    let mut both = recalls(&[target(3, vec![vec![one]])]);
+    both.merge(&recalls(&[other]));
+    assert_eq!(both.add(), Some(1.0 / 3.0));
+    assert_eq!(both.mssd_mm()[9], 0.5);
+}
+
+#[test]
 fn estimates_a_diameter_apart_are_wrong_for_every_error() {
     let mut apart = errors(0.0);
     apart.translation_m = DIAMETER;

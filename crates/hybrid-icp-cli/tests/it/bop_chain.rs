@@ -24,7 +24,8 @@ fn without_times(markdown: &str) -> String {
     let (table, rest) = markdown.split_once("\n\n").unwrap();
     for line in table.lines() {
         let cells: Vec<&str> = line.split('|').collect();
-        let _ = writeln!(text, "{}|", cells[..cells.len() - 3].join("|"));
+        let (figures, times) = cells.split_at(cells.len() - 5);
+        let _ = writeln!(text, "{}|{}", figures.join("|"), times[2..].join("|"));
     }
     text + "\n" + rest
 }

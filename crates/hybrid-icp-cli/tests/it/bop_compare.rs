@@ -58,12 +58,17 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
             "hybrid.json",
             "initial.json",
             "nn-point-to-point.csv",
-            "nn-point-to-point.json"
+            "nn-point-to-point.json",
+            "ray-shift.csv",
+            "ray-shift.json"
         ]
     );
     let cells = cells(folder);
     let named: Vec<&str> = cells.iter().map(|line| line[0].as_str()).collect();
-    assert_eq!(named, ["initial", "hybrid", "nn-point-to-point"]);
+    assert_eq!(
+        named,
+        ["initial", "ray-shift", "hybrid", "nn-point-to-point"]
+    );
     for line in &cells {
         let path = folder.join(format!("compared/{}.json", line[0]));
         let report: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
@@ -73,16 +78,19 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         }
         let adi = report["median_adi_mm"].as_f64().unwrap();
         assert_eq!(format!("{adi:.2}"), line[5]);
+        for (key, cell) in ["mssd_recall", "add_recall"].iter().zip(&line[10..]) {
+            assert_eq!(&format!("{:.3}", report[key].as_f64().unwrap()), cell);
+        }
         assert!(told.out.contains(&line.join(" | ")), "{}", told.out);
     }
-    assert_eq!(cells[0][6..], ["-"; 4]);
+    assert_eq!(cells[0][6..10], ["-"; 4]);
     let number = |line: usize, cell: usize| cells[line][cell].parse::<f64>().unwrap();
     // Most poses are better after Hybrid ICP than before, and no share is above the whole.
-    assert!(number(1, 1) > number(0, 1) && number(1, 6) > 80.0);
-    for line in [1, 2] {
+    assert!(number(2, 1) > number(0, 1) && number(2, 6) > 80.0);
+    for line in [1, 2, 3] {
         assert!(number(line, 6) + number(line, 7) <= 100.05);
         assert!(number(line, 8) > 0.0);
-        let ratio = number(line, 8) / number(1, 8);
+        let ratio = number(line, 8) / number(2, 8);
         assert!((number(line, 9) - ratio).abs() < 0.01 + 0.01 * ratio);
     }
     let read = |name: &str| std::fs::read_to_string(folder.join("compared").join(name)).unwrap();
@@ -90,7 +98,13 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     for (entry, line) in document["entries"].as_array().unwrap().iter().zip(&cells) {
         let report: Value = serde_json::from_str(&read(&format!("{}.json", line[0]))).unwrap();
         assert_eq!(entry["name"].as_str().unwrap(), line[0]);
-        for key in ["ar", "ar_vsd", "median_adi_mm", "targets", "objects"] {
+        for key in [
+            "ar",
+            "mssd_recall",
+            "add_recall",
+            "mssd_mm_recalls",
+            "objects",
+        ] {
             assert_eq!(entry[key], report[key], "{key}");
         }
     }
@@ -108,7 +122,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     let picture = "<figure><img src=\"data:image/png;base64,iVBORw0KGgo";
     assert_eq!(page.matches(picture).count(), 3);
     // A dot per line for AR and for the median ADI.
-    assert_eq!(page.matches("<circle").count(), 6);
+    assert_eq!(page.matches("<circle").count(), 8);
     let best = cells.iter().map(|line| &line[1]).max().unwrap();
     assert!(page.contains(&format!("<td><b>{best}</b></td>")), "{best}");
     let least = cells.iter().map(|line| &line[5]);

@@ -95,7 +95,12 @@ fn the_truth_scores_one_on_every_metric() {
 
     let table = eval(&world, &[]).exits(0).out;
     let lines: Vec<&str> = table.lines().collect();
-    assert_eq!(lines.len(), 4);
+    assert_eq!(lines.len(), 5);
+    assert!(lines[4].starts_with("recall of MSSD below 2 mm 1.000, 4 mm 1.000"));
+    for part in [&report, &report["objects"]["1"]] {
+        assert_eq!(part["mssd_recall"], json!(1.0));
+        assert_eq!(part["mssd_mm_recalls"], json!(vec![1.0; 10]));
+    }
     assert!(lines[0].contains("MSSD") && lines[3].trim_start().starts_with("all"));
 }
 
@@ -556,6 +561,7 @@ fn scores_are_compared_with_correctness() {
     for part in [
         "20 estimates, 10 correct, ROC area 0.900",
         "0.9-1.0         10",
+        "score against MSSD < 0.1 d: ",
     ] {
         assert!(run.out.contains(part), "no {part:?} in {}", run.out);
     }

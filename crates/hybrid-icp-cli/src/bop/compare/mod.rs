@@ -15,7 +15,7 @@ use self::report::Comparison;
 use super::eval::{self, DELTA_MM, EvalJob};
 use super::options::{DatasetOptions, ThreadOptions};
 use super::refine::{RefineJob, RowOptions};
-use crate::choice::Source;
+use crate::choice::{Pipeline, Source};
 use crate::limits::limits;
 use crate::outputs::{Files, journal_of};
 use crate::terminal::say;
@@ -23,11 +23,11 @@ use crate::terminal::say;
 /// Refine a result file with several pipelines, and compare them by their evaluations.
 ///
 /// Writes the result file and the evaluation (JSON) of every pipeline. Writes the comparison as
-/// compare.md, compare.html and compare.json: average recalls, the median ADI, the shares of the
-/// poses whose ADI fell and rose by more than 0.1 mm, and the time per pose on one thread with its
-/// ratio to that of the first pipeline; AR and median ADI by object. The page also has pictures of
-/// the three rows with the largest ADI after a pipeline. If a run is interrupted, the same command
-/// continues it.
+/// compare.md, compare.html and compare.json: average recalls, success by MSSD and ADD, the median
+/// ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, and the time per pose
+/// on one thread with its ratio to that of the first pipeline; AR and median ADI by object. The
+/// page also has pictures of the three rows with the largest ADI after a pipeline. If a run is
+/// interrupted, the same command continues it.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -53,19 +53,22 @@ Example:
 
 /// Name of the initial poses.
 const INITIAL: &str = "initial";
+/// Name of the first baseline of practitioners, and its stage in a pipeline file.
+const BASELINE: &str = "ray-shift";
 /// Name of the files of the comparison, and their endings.
 const COMPARISON: &str = "compare";
 const FORMS: [&str; 3] = ["md", "html", "json"];
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mut names = BTreeSet::from([INITIAL, COMPARISON].map(str::to_owned));
-    let mut pipelines = Vec::new();
+    let mut names = BTreeSet::from([INITIAL, BASELINE, COMPARISON].map(str::to_owned));
+    let baseline = Pipeline::parse(BASELINE, format!("type = {BASELINE:?}"), &[])?;
+    let mut pipelines = vec![(BASELINE.to_owned(), baseline)];
     for source in &arguments.pipelines {
         let name = source.short_name();
         if !names.insert(name.clone()) {
             bail!(
-                "--pipelines gives {name} twice, expected names that differ from each other, from {INITIAL} and from {COMPARISON}"
+                "--pipelines gives {name} twice, expected names that differ from each other, from {INITIAL}, {BASELINE} and {COMPARISON}"
             );
         }
         pipelines.push((name, source.choose(&[])?));
@@ -91,6 +94,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             rescore: Rescore::Keep,
             resume: true,
             resumed_by: "the same command",
+            // Nobody expects the poses of the baseline to be right.
+            distrusts: name != BASELINE,
             listed_by: None,
         };
         let seconds = job.run(limits().read_results(&arguments.init)?)?;
@@ -134,7 +139,7 @@ impl Arguments {
     /// Checks that every file of the comparison can be written, and that none replaces an input.
     fn check_files(&self) -> anyhow::Result<()> {
         let names = self.pipelines.iter().map(Source::short_name);
-        let names: Vec<String> = names.collect();
+        let names: Vec<String> = names.chain([BASELINE.to_owned()]).collect();
         let mut written: Vec<PathBuf> = Vec::new();
         written.extend(FORMS.map(|ending| self.out.join(format!("{COMPARISON}.{ending}"))));
         written.push(self.out.join(format!("{INITIAL}.json")));

@@ -54,6 +54,9 @@ type Figure<T> = fn(&T) -> Option<f64>;
 /// Change of the ADI in meters from which a pose counts as improved or worsened.
 const CHANGE: f64 = 1e-4;
 
+/// Place of the first pipeline, after the initial poses and the baseline.
+const FIRST: usize = 2;
+
 /// Rows that the page has pictures of.
 const N_WORST: usize = 3;
 
@@ -62,7 +65,8 @@ const HIGHEST: f64 = 1.0;
 const LOWEST: f64 = -1.0;
 
 const EXPLAINED: &str = "AR is the mean of the average recalls of VSD, MSSD and MSPD; ADI is that of the estimates matched to an \
-    instance. A pose is improved or worsened when its ADI fell or rose by more than 0.1 mm. Times are of one thread, for mask, \
+    instance. ADD is over objects that are not symmetric. The row ray-shift moves each initial pose along its viewing ray by the \
+    median depth difference. A pose is improved or worsened when its ADI fell or rose by more than 0.1 mm. Times are of one thread, for mask, \
     normals and pipeline; compare their ratios.";
 
 impl Comparison {
@@ -83,10 +87,22 @@ impl Comparison {
     }
 
     /// Adds an evaluation with the mean seconds per pose: first that of the initial poses, then
-    /// that of every pipeline.
+    /// that of the baseline, then that of every pipeline.
+    ///
+    /// The time ratio of the baseline is unknown until the first pipeline is added.
     pub(super) fn add(&mut self, name: &str, evaluation: eval::Report, seconds: Option<f64>) {
         let ms_per_pose = seconds.map(|s| 1e3 * s);
-        let first = self.entries.get(1).map_or(ms_per_pose, |e| e.ms_per_pose);
+        let place = self.entries.len();
+        let first = self
+            .entries
+            .get(FIRST)
+            .map_or(ms_per_pose, |e| e.ms_per_pose);
+        if let (FIRST, Some(baseline)) = (place, self.entries.last_mut()) {
+            baseline.time_ratio = baseline
+                .ms_per_pose
+                .zip(first)
+                .map(|(ms, first)| ms / first);
+        }
         let initial = self.entries.first();
         self.entries.push(Entry {
             name: name.to_owned(),
@@ -101,9 +117,9 @@ impl Comparison {
 
     /// Returns the recalls, errors and times of all.
     pub(super) fn overall(&self) -> Table {
-        let first = self.entries.get(1).map_or("", |entry| &entry.name);
+        let first = self.entries.get(FIRST).map_or("", |entry| &entry.name);
         let ratio = format!("time / {first}");
-        let columns: [(&str, usize, f64, Figure<Entry>); 9] = [
+        let columns: [(&str, usize, f64, Figure<Entry>); 11] = [
             ("AR", 3, HIGHEST, |e| Some(e.all.ar)),
             ("VSD", 3, HIGHEST, |e| Some(e.all.ar_vsd)),
             ("MSSD", 3, HIGHEST, |e| Some(e.all.ar_mssd)),
@@ -117,6 +133,8 @@ impl Comparison {
             }),
             ("ms per pose", 2, LOWEST, |e| e.ms_per_pose),
             (&ratio, 2, LOWEST, |e| e.time_ratio),
+            ("MSSD<0.1d", 3, HIGHEST, |e| Some(e.all.mssd_recall)),
+            ("ADD<0.1d", 3, HIGHEST, |e| e.all.add_recall),
         ];
         let mut table = Table::new(&["pipeline"]);
         let heads = columns.iter().map(|(head, ..)| (*head).to_owned());
@@ -178,7 +196,7 @@ impl Comparison {
     /// Returns the rows with the largest ADI after any of the pipelines, each with that pipeline.
     pub(super) fn worst(&self) -> Vec<Worst> {
         let mut largest: BTreeMap<usize, (f64, &str)> = BTreeMap::new();
-        for entry in self.entries.iter().skip(1) {
+        for entry in self.entries.iter().skip(FIRST) {
             for (row, adi) in &entry.adi_m {
                 let most = largest.entry(*row).or_insert((*adi, &entry.name));
                 if *adi > most.0 {

@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use crate::terminal::table;
 
-/// An estimate is correct if its ADI to the nearest instance is below this share of the diameter.
+/// An estimate is correct if its error against the nearest instance is below this share of the
+/// diameter.
 const THRESHOLD: f64 = 0.1;
 /// Number of score ranges in the reliability table.
 const BINS: usize = 10;
@@ -26,6 +27,10 @@ pub(super) struct Calibration {
     roc_area: Option<f64>,
     /// Ranges of the score that contain estimates.
     reliability: Vec<Line>,
+    /// Estimates whose MSSD is below a tenth of the diameter.
+    correct_mssd: usize,
+    /// The area for MSSD instead of ADI.
+    roc_area_mssd: Option<f64>,
 }
 
 /// A line of the reliability table.
@@ -52,7 +57,8 @@ impl Calibration {
         let order: Vec<usize> = frames.flat_map(|(_, indices)| indices).collect();
         let judged = order.par_iter().with_max_len(64);
         let judged = judged.filter_map(|index| judge(&rows[*index], scenes, objects));
-        let judged: Vec<LabeledScore> = judged.collect();
+        let (judged, by_mssd): (Vec<LabeledScore>, Vec<LabeledScore>) =
+            judged.map(|[adi, mssd]| (adi, mssd)).unzip();
         let bins = reliability(&judged, BINS).into_iter();
         Self {
             estimates: judged.len(),
@@ -68,14 +74,16 @@ impl Calibration {
                     mean_score: bin.mean_score(),
                 })
                 .collect(),
+            correct_mssd: by_mssd.iter().filter(|j| j.correct).count(),
+            roc_area_mssd: roc_area(&by_mssd),
         }
     }
 
     /// Returns the figures as lines for people.
     pub(super) fn table(&self) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v:.3}"));
-        let area = match self.roc_area {
-            Some(_) => number(self.roc_area),
+        let area = |area: Option<f64>| match area {
+            Some(_) => number(area),
             None => "undefined, because all are correct or all are wrong".to_owned(),
         };
         let heads = ["score", "estimates", "share correct", "mean score"];
@@ -89,20 +97,25 @@ impl Calibration {
             ]
         }));
         format!(
-            "score against ADI < 0.1 d: {} estimates, {} correct, ROC area {area}\n{}",
+            "score against ADI < 0.1 d: {} estimates, {} correct, ROC area {}\n{}\n\
+             score against MSSD < 0.1 d: {} correct, ROC area {}",
             self.estimates,
             self.correct,
-            table(&rows, 0)
+            area(self.roc_area),
+            table(&rows, 0),
+            self.correct_mssd,
+            area(self.roc_area_mssd),
         )
     }
 }
 
-/// Judges a row by its ADI to the nearest instance; `None` without ground truth of its object.
+/// Judges a row by its ADI and its MSSD to the nearest instance; `None` without ground truth of its
+/// object.
 fn judge(
     row: &ResultRow,
     scenes: &Scenes,
     objects: &BTreeMap<u32, EvaluatedObject<'_>>,
-) -> Option<LabeledScore> {
+) -> Option<[LabeledScore; 2]> {
     let scene = scenes.get(row.scene_id).ok()?;
     let truths = scene.ground_truth(row.im_id)?.iter();
     let object = objects.get(&row.obj_id)?;
@@ -112,12 +125,16 @@ fn judge(
         let truth = truth.camera_from_object;
         // The benchmark's errors do the same. It also saves the search for the nearest vertices.
         match (estimate.translation.vector - truth.translation.vector).norm() >= diameter {
-            true => f64::INFINITY,
-            false => object.points.adi(&estimate, &truth),
+            true => [f64::INFINITY; 2],
+            false => [
+                object.points.adi(&estimate, &truth),
+                object.points.mssd(&estimate, &truth),
+            ],
         }
     });
-    Some(LabeledScore {
+    let least = errors.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1])])?;
+    Some(least.map(|error| LabeledScore {
         score: row.score,
-        correct: errors.reduce(f64::min)? < THRESHOLD * diameter,
-    })
+        correct: error < THRESHOLD * diameter,
+    }))
 }

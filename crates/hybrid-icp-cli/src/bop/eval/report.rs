@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hicp_bop::Judged;
-use hybrid_icp::score::Recalls;
+use hybrid_icp::score::{MSSD_MM, N_THRESHOLDS, Recalls};
 use serde::Serialize;
 
 use super::calibration::Calibration;
@@ -25,6 +25,13 @@ pub(crate) struct Summary {
     ad_recall: f64,
     /// Median ADI in millimeters of the estimates that match an instance; `null` without any.
     pub(crate) median_adi_mm: Option<f64>,
+    /// Recall of MSSD below a tenth of the diameter.
+    pub(crate) mssd_recall: f64,
+    /// Recall of ADD below a tenth of the diameter, without symmetric objects; `null` without
+    /// others.
+    pub(crate) add_recall: Option<f64>,
+    /// Recalls of MSSD below 2, 4, …, 20 mm.
+    mssd_mm_recalls: [f64; N_THRESHOLDS],
 }
 
 impl Summary {
@@ -45,6 +52,9 @@ impl Summary {
             ar_mspd: recalls.mspd(),
             ad_recall: recalls.ad(),
             median_adi_mm: median(&mut adi),
+            mssd_recall: recalls.mssd_below_tenth(),
+            add_recall: recalls.add(),
+            mssd_mm_recalls: recalls.mssd_mm(),
         }
     }
 
@@ -72,6 +82,9 @@ impl Summary {
         cells.extend(recalls.map(|recall| format!("{recall:.3}")));
         let median = self.median_adi_mm;
         cells.push(median.map_or("-".to_owned(), |mm| format!("{mm:.2}")));
+        cells.push(format!("{:.3}", self.mssd_recall));
+        let add = self.add_recall;
+        cells.push(add.map_or("-".to_owned(), |recall| format!("{recall:.3}")));
         cells
     }
 }
@@ -98,7 +111,7 @@ pub(crate) struct Report {
     pub(crate) adi_m: BTreeMap<usize, f64>,
 }
 
-const HEADS: [&str; 9] = [
+const HEADS: [&str; 11] = [
     "object",
     "targets",
     "missing",
@@ -108,6 +121,8 @@ const HEADS: [&str; 9] = [
     "MSPD",
     "AD(D/I)<0.1d",
     "median ADI mm",
+    "MSSD<0.1d",
+    "ADD<0.1d",
 ];
 
 impl Report {
@@ -118,6 +133,10 @@ impl Report {
         rows.extend(objects.map(|(id, summary)| summary.cells(id.to_string())));
         rows.push(self.all.cells("all".to_owned()));
         let mut text = table(&rows, 0);
+        let recalls = MSSD_MM.iter().zip(self.all.mssd_mm_recalls);
+        let recalls = recalls.map(|(mm, recall)| format!("{mm} mm {recall:.3}"));
+        let recalls: Vec<String> = recalls.collect();
+        text.push_str(&format!("\nrecall of MSSD below {}", recalls.join(", ")));
         if self.left_out > 0 {
             let count = self.left_out;
             text.push_str(&format!(

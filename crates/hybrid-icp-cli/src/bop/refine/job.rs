@@ -84,6 +84,7 @@ impl JobOptions {
             },
             resume: self.resume,
             resumed_by: "--resume",
+            distrusts: true,
             listed_by: Some("--rows"),
         }
     }
@@ -111,6 +112,8 @@ pub(crate) struct RefineJob<'a> {
     pub(crate) resume: bool,
     /// The option that continues an interrupted run, for messages.
     pub(crate) resumed_by: &'static str,
+    /// If `true`, warns of poses that should not be trusted.
+    pub(crate) distrusts: bool,
     /// The option that lists the status of every row, for messages.
     pub(crate) listed_by: Option<&'static str>,
 }

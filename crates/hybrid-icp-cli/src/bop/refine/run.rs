@@ -97,7 +97,9 @@ impl RefineJob<'_> {
         // Warnings go to standard error even if standard output fails.
         let said = say(text);
         images.iter().for_each(warn);
-        distrust.warn(self);
+        if self.distrusts {
+            distrust.warn(self);
+        }
         report_faults(self, (&shared.models, &models_dir), &results)?;
         said?;
         Ok(mean_seconds(&results))

@@ -1,0 +1,66 @@
+//! The baseline that moves an object along its viewing ray.
+
+use hicp_core::{Isometry3, Problem, Translation3};
+
+use crate::outcome::{Outcome, Termination};
+use crate::session::Session;
+use crate::stage::stage_trait::Stage;
+
+/// Moves the model along the ray to its center by the median difference between measured and
+/// rendered depth.
+///
+/// It is the first thing that practitioners try, so comparisons include it. It keeps the rotation.
+/// Pixels of the mask that the model covers count. Without any, the initial pose is kept.
+///
+/// Cost: two renders and O(rendered pixels).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RayShift {
+    /// Measured minus rendered depth of the common pixels, meters.
+    differences: Vec<f64>,
+}
+
+/// Number of renders, each followed by a shift.
+const PASSES: usize = 2;
+
+impl Stage for RayShift {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let mut outcome = Outcome::kept(init, Termination::NoPairs);
+        let Some((model, observation)) = problem.sides() else {
+            return outcome;
+        };
+        for _ in 0..PASSES {
+            let pose = outcome.camera_from_object;
+            let view = (session.workspace).view(model, observation.camera(), &pose);
+            let region = view.region().intersection(&observation.region());
+            let (depth, mask) = (observation.depth(), observation.mask());
+            self.differences.clear();
+            for v in region.v_min..region.v_max {
+                for u in region.u_min..region.u_max {
+                    let rendered = view.depth_at(u, v);
+                    let measured = depth.get(u, v).filter(|_| mask.get(u, v) == Some(true));
+                    let measured = measured.filter(|z| *z > 0.0 && rendered > 0.0);
+                    let difference = measured.map(|z| f64::from(z) - f64::from(rendered));
+                    self.differences.extend(difference);
+                }
+            }
+            let middle = self.differences.len() / 2;
+            let center = (pose * model.center()).coords;
+            if self.differences.is_empty() || center.z <= 0.0 {
+                break;
+            }
+            let (_, median, _) = (self.differences).select_nth_unstable_by(middle, f64::total_cmp);
+            let shift = Translation3::from(center * (*median / center.z));
+            outcome = Outcome::refined(shift * pose, Termination::Converged);
+        }
+        outcome
+    }
+
+    fn name(&self) -> &'static str {
+        "ray-shift"
+    }
+}
