@@ -187,6 +187,7 @@ fn row_of(index: usize, refinement: &Refinement) -> RowResult {
         status,
         pose,
         mve: Some((refinement.mve_initial, refinement.mve)),
+        confidence: Some(refinement.confidence),
         flatness: refinement.flatness,
     }
 }

@@ -21,6 +21,8 @@ pub struct RowResult {
     /// MVE of the row's pose and of the result's pose; `None` if the row did not reach the
     /// pipeline.
     pub mve: Option<(f64, f64)>,
+    /// The probability that the result's pose is right ([`hybrid_icp::Refinement::confidence`]).
+    pub confidence: Option<f64>,
     /// Flatness of the surfaces at the result's pose ([`hybrid_icp::Refinement::flatness`]).
     pub flatness: Option<Flatness>,
 }
@@ -31,9 +33,11 @@ impl RowResult {
     /// Without an MVE, there are none.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        match self.mve {
-            Some((before, after)) => warnings_of_result(before, after, self.flatness),
-            None => Vec::new(),
+        match (self.mve, self.confidence) {
+            (Some((before, after)), Some(confidence)) => {
+                warnings_of_result(before, after, confidence, self.flatness)
+            }
+            _ => Vec::new(),
         }
     }
 
@@ -45,6 +49,7 @@ impl RowResult {
             status,
             pose: None,
             mve: None,
+            confidence: None,
             flatness: None,
         }
     }
@@ -72,6 +77,8 @@ pub enum Rescore {
     Keep,
     /// 1 − MVE of the row's output pose; 0 for a row without an MVE.
     Mve,
+    /// The probability that the row's output pose is right; 0 for a row without one.
+    Confidence,
 }
 
 impl FrameResult {
@@ -99,8 +106,10 @@ impl FrameResult {
             if let Some(pose) = refined.pose {
                 row.set_camera_from_object(pose);
             }
-            if rescore == Rescore::Mve {
-                row.score = refined.mve.map_or(0.0, |(_, mve)| 1.0 - mve);
+            match rescore {
+                Rescore::Keep => {}
+                Rescore::Mve => row.score = refined.mve.map_or(0.0, |(_, mve)| 1.0 - mve),
+                Rescore::Confidence => row.score = refined.confidence.unwrap_or(0.0),
             }
         }
     }

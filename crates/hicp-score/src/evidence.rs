@@ -185,7 +185,7 @@ impl Evidence {
 }
 
 /// A median of shares of the diameter, from a histogram.
-struct Median {
+pub(crate) struct Median {
     bins: [u32; BINS],
     count: u32,
 }
@@ -200,7 +200,7 @@ impl Default for Median {
 }
 
 impl Median {
-    fn add(&mut self, value: f32) {
+    pub(crate) fn add(&mut self, value: f32) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates; NaN is 0.
         let bin = (value.abs() * (BINS as f32 / COVERED)) as usize;
         self.bins[bin.min(BINS - 1)] += 1;
@@ -208,7 +208,7 @@ impl Median {
     }
 
     /// Returns the median, interpolated within its bin; 0 without values.
-    fn get(&self) -> f64 {
+    pub(crate) fn get(&self) -> f64 {
         let half = f64::from(self.count) / 2.0;
         let mut below = 0.0;
         for (bin, count) in self.bins.iter().enumerate() {

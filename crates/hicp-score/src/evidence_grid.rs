@@ -110,6 +110,34 @@ impl Grid {
         self.masked[index]
     }
 
+    /// Returns the measured depth at a cell, meters; 0 if it is missing.
+    pub(crate) fn measured(&self, index: usize) -> f32 {
+        self.measured[index]
+    }
+
+    /// Returns whether the model is rendered at a cell.
+    pub(crate) fn is_rendered(&self, index: usize) -> bool {
+        self.cells[index] != Cell::Empty
+    }
+
+    /// Returns whether a cell shows both surfaces.
+    pub(crate) fn is_compared(&self, index: usize) -> bool {
+        self.is_rendered(index) && self.cells[index] != Cell::Unmeasured
+    }
+
+    /// Returns the cell that is some steps to the right and down, if it is in the grid.
+    pub(crate) fn offset(&self, index: usize, right: isize, down: isize) -> Option<usize> {
+        let column = (index % SIDE).checked_add_signed(right)?;
+        let row = (index / SIDE).checked_add_signed(down)?;
+        (column < self.width && row < self.height).then_some(row * SIDE + column)
+    }
+
+    /// Returns the part of a cell if the grid is divided into `parts` × `parts`.
+    pub(crate) fn part(&self, index: usize, parts: usize) -> usize {
+        let (column, row) = (index % SIDE, index / SIDE);
+        row * parts / self.height * parts + column * parts / self.width
+    }
+
     /// Returns the rendered minus the measured depth, meters.
     pub(crate) fn gap(&self, index: usize) -> f32 {
         self.gap[index]

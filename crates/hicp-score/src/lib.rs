@@ -3,6 +3,7 @@
 //! - [`Score`]: the trait. [`MeanVsd`] (the paper's MVE) scores a pose against the live image,
 //!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
 //! - [`Evidence`]: what agrees with a pose, what contradicts it, and how well the mask fits.
+//! - [`Confidence`]: the probability that a pose is right, from the evidence and its [`Misfit`].
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
 //!   benchmark.
@@ -30,10 +31,13 @@
 mod agreement;
 mod bop_vsd;
 mod calibration;
+mod confidence;
+mod confidence_curves;
 mod evidence;
 mod evidence_grid;
 mod flatness;
 mod mean_vsd;
+mod misfit;
 mod model_points;
 mod nearest;
 mod occlusion;
@@ -46,10 +50,12 @@ mod vsd;
 
 pub use bop_vsd::{bop_vsd, spheres_overlap};
 pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
+pub use confidence::{Confidence, N_FEATURES};
 pub use evidence::Evidence;
 pub use flatness::Flatness;
 pub use hicp_core;
 pub use mean_vsd::MeanVsd;
+pub use misfit::Misfit;
 pub use model_points::ModelPoints;
 pub use occlusion::{Occlusion, VISIBILITY_TOLERANCE_METERS};
 pub use pose_error::{add, adi, mspd, mssd};

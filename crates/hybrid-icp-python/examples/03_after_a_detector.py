@@ -26,7 +26,7 @@ def refine(model: Model, camera: Camera, depth: npt.NDArray[np.float32]) -> Arra
     """Returns a pose that a robot can trust, or raises an exception."""
     mask, rough = detect(depth)
     result = Pipeline().refine(model, Observation(depth, mask, camera), rough)
-    if result.mve >= 0.3 or result.warnings:
+    if result.confidence < 0.95:
         raise RuntimeError(f"the pose is uncertain: {result} {result.warnings}")
     return result.T_co
 

@@ -42,17 +42,18 @@ pub(crate) fn shape(lengths: &[usize]) -> String {
 }
 
 /// Returns the choice that `word` names.
-pub(crate) fn choice<T>(name: &str, word: &str, [a, b]: [(&str, T); 2]) -> PyResult<T> {
-    if word == a.0 {
-        Ok(a.1)
-    } else if word == b.0 {
-        Ok(b.1)
-    } else {
-        Err(InputError::new_err(format!(
-            "{name} is {word:?}, expected {:?} or {:?}",
-            a.0, b.0
-        )))
-    }
+pub(crate) fn choice<T, const N: usize>(
+    name: &str,
+    word: &str,
+    choices: [(&str, T); N],
+) -> PyResult<T> {
+    let words = choices.each_ref().map(|(word, _)| format!("{word:?}"));
+    let mut choices = choices.into_iter();
+    let chosen = choices.find_map(|(choice, value)| (choice == word).then_some(value));
+    chosen.ok_or_else(|| {
+        let expected = words.join(" or ");
+        InputError::new_err(format!("{name} is {word:?}, expected {expected}"))
+    })
 }
 
 /// Creates the error for a value of the wrong type or shape.

@@ -83,8 +83,9 @@ pub(crate) fn result_header() -> String {
 ///     Ids of the objects whose models the constructor reads.
 /// detections : str or os.PathLike, optional
 ///     Use the masks of a detections file instead of mask_visib.
-/// rescore : {"keep", "mve"}, optional
-///     The score of a refined row: its old score, or 1 − MVE.
+/// rescore : {"keep", "mve", "confidence"}, optional
+///     The score of a refined row: its old score, 1 − MVE, or its
+///     confidence.
 #[pyclass(frozen, module = "hybrid_icp.bop", name = "DatasetRefiner")]
 pub(crate) struct PyDatasetRefiner {
     shared: DatasetRefiner,
@@ -105,7 +106,11 @@ impl PyDatasetRefiner {
         detections: Option<PathBuf>,
         rescore: &str,
     ) -> PyResult<Self> {
-        let choices = [("keep", Rescore::Keep), ("mve", Rescore::Mve)];
+        let choices = [
+            ("keep", Rescore::Keep),
+            ("mve", Rescore::Mve),
+            ("confidence", Rescore::Confidence),
+        ];
         let rescore = array::choice("rescore", rescore, choices)?;
         let refiner = Mutex::new(Refiner::boxed(pipeline.get().build()?));
         let shared = py

@@ -51,9 +51,30 @@ impl PyResultOf {
         Matrix::new(4, self.matrix.to_vec())
     }
 
+    /// Probability that the pose is right, 0 to 1.
+    ///
+    /// A pose is right if no point of the surface is farther from its true place than a tenth of
+    /// the diameter. Accept a pose with 0.95 or more.
+    #[getter]
+    fn confidence(&self) -> f64 {
+        self.refinement.confidence
+    }
+
+    /// Largest distance to expect of a surface point from its true place, meters.
+    #[getter]
+    fn expected_error_meters(&self) -> f64 {
+        self.refinement.expected_error_meters
+    }
+
+    /// Rotation error to expect, degrees.
+    #[getter]
+    fn expected_error_degrees(&self) -> f64 {
+        self.refinement.expected_error_degrees
+    }
+
     /// Mean VSD estimate of the returned pose: 0 if it explains the image everywhere, 1 if nowhere.
     ///
-    /// Accept the pose if this is below 0.3 and `warnings` is empty.
+    /// Imperfect masks raise it for right poses, too; `confidence` does not have this weakness.
     #[getter]
     fn mve(&self) -> f64 {
         self.refinement.mve
@@ -86,7 +107,7 @@ impl PyResultOf {
 
     /// Reasons not to trust the pose, as sentences; empty if there are none.
     ///
-    /// - The pose does not explain the image.
+    /// - The pose does not explain the image, or is more likely wrong than right.
     /// - The refinement made the pose worse.
     /// - The initial pose explained nothing of the image.
     /// - The measured surface is flat, but the model is not.
@@ -189,6 +210,9 @@ impl PyResultOf {
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let names = [
             "T_co",
+            "confidence",
+            "expected_error_meters",
+            "expected_error_degrees",
             "mve",
             "mve_initial",
             "evidence",
@@ -213,8 +237,9 @@ impl PyResultOf {
 
     fn __repr__(&self) -> String {
         format!(
-            "Result({}, mve {:.3} -> {:.3}, {} pairs, {} iterations, {})",
+            "Result({}, confidence {:.2}, mve {:.3} -> {:.3}, {} pairs, {} iterations, {})",
             self.outcome(),
+            self.confidence(),
             self.mve_initial(),
             self.mve(),
             self.n_pairs(),

@@ -29,6 +29,8 @@ def test_refinement_reduces_the_error_of_a_pose(scene):
     before, after = (hi.add(T_co, scene.true, scene.model) for T_co in (scene.rough, result.T_co))
     assert before > 0.01 and after < 0.0001
     assert result.mve < 0.01 and result.mve_initial > 0.3
+    assert 0.95 <= result.confidence <= 1.0
+    assert result.expected_error_meters < 0.01 and result.expected_error_degrees < 10
     assert result.T_co.shape == (4, 4) and result.T_co.dtype == np.float64
     assert result.mve == hi.mve(scene.model, scene.observation, result.T_co)
     assert result.warnings == []
@@ -76,7 +78,7 @@ def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
     evidence = known["evidence"]
     assert evidence["agrees"] > 0.9 and evidence["seen_through"] + evidence["inside"] < 0.1
     assert known["stages"][0]["regime"] in ("aligned", "misaligned")
-    assert repr(result).startswith("Result(refined, mve 0.")
+    assert repr(result).startswith("Result(refined, confidence ")
 
 
 def test_an_object_is_found_without_an_initial_pose(scene):

@@ -38,7 +38,8 @@ def compare(program, folder, pipeline, model, depth, scale_mm, mask, camera, rot
     assert stated["cam_R_m2c"] == result.T_co[:3, :3].flatten().tolist()
     if result.refined:
         assert stated["cam_t_m2c"] == (result.T_co[:3, 3] * 1000.0).tolist()
-    for key in ("mve", "mve_initial", "evidence", "outcome", "termination", "iterations", "n_pairs"):
+    keys = ("confidence", "mve", "mve_initial", "evidence", "outcome", "termination")
+    for key in (*keys, "iterations", "n_pairs"):
         assert stated[key] == found[key], key
     for theirs, ours in zip(stated["trace"], found["stages"], strict=True):
         theirs.pop("stage")

@@ -30,11 +30,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         Verdict::KeptInitial(why) => println!("kept the detected pose: {why}"),
     }
     println!(
-        "mean VSD estimate {:.3}, before {:.3}",
-        refined.mve, refined.mve_initial
+        "confidence {:.3}, mean VSD estimate {:.3}, before {:.3}",
+        refined.confidence, refined.mve, refined.mve_initial
     );
-    if refined.mve >= 0.3 || refined.mve > refined.mve_initial {
-        return Err("this pose does not explain the image".into());
+    if refined.confidence < 0.95 {
+        return Err("this pose may be wrong".into());
     }
     println!("{}", refined.outcome.camera_from_object);
     if let Some(quality) = refined.outcome.quality {

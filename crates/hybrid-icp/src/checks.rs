@@ -33,6 +33,10 @@ const SLIVER_RATIO: f64 = 20.0;
 /// found in the mask of another object are above it (`docs/robustness.md`).
 pub const EXPLAINS_NOTHING: f64 = 0.9;
 
+/// The recommended least confidence of an accepted pose. `docs/book/trust.md` states how many of such
+/// poses are wrong.
+pub const ACCEPTED: f64 = 0.95;
+
 /// Share of the mesh's diameter by which a stated one may differ. BOP states the diameters of other
 /// versions of the mesh, with more vertices.
 const DIAMETER_TOLERANCE: f64 = 0.05;
@@ -172,41 +176,51 @@ pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
     differ.then_some(Warning::StatedDiameter { stated, measured })
 }
 
-/// Returns warnings about the result of a refinement, from the scores of its two poses.
+/// Returns warnings about the result of a refinement.
 ///
 /// The arguments are [`Refinement::mve_initial`](crate::Refinement::mve_initial),
-/// [`Refinement::mve`](crate::Refinement::mve) and
+/// [`Refinement::mve`](crate::Refinement::mve),
+/// [`Refinement::confidence`](crate::Refinement::confidence) and
 /// [`Refinement::flatness`](crate::Refinement::flatness).
 ///
-/// Without a warning the pose can still be wrong: an object that looks nearly the same from two
-/// sides explains the image in both orientations, and an object of similar shape may have an MVE of
-/// 0.2 or 0.3.
+/// A high MVE alone is no reason for a warning, because imperfect masks raise it. Without a warning
+/// the pose can still be wrong: an object that looks nearly the same from two sides explains the
+/// image in both orientations.
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};
 /// // A rough pose that became a good one.
 /// let at = |residual| Some(Flatness::new(residual, 0.0025, 0.009, 0.2));
-/// assert_eq!(warnings_of_result(0.6, 0.1, at(0.002)), []);
+/// assert_eq!(warnings_of_result(0.6, 0.1, 0.97, at(0.002)), []);
 /// // Something was found in the mask, but nothing that the detector had seen there.
-/// assert!(matches!(warnings_of_result(0.95, 0.2, None)[..], [Warning::FoundElsewhere { .. }]));
+/// let found = warnings_of_result(0.95, 0.2, 0.7, None);
+/// assert!(matches!(found[..], [Warning::FoundElsewhere { .. }]));
 /// // Nothing was found.
-/// assert!(matches!(warnings_of_result(0.95, 0.7, None)[..], [Warning::Unexplained { .. }]));
+/// assert!(matches!(warnings_of_result(0.95, 0.7, 0.01, None)[..], [Warning::Unexplained { .. }]));
 /// // It got worse, but not bad.
-/// assert!(matches!(warnings_of_result(0.1, 0.2, None)[..], [Warning::Worse { .. }]));
+/// assert!(matches!(warnings_of_result(0.1, 0.2, 0.8, None)[..], [Warning::Worse { .. }]));
 /// // The object was found on a wall.
-/// assert!(matches!(warnings_of_result(0.6, 0.1, at(0.008))[..], [Warning::Flat { .. }]));
+/// assert!(matches!(warnings_of_result(0.6, 0.1, 0.8, at(0.008))[..], [Warning::Flat { .. }]));
 /// ```
 #[must_use]
-pub fn warnings_of_result(mve_initial: f64, mve: f64, flatness: Option<Flatness>) -> Vec<Warning> {
+pub fn warnings_of_result(
+    mve_initial: f64,
+    mve: f64,
+    confidence: f64,
+    flatness: Option<Flatness>,
+) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if mve > mve_initial {
         warnings.push(Warning::Worse { mve_initial, mve });
     }
-    if mve >= PAPER_ALPHA {
+    if mve >= PAPER_ALPHA && confidence < ACCEPTED {
         warnings.push(Warning::Unexplained { mve });
         return warnings;
     }
-    if mve_initial >= EXPLAINS_NOTHING {
+    if confidence < 0.5 {
+        warnings.push(Warning::Doubtful { confidence });
+    }
+    if mve_initial >= EXPLAINS_NOTHING && confidence < ACCEPTED {
         warnings.push(Warning::FoundElsewhere { mve_initial, mve });
     }
     if let Some(flatness) = flatness.filter(Flatness::is_flat) {

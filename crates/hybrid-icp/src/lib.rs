@@ -1,14 +1,14 @@
 //! Refines the 6D pose of a known object in a depth image, and scores the result.
 //!
-//! A detector gives a segmentation mask and a rough pose. One call returns a better pose and its
-//! mean VSD estimate (MVE): 0 if the pose explains the image everywhere, 1 if nowhere.
+//! A detector gives a segmentation mask and a rough pose. One call returns a better pose and the
+//! probability that it is right.
 //!
 //! ```
 //! use hybrid_icp::prelude::*;
 //!
 //! fn better(model: &Model, observation: &Observation, rough: &Isometry3<f64>) -> Option<Isometry3<f64>> {
 //!     let refined = Refiner::preset(Preset::Auto).refine(model, observation, rough);
-//!     let trusted = refined.mve < 0.3 && refined.warnings().is_empty();
+//!     let trusted = refined.confidence >= 0.95;
 //!     trusted.then_some(refined.outcome.camera_from_object)
 //! }
 //! ```
@@ -95,8 +95,8 @@ pub use hicp_switch as switch;
 
 pub use calibration::Calibration;
 pub use checks::{
-    EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings, warnings_of_model,
-    warnings_of_result,
+    ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings,
+    warnings_of_model, warnings_of_result,
 };
 pub use hicp_icp::BoxedStage;
 pub use mask_in_box::mask_in_box;

@@ -3,7 +3,7 @@
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
 use hicp_icp::{BoxedStage, Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
-use hicp_score::{Evidence, Flatness, MeanVsd, Score};
+use hicp_score::{Confidence, Evidence, Flatness, MeanVsd, Score};
 
 use crate::checks::warnings_of_result;
 use crate::preset::Preset;
@@ -24,10 +24,16 @@ pub struct Refinement {
     pub mve_initial: f64,
     /// The mean VSD estimate of the returned pose.
     ///
-    /// Accept a pose below 0.3 if there is no warning. Above `mve_initial`, the refinement made the
-    /// pose worse. If `mve_initial` is 0.9 or more, it may be the pose of another object
-    /// ([`Self::warnings`]).
+    /// Above `mve_initial`, the refinement made the pose worse.
     pub mve: f64,
+    /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
+    ///
+    /// Accept a pose with 0.95 or more ([`ACCEPTED`](crate::ACCEPTED)).
+    pub confidence: f64,
+    /// The largest distance to expect of a surface point from its true place, meters.
+    pub expected_error_meters: f64,
+    /// The rotation error to expect, degrees.
+    pub expected_error_degrees: f64,
     /// Flatness of the measured and the rendered surface at the returned pose, which tells whether
     /// a plane would explain the depth better. `None` if fewer than 64 pixels show both.
     pub flatness: Option<Flatness>,
@@ -39,7 +45,7 @@ impl Refinement {
     /// Returns the reasons not to trust the pose, if there are any ([`warnings_of_result`]).
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        warnings_of_result(self.mve_initial, self.mve, self.flatness)
+        warnings_of_result(self.mve_initial, self.mve, self.confidence, self.flatness)
     }
 }
 
@@ -221,12 +227,17 @@ impl<S: Stage> Refiner<S> {
         let pose = &outcome.camera_from_object;
         let mut context = self.workspace.context(problem);
         let mve = self.score.score(&mut context, pose);
+        let evidence = Evidence::at(&mut context, pose).unwrap_or_default();
+        let confidence = Confidence::at(&mut context, pose, &evidence, mve);
         Refinement {
             outcome,
             mve_initial: mve_initial.unwrap_or(mve),
             mve,
+            confidence: confidence.probability,
+            expected_error_meters: confidence.error_meters,
+            expected_error_degrees: confidence.error_degrees,
             flatness: Flatness::at(&mut context, pose),
-            evidence: Evidence::at(&mut context, pose).unwrap_or_default(),
+            evidence,
         }
     }
 

@@ -108,13 +108,21 @@ pub enum Warning {
         /// MVE of the returned pose.
         mve: f64,
     },
-    /// The returned pose has an MVE of [`PAPER_ALPHA`](hicp_switch::PAPER_ALPHA) or more.
+    /// The returned pose has an MVE of [`PAPER_ALPHA`](hicp_switch::PAPER_ALPHA) or more, and its
+    /// confidence is below [`ACCEPTED`](crate::ACCEPTED).
     #[error("MVE {mve:.3}: the pose does not explain the image, do not trust it")]
     Unexplained {
         /// MVE of the returned pose.
         mve: f64,
     },
-    /// The initial pose explained nothing of the mask, but the returned one does.
+    /// The returned pose explains most of the mask, but is more likely wrong than right.
+    #[error("confidence {confidence:.2}: the pose is more likely wrong than right")]
+    Doubtful {
+        /// The probability that the pose is right.
+        confidence: f64,
+    },
+    /// The initial pose explained nothing of the mask, the returned one does, and its confidence is
+    /// below [`ACCEPTED`](crate::ACCEPTED).
     ///
     /// The mask may show another object that looks like this one from one side.
     #[error(

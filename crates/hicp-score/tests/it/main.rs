@@ -10,6 +10,7 @@
 
 mod bop_errors;
 mod calibration;
+mod confidence;
 mod evidence;
 mod flatness;
 mod pose_error;

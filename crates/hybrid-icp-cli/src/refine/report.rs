@@ -26,6 +26,10 @@ pub(crate) struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     mve_initial: Option<f64>,
     mve: f64,
+    /// The probability that the pose is right.
+    confidence: f64,
+    expected_error_mm: f64,
+    expected_error_degrees: f64,
     /// The evidence for and against the pose, by the names of its fields.
     evidence: BTreeMap<&'static str, f64>,
     iterations: usize,
@@ -90,6 +94,9 @@ impl Report {
             termination: outcome.termination.name(),
             mve_initial: init.map(|_| refined.mve_initial),
             mve: refined.mve,
+            confidence: refined.confidence,
+            expected_error_mm: refined.expected_error_meters * 1e3,
+            expected_error_degrees: refined.expected_error_degrees,
             evidence: BTreeMap::from(refined.evidence.named()),
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
@@ -178,15 +185,16 @@ pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
     let outcome = &refined.outcome;
     match outcome.verdict {
         Verdict::Refined => format!(
-            "refined: MVE {:.3} -> {:.3}, {} pairs, {} iterations; ended because {reason}",
+            "refined: confidence {:.2}, MVE {:.3} -> {:.3}, {} pairs, {} iterations; ended because {reason}",
+            refined.confidence,
             refined.mve_initial,
             refined.mve,
             outcome.n_pairs(),
             outcome.iterations,
         ),
         Verdict::KeptInitial(_) => format!(
-            "kept the initial pose: {reason}; MVE {:.3}, {} iterations",
-            refined.mve, outcome.iterations
+            "kept the initial pose: {reason}; confidence {:.2}, MVE {:.3}, {} iterations",
+            refined.confidence, refined.mve, outcome.iterations
         ),
     }
 }

@@ -180,6 +180,6 @@ fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     }
     let status = std::fs::read_to_string(world.path("rows.csv")).unwrap();
     let status: Vec<&str> = status.lines().collect();
-    assert_eq!(status[1], "3,0,9,,kept: missing model,,,");
+    assert_eq!(status[1], "3,0,9,,kept: missing model,,,,");
     assert!(status[4].starts_with("3,40,2,0,refined,"), "{}", status[4]);
 }

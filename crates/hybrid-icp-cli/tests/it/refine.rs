@@ -35,6 +35,10 @@ fn the_result_has_every_key_in_its_type() {
         assert!(result[key].as_f64().unwrap() > 0.0, "{key}");
     }
     assert!(result["mve"].as_f64() < result["mve_initial"].as_f64());
+    let confidence = result["confidence"].as_f64().unwrap();
+    assert!((0.95..=1.0).contains(&confidence), "{result}");
+    assert!(result["expected_error_mm"].as_f64().unwrap() < 20.0);
+    assert!(result["expected_error_degrees"].as_f64().unwrap() < 20.0);
     let evidence = &result["evidence"];
     assert!(evidence["agrees"].as_f64().unwrap() > 0.9, "{evidence}");
     assert!(
@@ -147,19 +151,16 @@ fn the_result_has_every_warning() {
         &["the median depth inside the mask", "do not trust it"],
     );
 
-    // The search finds the car in its mask from any initial pose. It cannot check that the detector
-    // meant this object.
+    // The search finds the car in its mask from any initial pose, and its confidence is high.
     let scene = Scene::new();
     let aside = Isometry3::translation(3.0, 0.0, 0.0) * truth();
     scene.write("init.json", pose_json(&aside).to_string());
-    let result = told(
-        &scene,
-        &[
-            "the initial pose explained nothing of the mask (MVE 1.000)",
-            "may be another object",
-        ],
+    let result = told(&scene, &[]);
+    let confidence = result["confidence"].as_f64().unwrap();
+    assert!(
+        confidence >= 0.95 && result["mve_initial"] == 1.0,
+        "{result}"
     );
-    assert!(result["mve"].as_f64().unwrap() < 0.4, "{result}");
 }
 
 #[test]

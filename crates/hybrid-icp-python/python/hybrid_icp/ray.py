@@ -88,8 +88,8 @@ def refine(
         The default is `Pipeline()`.
     detections : str or os.PathLike, optional
         Use the masks of a detections file instead of mask_visib.
-    rescore : {"keep", "mve"}, optional
-        The score of a refined row: its old score, or 1 - MVE.
+    rescore : {"keep", "mve", "confidence"}, optional
+        The score of a refined row: its old score, 1 - MVE, or its confidence.
     workers : int, optional
         Number of actors, with one thread each. The default is the number of CPUs of the cluster.
     num_cpus : float, optional

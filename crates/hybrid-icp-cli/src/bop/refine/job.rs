@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use hicp_bop::{MaskSource, Rescore};
 
 use super::row_options::RowOptions;
@@ -26,11 +26,12 @@ pub(crate) struct JobOptions {
     #[command(flatten)]
     pub(crate) choice: RowOptions,
     /// Replace the score, so that poses can be ranked without ground truth. With mve, the score is
-    /// 1 - MVE of the row's pose in the output, and 0 for a row without an MVE.
-    #[arg(long, value_name = "BY", value_parser = ["mve"])]
-    rescore: Option<String>,
-    /// Also write the status of every row as CSV, with its MVE before and after, and the reasons
-    /// not to trust its pose.
+    /// 1 - MVE of the row's pose in the output; with confidence, the probability that it is right.
+    /// A row that was not refined has 0.
+    #[arg(long, value_name = "BY", value_enum, hide_possible_values = true)]
+    rescore: Option<RescoreBy>,
+    /// Also write the status of every row as CSV, with its MVE before and after, its confidence,
+    /// and the reasons not to trust its pose.
     #[arg(long, value_name = "ROWS.csv")]
     rows: Option<PathBuf>,
     /// Continue a killed run with the same options. If it left no journal, start from the
@@ -79,7 +80,8 @@ impl JobOptions {
             threads: self.threads,
             timed: !self.no_time,
             rescore: match self.rescore {
-                Some(_) => Rescore::Mve,
+                Some(RescoreBy::Mve) => Rescore::Mve,
+                Some(RescoreBy::Confidence) => Rescore::Confidence,
                 None => Rescore::Keep,
             },
             resume: self.resume,
@@ -88,6 +90,13 @@ impl JobOptions {
             listed_by: Some("--rows"),
         }
     }
+}
+
+/// The new score of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RescoreBy {
+    Mve,
+    Confidence,
 }
 
 /// A refinement of the rows of a result file.

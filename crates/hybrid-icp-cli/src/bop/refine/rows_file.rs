@@ -6,7 +6,7 @@ use hicp_bop::{FrameResult, RowResult};
 use hicp_io::IoError;
 use hicp_io::bop::ResultRow;
 
-const HEADER: [&str; 8] = [
+const HEADER: [&str; 9] = [
     "scene_id",
     "im_id",
     "obj_id",
@@ -14,15 +14,16 @@ const HEADER: [&str; 8] = [
     "status",
     "mve_initial",
     "mve",
+    "confidence",
     "warnings",
 ];
 
 /// Writes one line per row of the output, in the order of the output.
 ///
-/// A line has the status, the MVE before and after, and the warnings. The MVE is empty for a row
-/// that did not reach the pipeline. `row` counts the rows of the output from 0, as in the errors of
-/// `bop eval`. If poses are estimated, a row without a pose is not in the output, and its `row` is
-/// empty.
+/// A line has the status, the MVE before and after, the confidence, and the warnings. The numbers
+/// are empty for a row that did not reach the pipeline. `row` counts the rows of the output from 0,
+/// as in the errors of `bop eval`. If poses are estimated, a row without a pose is not in the
+/// output, and its `row` is empty.
 pub(super) fn write(
     path: &Path,
     rows: &[ResultRow],
@@ -44,7 +45,7 @@ pub(super) fn write(
             lines.serialize((
                 (row.scene_id, row.im_id, row.obj_id, written),
                 result.status.to_string(),
-                [before, after].map(|mve| mve.map(|mve| mve.to_string())),
+                [before, after, result.confidence].map(|number| number.map(|n| n.to_string())),
                 warnings.join("; "),
             ))?;
         }
@@ -72,6 +73,7 @@ mod tests {
             status,
             pose: None,
             mve,
+            confidence: mve.map(|_| 0.75),
             flatness,
         };
         let frame = |rows| FrameResult {
@@ -95,10 +97,10 @@ mod tests {
         write(&path, &rows, &results, false).unwrap();
         assert_eq!(
             std::fs::read_to_string(path).unwrap(),
-            "scene_id,im_id,obj_id,row,status,mve_initial,mve,warnings\n\
-             1,2,5,0,refined,0.5,0.25,\n\
-             1,2,6,1,kept: no mask of the object,,,\n\
-             1,2,7,2,refined,0.95,0.1,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \
+            "scene_id,im_id,obj_id,row,status,mve_initial,mve,confidence,warnings\n\
+             1,2,5,0,refined,0.5,0.25,0.75,\n\
+             1,2,6,1,kept: no mask of the object,,,,\n\
+             1,2,7,2,refined,0.95,0.1,0.75,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \
              another object; the surface inside the mask is flat to within 0.0010 m, that of the model at the pose only to within 0.0100 m, and \
              0.0100 m away from it: what is there may be another object\"\n"
         );

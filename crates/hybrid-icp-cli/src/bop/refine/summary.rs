@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::bail;
 use hicp_bop::{FrameResult, Models, RowResult, RowStatus};
 use hybrid_icp::switch::PAPER_ALPHA;
-use hybrid_icp::{EXPLAINS_NOTHING, Warning};
+use hybrid_icp::{ACCEPTED, EXPLAINS_NOTHING, Warning};
 
 use super::job::RefineJob;
 use crate::bop::statistics::median;
@@ -47,6 +47,11 @@ pub(super) fn summary(
             true => format!("\n  median MVE {after:.3}"),
             false => format!("\n  median MVE {before:.3} -> {after:.3}"),
         });
+        let confident = rows_of(results).filter(|row| row.confidence >= Some(ACCEPTED));
+        let count = confident.count();
+        text.push_str(&format!(
+            "\n  {count:>7}  with a confidence of {ACCEPTED} or more"
+        ));
     }
     if distrust.unexplained > 0 {
         let count = distrust.unexplained;

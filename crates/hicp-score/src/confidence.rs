@@ -1,0 +1,143 @@
+//! The probability that a pose is right, and its expected error.
+
+use hicp_core::{Context, Isometry3};
+
+use crate::confidence_curves::{BASE, CURVES, Curve, KNOTS};
+use crate::evidence::Evidence;
+use crate::misfit::Misfit;
+
+/// Number of features.
+pub const N_FEATURES: usize = CURVES.len();
+
+/// The calibrated probability that a pose is right, and the error to expect.
+///
+/// A pose is right if no point of the surface is farther from its true place than a tenth of the
+/// diameter ([`mssd`](crate::mssd) up to declared symmetries).
+///
+/// The model is a scorecard: each feature of the [`Evidence`], the [`Misfit`] and the score adds
+/// log-odds from a piecewise linear curve. The curves are fitted on simulated cases with imperfect
+/// masks, noise, occlusion, look-alikes and wrong classes (`cargo run --release -p hicp-tests
+/// --example confidence -- fit`). A probability is right on average over such cases. It tells
+/// nothing about two orientations that explain the image equally well.
+///
+/// ```
+/// use hicp_score::Confidence;
+/// assert_eq!(Confidence::none(0.2).probability, 0.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Confidence {
+    /// Probability that the pose is right, 0 to 1.
+    pub probability: f64,
+    /// Typical largest distance of a surface point from its true place, meters.
+    pub error_meters: f64,
+    /// Typical rotation error, degrees.
+    pub error_degrees: f64,
+}
+
+impl Confidence {
+    /// The names of [`Confidence::features`].
+    pub const FEATURES: [&'static str; N_FEATURES] = [
+        "ahead",
+        "rim_open",
+        "rim_ahead",
+        "systematic",
+        "bias",
+        "weak",
+        "unexplained",
+        "sigma",
+        "hidden",
+        "inside",
+        "mask_missing",
+        "log_pixels",
+        "mve",
+    ];
+
+    /// Measures the confidence at a pose whose mean VSD estimate is `mve`.
+    ///
+    /// `evidence` must be that at the pose. Without a model, an image or a rendered pixel, the
+    /// probability is 0. Cost: that of [`Misfit::at`]. Allocates nothing.
+    #[must_use]
+    pub fn at(
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        evidence: &Evidence,
+        mve: f64,
+    ) -> Self {
+        let diameter = context.problem.model().map_or(0.0, |m| m.diameter());
+        match Misfit::at(context, camera_from_object) {
+            Some(misfit) if evidence.agrees > 0.0 => {
+                Self::of(&Self::features(evidence, &misfit, mve), diameter)
+            }
+            _ => Self::none(diameter),
+        }
+    }
+
+    /// The confidence in a pose that nothing in the image supports.
+    ///
+    /// The expected errors are the diameter, in meters, and a half turn.
+    #[must_use]
+    pub fn none(diameter: f64) -> Self {
+        Self {
+            probability: 0.0,
+            error_meters: diameter,
+            error_degrees: 180.0,
+        }
+    }
+
+    /// Returns the features of the model, in the order of [`Confidence::FEATURES`].
+    #[must_use]
+    pub fn features(evidence: &Evidence, misfit: &Misfit, mve: f64) -> [f64; N_FEATURES] {
+        let seen = 1.0 - evidence.hidden - evidence.unmeasured;
+        [
+            misfit.ahead,
+            misfit.rim_open,
+            misfit.rim_ahead,
+            misfit.systematic,
+            misfit.bias.abs(),
+            misfit.weak,
+            misfit.unexplained,
+            misfit.sigma,
+            evidence.hidden,
+            evidence.inside,
+            evidence.mask_missing,
+            (evidence.pixels as f64 * seen).max(1.0).ln(),
+            mve,
+        ]
+    }
+
+    /// Evaluates the model for a `diameter` in meters.
+    #[must_use]
+    pub fn of(features: &[f64; N_FEATURES], diameter: f64) -> Self {
+        let mut sums = BASE;
+        for (curve, x) in CURVES.iter().zip(features) {
+            for (sum, y) in sums.iter_mut().zip(curve.at(*x)) {
+                *sum += y;
+            }
+        }
+        let [log_odds, log_error, log_degrees] = sums;
+        Self {
+            probability: 1.0 / (1.0 + (-log_odds).exp()),
+            error_meters: log_error.exp() * diameter,
+            error_degrees: log_degrees.exp().min(180.0),
+        }
+    }
+}
+
+impl Curve {
+    /// Returns the values at `x`, which is clamped to the knots. NaN counts as the last one.
+    fn at(&self, x: f64) -> [f64; 3] {
+        let right = self.knots.iter().position(|knot| x < *knot);
+        match right.unwrap_or(KNOTS) {
+            0 => self.values.map(|values| values[0]),
+            KNOTS => self.values.map(|values| values[KNOTS - 1]),
+            right => {
+                let (a, b) = (self.knots[right - 1], self.knots[right]);
+                let share = (x - a) / (b - a);
+                self.values
+                    .map(|y| y[right - 1] + share * (y[right] - y[right - 1]))
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Tests of the misfit and the confidence against scenes with known differences.
+
+use crate::support::{RayCaster, cuboid, pose, render_depth};
+use hicp_core::{
+    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
+};
+use hicp_score::{Confidence, Evidence, MeanVsd, Misfit, N_FEATURES, Score};
+
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 64;
+/// Depth of the wall behind the object, meters.
+const WALL: f32 = 0.6;
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::new(80.0, 80.0, 31.6, 30.3, WIDTH, HEIGHT).unwrap()
+}
+
+fn cube() -> Model {
+    Model::new(cuboid(0.08, 0.08, 0.08))
+}
+
+fn at() -> Isometry3<f64> {
+    pose(0.003, -0.002, 0.3, 0.4, 0.8, 0.2)
+}
+
+/// Returns the cube at [`at`] in front of a wall, with depths changed by pixel.
+fn scene(change: impl Fn(usize, f32) -> f32) -> Observation {
+    let alone = render_depth(&cube(), &camera(), &at());
+    let mask = alone.pixels().iter().map(|z| *z > 0.0).collect();
+    let depth = alone.pixels().iter().enumerate();
+    let depth = depth.map(|(i, z)| if *z > 0.0 { change(i, *z) } else { WALL });
+    let depth = DepthImage::from_meters(WIDTH, HEIGHT, depth.collect()).unwrap();
+    Observation::new(depth, Mask::new(WIDTH, HEIGHT, mask).unwrap(), camera()).unwrap()
+}
+
+fn judge(observation: &Observation, pose: &Isometry3<f64>) -> (Misfit, Confidence) {
+    let model = cube();
+    let mut renders = RenderCache::new(RayCaster);
+    let mut context = Context::new(Problem::new(&model, observation), &mut renders);
+    let evidence = Evidence::at(&mut context, pose).unwrap();
+    let mve = MeanVsd::default().score(&mut context, pose);
+    let confidence = Confidence::at(&mut context, pose, &evidence, mve);
+    (Misfit::at(&mut context, pose).unwrap(), confidence)
+}
+
+#[test]
+fn at_the_true_pose_nothing_misfits_and_the_confidence_is_high() {
+    let (misfit, confidence) = judge(&scene(|_, z| z), &at());
+    for share in [
+        misfit.systematic,
+        misfit.bias,
+        misfit.ahead,
+        misfit.rim_ahead,
+        misfit.rim_open,
+        misfit.weak,
+        misfit.unexplained,
+    ] {
+        assert!(share.abs() < 1e-6, "{misfit:?}");
+    }
+    assert!(confidence.probability > 0.95, "{confidence:?}");
+    assert!(confidence.error_meters < 0.01, "{confidence:?}");
+}
+
+/// A chessboard of errors is noise, an equal error of all pixels is not.
+#[test]
+fn noise_is_told_from_a_shift() {
+    let size = 0.004;
+    let diameter = cube().diameter();
+    let sign = |i: usize| {
+        if (i % 64 + i / 64) % 2 == 0 {
+            1.0
+        } else {
+            -1.0
+        }
+    };
+    let (noisy, _) = judge(&scene(|i, z| z + size * sign(i)), &at());
+    let (shifted, _) = judge(&scene(|_, z| z + size), &at());
+    let share = f64::from(size) / diameter;
+    assert!(
+        noisy.sigma > share && noisy.bias.abs() < 0.1 * share,
+        "{noisy:?}"
+    );
+    assert!(shifted.sigma < 0.3 * share, "{shifted:?}");
+    assert!(
+        (shifted.systematic - share).abs() < 0.1 * share,
+        "{shifted:?}"
+    );
+    assert!((shifted.bias - share).abs() < 0.1 * share, "{shifted:?}");
+}
+
+#[test]
+fn wrong_poses_have_a_lower_confidence() {
+    let observation = scene(|_, z| z);
+    let mut last = judge(&observation, &at()).1.probability;
+    for meters in [0.02, 0.05] {
+        let aside = Isometry3::translation(meters, 0.0, 0.0) * at();
+        let (misfit, confidence) = judge(&observation, &aside);
+        assert!(misfit.ahead > 0.0 && misfit.rim_ahead > 0.0, "{misfit:?}");
+        assert!(confidence.probability < last, "{confidence:?}");
+        last = confidence.probability;
+    }
+    assert!(last < 0.1, "{last}");
+}
+
+#[test]
+fn without_agreement_the_probability_is_zero() {
+    let beside = Isometry3::translation(5.0, 0.0, 0.0) * at();
+    let (misfit, confidence) = judge(&scene(|_, z| z), &beside);
+    assert_eq!(confidence, Confidence::none(cube().diameter()));
+    assert_eq!(misfit.ahead, 0.0);
+}
+
+#[test]
+fn features_out_of_range_give_finite_numbers() {
+    for x in [f64::NEG_INFINITY, -1.0, 1e9, f64::INFINITY, f64::NAN] {
+        let confidence = Confidence::of(&[x; N_FEATURES], 0.1);
+        assert!((0.0..=1.0).contains(&confidence.probability), "{x}");
+        assert!(confidence.error_meters.is_finite() && confidence.error_degrees <= 180.0);
+    }
+}

@@ -1,0 +1,191 @@
+//! Poses to judge: results of pipelines, with the truth.
+
+use std::error::Error;
+
+use hicp_sim::{Household, SimRng, stream};
+use hicp_tests::symmetric_pose_distance;
+use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
+use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
+use hybrid_icp::prelude::{Repeat, Stage};
+use hybrid_icp::score::{Confidence, Misfit, ModelPoints, N_FEATURES};
+use hybrid_icp::{Preset, Refinement, Refiner, presets};
+use rand::RngExt;
+
+/// The pipelines whose results are judged.
+const PRESETS: [Preset; 3] = [Preset::Local, Preset::Auto, Preset::Search];
+
+/// A judged pose.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// The features of the confidence.
+    pub features: [f64; N_FEATURES],
+    /// The stated confidence.
+    pub confidence: f64,
+    /// The stated errors: the largest of a surface point in diameters, and the rotation in degrees.
+    pub expected: [f64; 2],
+    /// The true errors; `None` if the model is wrong.
+    pub errors: Option<[f64; 2]>,
+    /// Share of the object that is visible.
+    pub visible: f64,
+    /// The mean VSD estimate of the result, and whether a warning accompanies it.
+    pub mve: f64,
+    /// Whether the result has a warning.
+    pub warned: bool,
+    /// The source of the pose.
+    pub kind: Kind,
+}
+
+/// The source of a judged pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A refinement from a start near the truth.
+    Near,
+    /// A refinement from any rotation.
+    Turned,
+    /// A pose that was found without a start.
+    Estimated,
+    /// A perturbed pose that was not refined.
+    Unrefined,
+    /// A refinement with the model in other proportions.
+    LookAlike,
+    /// A refinement with the model of another object.
+    OtherClass,
+}
+
+impl Kind {
+    /// Every kind, with its name in tables.
+    pub const ALL: [(Self, &str); 6] = [
+        (Self::Near, "near start"),
+        (Self::Turned, "any rotation"),
+        (Self::Estimated, "no start"),
+        (Self::Unrefined, "not refined"),
+        (Self::LookAlike, "look-alike"),
+        (Self::OtherClass, "other class"),
+    ];
+}
+
+impl Case {
+    /// Returns whether the pose is right.
+    pub fn right(&self) -> bool {
+        self.errors.is_some_and(|[distance, _]| distance < 0.1)
+    }
+
+    /// Judges a result. `truth` is the true pose, if the model is that of the object.
+    pub fn new(
+        refiner: &mut Refiner,
+        (model, observation): (&Model, &Observation),
+        refined: &Refinement,
+        truth: Option<&Isometry3<f64>>,
+        (visible, kind): (f64, Kind),
+    ) -> Self {
+        let pose = &refined.outcome.camera_from_object;
+        let problem = Problem::new(model, observation);
+        let misfit = Misfit::at(&mut refiner.workspace_mut().context(&problem), pose);
+        let errors = truth.map(|truth| {
+            let (angle, _) = symmetric_pose_distance(pose, truth, model.symmetries());
+            let distance = ModelPoints::new(model).mssd(pose, truth) / model.diameter();
+            [distance, angle.to_degrees()]
+        });
+        Self {
+            features: Confidence::features(
+                &refined.evidence,
+                &misfit.unwrap_or_default(),
+                refined.mve,
+            ),
+            confidence: refined.confidence,
+            expected: [
+                refined.expected_error_meters / model.diameter(),
+                refined.expected_error_degrees,
+            ],
+            errors,
+            visible,
+            mve: refined.mve,
+            warned: !refined.warnings().is_empty(),
+            kind,
+        }
+    }
+}
+
+/// Simulates cases of some objects until there are `count`.
+///
+/// Every visible object gets several poses, each with another random kind of mask.
+pub fn simulate(
+    objects: &[Household],
+    seed: u64,
+    count: usize,
+) -> Result<Vec<Case>, Box<dyn Error>> {
+    let scenes = Tabletop::new(objects)?;
+    let alike = Tabletop::look_alikes(objects)?;
+    let mut refiners = PRESETS.map(Refiner::preset);
+    let mut cases = Vec::new();
+    for scene in seed.. {
+        for (place, seen) in (0..).zip(scenes.scene(scene)?) {
+            let mut random = stream(scene, &["confidence"], place);
+            let others = scenes.objects.len();
+            let other = (seen.model + random.random_range(1..others)) % others;
+            let models = [&scenes, &scenes, &alike].map(|s| &s.objects[seen.model].1);
+            let [own, _, alike] = models;
+            let kinds = [
+                (Kind::Near, own),
+                (Kind::Near, own),
+                (Kind::Turned, own),
+                (Kind::Estimated, own),
+                (Kind::OtherClass, &scenes.objects[other].1),
+                match place % 2 {
+                    0 => (Kind::Unrefined, own),
+                    _ => (Kind::LookAlike, alike),
+                },
+            ];
+            for (kind, model) in kinds {
+                let refiner = &mut refiners[random.random_range(0..PRESETS.len())];
+                cases.push(case(refiner, &seen, kind, (own, model), &mut random)?);
+            }
+        }
+        if cases.len() >= count {
+            break;
+        }
+    }
+    cases.truncate(count);
+    Ok(cases)
+}
+
+/// Returns a refiner that only judges the initial pose.
+fn unrefined() -> Refiner<impl Stage> {
+    Refiner::new(Repeat {
+        times: 0,
+        stage: presets::local(),
+    })
+}
+
+fn case(
+    refiner: &mut Refiner,
+    seen: &Seen,
+    kind: Kind,
+    (own, model): (&Model, &Model),
+    random: &mut SimRng,
+) -> Result<Case, Box<dyn Error>> {
+    let mask = MaskKind::ALL[random.random_range(0..MaskKind::ALL.len())];
+    let observation = seen.observe(mask)?;
+    let factor = 2.0 * random.random::<f64>();
+    let init = match kind {
+        Kind::Near | Kind::Unrefined | Kind::LookAlike => seen.near(random, factor),
+        _ => seen.turned(random, own, model),
+    };
+    let refined = match kind {
+        Kind::Estimated => refiner.estimate(model, &observation),
+        Kind::Unrefined => unrefined().refine(model, &observation, &init),
+        _ => refiner.refine(model, &observation, &init),
+    };
+    let truth = match kind {
+        Kind::LookAlike | Kind::OtherClass => None,
+        _ => Some(&seen.truth),
+    };
+    let sides = (model, &observation);
+    Ok(Case::new(
+        refiner,
+        sides,
+        &refined,
+        truth,
+        (seen.visible_share, kind),
+    ))
+}

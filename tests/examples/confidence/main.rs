@@ -1,0 +1,119 @@
+//! Measures the calibration of the confidence on simulated and real cases, as Markdown tables.
+//!
+//! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
+//! objects, and `-- fit [CASES]` for the curves, which are fitted on the tuning objects.
+
+mod cases;
+mod fit;
+mod real;
+
+use hicp_sim::Household;
+use hybrid_icp::score::{LabeledScore, reliability, roc_area};
+
+use crate::cases::{Case, Kind};
+
+/// Confidence at which a pose is accepted.
+const ACCEPTED: f64 = 0.95;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let count = arguments
+        .last()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(6000);
+    match arguments.first().map(String::as_str) {
+        Some("fit") => fit::print(&cases::simulate(&Household::TUNING, 0, count)?),
+        Some("tuning") => report(&cases::simulate(&Household::TUNING, 1 << 20, count)?),
+        _ => {
+            report(&cases::simulate(&Household::TEST, 0, count)?);
+            if let Some(cases) = real::cases() {
+                println!("\n## Real frames\n");
+                report(&cases);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Prints the reliability table and the figures of some cases.
+fn report(cases: &[Case]) {
+    let labeled: Vec<LabeledScore> = cases
+        .iter()
+        .map(|case| LabeledScore {
+            score: case.confidence,
+            correct: case.right(),
+        })
+        .collect();
+    println!("| confidence | poses | mean confidence | right |");
+    println!("|---|---:|---:|---:|");
+    let mut error = 0.0;
+    for bin in reliability(&labeled, 10) {
+        let (Some(mean), Some(right)) = (bin.mean_score(), bin.share_correct()) else {
+            continue;
+        };
+        error += (mean - right).abs() * bin.count as f64 / cases.len() as f64;
+        let (low, high) = (bin.lower, bin.upper);
+        println!(
+            "| {low:.1} to {high:.1} | {} | {mean:.3} | {right:.3} |",
+            bin.count
+        );
+    }
+    println!("\n| figure | value |");
+    println!("|---|---:|");
+    println!("| poses | {} |", cases.len());
+    println!("| expected calibration error | {error:.3} |");
+    if let Some(area) = roc_area(&labeled) {
+        println!("| ROC area | {area:.3} |");
+    }
+    let accepted = |case: &&Case| case.confidence >= ACCEPTED;
+    let share = |of: &dyn Fn(&Case) -> bool, that: &dyn Fn(&Case) -> bool| {
+        let all = cases.iter().filter(|case| of(case));
+        let n = all.clone().count();
+        let share = all.filter(|case| that(case)).count() as f64 / n.max(1) as f64;
+        format!("{:.1} % of {n}", 100.0 * share)
+    };
+    let high = |case: &Case| accepted(&case);
+    let seen = |case: &Case| case.right() && case.visible >= 0.5;
+    println!(
+        "| wrong, of those ≥ {ACCEPTED} | {} |",
+        share(&high, &|case| !case.right())
+    );
+    println!(
+        "| ≥ {ACCEPTED}, of the right ones half visible | {} |",
+        share(&seen, &high)
+    );
+    let within = |which: usize| {
+        let ratio = |case: &Case| Some(case.errors?[which] / case.expected[which]);
+        let mut ratios: Vec<f64> = cases.iter().filter(accepted).filter_map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        let at = |share: f64| ratios.get((ratios.len() as f64 * share) as usize);
+        let [low, middle, high] = [0.1, 0.5, 0.9].map(|s| at(s).copied().unwrap_or(f64::NAN));
+        format!("{low:.2}, {middle:.2}, {high:.2}")
+    };
+    println!(
+        "| true over expected distance: 10 %, median, 90 % | {} |",
+        within(0)
+    );
+    println!(
+        "| true over expected angle: 10 %, median, 90 % | {} |",
+        within(1)
+    );
+
+    println!(
+        "\n| poses | right | ≥ {ACCEPTED} and right | ≥ {ACCEPTED} and wrong | MVE < 0.3, no warning, and wrong |"
+    );
+    println!("|---|---:|---:|---:|---:|");
+    for (kind, name) in Kind::ALL {
+        let of = |case: &Case| case.kind == kind;
+        if !cases.iter().any(of) {
+            continue;
+        }
+        println!(
+            "| {name} | {} | {} | {} | {} |",
+            share(&of, &Case::right),
+            share(&of, &|case| high(case) && case.right()),
+            share(&of, &|case| high(case) && !case.right()),
+            share(&of, &|case| case.mve < 0.3 && !case.warned && !case.right()),
+        );
+    }
+}
