@@ -177,8 +177,8 @@ impl<S: Stage> Refiner<S> {
     /// `mve_initial` equals `mve`, because there is no initial pose.
     ///
     /// Never fails on data: if no surface was measured inside the mask, the outcome keeps the
-    /// identity and states the reason. Deterministic. Cost: as `search`, about 10 ms on one core if
-    /// the object is found at once.
+    /// identity and states the reason. Deterministic. Cost: that of a `search` that does not end at
+    /// once, some tens of milliseconds on one core; the search allocates its list of hypotheses.
     ///
     /// ```
     /// # use hybrid_icp::core::{DepthImage, Mask, Model, Observation, PinholeCamera, Point3, TriMesh};
