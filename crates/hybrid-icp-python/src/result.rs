@@ -92,7 +92,8 @@ impl PyResultOf {
     ///
     /// - `agrees`: the measured surface is within 10 % of the diameter of the rendered one.
     /// - `seen_through`: it is farther; the camera looks through the object.
-    /// - `inside`: it is nearer and continues an agreeing surface; the object is in a table or wall.
+    /// - `inside`: it is nearer and continues an agreeing surface; the object is in a table or
+    ///   wall.
     /// - `hidden`: it is nearer and ends in a step; something stands in front.
     /// - `unmeasured`: no depth was measured.
     ///

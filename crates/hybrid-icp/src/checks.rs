@@ -33,8 +33,8 @@ const SLIVER_RATIO: f64 = 20.0;
 /// found in the mask of another object are above it (`docs/robustness.md`).
 pub const EXPLAINS_NOTHING: f64 = 0.9;
 
-/// The recommended least confidence of an accepted pose. `docs/book/trust.md` states how many of such
-/// poses are wrong.
+/// The recommended least confidence of an accepted pose. `docs/book/trust.md` states how many of
+/// such poses are wrong.
 pub const ACCEPTED: f64 = 0.95;
 
 /// Share of the mesh's diameter by which a stated one may differ. BOP states the diameters of other
