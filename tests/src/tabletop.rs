@@ -61,6 +61,15 @@ impl MaskKind {
         }
     }
 
+    /// Returns a mask with this defect.
+    ///
+    /// # Errors
+    ///
+    /// Never for the kinds in [`MaskKind::ALL`].
+    pub fn apply(self, mask: &Mask) -> Result<Mask, SimError> {
+        self.defects().apply(&mut stream(0, &["mask"], 0), mask)
+    }
+
     fn defects(self) -> MaskDefects {
         let mut defects = MaskDefects::default();
         match self {
@@ -211,9 +220,7 @@ impl Seen {
     ///
     /// Never with the sizes of a scene.
     pub fn observe(&self, kind: MaskKind) -> Result<Observation, SimError> {
-        let mask = kind
-            .defects()
-            .apply(&mut stream(0, &["mask"], 0), &self.visible)?;
+        let mask = kind.apply(&self.visible)?;
         Ok(Observation::new(
             Arc::clone(&self.depth),
             mask,

@@ -89,9 +89,7 @@ impl Evidence {
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
         let (model, observation) = context.problem.sides()?;
         let view = context.view(camera_from_object)?;
-        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let diameter = model.diameter() as f32;
-        Some(Self::of(observation, view, diameter))
+        Some(Self::of(observation, view, model.diameter()))
     }
 
     /// Returns the share of the rendered pixels that contradict the pose.
@@ -120,7 +118,19 @@ impl Evidence {
         ]
     }
 
-    fn of(observation: &Observation, view: &RenderedView, diameter: f32) -> Self {
+    /// Returns the share of the nearer measured surfaces that contain the object.
+    pub(crate) fn inside_share(&self) -> f64 {
+        let nearer = self.inside + self.hidden;
+        if nearer > 0.0 {
+            self.inside / nearer
+        } else {
+            0.0
+        }
+    }
+
+    pub(crate) fn of(observation: &Observation, view: &RenderedView, diameter: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let diameter = diameter as f32;
         let mut grid = Grid::new(observation, view, AGREES * diameter);
         grid.find_insides();
         let area = (grid.step() * grid.step()) as f64;

@@ -29,6 +29,7 @@
 #![allow(clippy::cast_precision_loss)]
 
 mod agreement;
+mod background;
 mod bop_vsd;
 mod calibration;
 mod confidence;
@@ -36,6 +37,7 @@ mod confidence_curves;
 mod evidence;
 mod evidence_grid;
 mod flatness;
+mod mask_trust;
 mod mean_vsd;
 mod misfit;
 mod model_points;
@@ -54,6 +56,7 @@ pub use confidence::{Confidence, N_FEATURES};
 pub use evidence::Evidence;
 pub use flatness::Flatness;
 pub use hicp_core;
+pub use mask_trust::MaskTrust;
 pub use mean_vsd::MeanVsd;
 pub use misfit::Misfit;
 pub use model_points::ModelPoints;

@@ -1,9 +1,13 @@
 //! The mean VSD estimate.
 
-use hicp_core::internal::vectorized;
-use hicp_core::{Context, Isometry3};
+use std::ops::Range;
 
-use crate::agreement::{Agreement, Row};
+use hicp_core::internal::vectorized;
+use hicp_core::{Context, Isometry3, Observation, RenderedView};
+
+use crate::agreement::{Agreement, Found, Row, Weights};
+use crate::evidence::Evidence;
+use crate::mask_trust::{MaskTrust, TrustMap};
 use crate::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
@@ -23,7 +27,14 @@ use crate::tolerances::{N_TOLERANCES, errors, mean};
 pub struct MeanVsd {
     /// The rendered pixels outside the mask that count against the pose.
     pub occlusion: Occlusion,
+    /// The trust in the mask.
+    ///
+    /// With [`MaskTrust::Imperfect`], `occlusion` has no effect.
+    pub mask: MaskTrust,
 }
+
+/// Share of the pixels from which on those behind a measured surface are examined.
+const LEAST_NEARER: f64 = 0.02;
 
 // Deviation: masked pixels without depth count in neither mask; the paper's images have none.
 impl MeanVsd {
@@ -32,6 +43,7 @@ impl MeanVsd {
     pub fn paper() -> Self {
         Self {
             occlusion: Occlusion::Counted,
+            ..Self::default()
         }
     }
 
@@ -42,6 +54,16 @@ impl MeanVsd {
     pub fn lenient() -> Self {
         Self {
             occlusion: Occlusion::LENIENT,
+            ..Self::default()
+        }
+    }
+
+    /// Creates the score for the masks of detectors ([`MaskTrust::Imperfect`]).
+    #[must_use]
+    pub fn imperfect_mask() -> Self {
+        Self {
+            mask: MaskTrust::Imperfect,
+            ..Self::default()
         }
     }
 
@@ -57,39 +79,89 @@ impl MeanVsd {
         else {
             return [1.0; N_TOLERANCES];
         };
-        let (camera, depth, mask) = (
-            observation.camera(),
-            observation.depth().pixels(),
-            observation.mask().pixels(),
-        );
-        let image_width = observation.depth().width() as usize;
-        let region = view.region();
-        let rendered = view.depth().chunks_exact(region.width().max(1));
+        let compared = Compared {
+            observation,
+            view,
+            diameter: model.diameter(),
+        };
+        match self.mask {
+            MaskTrust::Exact => {
+                let mask = observation.mask().pixels();
+                let hidden_beyond = self.occlusion.least_distance_behind();
+                let found = compared.count(hidden_beyond, |_, pixels| {
+                    std::iter::once((0, pixels.len(), &mask[pixels]))
+                });
+                let union = observation.n_measured() as u64 + found.outside;
+                errors(found.correct, union)
+            }
+            MaskTrust::Imperfect => {
+                compared.imperfect(&TrustMap::of(observation, model.diameter()))
+            }
+        }
+    }
+}
+
+/// A render and an observation.
+struct Compared<'a> {
+    observation: &'a Observation,
+    view: &'a RenderedView,
+    diameter: f64,
+}
+
+impl Compared<'_> {
+    /// Counts the rendered pixels, with the weights of the mask for the parts of each row.
+    fn count<W: Weights, P: Iterator<Item = (usize, usize, W)>>(
+        &self,
+        hidden_beyond: f64,
+        parts: impl Fn(u32, Range<usize>) -> P,
+    ) -> Found {
+        let (camera, region) = (self.observation.camera(), self.view.region());
+        let depth = self.observation.depth().pixels();
+        let image_width = camera.width() as usize;
         let inverse_fy = 1.0 / camera.fy();
+        let rendered = self.view.depth().chunks_exact(region.width().max(1));
         let rows = (region.v_min..region.v_max)
             .zip(rendered)
-            .map(|(v, rendered)| {
+            .flat_map(|(v, rendered)| {
                 let start = v as usize * image_width + region.u_min as usize;
-                let columns = start..start + rendered.len();
-                Row {
-                    rendered,
-                    observed: &depth[columns.clone()],
-                    masked: &mask[columns],
-                    u: region.u_min,
-                    y: (f64::from(v) - camera.cy()) * inverse_fy,
-                }
+                let y = (f64::from(v) - camera.cy()) * inverse_fy;
+                parts(v, start..start + rendered.len()).map(move |(from, to, mask)| Row {
+                    rendered: &rendered[from..to],
+                    observed: &depth[start + from..start + to],
+                    mask,
+                    #[allow(clippy::cast_possible_truncation)] // A column of an image.
+                    u: region.u_min + from as u32,
+                    y,
+                })
             });
-        let found = vectorized(Agreement {
+        vectorized(Agreement {
             rows,
             cx: camera.cx(),
             inverse_fx: 1.0 / camera.fx(),
-            diameter: model.diameter(),
-            hidden_beyond: self.occlusion.least_distance_behind(),
+            diameter: self.diameter,
+            hidden_beyond,
+        })
+    }
+
+    /// Returns e(τ) with an imperfect mask.
+    fn imperfect(&self, trust: &TrustMap) -> [f64; N_TOLERANCES] {
+        if trust.total() == 0 {
+            return [1.0; N_TOLERANCES];
+        }
+        let region = self.view.region();
+        let hidden_beyond = trust.seen_through_meters();
+        let found = self.count(hidden_beyond, |v, pixels| {
+            trust.parts(v, region.u_min, pixels.len())
         });
-        errors(
-            found.correct,
-            observation.n_measured() as u64 + found.outside,
-        )
+        // A pixel behind a measured surface counts if the object reaches into that surface.
+        let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
+            Evidence::of(self.observation, self.view, self.diameter).inside_share()
+        } else {
+            0.0
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A share of a count.
+        let inside = (found.nearer as f64 * share) as u64;
+        errors(found.correct, trust.total() + found.outside + inside)
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
 
+use crate::mask_trust::{CERTAIN, MaskTrust, TrustMap};
 use crate::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, mean};
@@ -26,6 +27,8 @@ pub struct SampledMve {
     pub pixels: usize,
     /// The splatted pixels outside the mask that count against the pose.
     pub occlusion: Occlusion,
+    /// The trust in the mask, as in [`MeanVsd`](crate::MeanVsd).
+    pub mask: MaskTrust,
     /// The depth buffer of the coarse image; all 0 between two poses.
     buffer: Vec<f32>,
     /// The pixels of the buffer that were written.
@@ -40,6 +43,7 @@ impl SampledMve {
             samples,
             pixels,
             occlusion: Occlusion::default(),
+            mask: MaskTrust::Exact,
             buffer: Vec::new(),
             touched: Vec::new(),
         }
@@ -52,6 +56,16 @@ impl SampledMve {
         Self {
             occlusion: Occlusion::LENIENT,
             ..Self::default()
+        }
+    }
+
+    /// Creates the default score for the masks of detectors, like
+    /// [`MeanVsd::imperfect_mask`](crate::MeanVsd::imperfect_mask).
+    #[must_use]
+    pub fn imperfect_mask() -> Self {
+        Self {
+            mask: MaskTrust::Imperfect,
+            ..Self::lenient()
         }
     }
 
@@ -109,13 +123,25 @@ impl SampledMve {
     }
 
     /// Compares the depth buffer with the observation, and clears it.
-    fn compare(&mut self, coarse: &Observation, diameter: f64) -> f64 {
+    fn compare(&mut self, fine: &Observation, coarse: &Observation, diameter: f64) -> f64 {
         let camera = coarse.camera();
         let width = camera.width() as usize;
         let (depth, mask) = (coarse.depth().pixels(), coarse.mask().pixels());
-        let hidden_beyond = self.occlusion.least_distance_behind();
         let mut correct = AgreementCounts::new(diameter);
         let mut outside = 0;
+        let factor = self.factor(fine);
+        let trust = (self.mask == MaskTrust::Imperfect).then(|| TrustMap::of(fine, diameter));
+        let (one, total, hidden_beyond) = match &trust {
+            Some(trust) => (
+                u64::from(CERTAIN),
+                trust.total() / u64::from(factor).pow(2),
+                -trust.seen_through_meters(),
+            ),
+            None => {
+                let hidden_beyond = self.occlusion.least_distance_behind();
+                (1, coarse.n_measured() as u64, hidden_beyond)
+            }
+        };
         for index in self.touched.drain(..) {
             let z = f64::from(std::mem::take(&mut self.buffer[index]));
             let measured = f64::from(depth[index]);
@@ -123,15 +149,25 @@ impl SampledMve {
             let y = ((index / width) as f64 - camera.cy()) / camera.fy();
             let behind = (z - measured) * (x * x + y * y + 1.0).sqrt();
             let known = measured > 0.0;
-            if mask[index] {
-                if known {
-                    correct.add(behind.abs());
+            let weight = match &trust {
+                Some(trust) => {
+                    #[allow(clippy::cast_possible_truncation)] // A pixel of an image.
+                    let (u, v) = ((index % width) as u32, (index / width) as u32);
+                    u64::from(trust.weight(u * factor, v * factor))
                 }
-            } else if !(known && behind > hidden_beyond) {
-                outside += 1;
+                None => u64::from(mask[index]),
+            };
+            if weight > 0 && known {
+                correct.add(behind.abs(), weight);
+            }
+            if !(known && behind > hidden_beyond) {
+                outside += one - weight;
             }
         }
-        mean(&correct.errors(coarse.n_measured() as u64 + outside))
+        if total == 0 {
+            return 1.0;
+        }
+        mean(&correct.errors(total + outside))
     }
 }
 
@@ -150,7 +186,7 @@ impl Score for SampledMve {
         let coarse = observation.decimated(self.factor(observation));
         let surface = Surface::of(model, self.samples);
         self.splat(&coarse, &surface, camera_from_object);
-        self.compare(&coarse, model.diameter())
+        self.compare(observation, &coarse, model.diameter())
     }
 
     fn name(&self) -> &'static str {

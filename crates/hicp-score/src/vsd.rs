@@ -77,7 +77,7 @@ pub fn vsd(
             union += 1;
         }
         if *in_estimate && *in_truth {
-            counts.add((d_estimate - d_truth).abs());
+            counts.add((d_estimate - d_truth).abs(), 1);
         }
     }
     Ok(counts.errors(union))
@@ -195,7 +195,10 @@ impl Vsd {
                 let z_true = truth.depth_at(u, v);
                 if z_true > 0.0 {
                     let difference = (f64::from(z) - f64::from(z_true)).abs();
-                    counts.add(difference * camera.distance_per_depth(f64::from(u), f64::from(v)));
+                    counts.add(
+                        difference * camera.distance_per_depth(f64::from(u), f64::from(v)),
+                        1,
+                    );
                 } else {
                     union += 1;
                 }

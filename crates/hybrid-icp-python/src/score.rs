@@ -3,7 +3,7 @@
 use hybrid_icp::core::{Isometry3, Problem, RenderedView, Renderer};
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::score::{MeanVsd, Occlusion, Score, VISIBILITY_TOLERANCE_METERS};
+use hybrid_icp::score::{MaskTrust, MeanVsd, Occlusion, Score, VISIBILITY_TOLERANCE_METERS};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -56,13 +56,16 @@ pub(crate) fn render_depth(
 ///     than this distance, meters. With a negative value, the measured surface can also be that
 ///     far behind, for masks that miss a part of the object. `None` is the definition of the
 ///     paper: every rendered pixel counts.
+/// imperfect_mask : bool, optional
+///     Expects the mask of a detector: too large, too small, soft, or a box. `occlusion_tolerance`
+///     then has no effect.
 ///
 /// Returns
 /// -------
 /// float
 ///     The mean over τ = 5 %, …, 50 % of the diameter.
 #[pyfunction]
-#[pyo3(signature = (model, observation, T_co, *, occlusion_tolerance = VISIBILITY_TOLERANCE_METERS))]
+#[pyo3(signature = (model, observation, T_co, *, occlusion_tolerance = VISIBILITY_TOLERANCE_METERS, imperfect_mask = false))]
 #[allow(non_snake_case)]
 pub(crate) fn mve(
     py: Python<'_>,
@@ -70,11 +73,16 @@ pub(crate) fn mve(
     observation: &Bound<'_, PyObservation>,
     T_co: &Bound<'_, PyAny>,
     occlusion_tolerance: Option<f64>,
+    imperfect_mask: bool,
 ) -> PyResult<f64> {
     let pose = array::motion(T_co, "T_co")?.isometry;
     let (model, observation) = (&model.get().model, &observation.get().observation);
     let mut score = MeanVsd {
         occlusion: occlusion_tolerance.map_or(Occlusion::Counted, Occlusion::from_tolerance),
+        mask: match imperfect_mask {
+            true => MaskTrust::Imperfect,
+            false => MaskTrust::Exact,
+        },
     };
     Ok(py.detach(|| {
         let mut workspace = Workspace::new(Rasterizer::default());

@@ -1,8 +1,10 @@
 //! Scores.
 
-use hicp_score::{MeanVsd, Occlusion, SampledMve};
+use hicp_score::{MaskTrust, MeanVsd, Occlusion, SampledMve};
 
+use crate::build::Parameters;
 use crate::catalog::Catalog;
+use crate::error::PipelineError;
 use crate::range::Range;
 use crate::work::Limited::Samples;
 
@@ -19,6 +21,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         let tolerance: f64 = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
         Ok(MeanVsd {
             occlusion: Occlusion::from_tolerance(tolerance),
+            mask: mask_trust(p)?,
         })
     });
     catalog.add_score("sampled-mve", |p| {
@@ -29,6 +32,16 @@ pub(super) fn add(catalog: &mut Catalog) {
         let mut score = SampledMve::new(samples, pixels);
         let tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
         score.occlusion = Occlusion::from_tolerance(tolerance);
+        score.mask = mask_trust(p)?;
         Ok(score)
     });
+}
+
+fn mask_trust(p: &mut Parameters<'_>) -> Result<MaskTrust, PipelineError> {
+    let about = "expects a mask that is too large, too small, soft or a box; occlusion_tolerance \
+        then has no effect";
+    Ok(match p.flag("imperfect_mask", false, about)? {
+        true => MaskTrust::Imperfect,
+        false => MaskTrust::Exact,
+    })
 }

@@ -13,6 +13,7 @@ mod calibration;
 mod confidence;
 mod evidence;
 mod flatness;
+mod imperfect_mask;
 mod pose_error;
 mod recall;
 mod regions;

@@ -168,6 +168,7 @@ fn an_occluder_at_exactly_the_tolerance_does_not_hide() {
     let found = |tolerance: f64| {
         let mean_vsd = MeanVsd {
             occlusion: Occlusion::Tolerated { meters: tolerance },
+            ..MeanVsd::default()
         };
         mve(mean_vsd, &drawn([0.5, 0.5]), &observation)
     };

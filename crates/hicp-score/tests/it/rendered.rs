@@ -5,8 +5,8 @@ use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
 };
 use hicp_score::{
-    MeanVsd, N_TOLERANCES, Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, Vsd,
-    tolerances, vsd,
+    MaskTrust, MeanVsd, N_TOLERANCES, Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS,
+    Vsd, tolerances, vsd,
 };
 
 fn camera() -> PinholeCamera {
@@ -42,11 +42,13 @@ fn mve(
 const BOTH: [MeanVsd; 2] = [
     MeanVsd {
         occlusion: Occlusion::Counted,
+        mask: MaskTrust::Exact,
     },
     MeanVsd {
         occlusion: Occlusion::Tolerated {
             meters: VISIBILITY_TOLERANCE_METERS,
         },
+        mask: MaskTrust::Exact,
     },
 ];
 

@@ -384,6 +384,7 @@ def mve(
     T_co: npt.ArrayLike,
     *,
     occlusion_tolerance: float | None = ...,
+    imperfect_mask: bool = ...,
 ) -> float: ...
 def render_depth(
     model: Model, camera: Camera, T_co: npt.ArrayLike

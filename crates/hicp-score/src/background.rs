@@ -1,0 +1,153 @@
+//! The plane behind an object, such as the table it stands on.
+
+use hicp_core::{Matrix3, Observation, Vector3};
+
+/// Width of the ring around the mask, as a share of the square root of the mask's area.
+const RING: f64 = 0.25;
+/// Fewest pixels of the ring for a plane, and about the most that are used.
+const FEWEST: usize = 50;
+const MOST: usize = 600;
+/// Share of the ring that must lie on the plane.
+const LEAST_SHARE: f64 = 0.4;
+/// Number of planes through three pixels that are tried.
+const TRIES: usize = 48;
+/// Smallest height above the plane of a point that is not on it, meters.
+const LEAST_HEIGHT_METERS: f64 = 0.004;
+/// Largest half width of the window over which heights are averaged, pixels.
+const MAX_HALF_WINDOW: usize = 4;
+
+/// A plane: 1/z = a + b u + c v, which is exact in an image.
+pub(crate) struct Background {
+    plane: Vector3<f64>,
+    noise: f64,
+}
+
+impl Background {
+    /// Finds the plane that most pixels around the mask lie on, or returns `None`.
+    ///
+    /// `noise` is the standard deviation of the depth, meters.
+    pub(crate) fn around(observation: &Observation, area: usize, noise: f64) -> Option<Self> {
+        let (region, camera) = (observation.region(), observation.camera());
+        let (depth, mask) = (observation.depth(), observation.mask());
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Far below 2³².
+        let band = (RING * (area as f64).sqrt()).ceil().max(4.0) as u32;
+        let columns = region.u_min.saturating_sub(band)..(region.u_max + band).min(camera.width());
+        let rows = region.v_min.saturating_sub(band)..(region.v_max + band).min(camera.height());
+        let step = (columns.len() * rows.len() / (2 * MOST)).isqrt().max(1);
+        let ring: Vec<Vector3<f64>> = rows
+            .step_by(step)
+            .flat_map(|v| columns.clone().step_by(step).map(move |u| (u, v)))
+            .filter(|(u, v)| mask.get(*u, *v) == Some(false))
+            .filter_map(|(u, v)| {
+                let z = f64::from(depth.get(u, v)?);
+                (z > 0.0).then(|| Vector3::new(f64::from(u), f64::from(v), z))
+            })
+            .collect();
+        if ring.len() < FEWEST {
+            return None;
+        }
+        let near = LEAST_HEIGHT_METERS.max(2.5 * noise);
+        let on = |plane: &Vector3<f64>, pixel: &Vector3<f64>| height(plane, pixel).abs() < near;
+        let support = |plane: &Vector3<f64>| ring.iter().filter(|p| on(plane, p)).count();
+        let mut best = (0, Vector3::zeros());
+        let mut state = 1_usize;
+        let mut next = || {
+            // A fixed sequence keeps the result deterministic.
+            state = state.wrapping_mul(1_103_515_245).wrapping_add(12_345) % (1 << 31);
+            ring[(state >> 8) % ring.len()]
+        };
+        for _ in 0..TRIES {
+            let three = [next(), next(), next()];
+            if let Some(plane) = fit(three.iter()) {
+                let count = support(&plane);
+                if count > best.0 {
+                    best = (count, plane);
+                }
+            }
+        }
+        for _ in 0..2 {
+            let plane = fit(ring.iter().filter(|p| on(&best.1, p)))?;
+            best = (support(&plane), plane);
+        }
+        (best.0 as f64 > LEAST_SHARE * ring.len() as f64).then_some(Self {
+            plane: best.1,
+            noise,
+        })
+    }
+
+    /// Returns the certainty that each of some pixels is not on the plane, 0 to 1.
+    ///
+    /// The pixels ((u, v), z) are the rows of a grid with `width` columns, `step` pixels apart.
+    pub(crate) fn off_plane(
+        &self,
+        pixels: impl Iterator<Item = ((u32, u32), f32)>,
+        width: usize,
+        step: usize,
+    ) -> Vec<f32> {
+        // Sums of heights and counts over the rectangle from the corner of the grid.
+        let mut sums = vec![(0.0, 0_u32); width + 1];
+        let mut line = (0.0, 0);
+        for ((u, v), z) in pixels {
+            if sums.len().is_multiple_of(width + 1) {
+                line = (0.0, 0);
+                sums.push(line);
+            }
+            if z > 0.0 {
+                let pixel = Vector3::new(f64::from(u), f64::from(v), f64::from(z));
+                let height = height(&self.plane, &pixel).clamp(-1.0, 1.0);
+                line = (line.0 + height, line.1 + 1);
+            }
+            let above: (f64, u32) = sums[sums.len() - width - 1];
+            sums.push((above.0 + line.0, above.1 + line.1));
+        }
+        // Averaging over a window reduces the noise by its width.
+        let error = |half: usize| 3.0 * self.noise / (2 * half + 1) as f64;
+        let largest = (MAX_HALF_WINDOW / step).max(1);
+        let half = (0..largest).find(|half| error(*half) <= LEAST_HEIGHT_METERS);
+        let half = half.unwrap_or(largest);
+        let least = LEAST_HEIGHT_METERS.max(error(half));
+        let at = |row: usize, column: usize| sums[row * (width + 1) + column];
+        let rows = sums.len() / (width + 1) - 1;
+        let mut off = Vec::with_capacity(rows * width);
+        for row in 0..rows {
+            let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(rows));
+            for column in 0..width {
+                let (left, right) = (column.saturating_sub(half), (column + half + 1).min(width));
+                let (a, b) = (at(top, left), at(top, right));
+                let (c, d) = (at(bottom, left), at(bottom, right));
+                let count = (d.1 + a.1) - (b.1 + c.1);
+                let mean = (d.0 + a.0 - b.0 - c.0) / f64::from(count.max(1));
+                #[allow(clippy::cast_possible_truncation)] // Between 0 and 1.
+                off.push((mean.abs() / least - 1.0).clamp(0.0, 1.0) as f32);
+            }
+        }
+        off
+    }
+}
+
+/// Returns the distance of a pixel (u, v, z) in front of a plane, along the optical axis, meters.
+fn height(plane: &Vector3<f64>, pixel: &Vector3<f64>) -> f64 {
+    let inverse = plane.x + plane.y * pixel.x + plane.z * pixel.y;
+    if inverse > 0.0 {
+        1.0 / inverse - pixel.z
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Fits a plane to pixels by least squares of inverse depth.
+fn fit<'a>(pixels: impl Iterator<Item = &'a Vector3<f64>>) -> Option<Vector3<f64>> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for pixel in pixels {
+        // Steps of a hundred pixels keep the numbers of equal size.
+        let row = Vector3::new(1.0, pixel.x * 1e-2, pixel.y * 1e-2);
+        normal += row * row.transpose();
+        right += row / pixel.z;
+    }
+    let solution = normal.try_inverse()? * right;
+    Some(Vector3::new(
+        solution.x,
+        solution.y * 1e-2,
+        solution.z * 1e-2,
+    ))
+}
