@@ -108,7 +108,8 @@ pub struct Seen {
     pub visible_share: f64,
     /// Standard deviation of the depth noise, percent of the depth.
     pub noise_percent: f64,
-    camera: PinholeCamera,
+    /// The camera.
+    pub camera: PinholeCamera,
 }
 
 impl Tabletop {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use hicp_io::bop::{Detection, ResultRow};
 use hybrid_icp::core::{Isometry3, Model};
-use hybrid_icp::icp::Verdict;
+use hybrid_icp::icp::{Alternative, Verdict};
 use hybrid_icp::{Refinement, Refiner, warnings};
 
 use crate::bop_image::BopImage;
@@ -85,7 +85,7 @@ impl DatasetRefiner {
                         match observed {
                             Ok(observed) => {
                                 let refined = work.refiner.refine(model, &observed, &init);
-                                work.done(start, row_of(index, &refined));
+                                work.done(start, index, &refined);
                             }
                             Err(status) => work.leave(&[(index, init)], status),
                         }
@@ -126,7 +126,7 @@ impl Work<'_, '_> {
                         self.result.warnings.extend(warnings.map(|d| (obj_id, d)));
                     }
                     let refined = self.refiner.refine(model, observation, init);
-                    self.done(start, row_of(*index, &refined));
+                    self.done(start, *index, &refined);
                     // Only the first refined row includes the time of the choice.
                     start = Instant::now();
                 }
@@ -150,7 +150,7 @@ impl Work<'_, '_> {
             match detection.and_then(|detection| self.frame.observe_detection(detection)) {
                 Ok(observation) => {
                     let found = self.refiner.estimate(model, &observation);
-                    self.done(start, row_of(*index, &found));
+                    self.done(start, *index, &found);
                     if !std::mem::replace(&mut looked, true) {
                         let pose = &found.outcome.camera_from_object;
                         let warnings = warnings(model, &observation, pose).into_iter();
@@ -162,7 +162,8 @@ impl Work<'_, '_> {
         }
     }
 
-    fn done(&mut self, start: Instant, row: RowResult) {
+    fn done(&mut self, start: Instant, index: usize, refinement: &Refinement) {
+        let row = row_of(index, refinement, self.refiner.alternatives());
         *self.result.seconds.get_or_insert(0.0) += start.elapsed().as_secs_f64();
         self.result.rows.push(row);
     }
@@ -176,7 +177,7 @@ impl Work<'_, '_> {
 }
 
 /// Returns the result of a row.
-fn row_of(index: usize, refinement: &Refinement) -> RowResult {
+fn row_of(index: usize, refinement: &Refinement, alternatives: &[Alternative]) -> RowResult {
     let outcome = &refinement.outcome;
     let (status, pose) = match outcome.verdict {
         Verdict::Refined => (RowStatus::Refined, Some(outcome.camera_from_object)),
@@ -189,5 +190,6 @@ fn row_of(index: usize, refinement: &Refinement) -> RowResult {
         mve: Some((refinement.mve_initial, refinement.mve)),
         confidence: Some(refinement.confidence),
         flatness: refinement.flatness,
+        alternatives: alternatives.to_vec(),
     }
 }

@@ -2,8 +2,9 @@
 
 use hicp_io::bop::ResultRow;
 use hybrid_icp::core::Isometry3;
+use hybrid_icp::icp::Alternative;
 use hybrid_icp::score::Flatness;
-use hybrid_icp::{Warning, warnings_of_result};
+use hybrid_icp::{Warning, warning_of_runner_up, warnings_of_result};
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
@@ -25,6 +26,10 @@ pub struct RowResult {
     pub confidence: Option<f64>,
     /// Flatness of the surfaces at the result's pose ([`hybrid_icp::Refinement::flatness`]).
     pub flatness: Option<Flatness>,
+    /// The distinct other poses that a search found, best first
+    /// ([`hybrid_icp::Refiner::alternatives`]).
+    #[serde(default)]
+    pub alternatives: Vec<Alternative>,
 }
 
 impl RowResult {
@@ -33,12 +38,12 @@ impl RowResult {
     /// Without an MVE, there are none.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        match (self.mve, self.confidence) {
-            (Some((before, after)), Some(confidence)) => {
-                warnings_of_result(before, after, confidence, self.flatness)
-            }
-            _ => Vec::new(),
-        }
+        let (Some((before, after)), Some(confidence)) = (self.mve, self.confidence) else {
+            return Vec::new();
+        };
+        let mut warnings = warnings_of_result(before, after, confidence, self.flatness);
+        warnings.extend(self.alternatives.first().and_then(warning_of_runner_up));
+        warnings
     }
 
     /// Creates the result of a row that did not reach the pipeline.
@@ -51,6 +56,7 @@ impl RowResult {
             mve: None,
             confidence: None,
             flatness: None,
+            alternatives: Vec::new(),
         }
     }
 }
@@ -112,5 +118,28 @@ impl FrameResult {
                 Rescore::Confidence => row.score = refined.confidence.unwrap_or(0.0),
             }
         }
+    }
+
+    /// Returns rows with the alternatives of each row, best first.
+    ///
+    /// `rows` are those of [`Self::enter`]. At most `count` rows are returned for each. Their score
+    /// is that of the row minus their gap, and never above it.
+    pub fn alternatives(
+        &self,
+        rows: &[ResultRow],
+        count: usize,
+    ) -> impl Iterator<Item = ResultRow> {
+        self.rows.iter().flat_map(move |refined| {
+            let row = rows.get(refined.index);
+            let others = refined.alternatives.iter().take(count);
+            row.into_iter().flat_map(move |row| {
+                others.clone().map(|other| {
+                    let mut row = row.clone();
+                    row.set_camera_from_object(other.camera_from_object);
+                    row.score -= other.gap.max(0.0);
+                    row
+                })
+            })
+        })
     }
 }

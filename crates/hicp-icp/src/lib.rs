@@ -22,12 +22,14 @@
 //! # let _ = projective_cascade();
 //! ```
 
+mod alternative;
 mod observer;
 mod outcome;
 mod session;
 mod stage;
 mod stop;
 
+pub use alternative::Alternative;
 pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
 pub use outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 pub use session::{Session, Workspace};

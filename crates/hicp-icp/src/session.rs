@@ -5,6 +5,7 @@ use hicp_core::{
     Renderer, Surfel,
 };
 
+use crate::alternative::Alternative;
 use crate::observer::Observer;
 
 /// The scratch memory and the render cache of one thread.
@@ -17,6 +18,7 @@ pub struct Workspace {
     pub(crate) pairs: Correspondences,
     /// Names of filters and stop rules, for the observer.
     pub(crate) names: Vec<&'static str>,
+    pub(crate) alternatives: Vec<Alternative>,
 }
 
 impl Workspace {
@@ -27,6 +29,7 @@ impl Workspace {
             source: Vec::new(),
             pairs: Correspondences::new(),
             names: Vec::new(),
+            alternatives: Vec::new(),
         }
     }
 
@@ -45,6 +48,20 @@ impl Workspace {
         camera_from_object: &Isometry3<f64>,
     ) -> &RenderedView {
         self.renders.view(model, camera, camera_from_object)
+    }
+
+    /// The distinct other poses that the last search found, best first.
+    ///
+    /// A [`HypothesisSearch`](crate::HypothesisSearch) writes them. Other stages leave them as they
+    /// are.
+    #[must_use]
+    pub fn alternatives(&self) -> &[Alternative] {
+        &self.alternatives
+    }
+
+    /// The same list, to clear it before a run or to write it in a custom search.
+    pub fn alternatives_mut(&mut self) -> &mut Vec<Alternative> {
+        &mut self.alternatives
     }
 
     /// Number of renders so far.

@@ -6,6 +6,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use hybrid_icp::core::{Isometry3, Model, Observation};
+use hybrid_icp::icp::Alternative;
 use hybrid_icp::{Refinement, Refiner, StageRecord, Trace};
 use pyo3::prelude::*;
 
@@ -13,7 +14,7 @@ use pyo3::prelude::*;
 const SIGNALS: Duration = Duration::from_millis(50);
 
 /// A refined hypothesis with its stages.
-pub(crate) type Refined = (Refinement, Vec<StageRecord>);
+pub(crate) type Refined = (Refinement, Vec<StageRecord>, Vec<Alternative>);
 
 /// Refines every hypothesis, with one refiner per thread.
 ///
@@ -47,7 +48,8 @@ pub(crate) fn run(
                         let Some(init) = inits.get(index) else { break };
                         let mut trace = Trace::new();
                         let refined = refiner.refine_observed(model, observation, init, &mut trace);
-                        results.push((index, (refined, trace.stages)));
+                        let others = refiner.alternatives().to_vec();
+                        results.push((index, (refined, trace.stages, others)));
                     }
                     drop(at_work);
                     results

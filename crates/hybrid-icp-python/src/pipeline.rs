@@ -236,8 +236,10 @@ impl PyPipeline {
                 &mut watch,
             )
         });
+        let others = refiner.alternatives().to_vec();
         self.put_back([refiner]);
-        Ok(PyResultOf::new(&init, refinement, watch.finish()?.stages))
+        let stages = watch.finish()?.stages;
+        Ok(PyResultOf::new(&init, refinement, stages, others))
     }
 
     /// Finds the pose of an object in its mask, without an initial pose.
@@ -288,13 +290,14 @@ impl PyPipeline {
                 trace,
             )
         });
+        let others = refiner.alternatives().to_vec();
         self.put_back([refiner]);
         let identity = Isometry3::identity();
         let start = Motion {
             isometry: identity,
             matrix: array::to_matrix(&identity),
         };
-        Ok(PyResultOf::new(&start, refinement, trace.stages))
+        Ok(PyResultOf::new(&start, refinement, trace.stages, others))
     }
 
     /// Refines many poses of one object in one image, on several threads.
@@ -352,7 +355,9 @@ impl PyPipeline {
         self.put_back(refiners);
         let results = inits.iter().zip(refined?);
         Ok(results
-            .map(|(init, (refinement, stages))| PyResultOf::new(init, refinement, stages))
+            .map(|(init, (refinement, stages, others))| {
+                PyResultOf::new(init, refinement, stages, others)
+            })
             .collect())
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hybrid_icp::icp::{Quality, Verdict};
+use hybrid_icp::icp::{Alternative, Quality, Verdict};
 use hybrid_icp::{Refinement, StageRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -20,10 +20,16 @@ pub(crate) struct PyResultOf {
     refinement: Refinement,
     matrix: [f64; 16],
     stages: Vec<StageRecord>,
+    alternatives: Vec<Alternative>,
 }
 
 impl PyResultOf {
-    pub(crate) fn new(init: &Motion, refinement: Refinement, stages: Vec<StageRecord>) -> Self {
+    pub(crate) fn new(
+        init: &Motion,
+        refinement: Refinement,
+        stages: Vec<StageRecord>,
+        alternatives: Vec<Alternative>,
+    ) -> Self {
         let outcome = &refinement.outcome;
         let matrix = match outcome.verdict {
             Verdict::Refined => array::to_matrix(&outcome.camera_from_object),
@@ -34,6 +40,7 @@ impl PyResultOf {
             refinement,
             matrix,
             stages,
+            alternatives,
         }
     }
 
@@ -112,10 +119,37 @@ impl PyResultOf {
     /// - The refinement made the pose worse.
     /// - The initial pose explained nothing of the image.
     /// - The measured surface is flat, but the model is not.
+    /// - Another pose explains the image as well.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         let warnings = self.refinement.warnings();
         warnings.iter().map(ToString::to_string).collect()
+    }
+
+    /// The distinct other poses that a search found, best first; a list of dicts, empty without a
+    /// search.
+    ///
+    /// Poses are distinct if their MSSD, up to declared symmetries, is above a tenth of the
+    /// diameter. The keys:
+    ///
+    /// - `T_co`: the pose, camera from object, shape (4, 4), float64, meters.
+    /// - `score`: the score of the search; lower is better.
+    /// - `gap`: the score minus that of the returned pose.
+    /// - `mssd`: distance from the returned pose, meters.
+    /// - `rotation_degrees`: angle to the returned pose.
+    #[getter]
+    fn alternatives<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let dict = |other: &Alternative| {
+            let dict = PyDict::new(py);
+            let pose = array::to_matrix(&other.camera_from_object);
+            dict.set_item("T_co", Matrix::new(4, pose.to_vec()))?;
+            dict.set_item("score", other.score)?;
+            dict.set_item("gap", other.gap)?;
+            dict.set_item("mssd", other.mssd_meters)?;
+            dict.set_item("rotation_degrees", other.rotation_degrees)?;
+            Ok(dict)
+        };
+        self.alternatives.iter().map(dict).collect()
     }
 
     /// "refined", or "kept_initial" if the result is the initial pose.
@@ -233,6 +267,13 @@ impl PyResultOf {
         let stages = slf.getattr("stages")?.try_iter()?;
         let stages: PyResult<Vec<_>> = stages.map(|stage| stage?.call_method0("to_dict")).collect();
         dict.set_item("stages", stages?)?;
+        let others = slf.get().alternatives(slf.py())?;
+        for other in &others {
+            if let Some(pose) = other.get_item("T_co")? {
+                other.set_item("T_co", pose.call_method0("tolist")?)?;
+            }
+        }
+        dict.set_item("alternatives", others)?;
         Ok(dict)
     }
 

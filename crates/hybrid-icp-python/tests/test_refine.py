@@ -81,6 +81,21 @@ def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
     assert repr(result).startswith("Result(refined, confidence ")
 
 
+def test_other_poses_of_a_search_come_with_their_scores(scene):
+    pipeline = hi.Pipeline("search", overrides=["threshold=0"])
+    result = pipeline.refine(scene.model, scene.observation, scene.rough)
+    assert result.alternatives
+    scores = [other["score"] for other in result.alternatives]
+    assert scores == sorted(scores)
+    for other in result.alternatives:
+        assert other["T_co"].shape == (4, 4) and other["gap"] <= other["score"]
+        assert other["mssd"] > 0 and other["rotation_degrees"] > 0
+    [again] = pipeline.refine_batch(scene.model, scene.observation, [scene.rough])
+    assert again.to_dict()["alternatives"] == result.to_dict()["alternatives"]
+    local = hi.Pipeline.preset("local").refine(scene.model, scene.observation, scene.rough)
+    assert local.alternatives == []
+
+
 def test_an_object_is_found_without_an_initial_pose(scene):
     result = hi.Pipeline().estimate(scene.model, scene.observation)
     assert hi.add(result.T_co, scene.true, scene.model) < 0.001

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 
 use hicp_core::{Isometry3, Model, Observation, diameter};
+use hicp_icp::Alternative;
 use hicp_score::Flatness;
 use hicp_switch::PAPER_ALPHA;
 
@@ -227,6 +228,17 @@ pub fn warnings_of_result(
         warnings.push(Warning::Flat { flatness });
     }
     warnings
+}
+
+/// Returns the warning about another pose that explains the image as well as the returned one.
+///
+/// There is none if the other pose is worse by [`Alternative::AMBIGUOUS_GAP`] or more.
+#[must_use]
+pub fn warning_of_runner_up(runner_up: &Alternative) -> Option<Warning> {
+    runner_up.is_ambiguous().then_some(Warning::Ambiguous {
+        gap: runner_up.gap,
+        rotation_degrees: runner_up.rotation_degrees,
+    })
 }
 
 /// Returns the area of the smallest side of the model's box along its axes, m²: 0 for a sheet.

@@ -95,8 +95,8 @@ pub use hicp_switch as switch;
 
 pub use calibration::Calibration;
 pub use checks::{
-    ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warnings,
-    warnings_of_model, warnings_of_result,
+    ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warning_of_runner_up,
+    warnings, warnings_of_model, warnings_of_result,
 };
 pub use hicp_icp::BoxedStage;
 pub use mask_in_box::mask_in_box;

@@ -1,11 +1,11 @@
 //! One call from an observation and a rough pose to a pose with its score.
 
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
-use hicp_icp::{BoxedStage, Observer, Outcome, Session, Stage, Workspace};
+use hicp_icp::{Alternative, BoxedStage, Observer, Outcome, Session, Stage, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, Evidence, Flatness, MeanVsd, Score};
 
-use crate::checks::warnings_of_result;
+use crate::checks::{warning_of_runner_up, warnings_of_result};
 use crate::preset::Preset;
 use crate::presets;
 use crate::warning::Warning;
@@ -39,13 +39,20 @@ pub struct Refinement {
     pub flatness: Option<Flatness>,
     /// The evidence for and against the returned pose, and how well the mask fits it.
     pub evidence: Evidence,
+    /// The best other pose that a search found; `None` without a search or another pose.
+    ///
+    /// [`Refiner::alternatives`] has all of them.
+    pub runner_up: Option<Alternative>,
 }
 
 impl Refinement {
     /// Returns the reasons not to trust the pose, if there are any ([`warnings_of_result`]).
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        warnings_of_result(self.mve_initial, self.mve, self.confidence, self.flatness)
+        let mut warnings =
+            warnings_of_result(self.mve_initial, self.mve, self.confidence, self.flatness);
+        warnings.extend(self.runner_up.as_ref().and_then(warning_of_runner_up));
+        warnings
     }
 }
 
@@ -162,6 +169,7 @@ impl<S: Stage> Refiner<S> {
     ) -> Refinement {
         let problem = Problem::new(model, observation);
         let mve_initial = self.mve(model, observation, init);
+        self.workspace.alternatives_mut().clear();
         let outcome = self.stage.run(
             &problem,
             init,
@@ -209,6 +217,7 @@ impl<S: Stage> Refiner<S> {
     ) -> Refinement {
         let problem = Problem::new(model, observation);
         let mut search = presets::estimate_with(&mut self.stage);
+        self.workspace.alternatives_mut().clear();
         let outcome = search.run(
             &problem,
             &Isometry3::identity(),
@@ -238,7 +247,18 @@ impl<S: Stage> Refiner<S> {
             expected_error_degrees: confidence.error_degrees,
             flatness: Flatness::at(&mut context, pose),
             evidence,
+            runner_up: self.workspace.alternatives().first().copied(),
         }
+    }
+
+    /// Returns the distinct other poses that the last run found, best first.
+    ///
+    /// Two poses are distinct if their MSSD, up to declared symmetries, is above a tenth of the
+    /// diameter. Only a search finds other poses: the presets `auto` and `search`, and
+    /// [`Self::estimate`].
+    #[must_use]
+    pub fn alternatives(&self) -> &[Alternative] {
+        self.workspace.alternatives()
     }
 
     /// Returns the mean VSD estimate of a pose: 0 agrees with the image everywhere, 1 nowhere.

@@ -134,6 +134,16 @@ pub enum Warning {
         /// MVE of the returned pose.
         mve: f64,
     },
+    /// Another pose explains the image as well as the returned one.
+    ///
+    /// It is not equivalent by a declared symmetry.
+    #[error("ambiguous: 2 poses within {:.2}, {rotation_degrees:.0}° apart", within(*gap))]
+    Ambiguous {
+        /// Score of the other pose minus that of the returned one.
+        gap: f64,
+        /// Angle between the two, up to declared symmetries, degrees.
+        rotation_degrees: f64,
+    },
     /// A plane explains the depth inside the mask better than the returned pose does, although the
     /// model is not flat there ([`Flatness::is_flat`]).
     ///
@@ -148,6 +158,11 @@ pub enum Warning {
         /// Flatness of the two surfaces and their distance from each other.
         flatness: Flatness,
     },
+}
+
+/// Returns a gap in score, rounded up to hundredths and at least 0.01.
+fn within(gap: f64) -> f64 {
+    (gap.abs() * 100.0).ceil().max(1.0) / 100.0
 }
 
 /// A length in messages: with four digits, or in scientific notation if it is tiny or huge.

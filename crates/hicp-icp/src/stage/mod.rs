@@ -2,12 +2,16 @@
 
 pub(crate) mod anderson;
 pub(crate) mod compose;
+pub(crate) mod distinct;
 pub(crate) mod guard;
 pub(crate) mod hypotheses;
 pub(crate) mod icp;
+pub(crate) mod near_symmetries;
 pub(crate) mod ray_shift;
 pub(crate) mod resolution;
 pub(crate) mod search;
+pub(crate) mod search_options;
+pub(crate) mod shortlist;
 pub(crate) mod stage_trait;
 
 pub use anderson::Anderson;
@@ -17,5 +21,6 @@ pub use hypotheses::Rotations;
 pub use icp::{Icp, MAX_ITERATIONS};
 pub use ray_shift::RayShift;
 pub use resolution::AtResolution;
-pub use search::{HypothesisSearch, SearchOptions, Start};
+pub use search::HypothesisSearch;
+pub use search_options::{SearchOptions, Start};
 pub use stage_trait::{BoxedStage, Stage};

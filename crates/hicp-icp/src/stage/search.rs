@@ -1,105 +1,47 @@
 //! Global search over hypotheses.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use hicp_core::{Isometry3, Problem, se3, so3};
+use hicp_core::{Isometry3, Model, Observation, Problem, Vector3, se3, so3};
 use hicp_score::Score;
 
+use crate::alternative::Alternative;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
-use crate::stage::hypotheses::{Hypotheses, Rotations};
+use crate::stage::distinct::Distinct;
+use crate::stage::hypotheses::Hypotheses;
+use crate::stage::near_symmetries::NearSymmetries;
+use crate::stage::search_options::{SearchOptions, Start};
+use crate::stage::shortlist::Shortlist;
 use crate::stage::stage_trait::Stage;
-use crate::stop::motion::Bound;
-
-/// The use of the initial pose by a [`HypothesisSearch`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Start {
-    /// The local stage refines it, and the search starts if the score stays bad.
-    #[default]
-    Refined,
-    /// It is ignored: the search always runs, and all hypotheses come from the image.
-    ///
-    /// It may be any finite pose, for example the identity. It is returned only if nothing was
-    /// observed or nothing was found. A bound, and other rotations than [`Rotations::Even`], still
-    /// refer to it.
-    Ignored,
-}
-
-/// The range, budget and conditions of a [`HypothesisSearch`].
-///
-/// Any value is valid: with a value out of range, nothing is searched or nothing better is found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SearchOptions {
-    /// The use of the initial pose.
-    pub start: Start,
-    /// The score above which the search starts.
-    ///
-    /// If the local stage ends at or below it, no hypotheses are tried.
-    pub threshold: f64,
-    /// The score at which no further hypotheses are refined.
-    pub good_enough: f64,
-    /// The gain in score by which a hypothesis must beat the local pose to replace it.
-    ///
-    /// With imperfect masks, the score does not separate poses better than that.
-    pub min_gain: f64,
-    /// The rotations to try, next to the neighbors of the initial pose.
-    pub rotations: Rotations,
-    /// Number of these rotations.
-    pub hypotheses: usize,
-    /// Number of best ranked hypotheses to refine.
-    pub refined: usize,
-    /// The smallest angle between the rotations of refined hypotheses, degrees.
-    ///
-    /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
-    pub spacing_degrees: f64,
-    /// The largest distance of the result from the initial pose; `None` for no limit.
-    pub bound: Option<Bound>,
-    /// The longest time of a run. At the limit, the best pose so far is returned with
-    /// [`Termination::Deadline`].
-    ///
-    /// Results then depend on the clock; `hypotheses` and `refined` are budgets that do not. The
-    /// clock is read between hypotheses, so a run exceeds the limit by at most one of them.
-    pub time_limit: Option<Duration>,
-}
-
-impl Default for SearchOptions {
-    /// 256 rotations of SO(3), of which 12 at least 20° apart are refined, without a bound.
-    ///
-    /// The search starts above a score of 0.15, and a hypothesis must be better by 0.03.
-    fn default() -> Self {
-        Self {
-            start: Start::Refined,
-            threshold: 0.15,
-            good_enough: 0.05,
-            min_gain: 0.03,
-            rotations: Rotations::Even,
-            hypotheses: 256,
-            refined: 12,
-            spacing_degrees: 20.0,
-            bound: None,
-            time_limit: None,
-        }
-    }
-}
 
 /// Runs a local stage, and searches if its score stays bad.
 ///
-/// The search ranks hypotheses by a cheap score and refines the best of them by a cheap stage. The
-/// local stage then refines the one with the lowest score, which is returned if it is better.
+/// 1. **Rank**: hypotheses are rotations from [`SearchOptions::rotations`], and neighbors of the
+///    initial and the local pose. Each is placed such that its visible centroid is the observed
+///    one. The best that differ are kept.
+/// 2. **Refine**: small rotations and shifts lower the ranking score of each, and the exploring
+///    stage refines it.
+/// 3. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
+///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
+///    local pose is good, because the score of a rotated mug is good, too. If the image shows
+///    enough of what tells the two poses apart, it costs only a projection of 256 points.
+/// 4. **Finish**: the local stage refines the two best poses that differ.
+///
+/// The best pose is returned if it beats the local pose. The others are in
+/// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
 /// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image. On an
 /// object that looks the same from several sides, it can return an equivalent pose.
-///
-/// Hypotheses are rotations from [`SearchOptions::rotations`], and neighbors of the initial and the
-/// local pose. Each is placed such that its visible centroid is the observed one. A hypothesis near
-/// a better ranked one is not refined.
 ///
 /// **Contract**: the score of the returned pose is never above that of the local stage's pose. A
 /// local stage in a [`Guard`](crate::Guard) is never worse than the initial pose. With a bound, a
 /// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
 /// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
-/// score, `refined` × the exploring stage, and the local stage once more.
+/// score, 4/3 `refined` × the exploring stage and 40 ranking scores, and the local stage twice. The
+/// near symmetries of a model are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, E, R, C> {
     /// Refines the initial pose, and the best hypothesis.
@@ -112,8 +54,14 @@ pub struct HypothesisSearch<S, E, R, C> {
     pub score: C,
     /// Range, budget and conditions.
     pub options: SearchOptions,
-    /// The best ranked hypotheses, best first.
-    ranked: Vec<(f64, Isometry3<f64>)>,
+    /// The best ranked hypotheses.
+    ranked: Shortlist,
+    /// The best ranked poses that look like the best pose found.
+    ranked_alike: Shortlist,
+    /// Those of them that are refined.
+    alike: Shortlist,
+    /// The distinct poses that were found, best first.
+    found: Vec<Found>,
 }
 
 impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
@@ -126,157 +74,277 @@ impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
             ranking,
             score,
             options,
-            ranked: Vec::new(),
+            ranked: Shortlist::default(),
+            ranked_alike: Shortlist::default(),
+            alike: Shortlist::default(),
+            found: Vec::new(),
         }
     }
 
-    /// Inserts a hypothesis into the list of the best, unless it is too near to a better one.
+    /// Iterates over the hypotheses that the last search ranked best, with their scores.
     ///
-    /// Hypotheses that are too near and not better leave the list.
-    fn list(&mut self, score: f64, pose: Isometry3<f64>) {
-        let SearchOptions {
-            refined,
-            spacing_degrees,
-            ..
-        } = self.options;
-        let place = self.ranked.partition_point(|(other, _)| *other <= score);
-        if place >= refined.min(MAX_REFINED) {
-            return;
-        }
-        let near = |other: &(f64, Isometry3<f64>)| {
-            let turn = other.1.rotation * pose.rotation.inverse();
-            other.1.rotation == pose.rotation || so3::angle(&turn).to_degrees() < spacing_degrees
-        };
-        if self.ranked[..place].iter().any(near) {
-            return;
-        }
-        let mut index = 0;
-        self.ranked.retain(|other| {
-            index += 1;
-            index <= place || !near(other)
-        });
-        self.ranked.insert(place, (score, pose));
-        self.ranked.truncate(refined.min(MAX_REFINED));
+    /// The best comes first. Their number is at most [`SearchOptions::refined`].
+    pub fn ranked(&self) -> impl Iterator<Item = &(f64, Isometry3<f64>)> {
+        self.ranked.iter()
     }
 }
 
 /// A refined pose with its score.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Found {
     score: f64,
     outcome: Outcome,
+    /// Whether the local stage refined it.
+    finished: bool,
+}
+
+/// A search in progress.
+struct Run<'a, 's> {
+    problem: &'a Problem<'a>,
+    init: &'a Isometry3<f64>,
+    distinct: Arc<Distinct>,
+    clock: Clock,
+    session: &'a mut Session<'s>,
+    iterations: usize,
+    /// Whether the observer requested the end.
+    stopped: bool,
+}
+
+impl Run<'_, '_> {
+    fn score(&mut self, score: &mut impl Score, pose: &Isometry3<f64>) -> f64 {
+        score.score(&mut self.session.workspace.context(self.problem), pose)
+    }
+
+    fn is_over(&self) -> bool {
+        self.stopped || self.clock.is_over()
+    }
 }
 
 impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
-    /// Scores an outcome, or returns `None` if it kept its start or lies outside of the bound.
-    fn found(
-        &mut self,
-        problem: &Problem<'_>,
-        init: &Isometry3<f64>,
-        outcome: Outcome,
-        session: &mut Session<'_>,
-    ) -> Option<Found> {
+    /// Adds a pose to the list of those found, unless it lies outside of the bound.
+    ///
+    /// Of two poses that are not distinct, the one with the lower score stays.
+    fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, finished: bool) {
         let pose = &outcome.camera_from_object;
-        let allowed = self.options.bound.is_none_or(|b| b.contains(init, pose));
-        (outcome.verdict == Verdict::Refined && allowed).then(|| {
-            let mut context = session.workspace.context(problem);
-            let score = self.score.score(&mut context, pose);
-            Found { score, outcome }
-        })
+        if self
+            .options
+            .bound
+            .is_some_and(|b| !b.contains(run.init, pose))
+        {
+            return;
+        }
+        let score = run.score(&mut self.score, pose);
+        let same = |found: &Found| !run.distinct.apart(&found.outcome.camera_from_object, pose);
+        if self
+            .found
+            .iter()
+            .any(|found| found.score <= score && same(found))
+        {
+            return;
+        }
+        self.found
+            .retain(|found| found.score <= score || !same(found));
+        let place = self.found.partition_point(|found| found.score <= score);
+        let found = Found {
+            score,
+            outcome,
+            finished,
+        };
+        self.found.insert(place, found);
     }
 
-    /// Ranks hypotheses into the list of the best, within the time limit.
-    fn rank(
-        &mut self,
-        problem: &Problem<'_>,
-        init: &Isometry3<f64>,
-        local: &Isometry3<f64>,
-        clock: &Clock,
-        session: &mut Session<'_>,
-    ) {
+    /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
+    fn rank(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.ranked.clear();
-        let Some(from) = Hypotheses::new(problem, init, self.options.bound) else {
+        let options = self.options;
+        let Some(from) = Hypotheses::new(run.problem, run.init, options.bound) else {
             return;
         };
-        let options = self.options;
-        // One more, for the hypothesis that is removed again.
-        self.ranked.reserve(options.refined.min(MAX_REFINED) + 1);
         let near = match options.start {
-            Start::Refined => [Some(init), Some(local)],
+            Start::Refined => [Some(run.init), Some(local)],
             Start::Ignored => [None; 2],
         };
         let hypotheses = near
             .into_iter()
             .flatten()
             .flat_map(|pose| from.neighbors(pose))
+            .chain(near[1].copied())
             .map(Some)
             .chain(from.of(options.rotations, options.hypotheses));
         for pose in hypotheses {
-            if clock.is_over() {
+            if run.is_over() {
                 return;
             }
             let Some(pose) = pose else {
                 continue;
             };
-            let mut context = session.workspace.context(problem);
-            let score = self.ranking.score(&mut context, &pose);
-            self.list(score, pose);
+            let score = run.score(&mut self.ranking, &pose);
+            self.ranked
+                .insert(score, pose, options.refined, options.spacing_degrees);
         }
     }
 
-    /// Refines the ranked hypotheses.
-    ///
-    /// Returns the best after the local stage, and the number of iterations.
-    fn explore(
-        &mut self,
-        problem: &Problem<'_>,
-        init: &Isometry3<f64>,
-        clock: &Clock,
-        session: &mut Session<'_>,
-    ) -> (Option<Found>, usize) {
-        let mut best: Option<Found> = None;
-        let mut iterations = 0;
-        for index in 0..self.ranked.len() {
-            if clock.is_over() {
-                return (best, iterations);
+    /// Lists the poses that look like the best one and may explain the image better or as well.
+    fn rank_alike(&mut self, run: &mut Run<'_, '_>, best: &Found, bad: bool) {
+        self.alike.clear();
+        let base = &best.outcome.camera_from_object;
+        let Some((model, observation)) = run.problem.sides() else {
+            return;
+        };
+        let near = NearSymmetries::of(model);
+        if near.is_empty() {
+            return;
+        }
+        let gap = if bad { f64::INFINITY } else { MAX_GAP };
+        let limit = run.score(&mut self.ranking, base) + gap;
+        let spacing = self.options.spacing_degrees;
+        for motion in near.undecided(observation, base, model.diameter()) {
+            if run.is_over() {
+                return;
             }
-            let (_, start) = self.ranked[index];
-            let outcome = self.explore.run(problem, &start, session);
-            iterations += outcome.iterations;
+            let pose = base * motion;
+            let bound = self.options.bound;
+            if bound.is_none_or(|b| b.contains(run.init, &pose)) {
+                let score = run.score(&mut self.ranking, &pose);
+                if score < limit {
+                    let refined = self.options.refined.div_ceil(3);
+                    self.alike.insert(score, pose, refined, spacing);
+                }
+            }
+        }
+        if bad {
+            return;
+        }
+        // The score decides which look-alikes of a good pose are worth refining.
+        std::mem::swap(&mut self.alike, &mut self.ranked_alike);
+        self.alike.clear();
+        for (_, pose) in self.ranked_alike.iter() {
+            let score = run.score(&mut self.score, pose);
+            if score < best.score + gap {
+                self.alike.insert(score, *pose, ALIKE_OF_GOOD, spacing);
+            }
+        }
+    }
+
+    /// Moves a pose in smaller and smaller steps while its ranking score falls.
+    fn climb(&mut self, run: &mut Run<'_, '_>, start: &Isometry3<f64>) -> Isometry3<f64> {
+        let Some(model) = run.problem.model() else {
+            return *start;
+        };
+        let mut best = (run.score(&mut self.ranking, start), *start);
+        let mut size = 1.0;
+        for _ in 0..CLIMBS {
+            let before = best.0;
+            for index in 0..12 {
+                let pose = moved(&best.1, index, model, size);
+                let score = run.score(&mut self.ranking, &pose);
+                if score < best.0 {
+                    best = (score, pose);
+                }
+            }
+            if best.0 == before {
+                size *= 0.5;
+            }
+        }
+        best.1
+    }
+
+    /// Refines ranked hypotheses at low cost, until one is good enough.
+    fn refine(&mut self, run: &mut Run<'_, '_>, ranked: &Shortlist, enough: f64) {
+        for (_, start) in ranked.iter() {
+            if run.is_over() {
+                return;
+            }
+            let start = self.climb(run, start);
+            let outcome = self.explore.run(run.problem, &start, run.session);
+            run.iterations += outcome.iterations;
+            run.stopped = outcome.termination == Termination::Stopped;
             // A hypothesis that the stage keeps is still another pose than the initial one.
-            let outcome = Outcome {
-                verdict: Verdict::Refined,
-                ..outcome
+            let verdict = Verdict::Refined;
+            self.add(run, Outcome { verdict, ..outcome }, false);
+            let good = |found: &Found| found.score <= enough;
+            if self.found.first().is_some_and(good) {
+                return;
+            }
+        }
+    }
+
+    /// Refines the best of all poses found by the local stage.
+    fn finish(&mut self, run: &mut Run<'_, '_>) {
+        let Some(best) = self.found.first().map(|found| found.score) else {
+            return;
+        };
+        for _ in 0..FINALISTS {
+            let next = |found: &&Found| !found.finished && found.score <= best + FINAL_GAP;
+            let Some(explored) = self.found.iter().find(next).copied() else {
+                return;
             };
-            if let Some(found) = self.found(problem, init, outcome, session)
-                && best.is_none_or(|best| found.score < best.score)
-            {
-                best = Some(found);
+            if run.is_over() {
+                return;
             }
-            if outcome.termination == Termination::Stopped {
-                return (best, iterations);
-            }
-            if best.is_some_and(|best| best.score <= self.options.good_enough) {
-                break;
-            }
-        }
-        if let Some(explored) = best {
             let start = explored.outcome.camera_from_object;
-            let next = self.stage.run(problem, &start, session);
-            iterations += next.iterations;
-            let outcome = explored.outcome.then(next);
-            if let Some(found) = self.found(problem, init, outcome, session)
-                && found.score <= explored.score
-            {
-                best = Some(found);
+            let next = self.stage.run(run.problem, &start, run.session);
+            run.iterations += next.iterations;
+            run.stopped = next.termination == Termination::Stopped;
+            self.add(run, explored.outcome.then(next), true);
+            for other in &mut self.found {
+                other.finished |= other.outcome == explored.outcome;
             }
         }
-        (best, iterations)
+    }
+
+    /// Writes the poses found apart from the returned one into the workspace.
+    fn write_alternatives(&self, run: &mut Run<'_, '_>, pose: &Isometry3<f64>, score: f64) {
+        let alternatives = &mut run.session.workspace.alternatives;
+        alternatives.reserve(self.found.len());
+        for found in &self.found {
+            let other = found.outcome.camera_from_object;
+            if run.distinct.apart(&other, pose) {
+                alternatives.push(Alternative {
+                    camera_from_object: other,
+                    score: found.score,
+                    gap: found.score - score,
+                    mssd_meters: run.distinct.mssd(&other, pose),
+                    rotation_degrees: run.distinct.degrees(&other, pose),
+                });
+            }
+        }
     }
 }
 
-/// The largest number of refined hypotheses: their list is kept in order.
-const MAX_REFINED: usize = 10_000;
+/// Number of distinct poses that the local stage refines, and the largest gap in score between them
+/// and the best one.
+const FINALISTS: usize = 2;
+const FINAL_GAP: f64 = 0.05;
+/// Number of refined poses that look like a good pose.
+const ALIKE_OF_GOOD: usize = 2;
+/// Gap in score up to which a pose looks like a good one before it is refined.
+const MAX_GAP: f64 = 0.05;
+
+/// Number of rounds of a climb, its first rotations, degrees, and its first shifts, as a share of
+/// the diameter.
+const CLIMBS: usize = 3;
+const CLIMB_DEGREES: f64 = 20.0;
+const CLIMB_DIAMETERS: f64 = 0.1;
+
+/// Returns a pose that is rotated around the object's center or shifted along an axis.
+///
+/// Of the twelve moves, the first six are rotations.
+fn moved(pose: &Isometry3<f64>, index: usize, model: &Model, size: f64) -> Isometry3<f64> {
+    let mut axis = Vector3::zeros();
+    axis[index / 2 % 3] = if index % 2 == 0 { size } else { -size };
+    let motion = if index < 6 {
+        let (turn, center) = (
+            so3::exp(&(axis * CLIMB_DEGREES.to_radians())),
+            model.center().coords,
+        );
+        Isometry3::from_parts((center - turn * center).into(), turn)
+    } else {
+        let shift = axis * CLIMB_DIAMETERS * model.diameter();
+        Isometry3::translation(shift.x, shift.y, shift.z)
+    };
+    pose * motion
+}
 
 /// The deadline of a run.
 struct Clock(Option<(Instant, Duration)>);
@@ -301,115 +369,74 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
     ) -> Outcome {
         let clock = Clock::start(self.options.time_limit);
         let ignored = self.options.start == Start::Ignored;
-        let mut local = if ignored {
-            Outcome::kept(init, Termination::NoPairs)
-        } else {
-            self.stage.run(problem, init, session)
+        let mut local = match self.options.start {
+            Start::Refined => self.stage.run(problem, init, session),
+            Start::Ignored => Outcome::kept(init, Termination::NoPairs),
         };
-        if !se3::is_finite(init)
-            || problem
-                .observation()
-                .is_none_or(|seen| seen.n_surfels() == 0)
-        {
+        self.found.clear();
+        session.workspace.alternatives.clear();
+        let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
+        let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
+            return local;
+        };
+        if !se3::is_finite(init) {
             return local;
         }
-        let stopped = local.termination == Termination::Stopped;
-        let mut iterations = local.iterations;
-        let found = self.found(problem, init, local, session);
-        if found.is_none() && local.verdict == Verdict::Refined {
+        let mut run = Run {
+            problem,
+            init,
+            distinct: Distinct::of(model),
+            clock,
+            iterations: local.iterations,
+            stopped: local.termination == Termination::Stopped,
+            session,
+        };
+        let allowed = self
+            .options
+            .bound
+            .is_none_or(|b| b.contains(init, &local.camera_from_object));
+        if !allowed {
             local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        let score = if ignored {
-            f64::INFINITY
-        } else {
-            found.map_or_else(
-                || {
-                    let mut context = session.workspace.context(problem);
-                    self.score.score(&mut context, init)
-                },
-                |found| found.score,
-            )
-        };
-        if score > self.options.threshold && !stopped {
-            let start = local.camera_from_object;
-            self.rank(problem, init, &start, &clock, session);
-            let (found, spent) = self.explore(problem, init, &clock, session);
-            iterations += spent;
-            if let Some(found) = found
-                && found.score < score - self.options.min_gain
-            {
-                local = found.outcome;
-            }
-            if clock.is_over() {
-                local.termination = Termination::Deadline;
-                if local.verdict != Verdict::Refined {
-                    local.verdict = Verdict::KeptInitial(Termination::Deadline);
-                }
+        let mut score = f64::INFINITY;
+        if !ignored {
+            self.add(&mut run, local, true);
+            score = self.found.first().map_or(score, |found| found.score);
+        }
+        let bad = score > self.options.threshold;
+        if bad {
+            self.rank(&mut run, &local.camera_from_object);
+            let ranked = std::mem::take(&mut self.ranked);
+            self.refine(&mut run, &ranked, self.options.good_enough);
+            self.ranked = ranked;
+        }
+        if let Some(best) = self.found.first().copied() {
+            self.rank_alike(&mut run, &best, bad);
+            let alike = std::mem::take(&mut self.alike);
+            self.refine(&mut run, &alike, f64::NEG_INFINITY);
+            self.alike = alike;
+        }
+        self.finish(&mut run);
+        let mut returned = local;
+        if let Some(best) = self.found.first()
+            && best.score < score - self.options.min_gain
+        {
+            (returned, score) = (best.outcome, best.score);
+        }
+        self.write_alternatives(&mut run, &returned.camera_from_object, score);
+        if bad && run.clock.is_over() {
+            returned.termination = Termination::Deadline;
+            if returned.verdict != Verdict::Refined {
+                returned.verdict = Verdict::KeptInitial(Termination::Deadline);
             }
         }
         Outcome {
-            iterations,
-            ..local
+            iterations: run.iterations,
+            ..returned
         }
     }
 
     fn name(&self) -> &'static str {
         "hypothesis-search"
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use hicp_core::Vector3;
-
-    use super::*;
-
-    /// Returns scores and angles of the refined hypotheses, for hypotheses rotated around one axis.
-    fn listed(spacing_degrees: f64, hypotheses: &[(f64, f64)]) -> Vec<(f64, f64)> {
-        let options = SearchOptions {
-            refined: 3,
-            spacing_degrees,
-            ..SearchOptions::default()
-        };
-        let mut search = HypothesisSearch::new((), (), (), (), options);
-        for (score, degrees) in hypotheses {
-            search.list(
-                *score,
-                Isometry3::rotation(Vector3::z() * degrees.to_radians()),
-            );
-        }
-        let turned = |pose: &Isometry3<f64>| pose.rotation.angle().to_degrees().round();
-        search
-            .ranked
-            .iter()
-            .map(|(score, pose)| (*score, turned(pose)))
-            .collect()
-    }
-
-    #[test]
-    fn duplicate_hypotheses_are_listed_once() {
-        let neighbors = [(0.5, 0.0), (0.6, 5.0), (0.7, 90.0)];
-        let both = [neighbors, neighbors].concat();
-        assert_eq!(listed(0.0, &both), neighbors);
-        assert_eq!(listed(20.0, &both), [(0.5, 0.0), (0.7, 90.0)]);
-    }
-
-    #[test]
-    fn of_two_near_hypotheses_the_better_stays() {
-        let hypotheses = [
-            (0.5, 0.0),
-            (0.6, 50.0),
-            (0.4, 10.0),
-            (0.45, 100.0),
-            (0.3, 150.0),
-        ];
-        assert_eq!(
-            listed(20.0, &hypotheses),
-            [(0.3, 150.0), (0.4, 10.0), (0.45, 100.0)]
-        );
-        assert_eq!(
-            listed(20.0, &[(0.5, 0.0), (0.6, 15.0), (0.4, 30.0)]),
-            [(0.4, 30.0), (0.5, 0.0)]
-        );
     }
 }

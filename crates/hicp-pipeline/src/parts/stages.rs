@@ -199,7 +199,7 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
         start: p.word("start", &starts, used)?,
         threshold: p.number("threshold", FACTOR, 0.15, "searches above this score")?,
         good_enough: p.number("good_enough", FACTOR, 0.05, "score that ends it")?,
-        min_gain: p.number("min_gain", FACTOR, 0.03, "gain that leaves the local pose")?,
+        min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
         rotations: p.word("rotations", &rotations, tried)?,
         hypotheses: p.limited(Hypotheses, "hypotheses", 0, 256, "rotations to rank")?,
         refined: p.count("refined", 0, 12, "hypotheses that are refined")?,

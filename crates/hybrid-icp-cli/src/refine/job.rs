@@ -23,6 +23,11 @@ pub(crate) struct JobOptions {
     /// The file for the JSON result; standard output if not given.
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// A JSON file for the distinct other poses that a search found, best first. Each has its pose
+    /// and score, the gap (its score minus that of the result), and rotation_degrees and mssd_mm
+    /// from the result.
+    #[arg(long, value_name = "FILE")]
+    alternatives: Option<PathBuf>,
     /// A PNG file for a picture: the depth around the object, with the model's outline at the
     /// initial pose (orange, dashed) and at the result (blue), and their MVE.
     #[arg(long, value_name = "FILE")]
@@ -87,6 +92,11 @@ impl JobOptions {
         if let Some(path) = &self.output {
             hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
         }
+        if let Some(path) = &self.alternatives {
+            let others = refiner.alternatives().iter().map(report::alternative);
+            let json = serde_json::to_string_pretty(&others.collect::<Vec<_>>())?;
+            hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+        }
         if let Some(path) = trace_path {
             trace.write(path)?;
         }
@@ -111,6 +121,7 @@ impl JobOptions {
     fn check_files(&self, inputs: &Inputs) -> anyhow::Result<()> {
         let mut files = Files::default()
             .writes("--output", &self.output)
+            .writes("--alternatives", &self.alternatives)
             .writes("--overlay", &self.overlay)
             .writes("--trace", &self.trace);
         for (option, path) in inputs.files() {

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use hicp_io::PoseFile;
-use hybrid_icp::icp::Verdict;
+use hybrid_icp::icp::{Alternative, Verdict};
 use hybrid_icp::{Refinement, StageRecord};
 use serde::Serialize;
+use serde_json::{Value, json};
 
+use crate::pose_json::add_pose;
 use crate::terminal::table;
 
 /// The JSON report of a refinement; lengths in millimeters as in BOP, losses in m².
@@ -127,6 +129,18 @@ impl StageReport {
             outcome: verdict(outcome.verdict),
         }
     }
+}
+
+/// Returns the JSON of another pose.
+pub(crate) fn alternative(other: &Alternative) -> Value {
+    let mut object = json!({
+        "score": other.score,
+        "gap": other.gap,
+        "rotation_degrees": other.rotation_degrees,
+        "mssd_mm": other.mssd_meters * 1e3,
+    });
+    add_pose(&mut object, &other.camera_from_object);
+    object
 }
 
 fn verdict(verdict: Verdict) -> &'static str {

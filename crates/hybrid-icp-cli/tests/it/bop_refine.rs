@@ -26,6 +26,35 @@ fn every_row_is_refined_against_its_own_instance() {
 }
 
 #[test]
+fn other_hypotheses_follow_the_rows() {
+    let world = World::new();
+    let rows = world.rows();
+    let search = ["--pipeline", "search", "--set", "threshold=0", "--no-time"];
+    let (run, refined) = world.refine(&rows, &search);
+    run.exits(0);
+    let options = [&search[..], &["--hypotheses", "3"]].concat();
+    let run = world.run(&options).exits(0);
+    assert!(run.out.contains("10 rows of 4 frames"), "{}", run.out);
+    let all = read_results(world.path("out.csv")).unwrap();
+    assert_eq!(all[..rows.len()], refined);
+    let others = &all[rows.len()..];
+    assert!(!others.is_empty() && others.len() <= 2 * rows.len());
+    for other in others {
+        let same = |row: &&ResultRow| {
+            (row.scene_id, row.im_id, row.obj_id) == (other.scene_id, other.im_id, other.obj_id)
+        };
+        let of_image = refined.iter().filter(same);
+        let best = of_image.map(|row| row.score).fold(0.0, f64::max);
+        assert!(other.score <= best);
+        assert!(
+            refined
+                .iter()
+                .all(|r| r.camera_from_object() != other.camera_from_object())
+        );
+    }
+}
+
+#[test]
 fn threads_do_not_change_a_byte() {
     let world = World::new();
     let rows = world.rows();

@@ -496,3 +496,23 @@ fn names_that_are_not_utf_8_are_accepted() {
         .exits(1)
         .complains(&["cannot read no"]);
 }
+
+#[test]
+fn other_poses_that_a_search_finds_are_written() {
+    let scene = Scene::new()
+        .with("--alternatives", "others.json")
+        .with("--pipeline", "search")
+        .with("--set", "threshold=0");
+    scene.run().exits(0);
+    let text = std::fs::read_to_string(scene.path("others.json")).unwrap();
+    let others: Vec<Value> = serde_json::from_str(&text).unwrap();
+    assert!(!others.is_empty());
+    let mut last = 0.0;
+    for other in &others {
+        let number = |key: &str| other[key].as_f64().unwrap();
+        assert!(number("score") >= last && number("mssd_mm") > 1.0);
+        assert!(number("gap") <= number("score") && number("rotation_degrees") > 0.0);
+        assert!(pose_of(other).translation.z > 0.0);
+        last = number("score");
+    }
+}

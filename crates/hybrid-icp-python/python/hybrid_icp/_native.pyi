@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, Union, final
+from typing import Any, Literal, Protocol, TypedDict, Union, final
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,13 @@ _Unit = Literal["m", "mm", "cm"]
 _Axis = tuple[Sequence[float], Sequence[float]]
 _Path = Union[str, os.PathLike[str]]
 _Outcome = Literal["refined", "kept_initial"]
+
+class _Alternative(TypedDict):
+    T_co: _Array
+    score: float
+    gap: float
+    mssd: float
+    rotation_degrees: float
 
 class _OnIteration(Protocol):
     def on_iteration(self, event: IterationEvent, /) -> object: ...
@@ -211,6 +218,8 @@ class Result:
     def evidence(self) -> dict[str, float]: ...
     @property
     def warnings(self) -> list[str]: ...
+    @property
+    def alternatives(self) -> list[_Alternative]: ...
     @property
     def outcome(self) -> _Outcome: ...
     @property

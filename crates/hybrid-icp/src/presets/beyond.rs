@@ -236,14 +236,13 @@ pub fn search() -> Search {
 
 /// `auto`: [`local`], followed by a search if its MVE stays above 0.2.
 ///
-/// The search ranks 128 rotations and refines 6 of them. A hypothesis replaces the local pose if
-/// its score is better by 0.05; the result can then be far from the initial pose.
+/// The search ranks 128 rotations and refines six of them. A hypothesis replaces
+/// the local pose if its score is better by 0.02; the result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.2,
-        good_enough: 0.15,
-        min_gain: 0.05,
+        good_enough: 0.1,
         hypotheses: 128,
         refined: 6,
         ..SearchOptions::default()

@@ -92,6 +92,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             threads: arguments.threads,
             timed: true,
             rescore: Rescore::Keep,
+            hypotheses: 1,
             resume: true,
             resumed_by: "the same command",
             // Nobody expects the poses of the baseline to be right.

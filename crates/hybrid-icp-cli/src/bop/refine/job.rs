@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use hicp_bop::{MaskSource, Rescore};
 
@@ -30,6 +31,16 @@ pub(crate) struct JobOptions {
     /// A row that was not refined has 0.
     #[arg(long, value_name = "BY", value_enum, hide_possible_values = true)]
     rescore: Option<RescoreBy>,
+    /// Write up to K poses per row: its own, and at the end of the file the distinct other poses
+    /// that a search found. The score of another pose is lower by its gap in MVE. Without a search,
+    /// there are none.
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 1,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000)
+    )]
+    hypotheses: usize,
     /// Also write the status of every row as CSV, with its MVE before and after, its confidence,
     /// and the reasons not to trust its pose.
     #[arg(long, value_name = "ROWS.csv")]
@@ -84,6 +95,7 @@ impl JobOptions {
                 Some(RescoreBy::Confidence) => Rescore::Confidence,
                 None => Rescore::Keep,
             },
+            hypotheses: self.hypotheses,
             resume: self.resume,
             resumed_by: "--resume",
             distrusts: true,
@@ -117,6 +129,8 @@ pub(crate) struct RefineJob<'a> {
     /// If `true`, writes times.
     pub(crate) timed: bool,
     pub(crate) rescore: Rescore,
+    /// Number of rows per estimate, at least 1.
+    pub(crate) hypotheses: usize,
     /// If `true`, continues an existing journal.
     pub(crate) resume: bool,
     /// The option that continues an interrupted run, for messages.

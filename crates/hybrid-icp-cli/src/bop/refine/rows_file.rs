@@ -69,12 +69,10 @@ mod tests {
             .collect();
         let flatness = Flatness::new(0.01, 0.001, 0.01, 0.2);
         let row = |index, status, mve, flatness| RowResult {
-            index,
-            status,
-            pose: None,
             mve,
             confidence: mve.map(|_| 0.75),
             flatness,
+            ..RowResult::unrefined(index, status)
         };
         let frame = |rows| FrameResult {
             rows,

@@ -71,6 +71,10 @@ impl RefineJob<'_> {
         if let Some(path) = self.rows {
             rows_file::write(path, &rows, &results, self.estimates())?;
         }
+        let others = results
+            .iter()
+            .flat_map(|result| result.alternatives(&rows, self.hypotheses - 1));
+        let others: Vec<ResultRow> = others.collect();
         if self.estimates() {
             let found = results.iter().flat_map(|result| &result.rows);
             let found = found.filter(|row| row.pose.is_some());
@@ -78,6 +82,9 @@ impl RefineJob<'_> {
             let mut index = 0..;
             rows.retain(|_| index.next().is_some_and(|index| found.contains(&index)));
         }
+        // The other poses come last, so that the numbers of the rows do not change.
+        let n_rows = rows.len();
+        rows.extend(others);
         hicp_io::bop::write_results(self.output, &rows)?;
         journal.map_or(Ok(()), Journal::remove)?;
 
@@ -85,7 +92,7 @@ impl RefineJob<'_> {
         let mut text = format!(
             "{}: {} rows of {} frames in {:.1} s on {} threads",
             self.output.display(),
-            rows.len(),
+            n_rows,
             results.len(),
             start.elapsed().as_secs_f64(),
             pool.current_num_threads(),

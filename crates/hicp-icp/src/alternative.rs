@@ -1,0 +1,36 @@
+//! Other poses that explain an image.
+
+use hicp_core::Isometry3;
+
+/// A pose that a search found besides the one it returned.
+///
+/// It differs from the returned pose, and from other alternatives, by an MSSD of more than a tenth
+/// of the diameter. MSSD and angle are up to declared symmetries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Alternative {
+    /// The pose `camera_from_object`, meters.
+    pub camera_from_object: Isometry3<f64>,
+    /// The score of the search for the pose; lower is better.
+    pub score: f64,
+    /// The score minus that of the returned pose.
+    ///
+    /// It is negative if the pose is better, but by less than the gain that a search requires.
+    pub gap: f64,
+    /// MSSD from the returned pose, meters.
+    pub mssd_meters: f64,
+    /// Smallest angle to the rotation of the returned pose, degrees.
+    pub rotation_degrees: f64,
+}
+
+impl Alternative {
+    /// The gap in score within which two poses explain the image equally well.
+    pub const AMBIGUOUS_GAP: f64 = 0.01;
+
+    /// Returns whether the pose explains the image as well as the returned one.
+    #[must_use]
+    pub fn is_ambiguous(&self) -> bool {
+        self.gap < Self::AMBIGUOUS_GAP
+    }
+}

@@ -1,0 +1,66 @@
+//! Whether two poses of an object differ by more than its declared symmetries.
+
+use std::sync::Arc;
+
+use hicp_core::{Isometry3, Model, Point3, Vector3, so3};
+use hicp_score::mssd;
+
+/// The share of the diameter by which distinct poses differ (MSSD).
+const APART: f64 = 0.1;
+
+/// The extreme points of an object with its expanded symmetries. Computed once per model.
+#[derive(Debug)]
+pub(crate) struct Distinct {
+    points: Vec<Point3<f32>>,
+    symmetries: Vec<Isometry3<f64>>,
+    apart_meters: f64,
+}
+
+impl Distinct {
+    pub(crate) fn of(model: &Model) -> Arc<Self> {
+        model.derived().get_or_build(0, || Self {
+            points: extremes(model),
+            symmetries: model.symmetries().motions(),
+            apart_meters: APART * model.diameter(),
+        })
+    }
+
+    /// Returns the MSSD of two poses up to the declared symmetries, meters.
+    pub(crate) fn mssd(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+        mssd(a, b, &self.points, &self.symmetries)
+    }
+
+    /// Returns the smallest angle between two poses up to the declared symmetries, degrees.
+    pub(crate) fn degrees(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+        let back = a.rotation.inverse() * b.rotation;
+        let angles = self.symmetries.iter();
+        let angles = angles.map(|motion| so3::angle(&(back * motion.rotation)));
+        angles.fold(f64::INFINITY, f64::min).to_degrees()
+    }
+
+    /// Returns whether two poses differ by more than a tenth of the diameter.
+    pub(crate) fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        self.mssd(a, b) > self.apart_meters
+    }
+}
+
+/// Returns the samples that are farthest along 26 directions. The largest distance between two
+/// poses is that of a point of the convex hull.
+fn extremes(model: &Model) -> Vec<Point3<f32>> {
+    let step = |index: i32| (index.rem_euclid(3) - 1) as f32;
+    let directions = (0..27).map(|i| Vector3::new(step(i), step(i / 3), step(i / 9)));
+    let mut points: Vec<Point3<f32>> = Vec::new();
+    for direction in directions.filter(|d| *d != Vector3::zeros()) {
+        let along = |s: &&hicp_core::Surfel| s.point.coords.dot(&direction);
+        let farthest = model
+            .samples()
+            .iter()
+            .max_by(|a, b| along(a).total_cmp(&along(b)));
+        points.extend(
+            farthest
+                .map(|s| s.point)
+                .filter(|point| !points.contains(point)),
+        );
+    }
+    points
+}

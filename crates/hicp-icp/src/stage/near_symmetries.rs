@@ -1,0 +1,231 @@
+//! Near symmetries: motions that map most of an object's surface onto itself.
+
+use std::sync::Arc;
+
+use hicp_core::{Isometry3, Matrix3, Model, Observation, Point3, Surfel, UnitQuaternion, Vector3};
+
+use crate::stage::distinct::Distinct;
+
+/// Number of surface samples that are compared, at most 256.
+const SAMPLES: usize = 256;
+/// Number of rotations around an axis.
+const STEPS: usize = 24;
+/// Share of the samples that must lie on the moved surface.
+const LEAST_SHARE: f64 = 0.6;
+/// Largest distance from the moved surface, as a share of the diameter.
+const TOLERANCE: f64 = 0.05;
+/// Number of alignments of the moved surface with itself, and the stride of their samples.
+const ALIGNMENTS: usize = 3;
+const STRIDE: usize = 3;
+/// Share of the seen samples that must tell two poses apart.
+const TELLING: f64 = 0.03;
+
+/// A set of samples.
+type Set = [u64; SAMPLES / 64];
+
+/// The motions S, in the object frame, for which the object at `pose` and at `pose · S` look nearly
+/// the same.
+///
+/// They are rotations in steps of 15° around the principal axes, also with the axis flipped. Each
+/// is shifted such that most of the surface lies on itself: the handle of a mug moves the center of
+/// the object away from the axis of its body. Declared symmetries are left out, and so are motions
+/// that differ from another one only by these.
+///
+/// Computed once per model, in some 10 ms.
+#[derive(Debug)]
+pub(crate) struct NearSymmetries {
+    samples: Vec<Surfel>,
+    oriented: bool,
+    /// The motions, with the samples that are far from the moved surface.
+    motions: Vec<(Isometry3<f64>, Set)>,
+}
+
+impl NearSymmetries {
+    /// Returns the near symmetries of a model.
+    pub(crate) fn of(model: &Model) -> Arc<Self> {
+        model.derived().get_or_build(0, || Self::find(model))
+    }
+
+    /// Returns whether there is none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.motions.is_empty()
+    }
+
+    /// Iterates over the motions for which the image may show the object at `pose · S` instead.
+    ///
+    /// Motions are left out if enough of what the image shows of the object at `pose` is not on
+    /// the surface at `pose · S`. Cost: one projection per sample.
+    pub(crate) fn undecided(
+        &self,
+        observation: &Observation,
+        pose: &Isometry3<f64>,
+        diameter: f64,
+    ) -> impl Iterator<Item = &Isometry3<f64>> {
+        let seen = self.seen(observation, pose, 2.0 * TOLERANCE * diameter);
+        let enough = (f64::from(count(&seen, &[u64::MAX; SAMPLES / 64])) * TELLING).max(1.0);
+        self.motions
+            .iter()
+            .filter(move |(_, bare)| f64::from(count(&seen, bare)) < enough)
+            .map(|(motion, _)| motion)
+    }
+
+    /// Returns the samples whose depth was measured.
+    fn seen(&self, observation: &Observation, pose: &Isometry3<f64>, tolerance: f64) -> Set {
+        let camera = observation.camera();
+        let mut seen = Set::default();
+        for (index, sample) in self.samples.iter().enumerate() {
+            let point = pose * sample.point.cast::<f64>();
+            let normal = pose.rotation * sample.normal.cast::<f64>();
+            if self.oriented && normal.dot(&point.coords) >= 0.0 {
+                continue;
+            }
+            let Some(pixel) = camera.project(&point) else {
+                continue;
+            };
+            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of images.
+            let surfel = observation.surfel_near(pixel.x as f32, pixel.y as f32);
+            if surfel.is_some_and(|s| (f64::from(s.point.z) - point.z).abs() < tolerance) {
+                seen[index / 64] |= 1 << (index % 64);
+            }
+        }
+        seen
+    }
+
+    fn find(model: &Model) -> Self {
+        let step = model.samples().len().div_ceil(SAMPLES).max(1);
+        let samples: Vec<Surfel> = model.samples().iter().step_by(step).copied().collect();
+        let tolerance = (TOLERANCE * model.diameter()) as f32;
+        let distinct = Distinct::of(model);
+        let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();
+        let identity = Isometry3::identity();
+        for rotation in rotations(&samples) {
+            let Some(motion) = align(&samples, &rotation, tolerance) else {
+                continue;
+            };
+            let mut known = motions.iter().map(|(motion, _)| motion);
+            if !distinct.apart(&motion, &identity) || known.any(|m| !distinct.apart(&motion, m)) {
+                continue;
+            }
+            let back: Isometry3<f32> = motion.inverse().cast();
+            let mut bare = Set::default();
+            for (index, sample) in samples.iter().enumerate() {
+                let point = back * sample.point;
+                let distances = samples.iter().map(|other| (other.point - point).norm());
+                if distances.fold(f32::INFINITY, f32::min) > 3.0 * tolerance {
+                    bare[index / 64] |= 1 << (index % 64);
+                }
+            }
+            motions.push((motion, bare));
+        }
+        Self {
+            samples,
+            oriented: model.mesh().is_closed(),
+            motions,
+        }
+    }
+}
+
+/// Returns the number of samples in both sets.
+fn count(a: &Set, b: &Set) -> u32 {
+    a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
+}
+
+/// Returns rotations around the principal axes of the samples, with and without a flip.
+fn rotations(samples: &[Surfel]) -> Vec<UnitQuaternion<f64>> {
+    let mean = mean(samples);
+    let covariance: Matrix3<f64> = samples
+        .iter()
+        .map(|s| s.point.cast::<f64>() - mean)
+        .map(|p| p * p.transpose())
+        .sum();
+    let axes = covariance.symmetric_eigen().eigenvectors;
+    let turn = |axis: usize, angle: f64| UnitQuaternion::new(axes.column(axis) * angle);
+    let mut rotations = Vec::with_capacity(6 * STEPS);
+    for axis in 0..3 {
+        for flip in [0.0, std::f64::consts::PI] {
+            rotations.extend((0..STEPS).map(|step| {
+                let angle = std::f64::consts::TAU * step as f64 / STEPS as f64;
+                turn(axis, angle) * turn((axis + 1) % 3, flip)
+            }));
+        }
+    }
+    rotations
+}
+
+/// Shifts the rotated samples such that most of them lie on the samples.
+///
+/// Returns `None` if too few do.
+fn align(
+    samples: &[Surfel],
+    rotation: &UnitQuaternion<f64>,
+    tolerance: f32,
+) -> Option<Isometry3<f64>> {
+    let center = mean(samples);
+    let shift = center - rotation * center;
+    let mut moved = Moved::new(&Isometry3::from_parts(shift.into(), *rotation));
+    for alignment in 0..ALIGNMENTS {
+        let (mut sum, mut near) = (Vector3::<f32>::zeros(), 0_usize);
+        for sample in samples.iter().step_by(STRIDE) {
+            if let Some(residual) = moved.residual(sample, samples, tolerance) {
+                sum += residual;
+                near += 1;
+            }
+        }
+        let share = (near * STRIDE) as f64 / samples.len().max(1) as f64;
+        let last = alignment + 1 == ALIGNMENTS;
+        if share < if last { LEAST_SHARE } else { 0.6 * LEAST_SHARE } {
+            return None;
+        }
+        // A shift moves surfaces along their normals by a third of it on average.
+        moved.shift += sum * (2.0 / near as f32);
+    }
+    Some(Isometry3::from_parts(
+        moved.shift.cast::<f64>().into(),
+        *rotation,
+    ))
+}
+
+/// A motion of samples.
+struct Moved {
+    turn: Matrix3<f32>,
+    shift: Vector3<f32>,
+}
+
+impl Moved {
+    fn new(motion: &Isometry3<f64>) -> Self {
+        Self {
+            turn: motion.rotation.to_rotation_matrix().into_inner().cast(),
+            shift: motion.translation.vector.cast(),
+        }
+    }
+
+    /// Returns the step from a moved sample to the surface, along the normal.
+    ///
+    /// Returns `None` if no surface of similar normal is near.
+    fn residual(
+        &self,
+        sample: &Surfel,
+        samples: &[Surfel],
+        tolerance: f32,
+    ) -> Option<Vector3<f32>> {
+        let point = self.turn * sample.point.coords + self.shift;
+        let normal = self.turn * *sample.normal;
+        let (mut least, mut nearest) = (9.0 * tolerance * tolerance, None);
+        for other in samples {
+            let difference = other.point.coords - point;
+            let distance = difference.norm_squared();
+            if distance < least && other.normal.dot(&normal) > 0.5 {
+                (least, nearest) = (distance, Some((difference, other.normal)));
+            }
+        }
+        // Samples do not lie on samples, so only the distance along the normal counts.
+        let (difference, normal) = nearest?;
+        let along = normal.dot(&difference);
+        (along.abs() < tolerance).then(|| *normal * along)
+    }
+}
+
+fn mean(samples: &[Surfel]) -> Point3<f64> {
+    let sum: Vector3<f64> = samples.iter().map(|s| s.point.coords.cast::<f64>()).sum();
+    Point3::from(sum / samples.len().max(1) as f64)
+}
