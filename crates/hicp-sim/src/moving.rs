@@ -43,6 +43,8 @@ pub struct MovingConfig {
     /// Number of images.
     pub frames: usize,
     /// Number of objects that stand on the table, behind the moving one.
+    ///
+    /// Those of the same model as the moving one are left out.
     pub standing: usize,
     /// The hand.
     pub hand: Hand,
@@ -91,8 +93,7 @@ pub struct MovingScene {
 }
 
 impl MovingScene {
-    /// Draws a scene in which the object `models[model]` moves. Other objects may be any of
-    /// `models`.
+    /// Draws a scene in which the object `models[model]` moves. The others are of `models`, too.
     ///
     /// # Errors
     ///
@@ -107,10 +108,14 @@ impl MovingScene {
         let last = models.len() as f64 - 1.0;
         check_range("index of the moving model", model as f64, 0.0..=last)?;
         check_range("number of frames", config.frames as f64, 1.0..=1e6)?;
-        let clutter = match config.standing {
+        let mut clutter = match config.standing {
             0 => None,
             count => Some(Clutter::draw(rng, models, count)?),
         };
+        // Nothing could tell a twin from an object that was hidden.
+        if let Some(clutter) = &mut clutter {
+            clutter.objects.retain(|object| object.model != model);
+        }
         let elevation = within(rng, &ELEVATION_DEGREES).to_radians();
         let azimuth = within(rng, &(0.0..std::f64::consts::TAU));
         let mut aside = || MEAN_ASIDE_METERS * (2.0 * rng.random::<f64>() - 1.0);

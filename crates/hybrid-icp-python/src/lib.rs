@@ -33,6 +33,7 @@ mod result;
 mod score;
 mod sequential;
 mod step;
+mod tracker;
 
 /// The native module that the package re-exports.
 #[pyo3::pymodule]
@@ -64,4 +65,6 @@ mod native {
     use crate::sequential::{PySequentialEstimator, PySequentialStep};
     #[pymodule_export]
     use crate::step::{point_to_plane_step, point_to_point_step};
+    #[pymodule_export]
+    use crate::tracker::{PyTracked, PyTracker};
 }

@@ -66,6 +66,18 @@ pub enum TrackState {
     Lost,
 }
 
+impl TrackState {
+    /// Returns the name in files: the word in lower case.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracking => "tracking",
+            Self::Doubtful => "doubtful",
+            Self::Lost => "lost",
+        }
+    }
+}
+
 /// The pose of the object in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -82,6 +94,21 @@ pub struct Tracked {
     /// Rotations count by the object's radius, and those around declared axes of symmetry do not
     /// count. It comes from the motion and the registration, without errors of the model.
     pub deviation_meters: f64,
+}
+
+impl Tracked {
+    /// Returns the share of the object's visible pixels that agree with the pose, 0 to 1.
+    ///
+    /// Hidden and unmeasured pixels do not count. Without visible pixels it is 0.
+    #[must_use]
+    pub fn agreement(&self) -> f64 {
+        let (agrees, contradicts) = (self.evidence.agrees, self.evidence.contradicts());
+        if agrees > 0.0 {
+            agrees / (agrees + contradicts)
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Follows a moving object from depth image to depth image, without masks.
@@ -155,6 +182,13 @@ impl Tracker {
         self.state = TrackState::Doubtful;
         self.unseen = 0.0;
         self.ambiguous = false;
+    }
+
+    /// Replaces the camera, for images of different sizes or intrinsic parameters.
+    ///
+    /// Poses stay in the camera frame.
+    pub fn set_camera(&mut self, camera: PinholeCamera) {
+        self.matcher.camera = camera;
     }
 
     /// Tracks the object in the next image.

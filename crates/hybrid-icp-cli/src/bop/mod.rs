@@ -6,6 +6,7 @@ mod estimate;
 mod eval;
 mod faults;
 mod generate;
+mod init;
 mod models;
 mod options;
 mod refine;
@@ -13,6 +14,7 @@ mod sequence;
 mod show;
 mod statistics;
 mod targets;
+mod track;
 
 use clap::Subcommand;
 
@@ -26,6 +28,7 @@ pub(crate) enum Command {
     Compare(compare::Arguments),
     Show(show::Arguments),
     Sequence(sequence::Arguments),
+    Track(track::Arguments),
 }
 
 /// Runs the command.
@@ -38,5 +41,6 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Show(arguments) => show::run(arguments),
         Command::Sequence(arguments) => sequence::run(arguments),
+        Command::Track(arguments) => track::run(arguments),
     }
 }

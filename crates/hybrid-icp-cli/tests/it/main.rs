@@ -20,6 +20,7 @@ mod bop_refine;
 mod bop_scale;
 mod bop_sequence;
 mod bop_show;
+mod bop_track;
 mod bop_warnings;
 mod command_line;
 mod common;

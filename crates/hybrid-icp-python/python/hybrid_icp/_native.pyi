@@ -375,6 +375,40 @@ class SequentialStep:
     @property
     def event(self) -> str: ...
 
+@final
+class Tracker:
+    def __new__(
+        cls,
+        model: Model,
+        camera: Camera,
+        T_co: npt.ArrayLike,
+        *,
+        meters_per_second: float = 0.3,
+        degrees_per_second: float = 90.0,
+    ) -> Tracker: ...
+    def step(
+        self,
+        depth: DepthImage | npt.ArrayLike,
+        seconds: float,
+        mask: npt.ArrayLike | None = None,
+        *,
+        scale: float | None = None,
+    ) -> Tracked: ...
+    def restart(self, T_co: npt.ArrayLike) -> None: ...
+
+@final
+class Tracked:
+    @property
+    def T_co(self) -> _Array: ...
+    @property
+    def state(self) -> Literal["tracking", "doubtful", "lost"]: ...
+    @property
+    def agreement(self) -> float: ...
+    @property
+    def evidence(self) -> dict[str, float]: ...
+    @property
+    def deviation(self) -> float: ...
+
 def add(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...
 def adi(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...
 def mssd(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...

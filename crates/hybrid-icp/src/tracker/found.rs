@@ -4,6 +4,11 @@ use hicp_core::Isometry3;
 use hicp_icp::Quality;
 use hicp_score::Evidence;
 
+/// Distance within which two surfaces agree in [`Evidence`], in diameters.
+const AGREES: f64 = 0.1;
+/// Median distance from the mean of a normal distribution of deviation 1.
+const MEDIAN: f64 = 0.6745;
+
 /// A registered pose with its evidence.
 ///
 /// The limits were chosen on simulated sequences of the tuning objects.
@@ -15,10 +20,33 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Returns the share of the visible pixels that contradict the pose.
+    /// Returns the share of the visible pixels that contradict the pose, without those of noise.
     fn contradiction(&self) -> f64 {
-        let against = self.evidence.contradicts();
-        against / (self.evidence.agrees + against).max(1e-9)
+        let e = &self.evidence;
+        let outside = self.outside();
+        let against = (e.contradicts() - outside * e.agrees / (1.0 - 2.0 * outside)).max(0.0);
+        against / (e.agrees + e.contradicts()).max(1e-9)
+    }
+
+    /// Returns the share of a surface that noise moves in front of the tolerance of agreement.
+    ///
+    /// As many pixels are moved behind it. The noise is normally distributed.
+    fn outside(&self) -> f64 {
+        let tolerance = AGREES / (self.evidence.noise / MEDIAN).max(1e-3);
+        // The upper tail of the normal distribution, to 2 % of its value below three deviations.
+        0.5 * (-0.717 * tolerance - 0.416 * tolerance * tolerance).exp()
+    }
+
+    /// Returns the unexplained share of the pixels around the object, without those of noise.
+    fn unexplained(&self) -> f64 {
+        self.evidence.unexplained - 2.0 * self.outside()
+    }
+
+    /// Returns whether the silhouette and the measured surface cover each other, up to two shares.
+    ///
+    /// It replaces the contour for sensors that measure nothing next to an edge.
+    fn fills(&self, contradiction: f64, unexplained: f64) -> bool {
+        self.contradiction() < contradiction && self.unexplained() < unexplained
     }
 
     /// Returns how well a pose fits, to compare poses in one image.
@@ -29,8 +57,13 @@ impl Found {
 
     /// Returns whether the image shows the object at the pose, given that it was expected there.
     pub(super) fn explains(&self) -> bool {
-        let e = &self.evidence;
-        e.agrees > 0.15 && self.contradiction() < 0.2 && e.contour > 0.2 && e.unexplained < 0.5
+        let ends = self.evidence.contour > 0.2 || self.fills(0.06, 0.1);
+        self.evidence.agrees > 0.15 && self.fills(0.2, 0.5) && ends
+    }
+
+    /// Returns the standard deviation of the depth noise, in diameters.
+    pub(super) fn noise(&self) -> f64 {
+        self.evidence.noise / MEDIAN
     }
 
     /// Returns whether most of the object is hidden at the pose.
@@ -39,18 +72,22 @@ impl Found {
     }
 
     /// Returns whether the pose is as good as a right one usually is.
+    ///
+    /// A seen contour excuses an unexplained surface around the object, such as a table.
     pub(super) fn is_sure(&self) -> bool {
-        self.explains() && self.contradiction() < 0.1 && self.evidence.contour > 0.35
+        let contour = self.evidence.contour;
+        let ends = contour > 0.6 || (contour > 0.45 && self.unexplained() < 0.15);
+        self.explains() && self.contradiction() < 0.1 && (ends || self.fills(0.04, 0.05))
     }
 
     /// Returns whether no other pose needs to be tried.
     pub(super) fn is_clear(&self) -> bool {
-        self.explains() && self.contradiction() < 0.03 && self.evidence.contour > 0.5
+        self.is_sure() && self.contradiction() < 0.03
     }
 
     /// Returns whether the image shows the object at a pose where it was not expected.
     pub(super) fn stands_alone(&self) -> bool {
-        let e = &self.evidence;
-        e.agrees > 0.4 && self.contradiction() < 0.06 && e.contour > 0.7 && e.unexplained < 0.15
+        let ends = self.evidence.contour > 0.7 || self.fills(0.03, 0.05);
+        self.evidence.agrees > 0.4 && self.fills(0.06, 0.15) && ends
     }
 }

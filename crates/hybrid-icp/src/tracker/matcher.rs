@@ -16,8 +16,12 @@ use super::motion::{Motion, registered};
 use super::region::Widening;
 use crate::presets::{Far, Local, Near, Search, local, search};
 
+/// Factor on the deviations of a registration, whose errors are correlated.
+const INFLATION: f64 = 2.0;
 /// Number of model points of a registration.
 const POINTS: usize = 1000;
+/// Depth noise before it is measured, in diameters.
+const START_NOISE: f64 = 0.02;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
 
@@ -34,6 +38,8 @@ pub(super) struct Matcher {
     pub(super) search: Search,
     pub(super) workspace: Workspace,
     widening: Widening,
+    /// Standard deviation of the depth noise, in diameters.
+    noise: f64,
 }
 
 impl Matcher {
@@ -53,6 +59,7 @@ impl Matcher {
             search: search(),
             workspace: Workspace::new(Rasterizer::default()),
             widening: Widening::default(),
+            noise: START_NOISE,
         }
     }
 
@@ -100,6 +107,9 @@ impl Matcher {
                 break;
             }
         }
+        if let Some(best) = best.filter(|best| best.evidence.agrees > 0.3) {
+            self.noise += 0.2 * (best.noise() - self.noise);
+        }
         Ok(best)
     }
 
@@ -127,6 +137,8 @@ impl Matcher {
     ) -> Result<Observation, ImageError> {
         let z = (pose * self.model.center()).z.max(self.extent.radius);
         let pixels = (self.camera.fx() * meters / z).clamp(2.0, 64.0);
+        // Noise must not cut the surface at the border of the gate, which would hold it in place.
+        let meters = meters + 2.5 * self.noise * self.extent.diameter;
         let view = self.workspace.view(&self.model, &self.camera, pose);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Clamped.
         let around = self
@@ -163,7 +175,7 @@ impl Matcher {
         let center = found.pose * self.model.center();
         let (scale, information) = match found.quality {
             Some(quality) => (
-                (3.0 * quality.plane_rmse).powi(2),
+                (INFLATION * quality.plane_rmse).powi(2),
                 quality.information().unwrap_or_default(),
             ),
             None => (1.0, Matrix6::zeros()),

@@ -52,6 +52,12 @@ pub(crate) struct Arguments {
     /// sides. `bop sequence` needs such a path.
     #[arg(long)]
     trajectory: bool,
+    /// Move an object in front of the camera, which stands still, at up to 0.3 m/s and 90 degrees/s
+    /// and 30 images per second. A hand passes in front of it; every second sequence of at least
+    /// 5 s has a hand that hides it for 1 to 3 s. The object of scene N is the N-th, and its first
+    /// instance. `bop track` tracks it.
+    #[arg(long, conflicts_with = "trajectory")]
+    moving: bool,
     /// Number of objects per scene. An object may appear several times.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=40), allow_negative_numbers = true)]
     instances: u32,
@@ -121,7 +127,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         camera,
         seed: arguments.seed,
         instances: arguments.instances as usize,
-        path_length: arguments.trajectory.then_some(arguments.images as usize),
+        images: arguments.images as usize,
+        path: arguments.trajectory,
+        moving: arguments.moving,
         starts: arguments.starts,
         perturbation: arguments.perturbation,
     };

@@ -10,8 +10,9 @@ use hicp_io::bop::{
 };
 use hicp_io::{write_depth_png, write_mask_png};
 use hicp_sim::{
-    AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout,
-    MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, SeenObject, perturb, stream,
+    AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout, Hand,
+    MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, MovingConfig, MovingScene,
+    SeenObject, Trajectory, perturb, stream,
 };
 use hybrid_icp::core::{Mask, Matrix3, PinholeCamera};
 use rand::RngExt as _;
@@ -22,6 +23,9 @@ use super::objects::Objects;
 pub(super) const DEPTH_SCALE: f64 = 0.1;
 /// Perturbation relative to the mean one (§VI-A.4), for translation and rotation each.
 const PERTURBATION: std::ops::Range<f64> = 0.5..1.5;
+
+/// Length of a sequence in which a hand hides the whole object for a time, seconds.
+const LONG_SECONDS: f64 = 5.0;
 
 /// The annotations and result rows of an image.
 pub(super) struct ImageRecord {
@@ -45,8 +49,12 @@ pub(super) struct Generator<'a> {
     pub(super) seed: u64,
     /// Number of objects per scene.
     pub(super) instances: usize,
-    /// Number of images on the camera's path, if it moves along one.
-    pub(super) path_length: Option<usize>,
+    /// Number of images per scene.
+    pub(super) images: usize,
+    /// Whether the camera moves along a path.
+    pub(super) path: bool,
+    /// Whether an object moves.
+    pub(super) moving: bool,
     /// Number of perturbed poses per target.
     pub(super) starts: u32,
     /// Perturbation relative to the mean error of an estimator.
@@ -67,15 +75,20 @@ impl Generator<'_> {
         let place = (u64::from(scene_id) << 32) + u64::from(im_id);
         let (models, camera, sensor) = (&self.objects.models, &self.camera, &sensor());
         let mut placing = stream(seed, &["bop", "scene"], u64::from(scene_id));
-        let clutter = Clutter::draw(&mut placing, models, self.instances)?;
         let mut looking = stream(seed, &["bop", "view"], place);
-        let view = match self.path_length {
-            Some(images) => {
+        let view = if self.moving {
+            let model = (scene_id as usize - 1) % models.len();
+            let scene = MovingScene::draw(&mut placing, models, model, &self.motion(scene_id))?;
+            scene.view(&mut looking, im_id as usize, models, camera, sensor)?
+        } else {
+            let clutter = Clutter::draw(&mut placing, models, self.instances)?;
+            if self.path {
                 let mut moving = stream(seed, &["bop", "path"], u64::from(scene_id));
-                let path = clutter.path(&mut moving, camera, images);
+                let path = clutter.path(&mut moving, camera, self.images);
                 clutter.view_from(&mut looking, path[im_id as usize], models, camera, sensor)?
+            } else {
+                clutter.view(&mut looking, models, camera, sensor)?
             }
-            None => clutter.view(&mut looking, models, camera, sensor)?,
         };
         self.write_images(scene_id, im_id, &view)?;
 
@@ -120,6 +133,23 @@ impl Generator<'_> {
             }
         }
         Ok(record)
+    }
+
+    /// Returns the moving object and the hand of a scene.
+    fn motion(&self, scene_id: u32) -> MovingConfig {
+        let trajectory = Trajectory::default();
+        let seconds = self.images as f64 / trajectory.frames_per_second;
+        let covered = scene_id.is_multiple_of(2) && seconds >= LONG_SECONDS;
+        MovingConfig {
+            trajectory,
+            frames: self.images,
+            standing: self.instances - 1,
+            hand: if covered {
+                Hand::Covering(1.0..3.0)
+            } else {
+                Hand::Passing
+            },
+        }
     }
 
     fn write_images(&self, scene_id: u32, im_id: u32, view: &ClutterView) -> anyhow::Result<()> {

@@ -1,7 +1,6 @@
 //! `hybrid-icp bop sequence`.
 
 mod camera_path;
-mod init;
 mod line;
 mod tracker;
 
@@ -23,7 +22,7 @@ use self::tracker::Tracker;
 use super::advice::advice;
 use super::options::DatasetOptions;
 use super::statistics::median;
-use super::{faults, models};
+use super::{faults, init, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::outputs::Files;
 use crate::terminal::{progress_bar, say, warn};

@@ -1,12 +1,31 @@
-//! The initial pose of a sequence.
+//! The images of an object that is followed, and its initial pose.
 
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
-use hicp_io::bop::ResultRow;
+use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::core::Isometry3;
 
 use crate::limits::limits;
+
+/// Returns the ids of a scene's images in ascending order, from the first or from `first`.
+pub(super) fn images(scene: &Scene, first: Option<u32>) -> anyhow::Result<Vec<u32>> {
+    let file = scene.dir().join("scene_camera.json");
+    if let Some(first) = first
+        && !scene.image_ids().any(|id| id == first)
+    {
+        bail!(
+            "--first {first} is not an image of {}, expected one of its {}",
+            file.display(),
+            scene.image_ids().count()
+        );
+    }
+    let images: Vec<u32> = scene.image_ids().filter(|id| Some(*id) >= first).collect();
+    if images.is_empty() {
+        bail!("{} has no image, expected at least one", file.display());
+    }
+    Ok(images)
+}
 
 /// Reads the pose from a pose file or a result file (`.csv`).
 ///

@@ -1,0 +1,32 @@
+"""The tracker of moving objects."""
+
+import numpy as np
+import pytest
+
+import hybrid_icp as hi
+from conftest import pose
+
+
+def test_a_moving_object_is_tracked_lost_and_found(scene):
+    tracker = hi.Tracker(scene.model, scene.camera, scene.rough)
+    motion, true = pose([0.02, 0.01, 0.0], [0.004, 0.0, -0.003]), scene.true
+    for frame in range(6):
+        true = motion @ true if frame else true
+        tracked = tracker.step(hi.render_depth(scene.model, scene.camera, true), 1 / 30)
+    assert tracked.state == "tracking" and tracked.agreement > 0.9
+    assert hi.add(tracked.T_co, true, scene.model) < 0.003
+    assert tracked.evidence["agrees"] > 0.9 and 0 <= tracked.deviation < 0.01
+    assert repr(tracked).startswith("Tracked(tracking, t = ")
+    nothing = np.zeros((240, 320), np.float32)
+    states = [tracker.step(nothing, 1 / 30).state for _ in range(6)]
+    assert "tracking" not in states and states[-1] == "lost"
+    tracker.restart(true)
+    depth = hi.DepthImage(hi.render_depth(scene.model, scene.camera, true))
+    assert tracker.step(depth, 1 / 30).state == "tracking"
+    assert tracker.step(depth, 1 / 30, np.zeros((240, 320), bool)).state != "tracking"
+
+
+def test_images_of_another_size_are_refused(scene):
+    tracker = hi.Tracker(scene.model, scene.camera, scene.true)
+    with pytest.raises(hi.InputError, match="4x3"):
+        tracker.step(np.full((3, 4), 0.5, np.float32), 1 / 30)

@@ -1,0 +1,225 @@
+//! Measures the tracker on simulated sequences of moving objects, with noise of 0 to 3 % of the
+//! depth and hands that pass in front.
+//!
+//! `cargo run --release -p hicp-tests --example tracking -- [tuning] [SEQUENCES] [trace]`
+//!
+//! - `tuning`: the tuning objects instead of the test objects.
+//! - `SEQUENCES`: their number, 200 if not given. Every third has no hand, a passing one, and one
+//!   that hides the object for 1 to 3 s.
+//! - `trace`: one line per frame.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use hicp_sim::{
+    ClutterView, DepthNoise, DepthSensor, Hand, Household, MovingConfig, MovingScene,
+    RelativeGaussian, Trajectory, perturb, stream,
+};
+use hybrid_icp::core::{Isometry3, Mask, Model, Observation, PinholeCamera, Point3};
+use hybrid_icp::score::mssd;
+use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
+use rand::RngExt;
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Share of the object that is visible when it has reappeared.
+const REAPPEARED: f64 = 0.5;
+/// Number of frames in which an object that reappeared has to be found.
+const FRAMES_TO_FIND: usize = 3;
+/// Noise below and above which sequences are counted apart, percent.
+const NOISE_PERCENT: f64 = 1.0;
+
+/// The counts of one kind of sequence.
+#[derive(Default)]
+struct Counts {
+    frames: usize,
+    lost: usize,
+    tracking: usize,
+    wrong: usize,
+    reappeared: usize,
+    found: usize,
+    tracker_ms: Vec<f64>,
+    hybrid_ms: Vec<f64>,
+}
+
+struct Bench {
+    names: Vec<&'static str>,
+    models: Vec<Model>,
+    camera: PinholeCamera,
+    trace: bool,
+}
+
+fn main() -> Result<(), Failure> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let has = |word: &str| words.iter().any(|w| w == word);
+    let sequences = words.iter().find_map(|w| w.parse().ok()).unwrap_or(200);
+    let objects = if has("tuning") {
+        Household::TUNING
+    } else {
+        Household::TEST
+    };
+    let models = objects.iter().map(|object| object.model());
+    let bench = Bench {
+        names: objects.iter().map(|object| object.name()).collect(),
+        models: models.collect::<Result<_, _>>()?,
+        camera: PinholeCamera::new(570.0, 570.0, 319.5, 239.5, 640, 480)?,
+        trace: has("trace"),
+    };
+    // A sequence of 60 frames has 2 s, or 4 s where the object is hidden for up to 3 s.
+    let kinds = [
+        ("no hand", Hand::Absent, 30.0),
+        ("a hand passes", Hand::Passing, 30.0),
+        ("hidden for 1 to 3 s", Hand::Covering(1.0..3.0), 15.0),
+    ];
+    let mut counts: Vec<[Counts; 2]> = kinds.iter().map(|_| <[Counts; 2]>::default()).collect();
+    for index in 0..sequences {
+        let kind = (index % 3) as usize;
+        let (_, hand, fps) = &kinds[kind];
+        bench.sequence(index, hand, *fps, &mut counts[kind])?;
+    }
+    println!(
+        "| sequences | noise | frames | lost | tracking | wrong while tracking | found again | ms | `hybrid`, ms |"
+    );
+    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|");
+    for (counts, (name, ..)) in counts.into_iter().zip(kinds) {
+        for (counts, noise) in counts.into_iter().zip(["0 to 1 %", "1 to 3 %"]) {
+            counts.print(name, noise);
+        }
+    }
+    Ok(())
+}
+
+impl Bench {
+    /// Tracks the object of a sequence, and counts into one of the two levels of noise.
+    fn sequence(
+        &self,
+        index: u64,
+        hand: &Hand,
+        fps: f64,
+        counts: &mut [Counts; 2],
+    ) -> Result<(), Failure> {
+        let mut rng = stream(21, &["tracking"], index);
+        let moving = (index / 3) as usize % self.models.len();
+        let config = MovingConfig {
+            trajectory: Trajectory {
+                frames_per_second: fps,
+                ..Trajectory::default()
+            },
+            hand: hand.clone(),
+            ..MovingConfig::default()
+        };
+        let scene = MovingScene::draw(&mut rng, &self.models, moving, &config)?;
+        let percent = 3.0 * rng.random::<f64>();
+        let counts = &mut counts[usize::from(percent > NOISE_PERCENT)];
+        let sensor = DepthSensor {
+            noise: DepthNoise::Relative(RelativeGaussian { percent }),
+            quantization_meters: Some(0.001),
+            ..DepthSensor::default()
+        };
+        let model = &self.models[moving];
+        let points: Vec<Point3<f32>> = model.samples().iter().map(|s| s.point).collect();
+        let motions = model.symmetries().motions();
+        let mut hybrid = Refiner::preset(Preset::Hybrid);
+        let mut tracker = Tracker::new(model.clone(), self.camera, TrackerConfig::default());
+        let start = perturb(&mut rng, &scene.poses[0], 0.0062, 9.5_f64.to_radians());
+        tracker.start(&start);
+        let mut state = TrackState::Tracking;
+        let mut reappeared = None;
+        for (frame, truth) in scene.poses.iter().enumerate() {
+            let view = scene.view(&mut rng, frame, &self.models, &self.camera, &sensor)?;
+            let depth = Arc::new(view.depth.clone());
+            let clock = Instant::now();
+            let tracked = tracker.step(&depth, 1.0 / fps, None)?;
+            counts.tracker_ms.push(1e3 * clock.elapsed().as_secs_f64());
+            let pose = &tracked.camera_from_object;
+            let off = mssd(pose, truth, &points, &motions) / model.diameter();
+            counts.frame(&tracked, off, state);
+            state = tracked.state;
+            let visible = visible_share(&view);
+            let after = !scene.hidden.is_empty() && frame >= scene.hidden.end;
+            if after && visible >= REAPPEARED && reappeared.is_none() {
+                reappeared = Some(frame + FRAMES_TO_FIND);
+                counts.reappeared += 1;
+            }
+            if reappeared.is_some_and(|end| frame < end)
+                && state == TrackState::Tracking
+                && off <= 0.1
+            {
+                counts.found += 1;
+                reappeared = Some(0);
+            }
+            if frame % 6 == 1 && visible > REAPPEARED {
+                counts.hybrid_ms.push(self.hybrid(
+                    &mut hybrid,
+                    model,
+                    &view,
+                    &scene.poses[frame - 1],
+                )?);
+            }
+            if self.trace {
+                println!(
+                    "{index} {} {percent:.1} % {frame} {off:.3} d, visible {visible:.2}: {tracked:?}",
+                    self.names[moving]
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the time of `hybrid` with the exact mask, from the pose in the frame before.
+    fn hybrid(
+        &self,
+        refiner: &mut Refiner,
+        model: &Model,
+        view: &ClutterView,
+        init: &Isometry3<f64>,
+    ) -> Result<f64, Failure> {
+        let (depth, mask) = (
+            Arc::new(view.depth.clone()),
+            view.instances[0].visible.clone(),
+        );
+        let clock = Instant::now();
+        let observation = Observation::new(depth, mask, self.camera)?;
+        refiner.refine(model, &observation, init);
+        Ok(1e3 * clock.elapsed().as_secs_f64())
+    }
+}
+
+impl Counts {
+    fn frame(&mut self, tracked: &Tracked, off: f64, before: TrackState) {
+        let lost = |state| state == TrackState::Lost;
+        self.frames += 1;
+        self.lost += usize::from(lost(tracked.state) && !lost(before));
+        let tracking = tracked.state == TrackState::Tracking;
+        self.tracking += usize::from(tracking);
+        self.wrong += usize::from(tracking && off > 0.1);
+    }
+
+    fn print(mut self, name: &str, noise: &str) {
+        let percent = |n: usize| 100.0 * n as f64 / self.frames.max(1) as f64;
+        let found = match self.reappeared {
+            0 => "–".to_owned(),
+            reappeared => format!("{} of {reappeared}", self.found),
+        };
+        println!(
+            "| {name} | {noise} | {} | {} | {:.1} % | {:.2} % | {found} | {:.2} | {:.2} |",
+            self.frames,
+            self.lost,
+            percent(self.tracking),
+            percent(self.wrong),
+            median(&mut self.tracker_ms),
+            median(&mut self.hybrid_ms),
+        );
+    }
+}
+
+fn visible_share(view: &ClutterView) -> f64 {
+    let count = |mask: &Mask| mask.pixels().iter().filter(|on| **on).count() as f64;
+    let moving = &view.instances[0];
+    count(&moving.visible) / count(&moving.silhouette).max(1.0)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
