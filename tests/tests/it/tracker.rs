@@ -81,14 +81,14 @@ fn a_hidden_object_is_lost_and_found_again() {
     let sequence = sequence(Household::Teapot, Hand::Covering(1.0..1.1), 80);
     let tracked = sequence.track();
     let hidden = sequence.scene.hidden.clone();
-    for frame in hidden.clone() {
-        assert_ne!(tracked[frame].state, TrackState::Tracking, "{frame}");
+    for found in &tracked[hidden.clone()] {
+        assert_ne!(found.state, TrackState::Tracking);
     }
     assert_eq!(tracked[hidden.end - 1].state, TrackState::Lost);
     // The hand leaves within nine frames.
-    for frame in hidden.end + 10..80 {
-        let (shift, angle) = sequence.errors(frame, &tracked[frame]);
-        assert_eq!(tracked[frame].state, TrackState::Tracking, "{frame}");
+    for (frame, found) in tracked.iter().enumerate().skip(hidden.end + 10) {
+        let (shift, angle) = sequence.errors(frame, found);
+        assert_eq!(found.state, TrackState::Tracking, "{frame}");
         assert!(shift < 0.03 && angle < 5.0, "{frame}: {shift} {angle}");
     }
 }

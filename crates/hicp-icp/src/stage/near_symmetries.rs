@@ -94,6 +94,7 @@ impl NearSymmetries {
     fn find(model: &Model) -> Self {
         let step = model.samples().len().div_ceil(SAMPLES).max(1);
         let samples: Vec<Surfel> = model.samples().iter().step_by(step).copied().collect();
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of samples.
         let tolerance = (TOLERANCE * model.diameter()) as f32;
         let distinct = Distinct::of(model);
         let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();

@@ -332,7 +332,7 @@ const CLIMB_DIAMETERS: f64 = 0.1;
 /// Of the twelve moves, the first six are rotations.
 fn moved(pose: &Isometry3<f64>, index: usize, model: &Model, size: f64) -> Isometry3<f64> {
     let mut axis = Vector3::zeros();
-    axis[index / 2 % 3] = if index % 2 == 0 { size } else { -size };
+    axis[index / 2 % 3] = if index.is_multiple_of(2) { size } else { -size };
     let motion = if index < 6 {
         let (turn, center) = (
             so3::exp(&(axis * CLIMB_DEGREES.to_radians())),

@@ -67,7 +67,7 @@ fn noise_is_told_from_a_shift() {
     let size = 0.004;
     let diameter = cube().diameter();
     let sign = |i: usize| {
-        if (i % 64 + i / 64) % 2 == 0 {
+        if (i % 64 + i / 64).is_multiple_of(2) {
             1.0
         } else {
             -1.0
