@@ -187,6 +187,7 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
     /// Lists the poses that look like the best one and may explain the image better or as well.
     fn rank_alike(&mut self, run: &mut Run<'_, '_>, best: &Found, bad: bool) {
         self.alike.clear();
+        self.ranked_alike.clear();
         let base = &best.outcome.camera_from_object;
         let Some((model, observation)) = run.problem.sides() else {
             return;
@@ -198,6 +199,7 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
         let gap = if bad { f64::INFINITY } else { MAX_GAP };
         let limit = run.score(&mut self.ranking, base) + gap;
         let spacing = self.options.spacing_degrees;
+        let refined = self.options.refined.div_ceil(3);
         for motion in near.undecided(observation, base, model.diameter()) {
             if run.is_over() {
                 return;
@@ -207,21 +209,19 @@ impl<S: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, E, R, C> {
             if bound.is_none_or(|b| b.contains(run.init, &pose)) {
                 let score = run.score(&mut self.ranking, &pose);
                 if score < limit {
-                    let refined = self.options.refined.div_ceil(3);
-                    self.alike.insert(score, pose, refined, spacing);
+                    self.ranked_alike.insert(score, pose, refined, spacing);
                 }
             }
         }
-        if bad {
-            return;
-        }
-        // The score decides which look-alikes of a good pose are worth refining.
-        std::mem::swap(&mut self.alike, &mut self.ranked_alike);
-        self.alike.clear();
-        for (_, pose) in self.ranked_alike.iter() {
-            let score = run.score(&mut self.score, pose);
+        for (ranked, pose) in self.ranked_alike.iter() {
+            // The score decides which look-alikes of a good pose are worth refining.
+            let (score, count) = if bad {
+                (*ranked, usize::MAX)
+            } else {
+                (run.score(&mut self.score, pose), ALIKE_OF_GOOD)
+            };
             if score < best.score + gap {
-                self.alike.insert(score, *pose, ALIKE_OF_GOOD, spacing);
+                self.alike.insert(score, *pose, refined.min(count), spacing);
             }
         }
     }
