@@ -32,8 +32,9 @@ use crate::terminal::{progress_bar, say};
 /// that agree with the pose. While an object is lost, its pose is a guess, and it is searched
 /// around it. deviation_mm is the standard deviation of the least determined displacement.
 ///
-/// The exit code is 0 even if the object is lost; the summary counts the states. It is 1 if a file
-/// is missing or damaged. If this is detected during the run, the lines are still written.
+/// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
+/// image whose depth is missing or damaged is predicted. If a file is damaged, the exit code is 1,
+/// and the lines are still written.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {

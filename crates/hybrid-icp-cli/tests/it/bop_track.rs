@@ -85,12 +85,17 @@ fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
     let folder = moving(4);
     let folder = folder.path();
     fs::remove_file(folder.join("set/test/000001/depth/000002.png")).unwrap();
-    let told = run(folder, TRACK.split(' ')).exits(1);
-    assert!(told.err.contains("000002.png"), "{}", told.err);
-    let lines = lines(folder);
-    assert_eq!(lines.len(), 4);
-    assert_ne!(lines[2]["state"], "tracking");
-    assert_eq!(lines[3]["state"], "tracking");
+    let depth = folder.join("set/test/000001/depth/000002.png");
+    for (damage, code) in [(None, 0), (Some("no image"), 1)] {
+        if let Some(text) = damage {
+            fs::write(&depth, text).unwrap();
+        }
+        let told = run(folder, TRACK.split(' ')).exits(code);
+        assert!(told.err.contains("000002.png"), "{}", told.err);
+        let lines = lines(folder);
+        assert_eq!(lines.len(), 4);
+        assert_ne!(lines[2]["state"], "tracking");
+    }
 }
 
 #[test]
