@@ -76,7 +76,7 @@ impl PyTracker {
     /// Parameters
     /// ----------
     /// depth : DepthImage or numpy.ndarray, shape (H, W)
-    ///     As for `Observation`, in the size of the camera.
+    ///     In meters, as for `Observation`, in the size of the camera.
     /// seconds : float
     ///     Time since the previous image.
     /// mask : numpy.ndarray, shape (H, W), optional

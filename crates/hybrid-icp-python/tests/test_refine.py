@@ -82,7 +82,7 @@ def test_the_dictionary_has_every_attribute_and_json_accepts_it(scene):
 
 
 def test_other_poses_of_a_search_come_with_their_scores(scene):
-    pipeline = hi.Pipeline("search", overrides=["threshold=0"])
+    pipeline = hi.Pipeline("search", overrides=["start=ignored"])
     result = pipeline.refine(scene.model, scene.observation, scene.rough)
     assert result.alternatives
     scores = [other["score"] for other in result.alternatives]
