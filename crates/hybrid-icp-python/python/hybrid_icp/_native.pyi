@@ -22,6 +22,8 @@ __all__ = [
     "SequentialEstimator",
     "SequentialStep",
     "StageEvent",
+    "Tracked",
+    "Tracker",
     "add",
     "adi",
     "fuse",
