@@ -21,7 +21,7 @@ pub struct MaskDefects {
     pub soft_cells: u32,
     /// The interpolated share above which a pixel of a soft mask is set.
     pub soft_threshold: f64,
-    /// Whether the mask is replaced by its bounding box.
+    /// If `true`, the bounding box replaces the mask.
     pub boxed: bool,
 }
 

@@ -155,7 +155,7 @@ pub struct Tracker {
     state: TrackState,
     /// Time since the image last showed the object, seconds.
     unseen: f64,
-    /// Whether another pose explains the image as well.
+    /// `true` if another pose explains the image as well.
     ambiguous: bool,
 }
 

@@ -29,7 +29,7 @@ pub struct Case {
     pub visible: f64,
     /// The mean VSD estimate of the result, and whether a warning accompanies it.
     pub mve: f64,
-    /// Whether the result has a warning.
+    /// `true` if the result has a warning.
     pub warned: bool,
     /// The source of the pose.
     pub kind: Kind,

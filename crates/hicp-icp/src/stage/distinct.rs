@@ -1,4 +1,4 @@
-//! Whether two poses of an object differ by more than its declared symmetries.
+//! The difference between two poses of an object, up to its declared symmetries.
 
 use std::sync::Arc;
 

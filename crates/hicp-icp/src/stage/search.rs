@@ -94,7 +94,7 @@ impl<S, E, R, C> HypothesisSearch<S, E, R, C> {
 struct Found {
     score: f64,
     outcome: Outcome,
-    /// Whether the local stage refined it.
+    /// `true` if the local stage refined it.
     finished: bool,
 }
 
@@ -106,7 +106,7 @@ struct Run<'a, 's> {
     clock: Clock,
     session: &'a mut Session<'s>,
     iterations: usize,
-    /// Whether the observer requested the end.
+    /// `true` if the observer requested the end.
     stopped: bool,
 }
 

@@ -51,9 +51,9 @@ pub(super) struct Generator<'a> {
     pub(super) instances: usize,
     /// Number of images per scene.
     pub(super) images: usize,
-    /// Whether the camera moves along a path.
+    /// `true` if the camera moves along a path.
     pub(super) path: bool,
-    /// Whether an object moves.
+    /// `true` if an object moves.
     pub(super) moving: bool,
     /// Number of perturbed poses per target.
     pub(super) starts: u32,
