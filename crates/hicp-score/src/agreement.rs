@@ -1,5 +1,7 @@
 //! Counts of agreeing pixels, many at a time.
 
+use std::ops::Range;
+
 use hicp_core::internal::VectorLoop;
 
 use crate::mask_trust::CERTAIN;
@@ -10,8 +12,10 @@ const LANES: usize = 8;
 
 /// The weights of a row of pixels of the mask.
 pub(crate) trait Weights: Copy {
-    /// The largest weight.
+    /// The largest weight: all-ones if a pixel either counts or does not.
     const ONE: u64;
+    /// Whether there are weights between 0 and the largest.
+    const GRADED: bool;
 
     /// Returns the weights of `n` pixels from the pixel `first` on, and 0 beyond them.
     fn load(&self, first: usize, n: usize) -> [u64; LANES];
@@ -19,7 +23,8 @@ pub(crate) trait Weights: Copy {
 
 /// An exact mask.
 impl Weights for &[bool] {
-    const ONE: u64 = 1;
+    const ONE: u64 = u64::MAX;
+    const GRADED: bool = false;
 
     #[inline(always)]
     fn load(&self, first: usize, n: usize) -> [u64; LANES] {
@@ -29,13 +34,14 @@ impl Weights for &[bool] {
         } else {
             masked[..n].copy_from_slice(&self[first..]);
         }
-        masked.map(u64::from)
+        masked.map(all_bits)
     }
 }
 
 /// Weights of an imperfect mask; `None` outside of its region.
 impl Weights for Option<&[u8]> {
     const ONE: u64 = CERTAIN as u64;
+    const GRADED: bool = true;
 
     #[inline(always)]
     fn load(&self, first: usize, n: usize) -> [u64; LANES] {
@@ -57,6 +63,20 @@ pub(crate) struct Row<'a, W> {
     pub(crate) u: u32,
     /// (v − cy) / fy.
     pub(crate) y: f64,
+}
+
+impl<'a, W> Row<'a, W> {
+    /// Returns some columns of the row with other weights.
+    pub(crate) fn part<V>(&self, columns: Range<usize>, mask: V) -> Row<'a, V> {
+        Row {
+            rendered: &self.rendered[columns.clone()],
+            observed: &self.observed[columns.clone()],
+            mask,
+            #[allow(clippy::cast_possible_truncation)] // A column of an image.
+            u: self.u + columns.start as u32,
+            y: self.y,
+        }
+    }
 }
 
 /// The loop that counts the pixels of a region, row by row.
@@ -102,18 +122,19 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                 // The last pixels of a row are padded with pixels that do not count.
                 let n = (width - first).min(LANES);
                 let (mut rendered, mut observed) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-                if n == LANES {
+                let weights = if n == LANES {
                     rendered.copy_from_slice(&row.rendered[first..first + LANES]);
                     observed.copy_from_slice(&row.observed[first..first + LANES]);
+                    row.mask.load(first, LANES)
                 } else {
                     rendered[..n].copy_from_slice(&row.rendered[first..]);
                     observed[..n].copy_from_slice(&row.observed[first..]);
-                }
+                    row.mask.load(first, n)
+                };
                 if rendered == [0.0; LANES] {
                     first += LANES;
                     continue;
                 }
-                let weights = row.mask.load(first, n);
                 // Masks are all-ones or zero instead of `bool`, which avoids a branch per pixel.
                 let mut relative = [0.0; LANES];
                 let mut certain = [0; LANES];
@@ -125,7 +146,7 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                     let behind = (z - measured) * distance_per_depth;
                     let (seen, known) = (all_bits(z > 0.0), all_bits(measured > 0.0));
                     let outside_mask = W::ONE - weights[lane];
-                    let counts = if W::ONE > 1 {
+                    let counts = if W::GRADED {
                         // Outside the mask, a pixel counts half if it is near the surface.
                         let through = all_bits(behind < -self.hidden_beyond) | !known;
                         let front =
@@ -138,8 +159,8 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                         all_bits(certain[lane] > 0)
                     } else {
                         let hidden = known & all_bits(behind > self.hidden_beyond);
-                        outside[lane] += outside_mask & seen & !hidden;
-                        all_bits(weights[lane] > 0)
+                        outside[lane] += 1 & outside_mask & seen & !hidden;
+                        weights[lane]
                     };
                     // NaN if the pixel does not count: NaN is below no limit.
                     let nothing = !(seen & known & counts);
@@ -148,7 +169,7 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                 }
                 for (correct, limit) in correct.iter_mut().zip(limits) {
                     for lane in 0..LANES {
-                        correct[lane] += if W::ONE > 1 {
+                        correct[lane] += if W::GRADED {
                             certain[lane] & all_bits(relative[lane] < limit)
                         } else {
                             u64::from(relative[lane] < limit)

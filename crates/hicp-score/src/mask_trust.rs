@@ -1,5 +1,6 @@
 //! The trust in the pixels of a mask.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::{Observation, PixelRegion};
@@ -166,13 +167,13 @@ impl TrustMap {
 
     /// Splits the columns `u..u + width` of a row at the borders of the mask's region.
     ///
-    /// Returns the first column of each part, relative to `u`, its end, and its weights.
+    /// Returns the columns of each part, relative to `u`, and its weights.
     pub(crate) fn parts(
         &self,
         v: u32,
         u: u32,
         width: usize,
-    ) -> impl Iterator<Item = (usize, usize, Option<&[u8]>)> {
+    ) -> impl Iterator<Item = (Range<usize>, Option<&[u8]>)> {
         let region = &self.region;
         let inside = (region.v_min..region.v_max).contains(&v);
         let column = |edge: u32| (edge.saturating_sub(u) as usize).min(width);
@@ -186,9 +187,9 @@ impl TrustMap {
             let first = region.index(u + from as u32, v).unwrap_or(0);
             &self.weights[first..first + to - from]
         });
-        [(0, from, None), (from, to, middle), (to, width, None)]
+        [(0..from, None), (from..to, middle), (to..width, None)]
             .into_iter()
-            .filter(|(from, to, _)| from < to)
+            .filter(|(columns, _)| !columns.is_empty())
     }
 }
 

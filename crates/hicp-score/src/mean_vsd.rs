@@ -1,7 +1,5 @@
 //! The mean VSD estimate.
 
-use std::ops::Range;
-
 use hicp_core::internal::vectorized;
 use hicp_core::{Context, Isometry3, Observation, RenderedView};
 
@@ -86,11 +84,8 @@ impl MeanVsd {
         };
         match self.mask {
             MaskTrust::Exact => {
-                let mask = observation.mask().pixels();
-                let hidden_beyond = self.occlusion.least_distance_behind();
-                let found = compared.count(hidden_beyond, |_, pixels| {
-                    std::iter::once((0, pixels.len(), &mask[pixels]))
-                });
+                let rows = compared.rows().map(|(_, row)| row);
+                let found = compared.count(rows, self.occlusion.least_distance_behind());
                 let union = observation.n_measured() as u64 + found.outside;
                 errors(found.correct, union)
             }
@@ -109,31 +104,37 @@ struct Compared<'a> {
 }
 
 impl Compared<'_> {
-    /// Counts the rendered pixels, with the weights of the mask for the parts of each row.
-    fn count<W: Weights, P: Iterator<Item = (usize, usize, W)>>(
-        &self,
-        hidden_beyond: f64,
-        parts: impl Fn(u32, Range<usize>) -> P,
-    ) -> Found {
+    /// Returns the rows of the rendered region with their indices and the mask as it is.
+    fn rows(&self) -> impl Iterator<Item = (u32, Row<'_, &[bool]>)> {
         let (camera, region) = (self.observation.camera(), self.view.region());
         let depth = self.observation.depth().pixels();
+        let mask = self.observation.mask().pixels();
         let image_width = camera.width() as usize;
         let inverse_fy = 1.0 / camera.fy();
         let rendered = self.view.depth().chunks_exact(region.width().max(1));
-        let rows = (region.v_min..region.v_max)
+        (region.v_min..region.v_max)
             .zip(rendered)
-            .flat_map(|(v, rendered)| {
+            .map(move |(v, rendered)| {
                 let start = v as usize * image_width + region.u_min as usize;
-                let y = (f64::from(v) - camera.cy()) * inverse_fy;
-                parts(v, start..start + rendered.len()).map(move |(from, to, mask)| Row {
-                    rendered: &rendered[from..to],
-                    observed: &depth[start + from..start + to],
-                    mask,
-                    #[allow(clippy::cast_possible_truncation)] // A column of an image.
-                    u: region.u_min + from as u32,
-                    y,
-                })
-            });
+                let columns = start..start + rendered.len();
+                let row = Row {
+                    rendered,
+                    observed: &depth[columns.clone()],
+                    mask: &mask[columns],
+                    u: region.u_min,
+                    y: (f64::from(v) - camera.cy()) * inverse_fy,
+                };
+                (v, row)
+            })
+    }
+
+    /// Counts the pixels of some rows.
+    fn count<'b, W: Weights + 'b>(
+        &self,
+        rows: impl Iterator<Item = Row<'b, W>>,
+        hidden_beyond: f64,
+    ) -> Found {
+        let camera = self.observation.camera();
         vectorized(Agreement {
             rows,
             cx: camera.cx(),
@@ -148,11 +149,11 @@ impl Compared<'_> {
         if trust.total() == 0 {
             return [1.0; N_TOLERANCES];
         }
-        let region = self.view.region();
-        let hidden_beyond = trust.seen_through_meters();
-        let found = self.count(hidden_beyond, |v, pixels| {
-            trust.parts(v, region.u_min, pixels.len())
+        let rows = self.rows().flat_map(|(v, row)| {
+            let parts = trust.parts(v, row.u, row.rendered.len());
+            parts.map(move |(columns, weights)| row.part(columns, weights))
         });
+        let found = self.count(rows, trust.seen_through_meters());
         // A pixel behind a measured surface counts if the object reaches into that surface.
         let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
             Evidence::of(self.observation, self.view, self.diameter).inside_share()
