@@ -28,45 +28,22 @@
 // Counts are converted to floating point; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
-mod agreement;
-mod background;
-mod bop_vsd;
-mod calibration;
-mod confidence;
-mod confidence_curves;
-mod evidence;
-mod evidence_grid;
-mod flatness;
-mod mask_trust;
-mod mean_vsd;
-mod misfit;
-mod model_points;
-mod nearest;
-mod occlusion;
-mod pose_error;
-mod recall;
-mod sampled_mve;
+mod errors;
+mod judgment;
+mod mve;
 mod score;
 mod tolerances;
-mod vsd;
 
-pub use bop_vsd::{bop_vsd, spheres_overlap};
-pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
-pub use confidence::{Confidence, N_FEATURES};
-pub use evidence::Evidence;
-pub use flatness::Flatness;
-pub use hicp_core;
-pub use mask_trust::MaskTrust;
-pub use mean_vsd::MeanVsd;
-pub use misfit::Misfit;
-pub use model_points::ModelPoints;
-pub use occlusion::{Occlusion, VISIBILITY_TOLERANCE_METERS};
-pub use pose_error::{add, adi, mspd, mssd};
-pub use recall::{
-    MSSD_MM, N_THRESHOLDS, PoseErrors, Recalls, TargetErrors, match_instances, most_visible,
-    top_estimates,
+pub use errors::{
+    MSSD_MM, ModelPoints, N_THRESHOLDS, PoseErrors, Recalls, ScoreError, TargetErrors, Vsd, add,
+    adi, bop_vsd, match_instances, most_visible, mspd, mssd, spheres_overlap, top_estimates,
+    visibility_masks, vsd,
 };
-pub use sampled_mve::SampledMve;
+pub use hicp_core;
+pub use judgment::{
+    Confidence, Evidence, Flatness, LabeledScore, Misfit, N_FEATURES, ReliabilityBin, reliability,
+    roc_area,
+};
+pub use mve::{MaskTrust, MeanVsd, Occlusion, SampledMve, VISIBILITY_TOLERANCE_METERS};
 pub use score::Score;
 pub use tolerances::{N_TOLERANCES, tolerances};
-pub use vsd::{ScoreError, Vsd, visibility_masks, vsd};

@@ -13,7 +13,7 @@ const SHARES: [f64; KNOTS] = [0.02, 0.2, 0.45, 0.7, 0.9, 0.98];
 const SMALL: f64 = 0.3;
 const SMOOTH: f64 = 3.0;
 
-/// Fits the curves and prints them as the file `confidence_curves.rs` has them.
+/// Fits the curves and prints them as the file `curves.rs` has them.
 pub fn print(cases: &[Case]) {
     let knots: Vec<[f64; KNOTS]> = (0..N_FEATURES).map(|f| knots(cases, f)).collect();
     let rows = |cases: &[&Case]| {

@@ -2,7 +2,7 @@
 
 use hicp_core::{Context, Isometry3, Observation, RenderedView};
 
-use crate::evidence_grid::{Cell, Grid};
+use crate::judgment::grid::{Cell, Grid};
 
 /// Share of the diameter within which the measured and the rendered surface agree.
 const AGREES: f32 = 0.1;

@@ -2,8 +2,8 @@
 
 use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, PixelRegion, RenderedView};
 
+use crate::errors::vsd::{ScoreError, visibility_masks, vsd};
 use crate::tolerances::N_TOLERANCES;
-use crate::vsd::{ScoreError, visibility_masks, vsd};
 
 /// Returns e_VSD(τ) for τ = 5 %, …, 50 % of the diameter with the visibility masks of BOP'19.
 ///

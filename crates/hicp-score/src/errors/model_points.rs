@@ -2,8 +2,8 @@
 
 use hicp_core::{Isometry3, Model, PinholeCamera, Point3};
 
-use crate::nearest::NearestPoints;
-use crate::pose_error::{add, mspd, mssd};
+use crate::errors::nearest::NearestPoints;
+use crate::errors::pose_error::{add, mspd, mssd};
 
 /// The vertices of a model with its symmetries expanded and a search tree, for many pairs of poses.
 ///

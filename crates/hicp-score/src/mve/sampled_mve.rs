@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
 
-use crate::mask_trust::{CERTAIN, MaskTrust, TrustMap};
-use crate::occlusion::Occlusion;
+use crate::mve::mask_trust::{CERTAIN, MaskTrust, TrustMap};
+use crate::mve::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, mean};
 

@@ -2,8 +2,8 @@
 
 use hicp_core::{Context, Isometry3, Observation, RenderedView};
 
-use crate::evidence::Median;
-use crate::evidence_grid::{Cell, Grid};
+use crate::judgment::evidence::Median;
+use crate::judgment::grid::{Cell, Grid};
 
 /// Median of the distance from the mean of two neighbors, per standard deviation of the noise.
 const ROUGHNESS_PER_SIGMA: f64 = 0.826;

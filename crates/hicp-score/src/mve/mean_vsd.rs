@@ -3,10 +3,10 @@
 use hicp_core::internal::vectorized;
 use hicp_core::{Context, Isometry3, Observation, RenderedView};
 
-use crate::agreement::{Agreement, Found, Row, Weights};
-use crate::evidence::Evidence;
-use crate::mask_trust::{MaskTrust, TrustMap};
-use crate::occlusion::Occlusion;
+use crate::judgment::evidence::Evidence;
+use crate::mve::agreement::{Agreement, Found, Row, Weights};
+use crate::mve::mask_trust::{MaskTrust, TrustMap};
+use crate::mve::occlusion::Occlusion;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 

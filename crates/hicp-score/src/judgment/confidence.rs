@@ -2,9 +2,9 @@
 
 use hicp_core::{Context, Isometry3};
 
-use crate::confidence_curves::{BASE, CURVES, Curve, KNOTS};
-use crate::evidence::Evidence;
-use crate::misfit::Misfit;
+use crate::judgment::curves::{BASE, CURVES, Curve, KNOTS};
+use crate::judgment::evidence::Evidence;
+use crate::judgment::misfit::Misfit;
 
 /// Number of features.
 pub const N_FEATURES: usize = CURVES.len();

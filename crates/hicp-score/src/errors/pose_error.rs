@@ -2,7 +2,7 @@
 
 use hicp_core::{Isometry3, Matrix3, PinholeCamera, Point2, Point3, Vector3};
 
-use crate::nearest::NearestPoints;
+use crate::errors::nearest::NearestPoints;
 
 /// Returns ADD: the mean distance between corresponding model points at two poses, in meters.
 ///

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use hicp_core::{Observation, PixelRegion};
 
-use crate::background::Background;
-use crate::occlusion::VISIBILITY_TOLERANCE_METERS;
+use crate::mve::background::Background;
+use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
 
 /// The trust in the mask of an observation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

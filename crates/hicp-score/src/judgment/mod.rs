@@ -1,0 +1,15 @@
+//! The evidence for and against a pose, and the trust that it deserves.
+
+pub(crate) mod calibration;
+pub(crate) mod confidence;
+pub(crate) mod curves;
+pub(crate) mod evidence;
+pub(crate) mod flatness;
+pub(crate) mod grid;
+pub(crate) mod misfit;
+
+pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
+pub use confidence::{Confidence, N_FEATURES};
+pub use evidence::Evidence;
+pub use flatness::Flatness;
+pub use misfit::Misfit;

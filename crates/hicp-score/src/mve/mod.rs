@@ -1,0 +1,13 @@
+//! The mean VSD estimate: a score of a pose against the live image.
+
+pub(crate) mod agreement;
+pub(crate) mod background;
+pub(crate) mod mask_trust;
+pub(crate) mod mean_vsd;
+pub(crate) mod occlusion;
+pub(crate) mod sampled_mve;
+
+pub use mask_trust::MaskTrust;
+pub use mean_vsd::MeanVsd;
+pub use occlusion::{Occlusion, VISIBILITY_TOLERANCE_METERS};
+pub use sampled_mve::SampledMve;
