@@ -159,7 +159,7 @@ fn metric_point_to_plane(ready: Ready) -> (Ready, Option<Step>) {
 }
 
 #[library_benchmark]
-#[bench::mve_mug(setup = projective, config = limit(795_939))]
+#[bench::mve_mug(setup = projective, config = limit(654_712))]
 fn score(mut ready: Ready) -> (Ready, f64) {
     let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
     let mut context = ready.workspace.context(&problem);
@@ -177,7 +177,7 @@ fn warm() -> (Case, Refiner) {
 }
 
 #[library_benchmark]
-#[bench::hybrid_mug(setup = warm, config = limit(19_078_637))]
+#[bench::hybrid_mug(setup = warm, config = limit(16_977_485))]
 fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
     let (case, mut refiner) = state;
     let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);

@@ -236,8 +236,7 @@ impl<S: Stage> Refiner<S> {
         let pose = &outcome.camera_from_object;
         let mut context = self.workspace.context(problem);
         let mve = self.score.score(&mut context, pose);
-        let evidence = Evidence::at(&mut context, pose).unwrap_or_default();
-        let confidence = Confidence::at(&mut context, pose, &evidence, mve);
+        let (evidence, confidence) = Confidence::at(&mut context, pose, mve);
         Refinement {
             outcome,
             mve_initial: mve_initial.unwrap_or(mve),

@@ -4,6 +4,8 @@ use hicp_core::{Context, Isometry3};
 
 use crate::judgment::curves::{BASE, CURVES, Curve, KNOTS};
 use crate::judgment::evidence::Evidence;
+use crate::judgment::grid::Grid;
+use crate::judgment::insides::find_insides;
 use crate::judgment::misfit::Misfit;
 
 /// Number of features.
@@ -54,24 +56,33 @@ impl Confidence {
         "mve",
     ];
 
-    /// Measures the confidence at a pose whose mean VSD estimate is `mve`.
+    /// Measures the evidence at a pose whose mean VSD estimate is `mve`, and the confidence.
     ///
-    /// `evidence` must be that at the pose. Without a model, an image or a rendered pixel, the
-    /// probability is 0. Cost: that of [`Misfit::at`]. Allocates nothing.
+    /// Without a model, an image or a rendered pixel, the probability is 0. Cost: one render
+    /// (shared with other components that use this pose) and about 40 µs. Allocates nothing.
     #[must_use]
     pub fn at(
         context: &mut Context<'_>,
         camera_from_object: &Isometry3<f64>,
-        evidence: &Evidence,
         mve: f64,
-    ) -> Self {
+    ) -> (Evidence, Self) {
         let diameter = context.problem.model().map_or(0.0, |m| m.diameter());
-        match Misfit::at(context, camera_from_object) {
-            Some(misfit) if evidence.agrees > 0.0 => {
-                Self::of(&Self::features(evidence, &misfit, mve), diameter)
-            }
-            _ => Self::none(diameter),
-        }
+        let (Some((_, observation)), Some(view)) =
+            (context.problem.sides(), context.view(camera_from_object))
+        else {
+            return (Evidence::default(), Self::none(diameter));
+        };
+        let mut grid = Grid::new(diameter);
+        grid.compare(observation, view);
+        find_insides(&mut grid);
+        let evidence = Evidence::of(&grid);
+        let confidence = if evidence.agrees > 0.0 {
+            let features = Self::features(&evidence, &Misfit::of(&grid), mve);
+            Self::of(&features, diameter)
+        } else {
+            Self::none(diameter)
+        };
+        (evidence, confidence)
     }
 
     /// The confidence in a pose that nothing in the image supports.

@@ -1,14 +1,10 @@
 //! The evidence for and against a pose, and the quality of the mask.
 
-use hicp_core::{Context, Isometry3, Observation, RenderedView};
+use hicp_core::{Context, Isometry3};
 
 use crate::judgment::grid::{Cell, Grid};
-
-/// Share of the diameter within which the measured and the rendered surface agree.
-const AGREES: f32 = 0.1;
-/// Number of bins of the medians, and the share of the diameter that they cover.
-const BINS: usize = 100;
-const COVERED: f32 = 0.5;
+use crate::judgment::insides::find_insides;
+use crate::judgment::median::{Median, Scale};
 
 /// The evidence for and against a pose, from one render.
 ///
@@ -67,8 +63,9 @@ pub struct Evidence {
     /// Share of the visible contour at which the measured surface ends.
     ///
     /// At a contour pixel, the measured surface one step outside is farther or nearer than the
-    /// rendered one. A contour in the middle of a wall has a share near 0.
-    pub contour: f64,
+    /// rendered one. A contour in the middle of a wall has a share near 0. `None` if nothing was
+    /// measured next to the agreeing pixels of the contour.
+    pub contour: Option<f64>,
     /// Share of the measured pixels of the mask outside the silhouette: the mask is too large.
     pub mask_extra: f64,
     /// Share of the agreeing pixels outside the mask: the mask is too small.
@@ -89,7 +86,10 @@ impl Evidence {
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
         let (model, observation) = context.problem.sides()?;
         let view = context.view(camera_from_object)?;
-        Some(Self::of(observation, view, model.diameter()))
+        let mut grid = Grid::new(model.diameter());
+        grid.compare(observation, view);
+        find_insides(&mut grid);
+        Some(Self::of(&grid))
     }
 
     /// Returns the share of the rendered pixels that contradict the pose.
@@ -99,6 +99,8 @@ impl Evidence {
     }
 
     /// Returns the numbers with the names of their fields, for tables and files.
+    ///
+    /// A `contour` of `None` is NaN.
     #[must_use]
     pub fn named(&self) -> [(&'static str, f64); 13] {
         [
@@ -111,78 +113,55 @@ impl Evidence {
             ("unexplained", self.unexplained),
             ("residual", self.residual),
             ("noise", self.noise),
-            ("contour", self.contour),
+            ("contour", self.contour.unwrap_or(f64::NAN)),
             ("mask_extra", self.mask_extra),
             ("mask_missing", self.mask_missing),
             ("mask_growth_pixels", self.mask_growth_pixels),
         ]
     }
 
-    /// Returns the share of the nearer measured surfaces that contain the object.
-    pub(crate) fn inside_share(&self) -> f64 {
-        let nearer = self.inside + self.hidden;
-        if nearer > 0.0 {
-            self.inside / nearer
-        } else {
-            0.0
-        }
-    }
-
-    pub(crate) fn of(observation: &Observation, view: &RenderedView, diameter: f64) -> Self {
-        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let diameter = diameter as f32;
-        let mut grid = Grid::new(observation, view, AGREES * diameter);
-        grid.find_insides();
+    pub(crate) fn of(grid: &Grid) -> Self {
         let area = (grid.step() * grid.step()) as f64;
-        let mut count = [0_usize; Cell::KINDS];
-        let (mut masked, mut explained, mut missing) = (0_usize, 0_usize, 0_usize);
-        let mut residuals = Median::default();
-        let mut noise = Median::default();
-        let (mut contour, mut supported, mut outline) = (0_usize, 0_usize, 0_usize);
-        for (index, cell) in grid.rendered() {
-            count[cell as usize] += 1;
-            let (in_mask, agrees) = (grid.masked(index), cell == Cell::Agrees);
-            masked += usize::from(in_mask && cell != Cell::Unmeasured);
-            explained += usize::from(in_mask && agrees);
-            missing += usize::from(!in_mask && agrees);
-            if agrees || cell == Cell::SeenThrough {
-                residuals.add(grid.gap(index) / diameter);
-            }
-            if agrees && let Some(roughness) = grid.roughness(observation, index) {
-                noise.add(roughness / diameter);
-            }
-            let (edges, ends, compared) = grid.contour(index);
-            outline += edges;
-            if agrees {
-                contour += compared;
-                supported += ends;
+        // Of the pixels outside and inside the mask.
+        let mut counts = [[0_usize; Cell::KINDS]; 2];
+        let mut residuals = Median::new();
+        let scale = Scale::new(grid.diameter());
+        for index in grid.rendered() {
+            let cell = grid.cell(index);
+            counts[usize::from(grid.masked(index))][cell as usize] += 1;
+            if matches!(cell, Cell::Agrees | Cell::SeenThrough) {
+                residuals.add(scale.bin(grid.gap(index)));
             }
         }
-        let rendered = count.iter().sum::<usize>();
+        let contour = Contour::of(grid);
+        let count = |cell: Cell| counts[0][cell as usize] + counts[1][cell as usize];
+        let rendered = counts.iter().flatten().sum::<usize>();
+        let agreeing = count(Cell::Agrees);
+        let [missing, explained] = counts.map(|count| count[Cell::Agrees as usize]);
+        let masked = counts[1].iter().sum::<usize>() - counts[1][Cell::Unmeasured as usize];
         let share = |n: usize, of: usize| n as f64 / of.max(1) as f64;
+        let all = grid.n_measured();
         let of_mask = |n: usize| {
-            let all = observation.n_measured() as f64;
             if all > 0.0 {
                 (1.0 - n as f64 * area / all).clamp(0.0, 1.0)
             } else {
                 0.0
             }
         };
-        let agreeing = count[Cell::Agrees as usize];
-        let extra = observation.n_measured() as f64 - masked as f64 * area;
+        let extra = all - masked as f64 * area;
         // A line at a random angle crosses 4/π pixel borders per pixel of its length.
-        let length = outline as f64 * grid.step() as f64 * std::f64::consts::FRAC_PI_4;
+        let length = (contour.sides * grid.step()) as f64 * std::f64::consts::FRAC_PI_4;
         Self {
             pixels: rendered * grid.step().pow(2),
             agrees: share(agreeing, rendered),
-            seen_through: share(count[Cell::SeenThrough as usize], rendered),
-            inside: share(count[Cell::Inside as usize], rendered),
-            hidden: share(count[Cell::Hidden as usize], rendered),
-            unmeasured: share(count[Cell::Unmeasured as usize], rendered),
+            seen_through: share(count(Cell::SeenThrough), rendered),
+            inside: share(count(Cell::Inside), rendered),
+            hidden: share(count(Cell::Hidden), rendered),
+            unmeasured: share(count(Cell::Unmeasured), rendered),
             unexplained: of_mask(explained),
             residual: residuals.get(),
-            noise: noise.get(),
-            contour: share(supported, contour),
+            noise: grid.noise(),
+            contour: (contour.compared > 0).then(|| share(contour.ends, contour.compared)),
             mask_extra: of_mask(masked),
             mask_missing: share(missing, agreeing),
             mask_growth_pixels: if length > 0.0 {
@@ -194,41 +173,34 @@ impl Evidence {
     }
 }
 
-/// A median of shares of the diameter, from a histogram.
-pub(crate) struct Median {
-    bins: [u32; BINS],
-    count: u32,
+/// The sides of cells at the silhouette.
+#[derive(Default)]
+struct Contour {
+    sides: usize,
+    /// Sides of agreeing cells with a measurement outside.
+    compared: usize,
+    /// Compared sides at which the measured surface ends.
+    ends: usize,
 }
 
-impl Default for Median {
-    fn default() -> Self {
-        Self {
-            bins: [0; BINS],
-            count: 0,
-        }
-    }
-}
-
-impl Median {
-    pub(crate) fn add(&mut self, value: f32) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates; NaN is 0.
-        let bin = (value.abs() * (BINS as f32 / COVERED)) as usize;
-        self.bins[bin.min(BINS - 1)] += 1;
-        self.count += 1;
-    }
-
-    /// Returns the median, interpolated within its bin; 0 without values.
-    pub(crate) fn get(&self) -> f64 {
-        let half = f64::from(self.count) / 2.0;
-        let mut below = 0.0;
-        for (bin, count) in self.bins.iter().enumerate() {
-            let count = f64::from(*count);
-            if count > 0.0 && below + count >= half {
-                let place = bin as f64 + (half - below) / count;
-                return place * f64::from(COVERED) / BINS as f64;
+impl Contour {
+    fn of(grid: &Grid) -> Self {
+        let mut contour = Self::default();
+        for index in grid.rim() {
+            let agrees = grid.cell(index) == Cell::Agrees;
+            let rendered = grid.gap(index) + grid.measured(index);
+            for other in Grid::neighbors(index) {
+                if !grid.cell(other).is_rendered() {
+                    contour.sides += 1;
+                    let measured = grid.measured(other);
+                    if agrees && measured > 0.0 {
+                        contour.compared += 1;
+                        let ends = (measured - rendered).abs() > grid.tolerance();
+                        contour.ends += usize::from(ends);
+                    }
+                }
             }
-            below += count;
         }
-        0.0
+        contour
     }
 }

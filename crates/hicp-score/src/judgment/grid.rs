@@ -1,15 +1,20 @@
-//! The pixels that the evidence compares, on a grid over the rendered region.
+//! The pixels that a judgment compares, on a grid over the rendered region.
 
 use hicp_core::{Observation, RenderedView};
 
-/// Number of cells along each side of the grid.
-const SIDE: usize = 64;
-const CELLS: usize = SIDE * SIDE;
-/// Steepest slope of a continuous surface against the image plane, depth per width.
-const STEEPEST: f32 = 3.0;
+use crate::judgment::median::{Median, Scale};
+
+/// Largest number of cells along each side of the grid.
+pub(crate) const SIDE: usize = 64;
+/// Cells around the grid, so that neighbors need no test for its border.
+const MARGIN: usize = 3;
+const STRIDE: usize = SIDE + 2 * MARGIN;
+pub(crate) const CELLS: usize = STRIDE * STRIDE;
+/// Share of the diameter within which the measured and the rendered surface agree.
+const AGREES: f32 = 0.1;
 
 /// The relation of the measured to the rendered surface at a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cell {
     Agrees,
     SeenThrough,
@@ -17,13 +22,19 @@ pub(crate) enum Cell {
     Hidden,
     Unmeasured,
     /// The model is not rendered.
-    #[default]
     Empty,
+    /// Not in the rendered region.
+    Beyond,
 }
 
 impl Cell {
-    /// Number of kinds of rendered cells.
-    pub(crate) const KINDS: usize = 5;
+    /// Number of kinds; rendered cells have the first ones.
+    pub(crate) const KINDS: usize = 7;
+
+    /// Returns whether the model is rendered.
+    pub(crate) fn is_rendered(self) -> bool {
+        (self as usize) < Self::Empty as usize
+    }
 }
 
 /// The compared pixels.
@@ -31,66 +42,137 @@ pub(crate) struct Grid {
     cells: [Cell; CELLS],
     /// Measured depth, meters.
     measured: [f32; CELLS],
-    /// Rendered minus measured depth, meters.
+    /// Rendered minus measured depth, meters; NaN if one is missing.
     gap: [f32; CELLS],
     masked: [bool; CELLS],
+    rendered: Indices,
+    /// The rendered cells at the silhouette.
+    rim: Indices,
+    /// Distances of measured pixels from the mean of their neighbors in the row: of agreeing
+    /// pixels, and of the rendered pixels of the mask.
+    noise: Median,
+    noise_in_mask: Median,
+    /// Whether a cell is behind a measured surface.
+    has_hidden: bool,
+    /// Number of measured pixels of the mask.
+    n_measured: usize,
     width: usize,
     height: usize,
     step: usize,
-    /// Pixel of the first cell.
-    corner: (usize, usize),
-    tolerance: f32,
+    diameter: f32,
     /// Width of a cell per meter of distance.
     spread: f32,
 }
 
 impl Grid {
-    /// Compares a render with an observation; surfaces within `tolerance` meters agree.
-    pub(crate) fn new(observation: &Observation, view: &RenderedView, tolerance: f32) -> Self {
+    /// The steps to the neighbors of a cell: right, left, down, up.
+    pub(crate) const SIDES: [isize; 4] = [1, -1, STRIDE.cast_signed(), -STRIDE.cast_signed()];
+
+    /// Creates a grid without cells, for a diameter in meters.
+    pub(crate) fn new(diameter: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let diameter = diameter as f32;
+        // A literal is written in place; a returned variable would be copied.
+        Self {
+            cells: [Cell::Beyond; CELLS],
+            measured: [0.0; CELLS],
+            gap: [0.0; CELLS],
+            masked: [false; CELLS],
+            rendered: Indices::NONE,
+            rim: Indices::NONE,
+            noise: Median::new(),
+            noise_in_mask: Median::new(),
+            has_hidden: false,
+            n_measured: 0,
+            width: 0,
+            height: 0,
+            step: 1,
+            diameter,
+            spread: 0.0,
+        }
+    }
+
+    /// Compares a render with an observation.
+    ///
+    /// Cells behind a measured surface are hidden until `insides` separates them.
+    pub(crate) fn compare(&mut self, observation: &Observation, view: &RenderedView) {
         let region = view.region();
         let camera = observation.camera();
         let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
         let image_width = camera.width() as usize;
         let (depth, mask) = (observation.depth().pixels(), observation.mask().pixels());
-        let mut grid = Self {
-            cells: [Cell::Empty; CELLS],
-            measured: [0.0; CELLS],
-            gap: [0.0; CELLS],
-            masked: [false; CELLS],
-            width: region.width().div_ceil(step),
-            height: region.height().div_ceil(step),
-            step,
-            corner: (region.u_min as usize, region.v_min as usize),
-            tolerance,
-            #[allow(clippy::cast_possible_truncation)]
-            spread: step as f32 / camera.fx().min(camera.fy()) as f32,
-        };
-        for row in 0..grid.height {
-            let v = grid.corner.1 + row * step;
+        self.n_measured = observation.n_measured();
+        self.width = region.width().div_ceil(step);
+        self.height = region.height().div_ceil(step);
+        self.step = step;
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let focal_length = camera.fx().min(camera.fy()) as f32;
+        self.spread = step as f32 / focal_length;
+        let (tolerance, scale) = (self.tolerance(), Scale::new(self.diameter));
+        for row in 0..self.height {
             let rendered = &view.depth()[row * step * region.width()..][..region.width()];
-            let start = v * image_width + grid.corner.0;
-            for column in 0..grid.width {
-                let (index, at) = (row * SIDE + column, column * step);
-                let (z, measured) = (rendered[at], depth[start + at]);
-                grid.measured[index] = measured;
-                grid.masked[index] = mask[start + at];
-                if z <= 0.0 {
+            let start = (region.v_min as usize + row * step) * image_width;
+            let (depth, mask) = (
+                &depth[start..][..image_width],
+                &mask[start..][..image_width],
+            );
+            let first = (row + MARGIN) * STRIDE + MARGIN;
+            let columns = (region.u_min as usize..).step_by(step);
+            for ((index, u), z) in (first..).zip(columns).zip(rendered.iter().step_by(step)) {
+                let measured = depth[u];
+                self.measured[index] = measured;
+                self.masked[index] = mask[u];
+                if *z <= 0.0 {
+                    (self.cells[index], self.gap[index]) = (Cell::Empty, f32::NAN);
+                    continue;
+                }
+                self.rendered.push(index);
+                if measured <= 0.0 {
+                    (self.cells[index], self.gap[index]) = (Cell::Unmeasured, f32::NAN);
                     continue;
                 }
                 let gap = z - measured;
-                grid.gap[index] = gap;
-                grid.cells[index] = if measured <= 0.0 {
-                    Cell::Unmeasured
-                } else if gap > tolerance {
+                self.gap[index] = gap;
+                self.cells[index] = if gap > tolerance {
+                    self.has_hidden = true;
                     Cell::Hidden
                 } else if gap < -tolerance {
                     Cell::SeenThrough
                 } else {
                     Cell::Agrees
                 };
+                // The first and the last column have no neighbors on both sides.
+                if let Some([left, _, right]) = depth.get(u.wrapping_sub(1)..u + 2)
+                    && *left > 0.0
+                    && *right > 0.0
+                {
+                    let roughness = scale.bin(measured - 0.5 * (left + right));
+                    if self.cells[index] == Cell::Agrees {
+                        self.noise.add(roughness);
+                    }
+                    if mask[u] {
+                        self.noise_in_mask.add(roughness);
+                    }
+                }
             }
         }
-        grid
+        let (cells, rim) = (&self.cells, &mut self.rim);
+        for index in self.rendered.iter() {
+            let inside = |other: usize| cells[other].is_rendered();
+            if !Self::neighbors(index).into_iter().all(inside) {
+                rim.push(index);
+            }
+        }
+    }
+
+    /// Returns whether a cell is behind a measured surface.
+    pub(crate) fn has_hidden(&self) -> bool {
+        self.has_hidden
+    }
+
+    /// Returns the number of measured pixels of the mask.
+    pub(crate) fn n_measured(&self) -> f64 {
+        self.n_measured as f64
     }
 
     /// Returns the distance between cells, pixels.
@@ -98,11 +180,39 @@ impl Grid {
         self.step
     }
 
-    /// Iterates over the cells at which the model is rendered.
-    pub(crate) fn rendered(&self) -> impl Iterator<Item = (usize, Cell)> + '_ {
-        self.indices()
-            .map(|index| (index, self.cells[index]))
-            .filter(|(_, cell)| *cell != Cell::Empty)
+    /// Returns the diameter of the model, meters.
+    pub(crate) fn diameter(&self) -> f32 {
+        self.diameter
+    }
+
+    /// Returns the distance within which surfaces agree, meters.
+    pub(crate) fn tolerance(&self) -> f32 {
+        AGREES * self.diameter
+    }
+
+    /// Returns the width of a cell per meter of distance.
+    pub(crate) fn spread(&self) -> f32 {
+        self.spread
+    }
+
+    /// Iterates over the cells at which the model is rendered, row by row.
+    pub(crate) fn rendered(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rendered.iter()
+    }
+
+    /// Iterates over the rendered cells with a neighbor that is not rendered, row by row.
+    pub(crate) fn rim(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rim.iter()
+    }
+
+    /// Returns the relation of the surfaces at a cell.
+    pub(crate) fn cell(&self, index: usize) -> Cell {
+        self.cells[index]
+    }
+
+    /// Replaces the relation at a rendered cell.
+    pub(crate) fn set_cell(&mut self, index: usize, cell: Cell) {
+        self.cells[index] = cell;
     }
 
     /// Returns whether the pixel of a cell is masked.
@@ -115,147 +225,64 @@ impl Grid {
         self.measured[index]
     }
 
-    /// Returns whether the model is rendered at a cell.
-    pub(crate) fn is_rendered(&self, index: usize) -> bool {
-        self.cells[index] != Cell::Empty
-    }
-
-    /// Returns whether a cell shows both surfaces.
-    pub(crate) fn is_compared(&self, index: usize) -> bool {
-        self.is_rendered(index) && self.cells[index] != Cell::Unmeasured
-    }
-
-    /// Returns the cell that is some steps to the right and down, if it is in the grid.
-    pub(crate) fn offset(&self, index: usize, right: isize, down: isize) -> Option<usize> {
-        let column = (index % SIDE).checked_add_signed(right)?;
-        let row = (index / SIDE).checked_add_signed(down)?;
-        (column < self.width && row < self.height).then_some(row * SIDE + column)
-    }
-
-    /// Returns the part of a cell if the grid is divided into `parts` × `parts`.
-    pub(crate) fn part(&self, index: usize, parts: usize) -> usize {
-        let (column, row) = (index % SIDE, index / SIDE);
-        row * parts / self.height * parts + column * parts / self.width
-    }
-
-    /// Returns the rendered minus the measured depth, meters.
+    /// Returns the rendered minus the measured depth, meters; NaN if one is missing.
     pub(crate) fn gap(&self, index: usize) -> f32 {
         self.gap[index]
     }
 
-    /// Returns the distance of a measured pixel from the mean of its neighbors in the row, meters.
-    pub(crate) fn roughness(&self, observation: &Observation, index: usize) -> Option<f32> {
-        let image_width = observation.camera().width() as usize;
-        let u = self.corner.0 + index % SIDE * self.step;
-        let v = self.corner.1 + index / SIDE * self.step;
-        if u == 0 || u + 1 >= image_width {
-            return None;
-        }
-        let at = v * image_width + u;
-        let depth = observation.depth().pixels();
-        let (left, right) = (depth[at - 1], depth[at + 1]);
-        let mean = 0.5 * (left + right);
-        (left > 0.0 && right > 0.0).then(|| (depth[at] - mean).abs())
+    /// Returns the median distance of an agreeing pixel from the mean of its neighbors in the row,
+    /// in diameters.
+    pub(crate) fn noise(&self) -> f64 {
+        self.noise.get()
     }
 
-    /// Counts the sides of a rendered cell at the silhouette, those at which the measured surface
-    /// ends, and those with a measurement outside.
-    pub(crate) fn contour(&self, index: usize) -> (usize, usize, usize) {
-        let (mut sides, mut ends, mut compared) = (4, 0, 0);
-        let rendered = self.gap[index] + self.measured[index];
-        for other in self.neighbors(index) {
-            if self.cells[other] != Cell::Empty {
-                sides -= 1;
-            } else if self.measured[other] > 0.0 {
-                compared += 1;
-                ends += usize::from((self.measured[other] - rendered).abs() > self.tolerance);
-            }
-        }
-        (sides, ends, compared)
+    /// Returns that of a rendered pixel of the mask.
+    pub(crate) fn noise_in_mask(&self) -> f64 {
+        self.noise_in_mask.get()
     }
 
-    /// Separates the cells inside a measured surface from those hidden by one that stands in front.
-    ///
-    /// A nearer surface that hides the object ends in a step of depth. If it instead continues the
-    /// surface at agreeing neighbors, the object reaches into it. The border of each connected part
-    /// decides by majority.
-    pub(crate) fn find_insides(&mut self) {
-        let mut parts = Parts::new();
-        for index in self.indices() {
-            if self.cells[index] != Cell::Hidden {
-                continue;
-            }
-            // The neighbors to the right and below: each pair once.
-            for other in self.neighbors(index).filter(|other| *other > index) {
-                if self.cells[other] == Cell::Hidden && self.continues(index, other) {
-                    parts.join(index, other);
-                }
-            }
-        }
-        // Agreeing neighbors over which the surface continues, minus those with a step.
-        let mut votes = [0_i16; CELLS];
-        for index in self.indices() {
-            if self.cells[index] == Cell::Hidden {
-                let agreeing = |other: &usize| self.cells[*other] == Cell::Agrees;
-                for other in self.neighbors(index).filter(agreeing) {
-                    let continues = self.continues(index, other);
-                    votes[parts.find(index)] += if continues { 1 } else { -1 };
-                }
-            }
-        }
-        for index in self.indices() {
-            if self.cells[index] == Cell::Hidden && votes[parts.find(index)] > 0 {
-                self.cells[index] = Cell::Inside;
-            }
-        }
+    /// Returns the cell that is some steps away, at most 3 beyond the grid.
+    pub(crate) fn offset(index: usize, steps: isize) -> usize {
+        index.wrapping_add_signed(steps)
     }
 
-    /// Returns whether the measured surface continues between neighbors without a step.
-    fn continues(&self, index: usize, other: usize) -> bool {
-        let (a, b) = (self.measured[index], self.measured[other]);
-        (a - b).abs() < (0.5 * self.tolerance).max(STEEPEST * self.spread * a.min(b))
+    /// Iterates over the four neighbors of a cell.
+    pub(crate) fn neighbors(index: usize) -> [usize; 4] {
+        Self::SIDES.map(|side| Self::offset(index, side))
     }
 
-    fn indices(&self) -> impl Iterator<Item = usize> + use<> {
-        let width = self.width;
-        (0..self.height).flat_map(move |row| (0..width).map(move |column| row * SIDE + column))
+    /// Returns the row and the column of a cell.
+    pub(crate) fn place(index: usize) -> (usize, usize) {
+        (index / STRIDE - MARGIN, index % STRIDE - MARGIN)
     }
 
-    /// Iterates over the neighbors within the grid.
-    fn neighbors(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
-        let (column, row) = (index % SIDE, index / SIDE);
-        [
-            (column > 0, index.wrapping_sub(1)),
-            (column + 1 < self.width, index + 1),
-            (row > 0, index.wrapping_sub(SIDE)),
-            (row + 1 < self.height, index + SIDE),
-        ]
-        .into_iter()
-        .filter_map(|(exists, other)| exists.then_some(other))
+    /// Returns the numbers of rows and columns.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        (self.height, self.width)
     }
 }
 
-/// Connected parts of the grid (union-find).
-struct Parts([u16; CELLS]);
+/// The indices of some cells, row by row.
+struct Indices {
+    cells: [u16; SIDE * SIDE],
+    count: usize,
+}
 
-impl Parts {
-    fn new() -> Self {
-        #[allow(clippy::cast_possible_truncation)] // At most 4,096.
-        Self(std::array::from_fn(|index| index as u16))
+impl Indices {
+    const NONE: Self = Self {
+        cells: [0; SIDE * SIDE],
+        count: 0,
+    };
+
+    fn push(&mut self, index: usize) {
+        #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
+        let cell = index as u16;
+        self.cells[self.count] = cell;
+        self.count += 1;
     }
 
-    fn find(&mut self, mut index: usize) -> usize {
-        while usize::from(self.0[index]) != index {
-            self.0[index] = self.0[usize::from(self.0[index])];
-            index = usize::from(self.0[index]);
-        }
-        index
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.find(a), self.find(b));
-        #[allow(clippy::cast_possible_truncation)] // At most 4,096.
-        let low = a.min(b) as u16;
-        self.0[a.max(b)] = low;
+    fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        let cells = &self.cells[..self.count];
+        cells.iter().map(|cell| usize::from(*cell))
     }
 }

@@ -1,9 +1,8 @@
 //! The disagreement of a pose with the image beyond the noise of the sensor.
 
-use hicp_core::{Context, Isometry3, Observation, RenderedView};
+use hicp_core::{Context, Isometry3};
 
-use crate::judgment::evidence::Median;
-use crate::judgment::grid::{Cell, Grid};
+use crate::judgment::grid::{Cell, Grid, SIDE};
 
 /// Median of the distance from the mean of two neighbors, per standard deviation of the noise.
 const ROUGHNESS_PER_SIGMA: f64 = 0.826;
@@ -59,97 +58,72 @@ impl Misfit {
     pub fn at(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<Self> {
         let (model, observation) = context.problem.sides()?;
         let view = context.view(camera_from_object)?;
-        Some(Self::of(observation, view, model.diameter()))
+        let mut grid = Grid::new(model.diameter());
+        grid.compare(observation, view);
+        Some(Self::of(&grid))
     }
 
-    fn of(observation: &Observation, view: &RenderedView, diameter: f64) -> Self {
+    pub(crate) fn of(grid: &Grid) -> Self {
+        let sigma = grid.noise_in_mask() / ROUGHNESS_PER_SIGMA;
+        let diameter = f64::from(grid.diameter());
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let grid = Grid::new(observation, view, (NEAR.0 * diameter) as f32);
-        let mut noise = Median::default();
-        for (index, cell) in grid.rendered() {
-            if grid.masked(index)
-                && cell != Cell::Unmeasured
-                && let Some(roughness) = grid.roughness(observation, index)
-            {
-                #[allow(clippy::cast_possible_truncation)]
-                noise.add(roughness / diameter as f32);
-            }
-        }
-        let sigma = noise.get() / ROUGHNESS_PER_SIGMA;
-        let limit = |(share, sigmas): (f64, f64)| share + sigmas * sigma;
+        let limit = |(share, sigmas): (f64, f64)| ((share + sigmas * sigma) * diameter) as f32;
         let [fine, rim, near, coarse] = [FINE, RIM, NEAR, COARSE].map(limit);
-        let behind = |index: usize| f64::from(grid.gap(index)) / diameter;
+        // The gap of a pixel that is not compared is NaN, which is below no limit.
+        let fits = |index: usize| grid.masked(index) & (grid.gap(index).abs() < near);
 
-        let (mut ahead, mut rim_ahead, mut rim_open) = <[Share; 3]>::default().into();
+        let mut ahead = Share::default();
         let mut explained = 0_usize;
         let (mut sum, mut count) = (0.0, 0_usize);
         let (mut products, mut pairs) = (0.0, 0_usize);
-        let mut parts = [(0_u32, 0_u32); PARTS * PARTS];
-        for (index, cell) in grid.rendered() {
-            if cell == Cell::Unmeasured {
+        let (height, width) = grid.size();
+        let mut parts = [[(0_u32, 0_u32); PARTS]; PARTS];
+        let of_row = part_of(height);
+        let of_column = part_of(width);
+        for index in grid.rendered() {
+            let (gap, masked) = (grid.gap(index), grid.masked(index));
+            if gap.is_nan() {
                 continue;
             }
-            let (gap, masked) = (behind(index), grid.masked(index));
             if gap <= fine || masked {
                 ahead.add(gap < -fine);
             }
-            explained += usize::from(masked && gap.abs() < coarse);
-            let fits = masked && gap.abs() < near;
+            explained += usize::from(masked & (gap.abs() < coarse));
+            let fitting = fits(index);
             if masked || gap < near {
-                let part = &mut parts[grid.part(index, PARTS)];
-                *part = (part.0 + 1, part.1 + u32::from(fits));
+                let (row, column) = Grid::place(index);
+                let part = &mut parts[of_row[row]][of_column[column]];
+                *part = (part.0 + 1, part.1 + u32::from(fitting));
             }
-            if fits {
+            if fitting {
+                let gap = f64::from(gap);
                 sum += gap;
                 count += 1;
-                for (right, down) in [(LAG, 0), (0, LAG)] {
-                    let other = grid.offset(index, right, down).filter(|other| {
-                        grid.is_compared(*other)
-                            && grid.masked(*other)
-                            && behind(*other).abs() < near
-                    });
-                    if let Some(other) = other {
-                        products += gap * behind(other);
+                for side in [Grid::SIDES[0], Grid::SIDES[2]] {
+                    let other = Grid::offset(index, LAG * side);
+                    if fits(other) {
+                        products += gap * f64::from(grid.gap(other));
                         pairs += 1;
                     }
                 }
             }
-            for (right, down) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let outside = |steps: isize| {
-                    let other = grid.offset(index, right * steps, down * steps)?;
-                    (!grid.is_rendered(other)).then_some(other)
-                };
-                if outside(1).is_none() {
-                    continue;
-                }
-                let inside = [0, 1].map(|steps| grid.offset(index, -right * steps, -down * steps));
-                for inner in inside.into_iter().flatten() {
-                    if grid.is_compared(inner) && behind(inner) <= rim {
-                        rim_ahead.add(behind(inner) < -rim);
-                    }
-                }
-                for outer in [2, 3].into_iter().filter_map(outside) {
-                    let step = f64::from(grid.measured(outer)) / diameter
-                        - f64::from(grid.measured(index)) / diameter
-                        - gap;
-                    if grid.measured(outer) > 0.0 && step >= -rim {
-                        rim_open.add(step <= rim);
-                    }
-                }
-            }
         }
-        let compared = parts.iter().filter(|(all, _)| *all >= LEAST_CELLS);
+        let around = Rim::of(grid, rim);
+        let compared = parts
+            .iter()
+            .flatten()
+            .filter(|(all, _)| *all >= LEAST_CELLS);
         let mut weak = Share::default();
         compared.for_each(|(all, agree)| weak.add(2 * agree < *all));
         let area = (grid.step() * grid.step()) as f64;
-        let all = (observation.n_measured() as f64).max(1.0);
+        let all = grid.n_measured().max(1.0);
         Self {
             sigma,
-            systematic: (products / pairs.max(1) as f64).max(0.0).sqrt(),
-            bias: -sum / count.max(1) as f64,
+            systematic: (products / pairs.max(1) as f64).max(0.0).sqrt() / diameter,
+            bias: -sum / count.max(1) as f64 / diameter,
             ahead: ahead.get(),
-            rim_ahead: rim_ahead.get(),
-            rim_open: rim_open.get(),
+            rim_ahead: around.ahead.get(),
+            rim_open: around.open.get(),
             weak: weak.get(),
             unexplained: (1.0 - explained as f64 * area / all).clamp(0.0, 1.0),
         }
@@ -173,4 +147,45 @@ impl Share {
     fn get(self) -> f64 {
         f64::from(self.count) / f64::from(self.of.max(1))
     }
+}
+
+/// The pixels along both sides of the silhouette.
+#[derive(Default)]
+struct Rim {
+    ahead: Share,
+    open: Share,
+}
+
+impl Rim {
+    /// Compares the pixels around the silhouette with a tolerance in meters.
+    fn of(grid: &Grid, tolerance: f32) -> Self {
+        let mut rim = Self::default();
+        for index in grid.rim().filter(|index| !grid.gap(*index).is_nan()) {
+            let rendered = grid.measured(index) + grid.gap(index);
+            for side in Grid::SIDES {
+                if grid.cell(Grid::offset(index, side)) != Cell::Empty {
+                    continue;
+                }
+                for inner in [0, -1].map(|steps| Grid::offset(index, steps * side)) {
+                    let gap = grid.gap(inner);
+                    if grid.cell(inner).is_rendered() && gap <= tolerance {
+                        rim.ahead.add(gap < -tolerance);
+                    }
+                }
+                for outer in [2, 3].map(|steps| Grid::offset(index, steps * side)) {
+                    let measured = grid.measured(outer);
+                    let step = measured - rendered;
+                    if grid.cell(outer) == Cell::Empty && measured > 0.0 && step >= -tolerance {
+                        rim.open.add(step <= tolerance);
+                    }
+                }
+            }
+        }
+        rim
+    }
+}
+
+/// Returns the part of each row or column of a grid of `size` cells.
+fn part_of(size: usize) -> [usize; SIDE] {
+    std::array::from_fn(|place| (place * PARTS / size.max(1)).min(PARTS - 1))
 }

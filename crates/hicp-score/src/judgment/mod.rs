@@ -6,6 +6,8 @@ pub(crate) mod curves;
 pub(crate) mod evidence;
 pub(crate) mod flatness;
 pub(crate) mod grid;
+pub(crate) mod insides;
+pub(crate) mod median;
 pub(crate) mod misfit;
 
 pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};

@@ -3,7 +3,8 @@
 use hicp_core::internal::vectorized;
 use hicp_core::{Context, Isometry3, Observation, RenderedView};
 
-use crate::judgment::evidence::Evidence;
+use crate::judgment::grid::Grid;
+use crate::judgment::insides::inside_share;
 use crate::mve::agreement::{Agreement, Found, Row, Weights};
 use crate::mve::mask_trust::{MaskTrust, TrustMap};
 use crate::mve::occlusion::Occlusion;
@@ -156,7 +157,9 @@ impl Compared<'_> {
         let found = self.count(rows, trust.seen_through_meters());
         // A pixel behind a measured surface counts if the object reaches into that surface.
         let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
-            Evidence::of(self.observation, self.view, self.diameter).inside_share()
+            let mut grid = Grid::new(self.diameter);
+            grid.compare(self.observation, self.view);
+            inside_share(&mut grid)
         } else {
             0.0
         };

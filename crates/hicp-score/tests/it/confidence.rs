@@ -37,9 +37,9 @@ fn judge(observation: &Observation, pose: &Isometry3<f64>) -> (Misfit, Confidenc
     let model = cube();
     let mut renders = RenderCache::new(RayCaster);
     let mut context = Context::new(Problem::new(&model, observation), &mut renders);
-    let evidence = Evidence::at(&mut context, pose).unwrap();
     let mve = MeanVsd::default().score(&mut context, pose);
-    let confidence = Confidence::at(&mut context, pose, &evidence, mve);
+    let (evidence, confidence) = Confidence::at(&mut context, pose, mve);
+    assert_eq!(evidence, Evidence::at(&mut context, pose).unwrap());
     (Misfit::at(&mut context, pose).unwrap(), confidence)
 }
 

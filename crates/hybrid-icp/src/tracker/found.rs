@@ -49,15 +49,20 @@ impl Found {
         self.contradiction() < contradiction && self.unexplained() < unexplained
     }
 
+    /// Returns the supported share of the contour; 0 if nothing was measured next to it.
+    fn contour(&self) -> f64 {
+        self.evidence.contour.unwrap_or(0.0)
+    }
+
     /// Returns how well a pose fits, to compare poses in one image.
     pub(super) fn merit(&self) -> f64 {
         let e = &self.evidence;
-        e.agrees - e.contradicts() - 0.5 * e.unexplained + 0.2 * e.contour
+        e.agrees - e.contradicts() - 0.5 * e.unexplained + 0.2 * self.contour()
     }
 
     /// Returns whether the image shows the object at the pose, given that it was expected there.
     pub(super) fn explains(&self) -> bool {
-        let ends = self.evidence.contour > 0.2 || self.fills(0.06, 0.1);
+        let ends = self.contour() > 0.2 || self.fills(0.06, 0.1);
         self.evidence.agrees > 0.15 && self.fills(0.2, 0.5) && ends
     }
 
@@ -75,7 +80,7 @@ impl Found {
     ///
     /// A seen contour excuses an unexplained surface around the object, such as a table.
     pub(super) fn is_sure(&self) -> bool {
-        let contour = self.evidence.contour;
+        let contour = self.contour();
         let ends = contour > 0.6 || (contour > 0.45 && self.unexplained() < 0.15);
         self.explains() && self.contradiction() < 0.1 && (ends || self.fills(0.04, 0.05))
     }
@@ -87,7 +92,7 @@ impl Found {
 
     /// Returns whether the image shows the object at a pose where it was not expected.
     pub(super) fn stands_alone(&self) -> bool {
-        let ends = self.evidence.contour > 0.7 || self.fills(0.03, 0.05);
+        let ends = self.contour() > 0.7 || self.fills(0.03, 0.05);
         self.evidence.agrees > 0.4 && self.fills(0.06, 0.15) && ends
     }
 }

@@ -1,0 +1,90 @@
+//! The separation of cells inside a measured surface from those that it hides.
+
+use crate::judgment::grid::{CELLS, Cell, Grid};
+
+/// Steepest slope of a continuous surface against the image plane, depth per width.
+const STEEPEST: f32 = 3.0;
+
+/// Finds the hidden cells that lie inside a measured surface.
+///
+/// A nearer surface that hides the object ends in a step of depth. If it instead continues the
+/// surface at agreeing neighbors, the object reaches into it. The border of each connected part
+/// decides by majority.
+pub(crate) fn find_insides(grid: &mut Grid) {
+    if !grid.has_hidden() {
+        return;
+    }
+    let mut hidden = [0_u16; CELLS];
+    let mut count = 0;
+    for index in grid.rendered() {
+        if grid.cell(index) == Cell::Hidden {
+            #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
+            let place = index as u16;
+            hidden[count] = place;
+            count += 1;
+        }
+    }
+    let hidden = || hidden[..count].iter().map(|index| usize::from(*index));
+    let mut parts = Parts::new();
+    for index in hidden() {
+        // The neighbors to the right and below: each pair once.
+        for other in [Grid::SIDES[0], Grid::SIDES[2]].map(|side| Grid::offset(index, side)) {
+            if grid.cell(other) == Cell::Hidden && continues(grid, index, other) {
+                parts.join(index, other);
+            }
+        }
+    }
+    // Agreeing neighbors over which the surface continues, minus those with a step.
+    let mut votes = [0_i16; CELLS];
+    for index in hidden() {
+        for other in Grid::neighbors(index) {
+            if grid.cell(other) == Cell::Agrees {
+                votes[parts.find(index)] += if continues(grid, index, other) { 1 } else { -1 };
+            }
+        }
+    }
+    for index in hidden() {
+        if votes[parts.find(index)] > 0 {
+            grid.set_cell(index, Cell::Inside);
+        }
+    }
+}
+
+/// Returns the share of the nearer measured surfaces that contain the object; 0 without any.
+pub(crate) fn inside_share(grid: &mut Grid) -> f64 {
+    find_insides(grid);
+    let count = |kind: Cell| grid.rendered().filter(|i| grid.cell(*i) == kind).count();
+    let (inside, hidden) = (count(Cell::Inside), count(Cell::Hidden));
+    inside as f64 / (inside + hidden).max(1) as f64
+}
+
+/// Returns whether the measured surface continues between neighbors without a step.
+fn continues(grid: &Grid, index: usize, other: usize) -> bool {
+    let (a, b) = (grid.measured(index), grid.measured(other));
+    (a - b).abs() < (0.5 * grid.tolerance()).max(STEEPEST * grid.spread() * a.min(b))
+}
+
+/// Connected parts of the grid (union-find).
+struct Parts([u16; CELLS]);
+
+impl Parts {
+    fn new() -> Self {
+        #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
+        Self(std::array::from_fn(|index| index as u16))
+    }
+
+    fn find(&mut self, mut index: usize) -> usize {
+        while usize::from(self.0[index]) != index {
+            self.0[index] = self.0[usize::from(self.0[index])];
+            index = usize::from(self.0[index]);
+        }
+        index
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.find(a), self.find(b));
+        #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
+        let low = a.min(b) as u16;
+        self.0[a.max(b)] = low;
+    }
+}
