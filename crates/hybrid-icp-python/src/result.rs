@@ -106,8 +106,9 @@ impl PyResultOf {
     ///
     /// The others are `pixels` (rendered), `unexplained` (share of the mask at which the model does
     /// not agree), `residual` and `noise` (medians, diameters), `contour` (share of the contour at
-    /// which the measured surface ends), `mask_extra` and `mask_missing` (shares by which the mask
-    /// is too large and too small) and `mask_growth_pixels` (negative if it is too small).
+    /// which the measured surface ends; NaN if nothing was measured there), `mask_extra` and
+    /// `mask_missing` (shares by which the mask is too large and too small) and
+    /// `mask_growth_pixels` (negative if it is too small).
     #[getter]
     fn evidence(&self) -> BTreeMap<&'static str, f64> {
         BTreeMap::from(self.refinement.evidence.named())
