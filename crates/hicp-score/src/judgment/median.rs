@@ -1,7 +1,8 @@
 //! Medians from a histogram.
 
 /// Number of bins, and the share of the diameter that they cover.
-const BINS: usize = 100;
+const BINS: usize = LAST as usize + 1;
+const LAST: u8 = 99;
 const COVERED: f32 = 0.5;
 
 /// A median of shares of the diameter.
@@ -58,6 +59,6 @@ impl Scale {
     pub(crate) fn bin(self, meters: f32) -> Bin {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates; NaN is 0.
         let bin = (meters.abs() * self.bins_per_meter) as u8;
-        Bin(bin.min(BINS as u8 - 1))
+        Bin(bin.min(LAST))
     }
 }
