@@ -2,6 +2,7 @@
 
 pub(crate) mod anderson;
 pub(crate) mod compose;
+pub(crate) mod descent;
 pub(crate) mod distinct;
 pub(crate) mod guard;
 pub(crate) mod hypotheses;
@@ -16,6 +17,7 @@ pub(crate) mod stage_trait;
 
 pub use anderson::Anderson;
 pub use compose::{Cascade, Repeat};
+pub use descent::Descent;
 pub use guard::{Guard, KeepBest};
 pub use hypotheses::Rotations;
 pub use icp::{Icp, MAX_ITERATIONS};

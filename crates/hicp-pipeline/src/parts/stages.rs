@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use hicp_icp::{
-    Anderson, AtResolution, Bound, BoxedStage, Cascade, Guard, HypothesisSearch, Icp, KeepBest,
-    MAX_ITERATIONS, RayShift, Repeat, Rotations, SearchOptions, Start,
+    Anderson, AtResolution, Bound, BoxedStage, Cascade, Descent, Guard, HypothesisSearch, Icp,
+    KeepBest, MAX_ITERATIONS, RayShift, Repeat, Rotations, SearchOptions, Start,
 };
 use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
 
@@ -141,6 +141,18 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(Guard {
             stage: p.part::<BoxedStage>("stage", None, "what is run")?,
             score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
+        })
+    });
+    catalog.add_stage("descent", |p| {
+        p.about = "Lowers a score that stays high by small moves along and around all axes. \
+            Source: pattern search, Hooke & Jeeves 1961. Cost: up to evaluations scores.";
+        let share = Range::new(0.0, 1.0, "diameters");
+        Ok(Descent {
+            score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
+            good_enough: p.number("good_enough", FACTOR, 0.2, "score that is kept")?,
+            first_step: p.number("first_step", share, 0.05, "first step of the surface")?,
+            last_step: p.number("last_step", share, 0.0125, "smallest step")?,
+            evaluations: p.count("evaluations", 1, 80, "largest number of scores")?,
         })
     });
     catalog.add_stage("keep-best", |p| {

@@ -19,8 +19,8 @@ use hybrid_icp::association::{
 };
 use hybrid_icp::core::Matrix6;
 use hybrid_icp::icp::{
-    AbsoluteLoss, AtResolution, Bound, Convergence, Deadline, Divergence, Guard, IterationLimit,
-    KeepBest, Oscillation, Regime, SmallMotion, TimeLimit,
+    AbsoluteLoss, AtResolution, Bound, Convergence, Deadline, Descent, Divergence, Guard,
+    IterationLimit, KeepBest, Oscillation, Regime, SmallMotion, TimeLimit,
 };
 use hybrid_icp::metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
@@ -284,6 +284,13 @@ fn built_in_stages_keep_the_laws() {
         || Guard {
             stage: fine(),
             score: MeanVsd::default(),
+        },
+        laws,
+    );
+    check_stage(
+        || Descent {
+            good_enough: 0.0,
+            ..Descent::<MeanVsd>::default()
         },
         laws,
     );
