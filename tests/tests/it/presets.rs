@@ -24,7 +24,7 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
 
     let mut refiner = Refiner::new(presets::local());
     let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
-    let (steps, _) = &mut refiner.stage_mut().0;
+    let (steps, ..) = &mut refiner.stage_mut().0;
     steps.max_steps = 1;
     steps.misaligned.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
     let changed = refiner.refine(&scene.model, &scene.observation, &init);

@@ -10,8 +10,8 @@ use hicp_association::{
     Stride, VisibleSurface,
 };
 use hicp_icp::{
-    Cascade, Convergence, Divergence, Guard, HypothesisSearch, Icp, IterationLimit, Repeat,
-    SearchOptions, Start,
+    Cascade, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp, IterationLimit,
+    Repeat, SearchOptions, Start,
 };
 use hicp_metric::{PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
@@ -38,6 +38,7 @@ pub type HybridVisible = Repeat<
 /// The type of [`local`].
 pub type Local = Cascade<(
     SwitchUntilStall<MeanVsd, Near, Far>,
+    Descent<MeanVsd>,
     Guard<GatedIcp<Symmetric>, MeanVsd>,
 )>;
 /// The stage that refines hypotheses.
@@ -141,19 +142,20 @@ pub fn hybrid_visible() -> HybridVisible {
     }
 }
 
-/// `local`: local refinement that never returns a pose with a higher MVE than the initial one.
+/// `local`: local refinement that never returns a pose with a higher score than the initial one.
 ///
-/// [`SwitchUntilStall`] runs up to six steps, until the MVE stalls or is at most 0.1, and keeps the
-/// pose with the lowest MVE. A step is the projective cascade if the estimate agrees with the
+/// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]).
+/// [`SwitchUntilStall`] runs up to six steps, until the score stalls or is at most 0.1, and keeps
+/// the pose with the lowest one. A step is the projective cascade if the estimate agrees with the
 /// image. Otherwise it pairs observed points with the model, first with point-to-point and then
-/// with the symmetric metric. A last stage with twice as many points is accepted only if the MVE
-/// improves.
+/// with the symmetric metric. If the score stays above 0.2, as with much noise, [`Descent`] lowers
+/// it directly. A last stage with twice as many points is accepted only if the score improves.
 #[must_use]
 pub fn local() -> Local {
     let far = (300, 5000);
     Cascade((
         SwitchUntilStall {
-            score: MeanVsd::default(),
+            score: MeanVsd::imperfect_mask(),
             alpha: PAPER_ALPHA,
             aligned: near(2000),
             misaligned: Cascade((
@@ -164,9 +166,13 @@ pub fn local() -> Local {
             min_gain: 0.01,
             good_enough: 0.1,
         },
+        Descent {
+            score: MeanVsd::imperfect_mask(),
+            ..Descent::default()
+        },
         Guard {
             stage: projective(Symmetric, 4000, 5),
-            score: MeanVsd::default(),
+            score: MeanVsd::imperfect_mask(),
         },
     ))
 }
@@ -174,7 +180,7 @@ pub fn local() -> Local {
 /// Creates the stage that refines hypotheses: two steps with fewer points.
 fn explore() -> Explore {
     SwitchUntilStall {
-        score: MeanVsd::default(),
+        score: MeanVsd::imperfect_mask(),
         alpha: PAPER_ALPHA,
         aligned: near(1000),
         misaligned: observed((150, 2000), PointToPoint, coarse()),
@@ -191,8 +197,8 @@ pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, Me
     HypothesisSearch::new(
         stage,
         explore(),
-        SampledMve::lenient(),
-        MeanVsd::lenient(),
+        SampledMve::imperfect_mask(),
+        MeanVsd::imperfect_mask(),
         SearchOptions {
             start: Start::Ignored,
             good_enough: 0.02,
@@ -201,10 +207,10 @@ pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, Me
     )
 }
 
-/// [`local`], followed by a search if its MVE stays above a threshold.
+/// [`local`], followed by a search if its score stays above a threshold.
 ///
-/// The search scores poses with an MVE for masks that miss a part of the object
-/// ([`MeanVsd::lenient`]). To change the options, for example to set a bound:
+/// The search scores poses with the MVE for the masks of detectors
+/// ([`MeanVsd::imperfect_mask`]). To change the options, for example to set a bound:
 ///
 /// ```
 /// use hybrid_icp::icp::{Bound, SearchOptions};
@@ -219,13 +225,13 @@ pub fn search_with(options: SearchOptions) -> Search {
     HypothesisSearch::new(
         local(),
         explore(),
-        SampledMve::lenient(),
-        MeanVsd::lenient(),
+        SampledMve::imperfect_mask(),
+        MeanVsd::imperfect_mask(),
         options,
     )
 }
 
-/// `search`: [`local`], followed by a search if its MVE stays above 0.15.
+/// `search`: [`local`], followed by a search if its score stays above 0.15.
 ///
 /// The search ranks 256 rotations and refines 12 of them. The result can be far from the initial
 /// pose, also at a pose that is equivalent by symmetry.
@@ -234,7 +240,7 @@ pub fn search() -> Search {
     search_with(SearchOptions::default())
 }
 
-/// `auto`: [`local`], followed by a search if its MVE stays above 0.2.
+/// `auto`: [`local`], followed by a search if its score stays above 0.2.
 ///
 /// The search ranks 128 rotations and refines six of them. A hypothesis replaces
 /// the local pose if its score is better by 0.02; the result can then be far from the initial pose.
