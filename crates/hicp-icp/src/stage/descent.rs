@@ -57,7 +57,8 @@ impl<C: Score> Stage for Descent<C> {
         };
         let mut context = session.workspace.context(problem);
         let mut best = (self.score.score(&mut context, init), *init);
-        if best.0 <= self.good_enough {
+        // A pose that explains nothing, or is not finite, shows no direction.
+        if best.0 <= self.good_enough || best.0 >= 1.0 {
             return kept;
         }
         let diameter = model.diameter();
