@@ -1,6 +1,7 @@
 //! Compares refinements with imperfect masks to refinements with exact ones, as Markdown tables.
 //!
-//! Run `cargo run --release -p hicp-tests --example masks [CASES] [tuning|test|ycbv] [PRESET…]`.
+//! Run `cargo run --release -p hicp-tests --example masks [CASES] [tuning|test|ycbv] [PIPELINE…]`.
+//! A pipeline is a preset or a TOML file; the default is `local` and `auto`.
 //!
 //! The cases are the visible objects of `hicp_tests::tabletop`. Each starts at the mean error of an
 //! estimator (6.2 mm, 9.5°), every fourth at twice that. With `ycbv`, they are the estimates of
@@ -16,23 +17,24 @@ use hicp_sim::{Household, stream};
 use hicp_tests::median;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
-use hybrid_icp::icp::Workspace;
+use hybrid_icp::icp::{BoxedStage, Workspace};
+use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, ModelPoints, Score};
 use hybrid_icp::{Preset, Refiner};
 
 type Failure = Box<dyn std::error::Error>;
 
-/// The results of a preset with a kind of mask.
+/// The results of a pipeline with a kind of mask.
 #[derive(Clone, Default)]
 struct Results {
     failed: Vec<bool>,
     milliseconds: Vec<f64>,
 }
 
-/// All presets with all kinds of masks.
+/// All pipelines with all kinds of masks.
 struct Study {
-    refiners: Vec<(Preset, Refiner, Vec<Results>)>,
+    refiners: Vec<(String, Refiner<BoxedStage>, Vec<Results>)>,
     workspace: Workspace,
     /// Scores of the true pose, by kind of mask.
     scores: Vec<Vec<f64>>,
@@ -40,13 +42,13 @@ struct Study {
 }
 
 impl Study {
-    fn new(presets: &[Preset]) -> Self {
+    fn new(pipelines: Vec<(String, BoxedStage)>) -> Self {
         let kinds = MaskKind::ALL.len();
-        let refiner = |preset| Refiner::preset(preset);
-        let presets = presets.iter();
+        let results = || vec![Results::default(); kinds];
+        let refiners = pipelines.into_iter();
         Self {
-            refiners: presets
-                .map(|preset| (*preset, refiner(*preset), vec![Results::default(); kinds]))
+            refiners: refiners
+                .map(|(name, stage)| (name, Refiner::new(stage), results()))
                 .collect(),
             workspace: Workspace::new(Rasterizer::default()),
             scores: vec![Vec::new(); kinds],
@@ -54,7 +56,7 @@ impl Study {
         }
     }
 
-    /// Refines a pose with every preset and kind of mask.
+    /// Refines a pose with every pipeline and kind of mask.
     fn add(
         &mut self,
         model: &Model,
@@ -82,6 +84,13 @@ impl Study {
                 results[index].milliseconds.push(time);
                 let mssd = points.mssd(&refined.outcome.camera_from_object, truth);
                 results[index].failed.push(mssd > 0.1 * model.diameter());
+                if mssd > 0.1 * model.diameter() && std::env::var("DIAG").is_ok() {
+                    let from_truth = refiner.refine(model, &observation, truth);
+                    let d = model.diameter();
+                    let mut s = |pose: &Isometry3<f64>| MeanVsd::imperfect_mask().score(&mut self.workspace.context(&Problem::new(model, &observation)), pose);
+                    let (st, sr, sf) = (s(truth), s(&refined.outcome.camera_from_object), s(&from_truth.outcome.camera_from_object));
+                    println!("FAIL {:>18} case {} d {d:.3} px {} init {:.2} end {:.2} fromtruth {:.2} scores truth {st:.3} end {sr:.3} fromtruth {sf:.3} {:?}", kind.name(), self.done, mask.pixels().iter().filter(|m| **m).count(), points.mssd(init, truth)/d, mssd/d, points.mssd(&from_truth.outcome.camera_from_object, truth)/d, refined.confidence);
+                }
             }
         }
         Ok(())
@@ -89,9 +98,9 @@ impl Study {
 
     fn print(&mut self) {
         println!("{} cases per kind of mask.\n", self.done);
-        for (preset, _, results) in &self.refiners {
+        for (name, _, results) in &self.refiners {
             println!(
-                "| `{preset}`: mask | failed % | difference, points, 95 % | ms | time ratio | score of the true pose |"
+                "| `{name}`: mask | failed % | difference, points, 95 % | ms | time ratio | score of the true pose |"
             );
             println!("|---|---:|---:|---:|---:|---:|");
             let exact = &results[0];
@@ -123,12 +132,12 @@ impl Study {
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let cases = arguments.first().map_or(Ok(2000), |text| text.parse())?;
-    let presets: Result<Vec<Preset>, _> = arguments.iter().skip(2).map(|p| p.parse()).collect();
-    let presets = match presets? {
-        none if none.is_empty() => vec![Preset::Local, Preset::Auto],
-        some => some,
+    let names = match arguments.get(2..) {
+        Some(names) if !names.is_empty() => names.to_vec(),
+        _ => vec!["local".to_owned(), "auto".to_owned()],
     };
-    let mut study = Study::new(&presets);
+    let pipelines: Result<Vec<_>, Failure> = names.into_iter().map(pipeline).collect();
+    let mut study = Study::new(pipelines?);
     match arguments.get(1).map(String::as_str) {
         Some("ycbv") => real(&mut study)?,
         Some("tuning") => simulated(&mut study, &Household::TUNING, 0, cases)?,
@@ -136,6 +145,15 @@ fn main() -> Result<(), Failure> {
     }
     study.print();
     Ok(())
+}
+
+/// Builds a preset or the pipeline of a file.
+fn pipeline(name: String) -> Result<(String, BoxedStage), Failure> {
+    let stage = match name.parse::<Preset>() {
+        Ok(preset) => preset.build(),
+        Err(_) => PipelineFile::read(&name)?.build()?,
+    };
+    Ok((name, stage))
 }
 
 fn simulated(

@@ -27,6 +27,8 @@ pub struct Descent<C> {
     pub first_step: f64,
     /// Smallest step, as a share of the model's diameter.
     pub last_step: f64,
+    /// Smallest gain in score of a move.
+    pub min_gain: f64,
     /// Largest number of scores.
     pub evaluations: usize,
 }
@@ -39,6 +41,7 @@ impl<C: Default> Default for Descent<C> {
             good_enough: 0.2,
             first_step: 0.05,
             last_step: 0.0125,
+            min_gain: 0.0,
             evaluations: 80,
         }
     }
@@ -83,7 +86,7 @@ impl<C: Score> Stage for Descent<C> {
                         diameter,
                     );
                     let score = self.score.score(&mut context, &pose);
-                    if score < best.0 {
+                    if score < best.0 - self.min_gain {
                         best = (score, pose);
                         improved = true;
                         break;
