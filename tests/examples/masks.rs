@@ -84,13 +84,6 @@ impl Study {
                 results[index].milliseconds.push(time);
                 let mssd = points.mssd(&refined.outcome.camera_from_object, truth);
                 results[index].failed.push(mssd > 0.1 * model.diameter());
-                if mssd > 0.1 * model.diameter() && std::env::var("DIAG").is_ok() {
-                    let from_truth = refiner.refine(model, &observation, truth);
-                    let d = model.diameter();
-                    let mut s = |pose: &Isometry3<f64>| MeanVsd::imperfect_mask().score(&mut self.workspace.context(&Problem::new(model, &observation)), pose);
-                    let (st, sr, sf) = (s(truth), s(&refined.outcome.camera_from_object), s(&from_truth.outcome.camera_from_object));
-                    println!("FAIL {:>18} case {} d {d:.3} px {} init {:.2} end {:.2} fromtruth {:.2} scores truth {st:.3} end {sr:.3} fromtruth {sf:.3} {:?}", kind.name(), self.done, mask.pixels().iter().filter(|m| **m).count(), points.mssd(init, truth)/d, mssd/d, points.mssd(&from_truth.outcome.camera_from_object, truth)/d, refined.confidence);
-                }
             }
         }
         Ok(())

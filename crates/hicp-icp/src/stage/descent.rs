@@ -34,14 +34,15 @@ pub struct Descent<C> {
 }
 
 impl<C: Default> Default for Descent<C> {
-    /// Runs above a score of 0.2, with steps from 5 % to 1.25 % of the diameter and 80 scores.
+    /// Runs above a score of 0.2, with steps of 5 % and 2.5 % of the diameter and at most 80 scores.
+    /// A move must gain 0.006.
     fn default() -> Self {
         Self {
             score: C::default(),
             good_enough: 0.2,
             first_step: 0.05,
-            last_step: 0.0125,
-            min_gain: 0.0,
+            last_step: 0.025,
+            min_gain: 0.006,
             evaluations: 80,
         }
     }
@@ -55,7 +56,8 @@ impl<C: Score> Stage for Descent<C> {
         session: &mut Session<'_>,
     ) -> Outcome {
         let kept = Outcome::kept(init, Termination::ScoreNotImproved);
-        let Some(model) = problem.model() else {
+        let seen = problem.sides().filter(|(_, o)| o.n_surfels() > 0);
+        let Some((model, _)) = seen else {
             return kept;
         };
         let mut context = session.workspace.context(problem);

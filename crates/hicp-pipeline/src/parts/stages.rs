@@ -151,8 +151,8 @@ pub(super) fn add(catalog: &mut Catalog) {
             score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
             good_enough: p.number("good_enough", FACTOR, 0.2, "score that is kept")?,
             first_step: p.number("first_step", share, 0.05, "first step of the surface")?,
-            last_step: p.number("last_step", share, 0.0125, "smallest step")?,
-            min_gain: p.number("min_gain", FACTOR, 0.0, "smallest gain of a move")?,
+            last_step: p.number("last_step", share, 0.025, "smallest step")?,
+            min_gain: p.number("min_gain", FACTOR, 0.006, "smallest gain of a move")?,
             evaluations: p.count("evaluations", 1, 80, "largest number of scores")?,
         })
     });

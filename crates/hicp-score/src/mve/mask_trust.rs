@@ -57,8 +57,12 @@ pub(crate) const CERTAIN: u8 = 255;
 pub(crate) struct TrustMap {
     /// The mask's box and a border.
     region: PixelRegion,
-    /// The weights of the pixels of the region, row by row; 0 without a measured depth.
+    /// The weights of the pixels of the region, row by row.
+    ///
+    /// Masked pixels without a measured depth have the full weight, so that they do not count
+    /// against a pose.
     weights: Vec<u8>,
+    /// The sum of the weights of measured pixels.
     total: u64,
     /// Standard deviation of the depth noise, meters.
     noise: f64,
@@ -134,18 +138,28 @@ impl TrustMap {
             }
         }
         let mut weights = Vec::with_capacity(region.area());
-        for row in 0..region.height() {
-            let start = row / step * width;
-            weights.extend((0..region.width()).map(|column| {
+        let mut total = 0;
+        for v in region.v_min..region.v_max {
+            let start = (v - region.v_min) as usize / step * width;
+            for u in region.u_min..region.u_max {
+                let measured = depth.get(u, v).is_some_and(|z| z > 0.0);
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // At most 255.
-                let weight = (trust[start + column / step] * f32::from(CERTAIN)) as u8;
-                weight
-            }));
+                let weight = match (measured, mask.get(u, v)) {
+                    (true, _) => {
+                        let column = (u - region.u_min) as usize / step;
+                        (trust[start + column] * f32::from(CERTAIN)) as u8
+                    }
+                    (false, Some(true)) => CERTAIN,
+                    _ => 0,
+                };
+                total += if measured { u64::from(weight) } else { 0 };
+                weights.push(weight);
+            }
         }
         Self {
             region,
-            total: weights.iter().map(|w| u64::from(*w)).sum(),
             weights,
+            total,
             noise,
         }
     }
@@ -155,9 +169,26 @@ impl TrustMap {
         VISIBILITY_TOLERANCE_METERS.max(2.0 * self.noise)
     }
 
-    /// Returns the sum of all weights.
+    /// Returns the sum of the weights of measured pixels.
     pub(crate) fn total(&self) -> u64 {
         self.total
+    }
+
+    /// Returns the same for every `factor`-th pixel of `observation`, computed once.
+    pub(crate) fn total_at(&self, observation: &Observation, diameter: f64, factor: u32) -> u64 {
+        struct Total(u64);
+        let key = diameter.to_bits() ^ u64::from(factor);
+        let total = observation.derived().get_or_build(key, || {
+            let (region, depth) = (&self.region, observation.depth());
+            let on_grid =
+                |from: u32, to: u32| (from.next_multiple_of(factor)..to).step_by(factor as usize);
+            let rows = on_grid(region.v_min, region.v_max);
+            let pixels =
+                rows.flat_map(|v| on_grid(region.u_min, region.u_max).map(move |u| (u, v)));
+            let measured = pixels.filter(|(u, v)| depth.get(*u, *v).is_some_and(|z| z > 0.0));
+            Total(measured.map(|(u, v)| u64::from(self.weight(u, v))).sum())
+        });
+        total.0
     }
 
     /// Returns the weight of a pixel.

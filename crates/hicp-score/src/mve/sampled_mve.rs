@@ -65,7 +65,7 @@ impl SampledMve {
     pub fn imperfect_mask() -> Self {
         Self {
             mask: MaskTrust::Imperfect,
-            ..Self::lenient()
+            ..Self::default()
         }
     }
 
@@ -134,7 +134,7 @@ impl SampledMve {
         let (one, total, hidden_beyond) = match &trust {
             Some(trust) => (
                 u64::from(CERTAIN),
-                trust.total() / u64::from(factor).pow(2),
+                trust.total_at(fine, diameter, factor),
                 -trust.seen_through_meters(),
             ),
             None => {

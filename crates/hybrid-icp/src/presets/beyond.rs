@@ -13,7 +13,7 @@ use hicp_icp::{
     Cascade, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp, IterationLimit,
     Repeat, SearchOptions, Start,
 };
-use hicp_metric::{PointToPoint, Symmetric};
+use hicp_metric::{PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
@@ -24,14 +24,14 @@ pub type GatedIcp<M> = Icp<VisibleSurface, Projective, MaxDistance, M, PaperStop
 /// A stage that pairs observed points with points of the model.
 pub type CloudToModelIcp<M> = Icp<AllSamples, ObservationToModel, (), M, PaperStop>;
 /// The stage of estimates that agree with the image.
-pub type Near = Cascade<(GatedIcp<PointToPoint>, GatedIcp<Symmetric>)>;
+pub type Near<M = PointToPlane> = Cascade<(GatedIcp<PointToPoint>, GatedIcp<M>)>;
 /// The stage of estimates that do not.
 pub type Far = Cascade<(CloudToModelIcp<PointToPoint>, CloudToModelIcp<Symmetric>)>;
 /// The type of [`hybrid_visible`].
 pub type HybridVisible = Repeat<
     Switch<
         Threshold<MeanVsd>,
-        Near,
+        Near<Symmetric>,
         Icp<VisibleSurface, NearestNeighbor, MaxNormalAngle, PointToPoint, PaperStop>,
     >,
 >;
@@ -39,7 +39,7 @@ pub type HybridVisible = Repeat<
 pub type Local = Cascade<(
     SwitchUntilStall<MeanVsd, Near, Far>,
     Descent<MeanVsd>,
-    Guard<GatedIcp<Symmetric>, MeanVsd>,
+    Guard<GatedIcp<PointToPlane>, MeanVsd>,
 )>;
 /// The stage that refines hypotheses.
 pub type Explore = SwitchUntilStall<MeanVsd, Near, CloudToModelIcp<PointToPoint>>;
@@ -73,12 +73,11 @@ fn projective<M>(metric: M, points: usize, iterations: usize) -> GatedIcp<M> {
     }
 }
 
-/// Creates the near stage: the projective cascade with the symmetric metric instead of
-/// point-to-plane.
-fn near(points: usize) -> Near {
+/// Creates the near stage: the projective cascade of point-to-point and another metric.
+fn near<M>(metric: M, points: usize) -> Near<M> {
     Cascade((
         projective(PointToPoint, points, 50),
-        projective(Symmetric, points, 50),
+        projective(metric, points, 50),
     ))
 }
 
@@ -130,7 +129,7 @@ pub fn hybrid_visible() -> HybridVisible {
                 score: MeanVsd::default(),
                 alpha: PAPER_ALPHA,
             },
-            aligned: near(2000),
+            aligned: near(Symmetric, 2000),
             misaligned: Icp {
                 selection: VisibleSurface::default(),
                 association: NearestNeighbor::default(),
@@ -157,7 +156,7 @@ pub fn local() -> Local {
         SwitchUntilStall {
             score: MeanVsd::imperfect_mask(),
             alpha: PAPER_ALPHA,
-            aligned: near(2000),
+            aligned: near(PointToPlane, 2000),
             misaligned: Cascade((
                 observed(far, PointToPoint, coarse()),
                 observed(far, Symmetric, Convergence::default()),
@@ -171,7 +170,7 @@ pub fn local() -> Local {
             ..Descent::default()
         },
         Guard {
-            stage: projective(Symmetric, 4000, 5),
+            stage: projective(PointToPlane, 4000, 20),
             score: MeanVsd::imperfect_mask(),
         },
     ))
@@ -182,7 +181,7 @@ fn explore() -> Explore {
     SwitchUntilStall {
         score: MeanVsd::imperfect_mask(),
         alpha: PAPER_ALPHA,
-        aligned: near(1000),
+        aligned: near(PointToPlane, 1000),
         misaligned: observed((150, 2000), PointToPoint, coarse()),
         max_steps: 2,
         min_gain: 0.01,
