@@ -59,11 +59,11 @@ pub struct SearchOptions {
 impl Default for SearchOptions {
     /// 256 rotations of SO(3), of which 12 at least 20° apart are refined, without a bound.
     ///
-    /// The search starts above a score of 0.15, and a hypothesis must be better by 0.02.
+    /// The search starts above a score of 0.1, and a hypothesis must be better by 0.02.
     fn default() -> Self {
         Self {
             start: Start::Refined,
-            threshold: 0.15,
+            threshold: 0.1,
             good_enough: 0.05,
             min_gain: 0.02,
             rotations: Rotations::Even,

@@ -210,7 +210,7 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     let used = "use of the initial pose; if ignored, the search always runs";
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
-        threshold: p.number("threshold", FACTOR, 0.15, "searches above this score")?,
+        threshold: p.number("threshold", FACTOR, 0.1, "searches above this score")?,
         good_enough: p.number("good_enough", FACTOR, 0.05, "score that ends it")?,
         min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
         rotations: p.word("rotations", &rotations, tried)?,

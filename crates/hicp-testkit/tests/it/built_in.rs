@@ -292,7 +292,9 @@ fn built_in_stages_keep_the_laws() {
             good_enough: 0.0,
             ..Descent::<MeanVsd>::default()
         },
-        laws,
+        StageLaws {
+            tells_the_observer: false,
+        },
     );
     check_stage(
         || KeepBest {

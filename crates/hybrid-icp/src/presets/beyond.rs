@@ -230,7 +230,7 @@ pub fn search_with(options: SearchOptions) -> Search {
     )
 }
 
-/// `search`: [`local`], followed by a search if its score stays above 0.15.
+/// `search`: [`local`], followed by a search if its score stays above 0.1.
 ///
 /// The search ranks 256 rotations and refines 12 of them. The result can be far from the initial
 /// pose, also at a pose that is equivalent by symmetry.
