@@ -34,8 +34,8 @@ pub struct Descent<C> {
 }
 
 impl<C: Default> Default for Descent<C> {
-    /// Runs above a score of 0.2, with steps of 5 % and 2.5 % of the diameter and at most 80 scores.
-    /// A move must gain 0.006.
+    /// Runs above a score of 0.2, with steps of 5 % and 2.5 % of the diameter. A move must gain
+    /// 0.006, and at most 80 scores are spent.
     fn default() -> Self {
         Self {
             score: C::default(),

@@ -266,7 +266,7 @@ fn widened(region: &PixelRegion, width: u32, height: u32) -> PixelRegion {
 
 /// Replaces infinite values by the distances, in pixels, to the nearest zero.
 ///
-/// The values are `step` pixels apart. /// The error of this two-pass transform is at most 8 %.
+/// The values are `step` pixels apart. The error of this two-pass transform is at most 8 %.
 fn to_zero(distances: &mut [f32], width: usize, step: f32) {
     let diagonal = std::f32::consts::SQRT_2 * step;
     // The second pass is the first one, from the last pixel to the first.
