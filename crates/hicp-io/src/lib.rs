@@ -31,6 +31,9 @@
 //! ```
 
 mod error;
+mod format;
+#[cfg(feature = "npy")]
+mod npy;
 
 mod limits;
 pub use limits::ReadLimits;
@@ -53,22 +56,22 @@ pub use unit::{LengthUnit, UnknownUnit};
 mod mesh;
 pub use mesh::{read_mesh, write_obj, write_ply};
 
-mod point_cloud;
-pub use point_cloud::{PointCloud, read_point_cloud_ply, write_point_cloud_ply};
+mod cloud;
+pub use cloud::{PointCloud, read_cloud, read_point_cloud_ply, write_point_cloud_ply};
 
 mod image;
 pub use image::{
-    read_depth_png, read_mask_png, read_png_size, read_rgb_png, write_depth_png, write_mask_png,
-    write_rgb_png,
+    MaskFile, MaskRule, RawDepth, read_depth, read_depth_png, read_mask, read_mask_png,
+    read_png_size, read_rgb_png, write_depth_png, write_mask_png, write_rgb_png,
 };
 
+mod document;
 mod json;
 
 mod pose;
-pub use pose::{PoseFile, pose_from_bop, pose_to_bop, read_pose_json, write_pose_json};
+pub use pose::{PoseFile, pose_from_bop, pose_to_bop, read_pose, read_pose_json, write_pose_json};
 
 mod camera;
-mod camera_model;
-pub use camera::{CameraFile, read_camera_json};
+pub use camera::{CameraFile, Distortion, read_camera, read_camera_json, register_depth};
 
 pub mod bop;

@@ -13,9 +13,12 @@ mod refine;
 pub type Target = fn(&[u8]);
 
 /// Every target by name: one per reader, and one for whole refinements.
-pub const TARGETS: [(&str, Target); 11] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("bop_json", readers::bop_json),
     ("camera_json", readers::camera_json),
+    ("cloud", readers::cloud),
+    ("gltf", readers::gltf),
+    ("image", readers::image),
     ("obj", readers::obj),
     ("pipeline_toml", readers::pipeline_toml),
     ("ply", readers::ply),

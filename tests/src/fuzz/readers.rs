@@ -8,8 +8,9 @@ use hicp_io::bop::{
     Rle, Scene, read_detections, read_models_info, read_results, read_targets, write_results,
 };
 use hicp_io::{
-    IoError, LengthUnit, read_camera_json, read_depth_png, read_mask_png, read_mesh,
-    read_point_cloud_ply, read_pose_json, read_rgb_png, write_mask_png, write_ply, write_pose_json,
+    IoError, LengthUnit, MaskFile, MaskRule, read_camera, read_camera_json, read_cloud, read_depth,
+    read_depth_png, read_mask, read_mask_png, read_mesh, read_point_cloud_ply, read_pose,
+    read_pose_json, read_rgb_png, write_mask_png, write_ply, write_pose_json,
 };
 use hybrid_icp::core::{TriMesh, se3};
 use hybrid_icp::pipeline::PipelineFile;
@@ -66,6 +67,23 @@ pub(super) fn obj(data: &[u8]) {
     mesh("a.obj", data);
 }
 
+pub(super) fn gltf(data: &[u8]) {
+    mesh("a.glb", data);
+}
+
+/// Reads the bytes as a point cloud of any format.
+pub(super) fn cloud(data: &[u8]) {
+    let path = with_bytes("a.cloud", data);
+    if let Some(cloud) = checked(&path, read_cloud(&path, LengthUnit::Meters)) {
+        assert!(cloud.points.iter().all(|p| p.iter().all(|x| x.is_finite())));
+        assert!(
+            cloud
+                .normals
+                .is_none_or(|normals| normals.len() == cloud.points.len())
+        );
+    }
+}
+
 pub(super) fn stl(data: &[u8]) {
     mesh("a.stl", data);
 }
@@ -90,6 +108,19 @@ pub(super) fn png(data: &[u8]) {
     }
     if let Some((width, height, pixels)) = checked(&path, read_rgb_png(&path)) {
         assert_eq!(pixels.len(), width as usize * height as usize * 3);
+    }
+}
+
+/// Reads the bytes as a depth image and as a mask of any format.
+pub(super) fn image(data: &[u8]) {
+    let path = with_bytes("a.image", data);
+    if let Some(depth) = checked(&path, read_depth(&path, Some(0.1))) {
+        assert!(depth.pixels().iter().all(|z| z.is_finite() && *z >= 0.0));
+    }
+    for rule in [MaskRule::NotZero, MaskRule::AtLeast(0.5)] {
+        if let Some(MaskFile { warning, .. }) = checked(&path, read_mask(&path, rule)) {
+            assert!(warning.is_none_or(|text| text.len() < 500));
+        }
     }
 }
 
@@ -232,6 +263,10 @@ pub(super) fn pipeline_toml(data: &[u8]) {
 
 pub(super) fn pose_json(data: &[u8]) {
     let path = with_bytes("pose.json", data);
+    if let Some(file) = checked(&path, read_pose(&path, Some(LengthUnit::Meters))) {
+        let pose = file.camera_from_object;
+        assert!(se3::is_finite(&pose), "{pose:?}");
+    }
     let Some(file) = checked(&path, read_pose_json(&path)) else {
         return;
     };
@@ -251,7 +286,13 @@ pub(super) fn pose_json(data: &[u8]) {
 
 pub(super) fn camera_json(data: &[u8]) {
     let path = with_bytes("camera.json", data);
-    if let Some(file) = checked(&path, read_camera_json(&path, (64, 48))) {
+    for file in [
+        checked(&path, read_camera_json(&path, (64, 48))),
+        checked(&path, read_camera(&path, (64, 48))),
+    ]
+    .into_iter()
+    .flatten()
+    {
         let camera = file.camera;
         assert_eq!((camera.width(), camera.height()), (64, 48));
         assert!(

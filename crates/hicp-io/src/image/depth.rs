@@ -1,11 +1,12 @@
-//! Depth images in 16-bit PNG files.
+//! Depth images: 16-bit PNG files, and files of other formats.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hicp_core::DepthImage;
 use png::{BitDepth, ColorType, Transformations};
 
 use super::pixels;
+use super::raster::Raster;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 
@@ -53,6 +54,98 @@ impl ReadLimits {
         let meters = image.bytes.chunks_exact(2).map(to_meters).collect();
         let depth = DepthImage::from_meters(image.width, image.height, meters);
         depth.map_err(|error| IoError::unusable(path, "depth image", error))
+    }
+}
+
+/// The supported formats.
+const EXPECTED: &str = "a depth image as PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
+
+/// Reads a depth image of any supported format, recognized by its first bytes.
+///
+/// - PNG, PGM and TIFF: 16-bit gray.
+/// - TIFF, NPY, NPZ, EXR and PFM: floating point of 16, 32 or 64 bits; NPY and NPZ also integers.
+///
+/// 0, NaN, infinity and negative numbers mean missing. `millimeters_per_unit` is the depth of one
+/// unit. `None` means that the numbers are meters, which only floating point can be. EXR files need
+/// a channel `Z`, or a single channel. NPZ archives need a single array, or one named `depth`.
+///
+/// # Errors
+///
+/// As for [`read_depth_png`]. Also if the numbers are integers and there is no unit, or if the
+/// format needs a cargo feature that is off.
+pub fn read_depth(
+    path: impl AsRef<Path>,
+    millimeters_per_unit: Option<f64>,
+) -> Result<DepthImage, IoError> {
+    ReadLimits::DEFAULT
+        .read_raw_depth(path)?
+        .scaled(millimeters_per_unit)
+}
+
+/// A depth image in the unit of its file.
+///
+/// It serves callers that need its size or the type of its numbers before they can state the unit.
+#[derive(Debug)]
+pub struct RawDepth {
+    path: PathBuf,
+    raster: Raster,
+}
+
+impl RawDepth {
+    /// Returns the width and height, pixels.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        (self.raster.width, self.raster.height)
+    }
+
+    /// Returns whether the numbers are floating point, and so probably meters.
+    #[must_use]
+    pub fn is_float(&self) -> bool {
+        self.raster.integer_bits.is_none()
+    }
+
+    /// Converts to meters, as [`read_depth`] does.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError`] if the unit is not finite and positive, or is missing for integers.
+    #[allow(clippy::cast_possible_truncation, reason = "depths are rounded to f32")]
+    pub fn scaled(self, millimeters_per_unit: Option<f64>) -> Result<DepthImage, IoError> {
+        let (path, (width, height)) = (&self.path, self.size());
+        let millimeters = match millimeters_per_unit {
+            Some(millimeters) => millimeters,
+            None if self.is_float() => 1000.0,
+            None => {
+                let expected = "floating-point meters, or the millimeters per unit (--depth-scale)";
+                return Err(IoError::new(path, None, "integers", expected));
+            }
+        };
+        check_scale(path, millimeters)?;
+        let meters = |units: f32| (f64::from(units) * millimeters / 1000.0) as f32;
+        let depth = DepthImage::collect(width, height, self.raster.samples.into_iter().map(meters));
+        depth.map_err(|error| IoError::unusable(path, "depth image", error))
+    }
+}
+
+impl ReadLimits {
+    /// Reads a depth image of any format, as [`read_depth`] does, but in the unit of its file.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_depth`].
+    pub fn read_raw_depth(&self, path: impl AsRef<Path>) -> Result<RawDepth, IoError> {
+        let path = path.as_ref();
+        let raster = Raster::read(self, path, EXPECTED)?;
+        let found = match (raster.channels, raster.integer_bits) {
+            (2.., _) => format!("{} numbers per pixel", raster.channels),
+            (_, Some(bits @ ..16)) => format!("{bits}-bit gray pixels"),
+            _ => {
+                let path = path.to_owned();
+                return Ok(RawDepth { path, raster });
+            }
+        };
+        let expected = "16-bit gray pixels, or one floating-point number per pixel";
+        Err(IoError::new(path, None, found, expected))
     }
 }
 

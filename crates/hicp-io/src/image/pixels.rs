@@ -3,16 +3,13 @@
 use std::io::{self, Cursor};
 use std::path::Path;
 
-use hicp_core::MAX_IMAGE_SIDE;
 use png::{BitDepth, ColorType, DecodingError, Transformations};
 
+use super::raster::{Raster, check_size, unpack};
 use crate::atomic::write_atomically;
-use crate::error::{IoError, Place};
-use crate::limits::{Limit, ReadLimits};
+use crate::error::IoError;
+use crate::limits::ReadLimits;
 use crate::source::read_head;
-
-/// Deflate compresses at most 1032 bytes into one: a smaller file cannot hold its header's image.
-const MAX_COMPRESSION: u64 = 1032;
 
 /// The pixels of an image as the decoder returns them.
 ///
@@ -22,7 +19,38 @@ pub(super) struct Pixels {
     pub(super) height: u32,
     pub(super) color: ColorType,
     pub(super) depth: BitDepth,
+    /// For a palette: whether a color is black or transparent.
+    background: Option<Vec<bool>>,
     pub(super) bytes: Vec<u8>,
+}
+
+impl From<Pixels> for Raster {
+    fn from(image: Pixels) -> Self {
+        let channels = image.color.samples();
+        let samples = match image.depth {
+            BitDepth::Sixteen => {
+                let pairs = image.bytes.chunks_exact(2);
+                pairs
+                    .map(|b| u16::from_be_bytes([b[0], b[1]]).into())
+                    .collect()
+            }
+            depth => unpack(
+                &image.bytes,
+                image.width as usize * channels,
+                depth as usize,
+            ),
+        };
+        Self {
+            channels,
+            has_alpha: matches!(image.color, ColorType::GrayscaleAlpha | ColorType::Rgba),
+            background: image.background,
+            ..Self::gray(
+                (image.width, image.height),
+                Some(image.depth as u32),
+                samples,
+            )
+        }
+    }
 }
 
 /// Decodes a PNG file. If `only_depth` is set, refuses all pixel types except 16-bit gray.
@@ -51,19 +79,8 @@ pub(super) fn read(
         let found = describe(header.color_type, header.bit_depth);
         return Err(IoError::new(path, None, found, "16-bit gray pixels"));
     }
-    let count = u64::from(width) * u64::from(height);
-    let found = format!("{width}x{height} pixels");
-    if width.max(height) > MAX_IMAGE_SIDE {
-        let expected = format!("sides of 1 to {MAX_IMAGE_SIDE}");
-        return Err(IoError::new(path, Place::Byte(16), found, expected));
-    }
-    let within = limits.check(Limit::PIXELS, path, Place::Byte(16), count);
-    within.map_err(|mut error| {
-        error.found = found;
-        error
-    })?;
-    let needed = (header.raw_bytes() as u64) / MAX_COMPRESSION;
-    IoError::check_promise(path, Place::Byte(16), (count, "pixels"), needed, available)?;
+    let (size, raw) = ((width.into(), height.into()), header.raw_bytes() as u64);
+    check_size(limits, (path, 16), size, raw, available)?;
 
     let mut reader = decoder.read_info().map_err(failed)?;
     // The decoder does not check the palette. It panics if the palette is cut short or has more
@@ -77,6 +94,19 @@ pub(super) fn read(
             return Err(IoError::new(path, None, found, expected));
         }
     }
+    let background = reader
+        .info()
+        .palette
+        .as_ref()
+        .filter(|_| indexed)
+        .map(|palette| {
+            let opacities = reader.info().trns.as_deref().unwrap_or_default();
+            let transparent = |index: usize| opacities.get(index) == Some(&0);
+            let colors = palette.chunks_exact(3).enumerate();
+            colors
+                .map(|(index, color)| *color == [0; 3] || transparent(index))
+                .collect()
+        });
     let size = reader.output_buffer_size();
     let size = size.ok_or(DecodingError::LimitsExceeded).map_err(failed)?;
     let mut bytes = Vec::new();
@@ -91,6 +121,7 @@ pub(super) fn read(
         height,
         color,
         depth,
+        background,
         bytes,
     })
 }

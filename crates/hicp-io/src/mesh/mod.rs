@@ -1,14 +1,16 @@
-//! Reading and writing of meshes as OBJ, OFF, PLY and STL files.
+//! Reading of meshes as GLB, glTF, OBJ, OFF, PLY and STL files, and writing.
 
 use std::path::Path;
 
 use hicp_core::TriMesh;
 
 use crate::error::IoError;
+use crate::format::{self, Format};
 use crate::limits::ReadLimits;
 use crate::source::read_head;
 use crate::unit::LengthUnit;
 
+mod gltf;
 mod lines;
 mod obj;
 mod off;
@@ -23,13 +25,17 @@ pub use write::{write_obj, write_ply};
 
 /// Reads a triangle mesh; the extension selects the format.
 ///
-/// The extension is `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case. Only geometry is
-/// read: materials, colors, normals, texture coordinates, lines and points are skipped. All objects
-/// and groups of a file become one mesh. Polygons are triangulated, concave ones by ear clipping.
+/// The extension is `.glb`, `.gltf`, `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case. Only
+/// geometry is read: materials, colors, normals, texture coordinates, lines and points are skipped.
+/// All objects and groups of a file become one mesh. Polygons are triangulated, concave ones by ear
+/// clipping.
 ///
 /// Coordinates are converted from `unit` to meters in `f64` and then rounded to `f32`. STL files
 /// already hold `f32`.
 ///
+/// - GLB and glTF: triangles, strips and fans of the default scene, with the transforms of its
+///   nodes; also quantized and sparse. The unit of the format is the meter, and y is up; the axes
+///   stay. Draco and meshopt compression is refused. Buffers are read from files next to it.
 /// - OBJ: relative indices, continued lines, comments after a record and any line ending are
 ///   accepted. Only the first three numbers of a vertex are read. Vertices that no face uses are
 ///   dropped.
@@ -74,13 +80,14 @@ impl ReadLimits {
             .to_string_lossy()
             .to_lowercase();
         let (check_head, parse): (CheckHead, Parse) = match extension.as_str() {
+            "glb" | "gltf" => (|_, _, _| Ok(()), gltf::parse),
             "obj" => (|_, _, _| Ok(()), obj::parse),
             "off" => (|_, _, _| Ok(()), off::parse),
             "ply" => (ply::check_head, ply::parse_mesh),
             "stl" => (stl::check_head, stl::parse),
             _ => {
                 let found = format!("a file with the extension {extension:?}");
-                return Err(IoError::new(path, None, found, ".obj, .off, .ply or .stl"));
+                return Err(IoError::new(path, None, found, EXTENSIONS));
             }
         };
         let reading = Reading {
@@ -90,9 +97,31 @@ impl ReadLimits {
         };
         // Check counts from the first bytes, to refuse a large file before reading all of it.
         let (head, bytes) = read_head(path)?;
+        check_format(path, &extension, &head)?;
         check_head(&reading, &head, bytes)?;
         parse(reading, self.read_bytes(path)?)?.finish()
     }
+}
+
+/// The extensions of the supported formats.
+const EXTENSIONS: &str = ".glb, .gltf, .obj, .off, .ply or .stl";
+
+/// Returns an error if the first bytes show another format than the extension.
+///
+/// The header of a binary STL file may start with any bytes, so only long signatures count.
+fn check_format(path: &Path, extension: &str, head: &[u8]) -> Result<(), IoError> {
+    use Format::{Exr, Glb, Gzip, Hdf5, Jpeg, Npy, Npz, Pcd, Ply, Png, Tiff};
+    let wanted = match Format::of(head) {
+        Some(Glb) if !extension.starts_with("gl") => ": rename it to .glb",
+        Some(Ply) if extension != "ply" && head.trim_ascii_start().starts_with(b"ply\n") => {
+            ": rename it to .ply"
+        }
+        Some(Pcd) => ": a cloud has no faces; make a surface first",
+        Some(Exr | Gzip | Hdf5 | Jpeg | Npy | Npz | Png | Tiff) => "",
+        _ => return Ok(()),
+    };
+    let expected = format!("a mesh named {EXTENSIONS}{wanted}");
+    Err(format::refuse(path, head, &expected))
 }
 
 type CheckHead = fn(&Reading<'_>, &[u8], u64) -> Result<(), IoError>;
@@ -115,13 +144,13 @@ mod tests {
 
     #[test]
     fn errors_name_an_unknown_extension() {
-        for (name, extension) in [("mesh.GLTF", "gltf"), ("mesh.ply.gz", "gz"), ("mesh", "")] {
+        for (name, extension) in [("mesh.DAE", "dae"), ("mesh.ply.gz", "gz"), ("mesh", "")] {
             match read_mesh(name, LengthUnit::Meters) {
                 Err(IoError {
                     found, expected, ..
                 }) => {
                     assert_eq!(found, format!("a file with the extension {extension:?}"));
-                    assert_eq!(expected, ".obj, .off, .ply or .stl");
+                    assert_eq!(expected, EXTENSIONS);
                 }
                 other => panic!("{other:?}"),
             }

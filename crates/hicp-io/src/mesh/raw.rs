@@ -19,7 +19,7 @@ pub(crate) struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    pub(super) fn refuse(
+    pub(crate) fn refuse(
         &self,
         place: Place,
         found: impl Into<String>,
@@ -28,12 +28,12 @@ impl Reading<'_> {
         IoError::new(self.path, place, found, expected)
     }
 
-    pub(super) fn check(&self, limit: Limit, place: Place, count: usize) -> Result<(), IoError> {
+    pub(crate) fn check(&self, limit: Limit, place: Place, count: usize) -> Result<(), IoError> {
         self.limits.check(limit, self.path, place, count as u64)
     }
 
     /// Returns an error for a position, in the unit of the file, that a mesh cannot have.
-    pub(super) fn check_position(&self, place: Place, position: &[f64]) -> Result<(), IoError> {
+    pub(crate) fn check_position(&self, place: Place, position: &[f64]) -> Result<(), IoError> {
         let most = f64::from(MAX_COORDINATE_METERS) * self.unit.units_per_meter();
         // The limit is below 2^24 and so exact in `f32`; rounding cannot exceed it.
         if position.iter().all(|x| x.abs() <= most) {

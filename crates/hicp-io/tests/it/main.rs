@@ -9,11 +9,17 @@
 
 mod any_bytes;
 mod awkward_files;
+#[cfg(feature = "all-formats")]
+mod camera_pose_formats;
 mod common;
 mod dataset_paths;
 mod hostile_files;
 mod hostile_images;
+#[cfg(feature = "all-formats")]
+mod image_formats;
 mod json_limits;
+#[cfg(feature = "all-formats")]
+mod mesh_cloud_formats;
 mod results;
 mod unwritable_numbers;
 mod ycbv;

@@ -1,4 +1,4 @@
-//! The location of the data folder that some tests need.
+//! The locations of files that tests read.
 
 use std::path::PathBuf;
 
@@ -15,4 +15,12 @@ pub(crate) fn data(part: &str) -> Option<PathBuf> {
         println!("skipped: {} does not exist (set HICP_DATA)", path.display());
         None
     }
+}
+
+/// Returns the path of a file in `tests/fixtures`.
+#[cfg(feature = "all-formats")]
+pub(crate) fn fixture(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures")
+        .join(name)
 }

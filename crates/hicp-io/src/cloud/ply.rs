@@ -4,20 +4,12 @@ use std::path::Path;
 
 use hicp_core::{Point3, UnitVector3, Vector3};
 
+use super::points::PointCloud;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 use crate::mesh::ply;
 use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
-
-/// Points in meters, with normals if the file has them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PointCloud {
-    /// Positions, meters.
-    pub points: Vec<Point3<f32>>,
-    /// One unit normal per point, or none at all.
-    pub normals: Option<Vec<UnitVector3<f32>>>,
-}
 
 /// Reads the vertices of an ASCII or binary PLY file as a point cloud.
 ///
@@ -34,8 +26,13 @@ pub fn read_point_cloud_ply(
 ) -> Result<PointCloud, IoError> {
     let path = path.as_ref();
     let limits = &ReadLimits::DEFAULT;
-    let reading = Reading { path, unit, limits };
-    let raw = ply::parse_points(reading, &limits.read_bytes(path)?)?;
+    parse(Reading { path, unit, limits }, &limits.read_bytes(path)?)
+}
+
+/// Parses the vertices of a PLY file.
+pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
+    let (path, unit) = (reading.path, reading.unit);
+    let raw = ply::parse_points(reading, content)?;
     let in_meters = |p: &Point3<f64>| (p / unit.units_per_meter()).cast::<f32>();
     let points = raw.vertices.iter().map(in_meters).collect();
     // A file has normals for all vertices or for none.

@@ -1,4 +1,4 @@
-//! Reading of cameras from JSON files.
+//! Reading of cameras from JSON files of BOP.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,8 +6,10 @@ use std::path::Path;
 use hicp_core::{Matrix3, PinholeCamera};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 
-use crate::camera_model::CameraModel;
+use super::distortion::Distortion;
+use super::model::CameraModel;
 use crate::error::{IoError, IoErrorKind, Place};
 use crate::json::{self, ById, Numbers, Positive};
 use crate::limits::{Limit, ReadLimits};
@@ -21,6 +23,26 @@ pub struct CameraFile {
     pub camera: PinholeCamera,
     /// Millimeters per unit of its depth images, if stated.
     pub depth_scale: Option<f64>,
+    /// The distortion of its images, if any.
+    pub distortion: Option<Distortion>,
+}
+
+/// Returns whether a JSON value has the form of BOP's cameras.
+pub(super) fn is_bop(root: &Value) -> bool {
+    let Value::Object(members) = root else {
+        return false;
+    };
+    let is_id = |key: &String| key.parse::<u32>().is_ok();
+    let of_images = !members.is_empty() && members.keys().all(is_id);
+    let camera = match members.values().next() {
+        Some(Value::Object(first)) if of_images => first,
+        _ => members,
+    };
+    let flat = ["fx", "fy", "cx", "cy", "width", "height"];
+    ["cam_K", "cam_model"]
+        .iter()
+        .any(|key| camera.contains_key(*key))
+        || (flat.iter().all(|key| camera.contains_key(*key)) && !camera.contains_key("ppx"))
 }
 
 /// The keys of all supported forms of a camera.
@@ -153,6 +175,7 @@ fn camera_of(
     Ok(CameraFile {
         camera,
         depth_scale,
+        distortion: None,
     })
 }
 
@@ -188,7 +211,8 @@ mod tests {
                 read(&text).unwrap(),
                 CameraFile {
                     camera,
-                    depth_scale
+                    depth_scale,
+                    distortion: None
                 }
             );
         }

@@ -34,7 +34,7 @@ pub fn pose_from_bop(
     Ok(pose(rotation, translation_mm))
 }
 
-fn pose(rotation: UnitQuaternion<f64>, translation_mm: &[f64; 3]) -> Isometry3<f64> {
+pub(super) fn pose(rotation: UnitQuaternion<f64>, translation_mm: &[f64; 3]) -> Isometry3<f64> {
     let [x, y, z] = translation_mm.map(|mm| mm / 1000.0);
     Isometry3::from_parts(Translation3::new(x, y, z), rotation)
 }

@@ -1,0 +1,86 @@
+//! Lens distortion, removed from images when they are read.
+
+use hicp_core::{DepthImage, Mask, PinholeCamera};
+
+/// A lens distortion: where the ray through a point of the ideal image plane really hits the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Distortion {
+    /// Brown–Conrady with k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order, `plumb_bob` and
+    /// `rational_polynomial` in ROS. The last three are 0 in the model of five parameters.
+    BrownConrady([f64; 8]),
+    /// Kannala–Brandt with k1 to k4, OpenCV's `fisheye` and `equidistant` in ROS.
+    KannalaBrandt([f64; 4]),
+}
+
+impl Distortion {
+    /// Moves a point of the plane at depth 1 to its place in the real image, both divided by z.
+    #[must_use]
+    pub fn distort(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let r2 = x * x + y * y;
+        match self {
+            Self::BrownConrady([k1, k2, p1, p2, k3, k4, k5, k6]) => {
+                let above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+                let radial = above / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+                [
+                    x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                    y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+                ]
+            }
+            Self::KannalaBrandt([k1, k2, k3, k4]) => {
+                let r = r2.sqrt();
+                let angle = r.atan();
+                let a2 = angle * angle;
+                let bent = angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))));
+                let factor = if r < 1e-12 { 1.0 } else { bent / r };
+                [x * factor, y * factor]
+            }
+        }
+    }
+
+    /// Removes the distortion from a depth image of `camera`, with the nearest pixel.
+    ///
+    /// Depth is along the optical axis, so its values stay. A pixel that the real image does not
+    /// show becomes missing.
+    ///
+    #[must_use]
+    pub fn undistort_depth(&self, camera: &PinholeCamera, depth: &DepthImage) -> DepthImage {
+        let pixels = self.sources(camera, depth.width(), depth.height());
+        let pixels = pixels.map(|source| source.and_then(|(u, v)| depth.get(u, v)));
+        let (width, height) = (depth.width(), depth.height());
+        let image = DepthImage::collect(width, height, pixels.map(Option::unwrap_or_default));
+        image.unwrap_or_else(|_| depth.clone())
+    }
+
+    /// Removes the distortion from a mask of `camera`, with the nearest pixel.
+    #[must_use]
+    pub fn undistort_mask(&self, camera: &PinholeCamera, mask: &Mask) -> Mask {
+        let pixels = self.sources(camera, mask.width(), mask.height());
+        let pixels = pixels.map(|source| source.and_then(|(u, v)| mask.get(u, v)));
+        let pixels = pixels.map(Option::unwrap_or_default).collect();
+        Mask::new(mask.width(), mask.height(), pixels).unwrap_or_else(|_| mask.clone())
+    }
+
+    /// Returns the pixel of the real image for each pixel of the ideal one, row by row.
+    fn sources(
+        &self,
+        camera: &PinholeCamera,
+        width: u32,
+        height: u32,
+    ) -> impl Iterator<Item = Option<(u32, u32)>> {
+        let (fx, fy, cx, cy) = (camera.fx(), camera.fy(), camera.cx(), camera.cy());
+        (0..height).flat_map(move |v| {
+            (0..width).map(move |u| {
+                let ideal = [(f64::from(u) - cx) / fx, (f64::from(v) - cy) / fy];
+                let [x, y] = self.distort(ideal);
+                let (u, v) = ((x * fx + cx).round(), (y * fy + cy).round());
+                let inside = u >= 0.0 && v >= 0.0 && u < width.into() && v < height.into();
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "inside of the image"
+                )]
+                inside.then_some((u as u32, v as u32))
+            })
+        })
+    }
+}

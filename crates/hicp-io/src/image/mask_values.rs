@@ -1,0 +1,202 @@
+//! Masks of any format, from the values of their pixels.
+
+use std::path::Path;
+
+use hicp_core::Mask;
+
+use super::raster::Raster;
+use crate::error::IoError;
+use crate::limits::ReadLimits;
+
+/// The supported formats.
+const EXPECTED: &str = "a mask as PNG, TIFF, BMP, NPY, NPZ or PGM";
+
+/// The pixels of a mask that belong to the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MaskRule {
+    /// Every value but 0.
+    #[default]
+    NotZero,
+    /// Every value of at least this number, for probabilities and soft masks.
+    AtLeast(f64),
+    /// The value, for label images.
+    Equal(f64),
+}
+
+impl MaskRule {
+    /// The value of a pixel of color: this plus 65536 · red + 256 · green + blue, each from 0 to
+    /// 255.
+    pub const COLOR: f64 = 16_777_216.0;
+}
+
+/// A mask, and a warning about its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskFile {
+    /// The mask.
+    pub mask: Mask,
+    /// For [`MaskRule::NotZero`]: the values and the options that choose among them, if there are
+    /// more than two values or none is 0.
+    pub warning: Option<String>,
+}
+
+/// Reads a mask of any supported format, recognized by its first bytes.
+///
+/// `rule` selects the pixels of the object by their value. The value of a pixel is its gray value,
+/// or in a palette image its index. Colors that are not gray have values from [`MaskRule::COLOR`].
+/// If the opacity of an image varies, it is the value instead; an opaque image has its colors.
+///
+/// # Errors
+///
+/// [`IoError`] if the file is not an image of such a format, is above a limit or damaged, or if
+/// `rule` selects no pixel (never for [`MaskRule::NotZero`]).
+pub fn read_mask(path: impl AsRef<Path>, rule: MaskRule) -> Result<MaskFile, IoError> {
+    ReadLimits::DEFAULT.read_mask(path, rule)
+}
+
+impl ReadLimits {
+    /// Reads a mask as [`read_mask`] does, within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_mask`].
+    pub fn read_mask(&self, path: impl AsRef<Path>, rule: MaskRule) -> Result<MaskFile, IoError> {
+        let path = path.as_ref();
+        let image = Raster::read(self, path, EXPECTED)?;
+        let values = values(&image);
+        let background = image.background.as_deref().unwrap_or_default();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an index of a palette"
+        )]
+        let is_background = |value: f64| {
+            background
+                .get(value as usize)
+                .copied()
+                .unwrap_or(value == 0.0)
+        };
+        let selected = |value: f64| match rule {
+            MaskRule::NotZero => !is_background(value),
+            MaskRule::AtLeast(least) => value >= least,
+            MaskRule::Equal(number) => value == number,
+        };
+        let pixels: Vec<bool> = values.clone().map(selected).collect();
+        let mut warning = None;
+        if rule == MaskRule::NotZero {
+            let found = Values::of(values);
+            let no_background = !found.distinct.iter().any(|value| is_background(*value));
+            warning = found.warning(no_background);
+        } else if !pixels.contains(&true) {
+            let found = format!("no pixel that fits {rule:?}");
+            let expected = format!("one of {}", Values::of(values).names());
+            return Err(IoError::new(path, None, found, expected));
+        }
+        let mask = Mask::new(image.width, image.height, pixels);
+        let mask = mask.map_err(|error| IoError::unusable(path, "mask", error))?;
+        Ok(MaskFile { mask, warning })
+    }
+}
+
+/// Returns the value of every pixel.
+fn values(image: &Raster) -> impl Iterator<Item = f64> + Clone {
+    let pixels = image.samples.chunks_exact(image.channels);
+    let colors = image.channels - usize::from(image.has_alpha);
+    let opacity = pixels.clone().map(move |pixel| pixel[colors..].first());
+    let first = opacity.clone().next().flatten();
+    let varies = image.has_alpha && opacity.clone().any(|alpha| alpha != first);
+    // Only the upper 8 bits of a color count.
+    let shift = if image.integer_bits == Some(16) {
+        256.0
+    } else {
+        1.0
+    };
+    pixels.map(move |pixel| match pixel {
+        [.., alpha] if varies => f64::from(*alpha),
+        [red, green, blue, ..] if !(red == green && green == blue) => {
+            let [red, green, blue] = [red, green, blue].map(|x| f64::from(x / shift).floor());
+            MaskRule::COLOR + 65536.0 * red + 256.0 * green + blue
+        }
+        // NaN is no object.
+        [gray, ..] if !gray.is_nan() => f64::from(*gray),
+        _ => 0.0,
+    })
+}
+
+/// Returns the value as a message shows it.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a color has 24 bits"
+)]
+fn shown(value: f64) -> String {
+    match value.abs() {
+        color if (MaskRule::COLOR..2.0 * MaskRule::COLOR).contains(&color) => {
+            format!("#{:06x}", (color - MaskRule::COLOR) as u32)
+        }
+        0.0 | 1e-4..1e9 => (value as f32).to_string(),
+        _ => format!("{value:e}"),
+    }
+}
+
+/// The largest number of distinct values that are counted.
+const COUNTED: usize = 256;
+
+/// The distinct values of a mask.
+struct Values {
+    /// In ascending order.
+    distinct: Vec<f64>,
+    /// Whether there are more than [`COUNTED`].
+    more: bool,
+}
+
+impl Values {
+    fn of(values: impl Iterator<Item = f64>) -> Self {
+        let (mut distinct, mut last, mut more) = (Vec::<f64>::new(), None, false);
+        for value in values {
+            // Neighbors are mostly equal.
+            if last.replace(value) != Some(value)
+                && let Err(at) = distinct.binary_search_by(|other| other.total_cmp(&value))
+            {
+                match distinct.len() < COUNTED {
+                    true => distinct.insert(at, value),
+                    false => more = true,
+                }
+            }
+        }
+        Self { distinct, more }
+    }
+
+    /// Lists the values, or their range if they are many.
+    fn names(&self) -> String {
+        let names: Vec<String> = self.distinct.iter().map(|value| shown(*value)).collect();
+        let more = if self.more { "more than " } else { "" };
+        match &names[..] {
+            [all @ .., last] if all.len() < 8 && !all.is_empty() => {
+                format!("the values {} and {last}", all.join(", "))
+            }
+            [only] => format!("the value {only}"),
+            [first, .., last] => format!("{more}{} values from {first} to {last}", names.len()),
+            [] => "no values".to_owned(),
+        }
+    }
+
+    fn warning(&self, no_background: bool) -> Option<String> {
+        let count = self.distinct.len();
+        if count <= 2 && !(count == 2 && no_background) {
+            return None;
+        }
+        let most = self.distinct.last().copied().unwrap_or(1.0);
+        // Half of 255 is 128, and half of 1 is 0.5.
+        let half = if most > 1.0 {
+            (most / 2.0).ceil()
+        } else {
+            most / 2.0
+        };
+        let half = shown(if most >= MaskRule::COLOR { 1.0 } else { half });
+        Some(format!(
+            "{}, and all but 0 count as the object: choose with --mask-threshold {half} (at least) or \
+             --mask-value N (a label)",
+            self.names()
+        ))
+    }
+}

@@ -1,0 +1,173 @@
+//! The numbers of glTF accessors: floating point, integers, quantized and sparse.
+
+use std::borrow::Cow;
+
+use super::schema::{Root, SparsePart};
+use crate::error::{IoError, Place, quote};
+use crate::limits::Limit;
+use crate::mesh::raw::Reading;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Accessors<'a, 'r> {
+    pub(super) reading: Reading<'r>,
+    pub(super) root: &'a Root,
+    pub(super) buffers: &'a [Cow<'a, [u8]>],
+}
+
+/// Elements in a view: offset in the view, type, components of an element, and count.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    offset: usize,
+    kind: u32,
+    components: usize,
+    count: usize,
+    normalized: bool,
+}
+
+impl Accessors<'_, '_> {
+    /// Reads the elements of an accessor, each of so many components, one after another.
+    ///
+    /// `limit` applies to the number of elements; indices are three per triangle.
+    pub(super) fn read(
+        &self,
+        index: usize,
+        components: usize,
+        limit: Limit,
+    ) -> Result<Vec<f64>, IoError> {
+        let place = Place::Field(format!("$.accessors[{index}]"));
+        let Some(accessor) = self.root.accessors.get(index) else {
+            let expected = format!("one of {} accessors", self.root.accessors.len());
+            return Err(self
+                .reading
+                .refuse(place, "an accessor that does not exist", expected));
+        };
+        let shape = if components == 1 { "SCALAR" } else { "VEC3" };
+        if accessor.shape != shape {
+            return Err(self.reading.refuse(place, quote(&accessor.shape), shape));
+        }
+        let per_item = if components == 1 { 3 } else { 1 };
+        self.reading
+            .check(limit, place.clone(), accessor.count / per_item)?;
+        let layout = Layout {
+            offset: accessor.byte_offset,
+            kind: accessor.component_type,
+            components,
+            count: accessor.count,
+            normalized: accessor.normalized,
+        };
+        let mut numbers = match accessor.buffer_view {
+            Some(view) => self.elements(&place, view, layout)?,
+            None => vec![0.0; accessor.count * components],
+        };
+        if let Some(sparse) = &accessor.sparse {
+            let part = |part: &SparsePart, kind, components| {
+                let layout = Layout {
+                    offset: part.byte_offset,
+                    kind,
+                    components,
+                    count: sparse.count,
+                    ..layout
+                };
+                self.elements(&place, part.buffer_view, layout)
+            };
+            let indices = part(
+                &sparse.indices,
+                sparse.indices.component_type.unwrap_or(0),
+                1,
+            )?;
+            let values = part(&sparse.values, accessor.component_type, components)?;
+            for (index, value) in indices.iter().zip(values.chunks_exact(components)) {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number beyond the end is refused"
+                )]
+                let at = *index as usize * components;
+                let Some(element) = numbers.get_mut(at..at + components) else {
+                    let expected = format!("below {}", accessor.count);
+                    return Err(self.reading.refuse(
+                        place,
+                        format!("sparse index {index}"),
+                        expected,
+                    ));
+                };
+                element.copy_from_slice(value);
+            }
+        }
+        Ok(numbers)
+    }
+
+    fn elements(&self, place: &Place, view: usize, layout: Layout) -> Result<Vec<f64>, IoError> {
+        let refuse = |found: String, expected: &str| {
+            Err(self.reading.refuse(place.clone(), found, expected))
+        };
+        let Some(found) = self.root.buffer_views.get(view) else {
+            return refuse(format!("buffer view {view}"), "one that exists");
+        };
+        if let Some(name) = found
+            .extensions
+            .keys()
+            .find(|name| name.contains("meshopt"))
+        {
+            let expected = "a file without meshopt compression: gltf-transform copy writes one";
+            return refuse(format!("meshopt compression ({name})"), expected);
+        }
+        let Some(size) = component_bytes(layout.kind) else {
+            return refuse(format!("component type {}", layout.kind), "5120 to 5126");
+        };
+        let element = size * layout.components;
+        let stride = found.byte_stride.unwrap_or(element);
+        let end = found.byte_offset.checked_add(found.byte_length);
+        let bytes = self.buffers.get(found.buffer);
+        let bytes = bytes.and_then(|bytes| bytes.get(found.byte_offset..end?));
+        let used = bytes.and_then(|bytes| {
+            let before = stride.checked_mul(layout.count.saturating_sub(1))?;
+            let last = layout.offset.checked_add(before)?.checked_add(element)?;
+            bytes.get(layout.offset..last)
+        });
+        let Some(used) = used.filter(|_| stride >= element) else {
+            if layout.count == 0 {
+                return Ok(Vec::new());
+            }
+            let (count, size) = (layout.count, bytes.map_or(0, <[u8]>::len));
+            let found = format!("{count} elements, {stride} bytes apart");
+            return refuse(
+                found,
+                &format!("as many as the {size} bytes of view {view} hold"),
+            );
+        };
+        let numbers = used.chunks(stride).flat_map(|element| {
+            let components = element.chunks_exact(size).take(layout.components);
+            components.map(|bytes| component(layout.kind, layout.normalized, bytes))
+        });
+        Ok(numbers.collect())
+    }
+}
+
+/// Returns the size of a component of a type, in bytes.
+fn component_bytes(kind: u32) -> Option<usize> {
+    match kind {
+        5120 | 5121 => Some(1),
+        5122 | 5123 => Some(2),
+        5125 | 5126 => Some(4),
+        _ => None,
+    }
+}
+
+/// Converts little-endian bytes to a number; normalized integers are from -1 to 1.
+fn component(kind: u32, normalized: bool, bytes: &[u8]) -> f64 {
+    let (number, largest) = match (kind, bytes) {
+        (5120, [a]) => (f64::from(i8::from_le_bytes([*a])), 127.0),
+        (5121, [a]) => (f64::from(*a), 255.0),
+        (5122, [a, b]) => (f64::from(i16::from_le_bytes([*a, *b])), 32767.0),
+        (5123, [a, b]) => (f64::from(u16::from_le_bytes([*a, *b])), 65535.0),
+        (5125, [a, b, c, d]) => (f64::from(u32::from_le_bytes([*a, *b, *c, *d])), 1.0),
+        (_, [a, b, c, d]) => (f64::from(f32::from_le_bytes([*a, *b, *c, *d])), 1.0),
+        _ => (f64::NAN, 1.0),
+    };
+    if normalized {
+        (number / largest).max(-1.0)
+    } else {
+        number
+    }
+}

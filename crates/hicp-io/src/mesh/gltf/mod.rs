@@ -1,0 +1,187 @@
+//! glTF 2.0 files: binary (`.glb`), or JSON (`.gltf`) with buffers next to it or inside of it.
+//!
+//! Coordinates stay as the format defines them, with y up. The crate `gltf` does not read quantized
+//! positions, and takes longer to compile than the rest of this crate.
+
+mod accessor;
+mod buffers;
+mod schema;
+
+use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
+
+use self::accessor::Accessors;
+use self::schema::{Node, Primitive, Root};
+use super::raw::{FACE, RawMesh, Reading};
+use crate::error::{IoError, Place};
+use crate::json;
+use crate::limits::Limit;
+
+/// Parses the triangles of the default scene, with the transforms of its nodes.
+pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
+    let (text, binary) = buffers::split(&reading, &content)?;
+    let root: Root = json::parse(reading.path, text)?;
+    let buffers = buffers::load(&reading, &root, binary)?;
+    let place = Place::Field("$.meshes".to_owned());
+    let found = format!("{} meshes", root.meshes.len());
+    let mut scene = Scene {
+        accessors: Accessors {
+            reading,
+            root: &root,
+            buffers: &buffers,
+        },
+        visited: vec![false; root.nodes.len()],
+        mesh: RawMesh::new(reading, reading.refuse(place, found, FACE)),
+    };
+    let chosen = root.scenes.get(root.scene.unwrap_or(0));
+    let mut open: Vec<(usize, Matrix4<f64>)> = match chosen {
+        Some(scene) => scene
+            .nodes
+            .iter()
+            .map(|node| (*node, Matrix4::identity()))
+            .collect(),
+        None => {
+            let mut is_child = vec![false; root.nodes.len()];
+            for child in root.nodes.iter().flat_map(|node| &node.children) {
+                is_child
+                    .get_mut(*child)
+                    .into_iter()
+                    .for_each(|is_child| *is_child = true);
+            }
+            let tops = (0..root.nodes.len()).filter(|node| !is_child[*node]);
+            tops.map(|node| (node, Matrix4::identity())).collect()
+        }
+    };
+    // The stack holds the first node on top, so that vertices are in the order of the file.
+    open.reverse();
+    while let Some((index, parent)) = open.pop() {
+        let node = scene.visit(index)?;
+        let world = parent * local(node);
+        if let Some(mesh) = node.mesh {
+            scene.add_mesh(mesh, &world)?;
+        }
+        open.extend(node.children.iter().rev().map(|child| (*child, world)));
+    }
+    Ok(scene.mesh)
+}
+
+/// Returns the transform of a node relative to its parent.
+fn local(node: &Node) -> Matrix4<f64> {
+    if let Some(matrix) = &node.matrix {
+        return Matrix4::from_column_slice(&matrix.0);
+    }
+    let [x, y, z] = node.translation.map_or([0.0; 3], |t| t.0);
+    let [i, j, k, w] = node.rotation.map_or([0.0, 0.0, 0.0, 1.0], |r| r.0);
+    let [sx, sy, sz] = node.scale.map_or([1.0; 3], |s| s.0);
+    let turned = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+    let moved = Isometry3::from_parts(Translation3::new(x, y, z), turned);
+    moved
+        .to_homogeneous()
+        .prepend_nonuniform_scaling(&[sx, sy, sz].into())
+}
+
+struct Scene<'a, 'r> {
+    accessors: Accessors<'a, 'r>,
+    visited: Vec<bool>,
+    mesh: RawMesh<'r>,
+}
+
+impl<'a> Scene<'a, '_> {
+    /// Returns a node. Refuses a node with two parents, which could multiply without end.
+    fn visit(&mut self, index: usize) -> Result<&'a Node, IoError> {
+        let place = Place::Field(format!("$.nodes[{index}]"));
+        let nodes = &self.accessors.root.nodes;
+        match (nodes.get(index), self.visited.get_mut(index)) {
+            (Some(node), Some(visited)) if !*visited => {
+                *visited = true;
+                Ok(node)
+            }
+            (None, _) | (_, None) => {
+                let expected = format!("one of {} nodes", nodes.len());
+                Err(self
+                    .mesh
+                    .reading
+                    .refuse(place, "a node that does not exist", expected))
+            }
+            _ => Err(self
+                .mesh
+                .reading
+                .refuse(place, "a node with two parents", "a tree of nodes")),
+        }
+    }
+
+    fn add_mesh(&mut self, index: usize, world: &Matrix4<f64>) -> Result<(), IoError> {
+        let root = self.accessors.root;
+        let Some(mesh) = root.meshes.get(index) else {
+            let place = Place::Field(format!("$.meshes[{index}]"));
+            let expected = format!("one of {} meshes", root.meshes.len());
+            return Err(self
+                .mesh
+                .reading
+                .refuse(place, "a mesh that does not exist", expected));
+        };
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let place = Place::Field(format!("$.meshes[{index}].primitives[{number}]"));
+            self.add_primitive(primitive, &place, world)?;
+        }
+        Ok(())
+    }
+
+    fn add_primitive(
+        &mut self,
+        primitive: &Primitive,
+        place: &Place,
+        world: &Matrix4<f64>,
+    ) -> Result<(), IoError> {
+        let reading = self.mesh.reading;
+        let mut extensions = primitive.extensions.keys();
+        if let Some(name) = extensions.find(|name| name.contains("draco")) {
+            let found = format!("Draco compression ({name})");
+            let expected = "a file without Draco compression: gltf-transform copy, or Blender's \
+                            export without compression, writes one";
+            return Err(reading.refuse(place.clone(), found, expected));
+        }
+        // Points and lines have no area.
+        let mode = primitive.mode.unwrap_or(4);
+        let (Some(positions), 4..=6) = (primitive.attributes.get("POSITION"), mode) else {
+            return Ok(());
+        };
+        let first = self.mesh.vertices.len();
+        let positions = self.accessors.read(*positions, 3, Limit::VERTICES)?;
+        for position in positions.chunks_exact(3) {
+            let point = Point3::new(position[0], position[1], position[2]).to_homogeneous();
+            let point = world * point;
+            self.mesh
+                .add_vertex(place.clone(), [point.x, point.y, point.z])?;
+        }
+        let count = self.mesh.vertices.len() - first;
+        let corners = match primitive.indices {
+            Some(indices) => self.accessors.read(indices, 1, Limit::TRIANGLES)?,
+            None => (0..count).map(|index| index as f64).collect(),
+        };
+        if let Some(index) = corners
+            .iter()
+            .find(|index| !(0.0..count as f64).contains(*index))
+        {
+            let found = format!("vertex {index} of a face");
+            return Err(reading.refuse(place.clone(), found, format!("below {count}")));
+        }
+        let faces = match mode {
+            4 => corners.len() / 3,
+            _ => corners.len().saturating_sub(2),
+        };
+        // A mirrored part would be inside out.
+        let mirrored = world.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+        for face in 0..faces {
+            let [a, b, c] = match mode {
+                4 => [3 * face, 3 * face + 1, 3 * face + 2],
+                5 if face % 2 == 1 => [face + 1, face, face + 2],
+                5 => [face, face + 1, face + 2],
+                _ => [0, face + 1, face + 2],
+            };
+            let order = if mirrored { [a, c, b] } else { [a, b, c] };
+            let corners = order.map(|corner| corners[corner] + first as f64);
+            self.mesh.add_corners(place.clone(), face, &corners)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,266 @@
+//! Depth images and masks that other programs wrote (`tests/fixtures/make.py`).
+
+use hicp_io::{MaskRule, read_depth, read_mask};
+
+use crate::common::fixture;
+
+/// The depth at every pixel, meters.
+fn expected(index: usize) -> f32 {
+    match index {
+        0 => 0.0,
+        _ => 1.0 + 0.1 * (index / 5) as f32 + 0.01 * (index % 5) as f32,
+    }
+}
+
+fn check_depth(name: &str, millimeters_per_unit: Option<f64>, tolerance: f32) {
+    let depth = read_depth(fixture(name), millimeters_per_unit).unwrap();
+    assert_eq!((depth.width(), depth.height()), (5, 4), "{name}");
+    for (index, meters) in depth.pixels().iter().enumerate() {
+        let error = (meters - expected(index)).abs();
+        assert!(error <= tolerance, "{name}, pixel {index}: {meters}");
+    }
+}
+
+#[test]
+fn integers_of_every_format_have_a_unit() {
+    for name in [
+        "depth_pillow_u16.png",
+        "depth_pillow_u16.pgm",
+        "depth_u16.tiff",
+        "depth_u16_big_endian.tiff",
+        "depth_u16_big.tiff",
+        "depth_opencv_u16.tiff",
+        "depth_u16_big_endian.npy",
+        "depth_i64.npy",
+    ] {
+        check_depth(name, Some(1.0), 1e-6);
+        let error = read_depth(fixture(name), None).unwrap_err().to_string();
+        assert!(
+            error.contains("found integers") && error.contains("--depth-scale"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn floating_point_is_in_meters() {
+    for name in [
+        "depth_f32_tiled.tiff",
+        "depth_f32_lzw.tiff",
+        "depth_f64.tiff",
+        "depth_f32.npy",
+        "depth_f64_fortran.npy",
+        "depth_single.npz",
+        "depth_named.npz",
+        "depth_opencv.pfm",
+        "depth_zip.exr",
+        "depth_zips.exr",
+        "depth_rle.exr",
+        "depth_piz.exr",
+    ] {
+        check_depth(name, None, 1e-6);
+    }
+    for name in ["depth_f16.tiff", "depth_f16.npy", "depth_none.exr"] {
+        check_depth(name, None, 1e-3);
+    }
+    let millimeters = read_depth(fixture("depth_f32.npy"), Some(1.0)).unwrap();
+    assert!((millimeters.pixels()[1] - 0.001_01).abs() < 1e-8);
+}
+
+#[test]
+fn files_that_cannot_be_depth_are_refused_with_advice() {
+    for (name, found, advice) in [
+        (
+            "depth_pickled.npy",
+            "pickled array of Python objects",
+            "np.save",
+        ),
+        (
+            "depth_unnamed.npz",
+            "2 arrays: \"a\", \"b\"",
+            "one named depth",
+        ),
+        ("photo.jpg", "a JPEG image", "PNG"),
+        ("mask_u8.tiff", "8-bit gray pixels", "16-bit gray"),
+        (
+            "mask_cut_out.png",
+            "4 numbers per pixel",
+            "one floating-point number",
+        ),
+        ("mask_bool.npy", "1-bit gray pixels", "16-bit gray"),
+        ("make.py", "data of an unknown format", "np.fromfile"),
+    ] {
+        let error = read_depth(fixture(name), Some(1.0))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains(name) && error.contains(found) && error.contains(advice),
+            "{error}"
+        );
+    }
+}
+
+fn object(index: usize) -> bool {
+    index % 5 >= 2
+}
+
+#[test]
+fn masks_of_two_values_need_no_option() {
+    for name in [
+        "mask_1_bit.png",
+        "mask_1_bit.tiff",
+        "mask_1_bit.bmp",
+        "mask_8_bit.bmp",
+        "mask_red.bmp",
+        "mask_red.png",
+        "mask_cut_out.png",
+        "mask_cut_out.tiff",
+        "mask_opaque.png",
+        "mask_transparent.bmp",
+        "mask_u8.tiff",
+        "mask_bool.npy",
+        "mask_u8_channel.npy",
+    ] {
+        let file = read_mask(fixture(name), MaskRule::NotZero).unwrap();
+        assert_eq!((file.mask.width(), file.mask.height()), (5, 4), "{name}");
+        assert!(
+            file.mask
+                .pixels()
+                .iter()
+                .enumerate()
+                .all(|(i, set)| *set == object(i)),
+            "{name}"
+        );
+        assert_eq!(file.warning, None, "{name}");
+    }
+}
+
+#[test]
+fn masks_of_more_values_are_read_with_a_warning_that_names_the_options() {
+    for (name, values) in [
+        ("mask_soft.png", "the values 0, 42, 127, 212 and 255, and"),
+        ("mask_labels.png", "the values 0, 1 and 3, and"),
+        ("mask_palette.png", "the values 0, 1 and 3, and"),
+        ("mask_colors.png", "the values 0, #3c0000 and #b40000, and"),
+        ("mask_probabilities.npy", "the values 0.025, 0.275"),
+    ] {
+        let warning = read_mask(fixture(name), MaskRule::NotZero).unwrap().warning;
+        let warning = warning.unwrap_or_else(|| panic!("{name}: no warning"));
+        assert!(warning.contains(values), "{name}: {warning}");
+        assert!(warning.contains("--mask-threshold") && warning.contains("--mask-value"));
+    }
+}
+
+#[test]
+fn a_threshold_or_a_value_selects_the_object() {
+    for (name, rule) in [
+        ("mask_soft.png", MaskRule::AtLeast(127.0)),
+        ("mask_probabilities.npy", MaskRule::AtLeast(0.5)),
+        ("mask_labels.png", MaskRule::Equal(3.0)),
+        ("mask_palette.png", MaskRule::Equal(3.0)),
+    ] {
+        let file = read_mask(fixture(name), rule).unwrap();
+        assert!(
+            file.mask
+                .pixels()
+                .iter()
+                .enumerate()
+                .all(|(i, set)| *set == object(i)),
+            "{name}"
+        );
+        assert_eq!(file.warning, None, "{name}");
+    }
+    let error = read_mask(fixture("mask_labels.png"), MaskRule::Equal(7.0)).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("Equal(7.0)") && text.contains("the values 0, 1 and 3"),
+        "{text}"
+    );
+}
+
+/// A truncated file, and a file with one changed byte, gives an image or an error.
+#[test]
+fn damaged_files_never_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixtures = std::fs::read_dir(fixture("")).unwrap();
+    for entry in fixtures.flatten().map(|entry| entry.path()) {
+        let whole = std::fs::read(&entry).unwrap();
+        let name = entry.file_name().unwrap().to_string_lossy().into_owned();
+        // Other tests damage every byte of PNG files.
+        if !(name.starts_with("depth") || name.starts_with("mask")) || name.ends_with("png") {
+            continue;
+        }
+        let path = folder.path().join(name);
+        let read = |content: &[u8]| {
+            std::fs::write(&path, content).unwrap();
+            for error in [
+                read_depth(&path, Some(1.0)).err(),
+                read_mask(&path, MaskRule::NotZero).err(),
+            ]
+            .into_iter()
+            .flatten()
+            {
+                assert!(error.to_string().len() < 1000, "{error}");
+            }
+        };
+        for end in (0..whole.len()).step_by(11) {
+            read(&whole[..end]);
+        }
+        for (at, flip) in (0..whole.len())
+            .step_by(4)
+            .zip([1, 0x80, 0xff].into_iter().cycle())
+        {
+            let mut content = whole.clone();
+            content[at] ^= flip;
+            read(&content);
+        }
+    }
+}
+
+/// The real frame of the data folder in every format.
+#[test]
+fn a_real_frame_is_the_same_in_every_format() {
+    let Some(folder) = crate::common::data("depth_formats") else {
+        return;
+    };
+    let count = |name: &str, scale: Option<f64>| {
+        let depth = read_depth(folder.join(name), scale).unwrap();
+        assert_eq!((depth.width(), depth.height()), (640, 480), "{name}");
+        let at = f64::from(depth.get(320, 240).unwrap());
+        assert!((at - 0.933).abs() < 1e-3, "{name}: {at}");
+        let measured = depth.pixels().iter().filter(|z| **z > 0.0).count();
+        let sum: f64 = depth.pixels().iter().map(|z| f64::from(*z)).sum();
+        assert_eq!(measured, 224_197, "{name}");
+        assert!((sum / 260_306.249 - 1.0).abs() < 1e-4, "{name}: {sum}");
+    };
+    for name in [
+        "ycbv50_1.pfm",
+        "ycbv50_1_compressed.npz",
+        "ycbv50_1_f16_metres.npy",
+        "ycbv50_1_f32_deflate_tiled.tiff",
+        "ycbv50_1_f32_metres.npy",
+        "ycbv50_1_f32_metres_nan.tiff",
+        "ycbv50_1_none_f16_Z.exr",
+        "ycbv50_1_zip_f32_Z.exr",
+    ] {
+        count(name, None);
+    }
+    for name in [
+        "ycbv50_1_stored.npz",
+        "ycbv50_1_u16_bigendian.npy",
+        "ycbv50_1_u16_bigendian.tiff",
+        "ycbv50_1_u16_raw.tiff",
+    ] {
+        count(name, Some(0.1));
+    }
+    for (name, found) in [
+        ("ycbv50_1_f32_metres.raw", "an unknown format"),
+        ("graspnet6dof_cheezit.npy", "a pickled array"),
+        ("kinect_frame_20121214T142255.814212_depth.pclzf", "PCLZF"),
+    ] {
+        let error = read_depth(folder.join(name), Some(1.0))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(found), "{error}");
+    }
+}

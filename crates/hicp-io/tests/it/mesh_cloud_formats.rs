@@ -1,0 +1,282 @@
+//! glTF meshes and point clouds that other programs wrote (`tests/fixtures/make.py`).
+
+use hicp_core::TriMesh;
+use hicp_io::{LengthUnit, read_cloud, read_mesh};
+use serde_json::Value;
+
+use crate::common::{data, fixture};
+
+/// The corners of the bounding box.
+fn bounds(mesh: &TriMesh) -> [[f32; 3]; 2] {
+    let fold = |start: f32, choose: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|axis| mesh.vertices().iter().map(|p| p[axis]).fold(start, choose))
+    };
+    [fold(f32::MAX, f32::min), fold(f32::MIN, f32::max)]
+}
+
+fn near(found: [[f32; 3]; 2], expected: [[f32; 3]; 2], tolerance: f32) -> bool {
+    let pairs = found.iter().flatten().zip(expected.iter().flatten());
+    pairs
+        .into_iter()
+        .all(|(a, b)| (a - b).abs() <= tolerance * b.abs().max(1.0))
+}
+
+/// Six times the volume, which is negative if the mesh is inside out.
+fn volume(mesh: &TriMesh) -> f32 {
+    let corner = |index: u32| mesh.vertices()[index as usize].coords;
+    let cone = |t: &[u32; 3]| corner(t[0]).dot(&corner(t[1]).cross(&corner(t[2])));
+    mesh.triangles().iter().map(cone).sum()
+}
+
+#[test]
+fn gltf_boxes_have_their_size_and_face_outward() {
+    for name in ["mesh_model.gltf", "mesh_embedded.gltf"] {
+        let mesh = read_mesh(fixture(name), LengthUnit::Meters).unwrap();
+        assert_eq!(mesh.triangles().len(), 12, "{name}");
+        assert!(
+            near(
+                bounds(&mesh),
+                [[-0.05, -0.1, -0.15], [0.05, 0.1, 0.15]],
+                1e-6
+            ),
+            "{name}"
+        );
+        assert!((volume(&mesh) - 6.0 * 0.006).abs() < 1e-6, "{name}");
+    }
+}
+
+#[test]
+fn nodes_turn_move_and_mirror_their_meshes() {
+    let mesh = read_mesh(fixture("mesh_scene.glb"), LengthUnit::Meters).unwrap();
+    assert_eq!(mesh.triangles().len(), 24);
+    assert!(near(
+        bounds(&mesh),
+        [[-0.05, -0.1, -1.15], [1.1, 0.1, 0.15]],
+        1e-6
+    ));
+    assert!(
+        (volume(&mesh) - 2.0 * 6.0 * 0.006).abs() < 1e-5,
+        "{}",
+        volume(&mesh)
+    );
+}
+
+#[test]
+fn compressed_and_misnamed_meshes_are_refused_with_advice() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = |name: &str, to: &str| {
+        let path = folder.path().join(to);
+        std::fs::copy(fixture(name), &path).unwrap();
+        path
+    };
+    for (path, parts) in [
+        (
+            fixture("mesh_draco.gltf"),
+            ["Draco compression", "gltf-transform"],
+        ),
+        (
+            copy("mesh_scene.glb", "a.ply"),
+            ["a binary glTF file", "rename it to .glb"],
+        ),
+        (
+            copy("cloud_binary.ply", "a.stl"),
+            ["a PLY file", "rename it to .ply"],
+        ),
+        (copy("cloud.npy", "a.obj"), ["a NumPy array", ".glb"]),
+        (
+            copy("mesh_model.gltf", "b.gltf"),
+            ["cannot be read", "gltf_buffer.bin"],
+        ),
+    ] {
+        let text = read_mesh(path, LengthUnit::Meters).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+    }
+}
+
+#[test]
+fn a_gltf_file_cannot_read_other_folders_or_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let refused = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        read_mesh(&path, LengthUnit::Meters)
+            .unwrap_err()
+            .to_string()
+    };
+    for uri in ["../secret.bin", "/etc/passwd", "file:///etc/passwd", "C:/x"] {
+        let text = refused(&format!(
+            r#"{{"buffers": [{{"uri": "{uri}", "byteLength": 4}}]}}"#
+        ));
+        assert!(text.contains("expected a file next to this one"), "{text}");
+    }
+    let text = refused(r#"{"scenes": [{"nodes": [0]}], "nodes": [{"children": [0]}]}"#);
+    assert!(
+        text.contains("$.nodes[0]: found a node with two parents"),
+        "{text}"
+    );
+    let accessor = r#"{"componentType": 5126, "type": "VEC3", "count": 1000000000000}"#;
+    let mesh =
+        r#""nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]"#;
+    let text = refused(&format!(r#"{{"accessors": [{accessor}], {mesh}}}"#));
+    assert!(text.contains("--max-vertices"), "{text}");
+}
+
+#[test]
+fn clouds_of_every_format_are_the_same() {
+    let points = [[0.1, -0.2, 0.8], [0.3, 0.1, 1.0], [-0.4, 0.25, 1.5]];
+    let normals = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, 1.0, 0.0]];
+    for name in [
+        "cloud_ascii.pcd",
+        "cloud_binary.pcd",
+        "cloud_compressed.pcd",
+        "cloud_bare.pcd",
+        "cloud_binary.ply",
+        "cloud.xyzn",
+        "cloud_bare.xyz",
+        "cloud_bare_named.csv",
+        "cloud_named.csv",
+        "cloud_bare_colors.xyz",
+        "cloud.npy",
+        "cloud_bare_organized.npy",
+    ] {
+        let cloud = read_cloud(fixture(name), LengthUnit::Meters).unwrap();
+        assert_eq!(cloud.points.len(), 3, "{name}");
+        for (found, expected) in cloud.points.iter().zip(points) {
+            assert!(
+                (found - hicp_core::Point3::from(expected)).norm() < 1e-6,
+                "{name}: {found}"
+            );
+        }
+        assert_eq!(cloud.normals.is_none(), name.contains("bare"), "{name}");
+        for (found, expected) in cloud.normals.iter().flatten().zip(normals) {
+            let error = (found.into_inner() - hicp_core::Vector3::from(expected)).norm();
+            assert!(error < 1e-6, "{name}: {found:?}");
+        }
+    }
+    let millimeters = read_cloud(fixture("cloud_ascii.pcd"), LengthUnit::Millimeters).unwrap();
+    assert!((millimeters.points[0].x - 0.0001).abs() < 1e-9);
+}
+
+#[test]
+fn files_that_are_no_cloud_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.pcd");
+    let whole = std::fs::read(fixture("cloud_binary.pcd")).unwrap();
+    let header = String::from_utf8_lossy(&whole).replace("WIDTH 3", "WIDTH 99999999");
+    let header = header.replace("POINTS 3", "POINTS 4000000");
+    for (content, part) in [
+        (whole[..whole.len() - 1].to_vec(), "promises 3 points"),
+        (header.into_bytes(), "promises 4000000 points"),
+        (
+            b"VERSION .7\nFIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n"
+                .to_vec(),
+            "x, y and z",
+        ),
+        (b"1 2 3\n4 five 6\n".to_vec(), "line 2: found \"4 five 6\""),
+        (b"\x89HDF\r\n\x1a\n".to_vec(), "an HDF5 file"),
+        (b"".to_vec(), "no points"),
+    ] {
+        std::fs::write(&path, content).unwrap();
+        let text = read_cloud(&path, LengthUnit::Meters)
+            .unwrap_err()
+            .to_string();
+        assert!(text.contains(part), "{text}");
+    }
+}
+
+/// glTF files of the data folder, with the counts and bounds of a reference reader.
+#[test]
+fn real_gltf_files_agree_with_a_reference_reader() {
+    let Some(folder) = data("gltf") else {
+        return;
+    };
+    let manifest = std::fs::read(folder.join("manifest.json")).unwrap();
+    let manifest: Vec<Value> = serde_json::from_slice(&manifest).unwrap();
+    // The reference reader ignores fans and normalized integers, and reads what a damaged part of a
+    // file does not reach.
+    let differs = ["PrimitiveMode_12", "OutOfRange", "badObject", "quantized"];
+    let mut wrong = Vec::new();
+    for entry in &manifest {
+        let file = entry["file"].as_str().unwrap();
+        if differs.iter().any(|part| file.contains(part)) {
+            continue;
+        }
+        let faces = entry["reader"]["faces"].as_u64();
+        match read_mesh(folder.join(file), LengthUnit::Meters) {
+            Ok(mesh) => {
+                let expected = serde_json::from_value(entry["reader"]["bounds"].clone());
+                let found = mesh.triangles().len() as u64;
+                let same = expected.is_ok_and(|expected| near(bounds(&mesh), expected, 1e-4));
+                if Some(found) != faces || !same {
+                    wrong.push(format!(
+                        "{file}: {found} faces {:?}, not {}",
+                        bounds(&mesh),
+                        entry["reader"]
+                    ));
+                }
+            }
+            Err(error) => {
+                let text = error.to_string();
+                let compressed = text.contains("Draco") || text.contains("meshopt");
+                if entry["expect"] == "load" && faces != Some(0) && !compressed {
+                    wrong.push(format!("{text} ({})", entry["reader"]));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    for name in ["apple", "bowl-soup", "cooking-spatula", "knife-block"] {
+        let mesh = |path: String| read_mesh(folder.join(path), LengthUnit::Meters).unwrap();
+        let quantized = mesh(format!("awkward/quantized_{name}.glb"));
+        let original = mesh(format!("household/{name}.glb"));
+        assert_eq!(
+            quantized.triangles().len(),
+            original.triangles().len(),
+            "{name}"
+        );
+        assert!(near(bounds(&quantized), bounds(&original), 1e-4), "{name}");
+    }
+}
+
+/// Clouds of sensors and other programs in the data folder.
+#[test]
+fn real_clouds_are_read() {
+    let Some(folder) = data("pointclouds") else {
+        return;
+    };
+    for (name, count, normals) in [
+        ("pcl_bun0.pcd", 397, true),
+        ("pcl_colored_cloud.pcd", 1000, true),
+        ("pcl_cturtle.pcd", 167_198, false),
+        ("pcl_milk.pcd", 13_704, false),
+        ("ycbv50_1_ascii.pcd", 5339, false),
+        ("ycbv50_1_binary_compressed.pcd", 32_029, false),
+        ("ycbv50_1_double.ply", 32_029, false),
+        ("ycbv50_1.xyzrgb", 5339, false),
+        ("trimesh_points_agisoft.xyz", 100, false),
+        ("trimesh_points_cloudcompare.xyz", 101, false),
+    ] {
+        let cloud = read_cloud(folder.join(name), LengthUnit::Meters);
+        let cloud = cloud.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            (cloud.points.len(), cloud.normals.is_some()),
+            (count, normals),
+            "{name}"
+        );
+    }
+    for name in [
+        "kinect_frame_20121214T142255.814212.pcd",
+        "osd_learn0.pcd",
+        "ycbv50_1_organised_binary.pcd",
+    ] {
+        let cloud = read_cloud(folder.join(name), LengthUnit::Meters).unwrap();
+        assert!((10_000..307_200).contains(&cloud.points.len()), "{name}");
+    }
+    for name in [
+        "libpointmatcher_car/car_cloud400.csv",
+        "libpointmatcher_car/car_cloud401.csv",
+    ] {
+        let cloud = read_cloud(folder.join("../clouds").join(name), LengthUnit::Meters).unwrap();
+        assert_eq!(cloud.normals.is_some(), name.contains("400"), "{name}");
+    }
+}
