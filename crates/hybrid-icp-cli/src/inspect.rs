@@ -21,7 +21,7 @@ use crate::terminal::say;
 Example:
   hybrid-icp inspect mug.ply --unit mm")]
 pub(crate) struct Arguments {
-    /// The mesh: OBJ, OFF, PLY or STL.
+    /// The mesh: GLB, glTF, OBJ, OFF, PLY or STL.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Unit of the mesh's coordinates: m, mm or cm.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::inputs::{ImageFiles, Inputs, Region};
+use super::inputs::{ImageFiles, Inputs, MaskOptions, Region};
 use super::job::JobOptions;
 
 /// Estimate the pose of an object in one depth image, without an initial pose.
@@ -17,9 +17,12 @@ use super::job::JobOptions;
 pub(crate) struct Arguments {
     #[command(flatten)]
     files: ImageFiles,
-    /// The object's mask: a PNG of the depth image's size, nonzero on the object.
+    /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
+    /// the object, or opaque if the opacity varies.
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    #[command(flatten)]
+    mask_options: MaskOptions,
     /// Without a mask: a box around the object, in pixels. The plane around the box, such as a
     /// table, is removed.
     #[arg(
@@ -77,13 +80,14 @@ fn bbox(text: &str) -> Result<Bbox, String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let region = match (&arguments.mask, arguments.bbox) {
-        (Some(path), _) => Region::Mask(path.clone()),
+        (Some(path), _) => Region::Mask(path.clone(), arguments.mask_options.rule()),
         (None, bbox) => Region::Box(bbox.unwrap_or_default()),
     };
     let inputs = Inputs {
         files: arguments.files.clone(),
         region,
         init: None,
+        init_unit: None,
     };
     arguments.job.run(&inputs)
 }

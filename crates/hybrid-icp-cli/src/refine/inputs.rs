@@ -1,45 +1,140 @@
 //! The files that a refinement reads.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_io::{CameraFile, IoErrorKind, LengthUnit, PoseFile};
+use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{DepthImage, Mask, Model, Observation, PinholeCamera};
 use hybrid_icp::mask_in_box;
 
 use crate::limits::limits;
-use crate::options::positive;
+use crate::options::{finite, positive};
 
 /// The files that describe the object and the image.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ImageFiles {
-    /// The object's mesh: OBJ, OFF, PLY or STL.
+    /// The object's mesh: GLB, glTF, OBJ, OFF, PLY or STL.
     #[arg(long, value_name = "FILE")]
     pub(crate) model: PathBuf,
-    /// Unit of the mesh's coordinates: m, mm or cm.
+    /// Unit of the mesh's coordinates: m, mm or cm. Required unless the mesh is glTF, which is in
+    /// m.
     #[arg(long, value_name = "UNIT")]
-    pub(crate) model_unit: LengthUnit,
-    /// The depth image: 16-bit gray PNG, 0 where nothing was measured.
+    pub(crate) model_unit: Option<LengthUnit>,
+    /// The depth image: PNG, TIFF, NPY, NPZ, EXR, PGM or PFM. 16-bit integers with a depth scale,
+    /// or floating-point meters; 0 or NaN where nothing was measured.
     #[arg(long, value_name = "FILE")]
     pub(crate) depth: PathBuf,
-    /// Millimeters per unit of the depth image, such as 1 or 0.1; the camera file's depth_scale if
-    /// not given.
+    /// Millimeters per unit of the depth image, such as 1 or 0.1. If not given: the camera file's
+    /// depth_scale for integers, meters for floating point.
     #[arg(long, value_name = "MM_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) depth_scale: Option<f64>,
-    /// The camera: JSON with cam_K (nine numbers, row-major), or with fx, fy, cx, cy, width and
-    /// height. Pixel centers are at integers.
+    /// The camera, as JSON, YAML, XML, text or NPY: cam_K (nine numbers, row-major), fx, fy, cx and
+    /// cy, a 3x3 matrix, or a file of ROS, OpenCV, RealSense or Open3D. Pixel centers are at
+    /// integers. If it has lens distortion, the depth image and the mask are undistorted.
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: PathBuf,
+    /// The camera of the depth image, if it is another one than that of the mask. The depth is then
+    /// moved into the image of --camera, which the mask, --init and the result belong to.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "camera_from_depth",
+        requires = "mask"
+    )]
+    pub(crate) depth_camera: Option<PathBuf>,
+    /// The pose of the depth camera in the frame of --camera, in a form of --init. Its translation
+    /// is in m, except for cam_t_m2c, which is in mm.
+    #[arg(long, value_name = "FILE", requires = "depth_camera")]
+    pub(crate) camera_from_depth: Option<PathBuf>,
+}
+
+impl ImageFiles {
+    /// Returns the unit of the mesh. Ends the program if it is neither stated nor part of the
+    /// format.
+    pub(crate) fn unit(&self) -> LengthUnit {
+        let is_gltf = ["glb", "gltf"].iter().any(|name| {
+            (self.model.extension()).is_some_and(|found| found.eq_ignore_ascii_case(name))
+        });
+        match self.model_unit {
+            Some(unit) => unit,
+            None if is_gltf => LengthUnit::Meters,
+            None => {
+                let text =
+                    "--model-unit <UNIT> is missing, expected the unit of the mesh: m, mm or cm\n";
+                clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, text).exit()
+            }
+        }
+    }
+}
+
+/// The pixels of a mask that belong to the object.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct MaskOptions {
+    /// The smallest value of the mask that is on the object, such as 128 or 0.5. For soft masks and
+    /// probabilities.
+    #[arg(long, value_name = "N", value_parser = finite, allow_negative_numbers = true)]
+    mask_threshold: Option<f64>,
+    /// The value of the mask that is on the object, such as 3, or a color such as #ff0000. For
+    /// label images.
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = label,
+        allow_negative_numbers = true,
+        conflicts_with = "mask_threshold"
+    )]
+    mask_value: Option<f64>,
+}
+
+/// Parses a number or a color.
+fn label(text: &str) -> Result<f64, String> {
+    let color = text.strip_prefix('#').filter(|hex| hex.len() == 6);
+    match color.and_then(|hex| u32::from_str_radix(hex, 16).ok()) {
+        Some(color) => Ok(MaskRule::COLOR + f64::from(color)),
+        None => finite(text).map_err(|_| "expected a number, or a color as #rrggbb".to_owned()),
+    }
+}
+
+impl MaskOptions {
+    pub(super) fn new(mask_threshold: Option<f64>, mask_value: Option<f64>) -> Self {
+        Self {
+            mask_threshold,
+            mask_value,
+        }
+    }
+
+    pub(crate) fn rule(self) -> MaskRule {
+        match (self.mask_threshold, self.mask_value) {
+            (Some(least), _) => MaskRule::AtLeast(least),
+            (None, Some(value)) => MaskRule::Equal(value),
+            (None, None) => MaskRule::NotZero,
+        }
+    }
 }
 
 /// The part of the image that shows the object.
 #[derive(Clone, Debug)]
 pub(crate) enum Region {
     /// The file of a mask.
-    Mask(PathBuf),
+    Mask(PathBuf, MaskRule),
     /// A box: x, y, width and height, pixels.
     Box([f64; 4]),
+}
+
+/// Reads a camera for the images of `size` in `image`.
+fn read_camera(path: &Path, size: (u32, u32), image: &Path) -> anyhow::Result<CameraFile> {
+    match limits().read_camera(path, size) {
+        Err(error) if error.kind == IoErrorKind::CameraSize => bail!(
+            "{}: found {}, but {} is {}x{}, expected the same size",
+            path.display(),
+            error.found,
+            image.display(),
+            size.0,
+            size.1
+        ),
+        read => Ok(read?),
+    }
 }
 
 /// The inputs of a refinement, or without an initial pose those of an estimate.
@@ -48,6 +143,8 @@ pub(crate) struct Inputs {
     pub(crate) files: ImageFiles,
     pub(crate) region: Region,
     pub(crate) init: Option<PathBuf>,
+    /// The unit of the initial pose's translation, if stated.
+    pub(crate) init_unit: Option<LengthUnit>,
 }
 
 /// The content of the files.
@@ -57,29 +154,86 @@ pub(crate) struct Read {
     pub(crate) mask: Mask,
     pub(crate) camera: PinholeCamera,
     pub(crate) init: Option<PoseFile>,
+    /// Millimeters per unit of the depth image.
     pub(crate) depth_scale: f64,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Inputs {
     /// Reads all files.
     pub(crate) fn read(&self) -> anyhow::Result<Read> {
-        let (CameraFile { camera, .. }, depth_scale) = self.read_camera()?;
         let limits = limits();
         let files = &self.files;
-        let depth = limits.read_depth_png(&files.depth, depth_scale)?;
+        let depth = limits.read_raw_depth(&files.depth)?;
+        let (depth_size, mut warnings) = (depth.size(), Vec::new());
+        let depth_camera = match &files.depth_camera {
+            Some(path) => Some(read_camera(path, depth_size, &files.depth)?),
+            None => None,
+        };
+        let (file_mask, bbox) = match &self.region {
+            Region::Mask(path, rule) => {
+                let MaskFile { mask, warning } = limits.read_mask(path, *rule)?;
+                let (width, height) = (mask.width(), mask.height());
+                if (width, height) != depth_size && depth_camera.is_none() {
+                    let (w, h) = depth_size;
+                    bail!(
+                        "{} is {width}x{height} pixels, but {} is {w}x{h}, expected the same size (--depth-camera and --camera-from-depth state another camera)",
+                        path.display(),
+                        files.depth.display()
+                    );
+                }
+                warnings.extend(warning.map(|text| format!("{}: {text}", path.display())));
+                (Some(mask), [0.0; 4])
+            }
+            Region::Box(bbox) => (None, *bbox),
+        };
+        let (size, sized) = match (&file_mask, &self.region) {
+            (Some(mask), Region::Mask(path, _)) if depth_camera.is_some() => {
+                ((mask.width(), mask.height()), path)
+            }
+            _ => (depth_size, &files.depth),
+        };
+        let of_mask = read_camera(&files.camera, size, sized)?;
+        let of_depth = depth_camera.as_ref().unwrap_or(&of_mask);
+        let default = match depth.is_float() {
+            true => Some(1000.0),
+            false => of_depth.depth_scale,
+        };
+        let Some(depth_scale) = files.depth_scale.or(default) else {
+            bail!(
+                "{}: no depth_scale, expected this key or --depth-scale (millimeters per unit of the depth image)",
+                files
+                    .depth_camera
+                    .as_ref()
+                    .unwrap_or(&files.camera)
+                    .display()
+            )
+        };
+        let camera = of_mask.camera;
+        let mut depth = depth.scaled(Some(depth_scale))?;
+        if let Some(distortion) = &of_depth.distortion {
+            depth = distortion.undistort_depth(&of_depth.camera, &depth);
+        }
+        if let Some(path) = &files.camera_from_depth {
+            let pose = limits.read_pose(path, None)?.camera_from_object;
+            depth = register_depth(&depth, &of_depth.camera, &camera, &pose);
+        }
+        let mask = match (file_mask, &of_mask.distortion) {
+            (Some(mask), Some(distortion)) => distortion.undistort_mask(&camera, &mask),
+            (Some(mask), None) => mask,
+            (None, _) => mask_in_box(&depth, &camera, bbox),
+        };
         Ok(Read {
-            mask: match &self.region {
-                Region::Mask(path) => limits.read_mask_png(path)?,
-                Region::Box(bbox) => mask_in_box(&depth, &camera, *bbox),
-            },
+            mask,
             init: match &self.init {
-                Some(path) => Some(limits.read_pose_json(path)?),
+                Some(path) => Some(limits.read_pose(path, self.init_unit)?),
                 None => None,
             },
-            model: Model::new(limits.read_mesh(&files.model, files.model_unit)?),
+            model: Model::new(limits.read_mesh(&files.model, files.unit())?),
             depth,
             camera,
             depth_scale,
+            warnings,
         })
     }
 
@@ -98,7 +252,7 @@ impl Inputs {
     /// Returns the path of the mask, or the option of the box.
     pub(crate) fn mask_name(&self) -> String {
         match &self.region {
-            Region::Mask(path) => path.display().to_string(),
+            Region::Mask(path, _) => path.display().to_string(),
             Region::Box(_) => "--bbox".to_owned(),
         }
     }
@@ -107,7 +261,7 @@ impl Inputs {
     pub(crate) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let files = &self.files;
         let mask = match &self.region {
-            Region::Mask(path) => Some(path),
+            Region::Mask(path, _) => Some(path),
             Region::Box(_) => None,
         };
         let given = [
@@ -115,42 +269,11 @@ impl Inputs {
             ("--depth", Some(&files.depth)),
             ("--mask", mask),
             ("--camera", Some(&files.camera)),
+            ("--depth-camera", files.depth_camera.as_ref()),
+            ("--camera-from-depth", files.camera_from_depth.as_ref()),
             ("--init", self.init.as_ref()),
         ];
         let given = given.into_iter();
         given.filter_map(|(option, path)| Some((option, path?)))
-    }
-
-    /// Reads the camera and the depth scale.
-    ///
-    /// First checks that the depth image and the mask have the same size.
-    fn read_camera(&self) -> anyhow::Result<(CameraFile, f64)> {
-        let files = &self.files;
-        let size = hicp_io::read_png_size(&files.depth)?;
-        let camera = files.camera.display();
-        let expected = format!(
-            "but {} is {}x{}, expected the same size",
-            files.depth.display(),
-            size.0,
-            size.1
-        );
-        if let Region::Mask(mask) = &self.region {
-            let (width, height) = hicp_io::read_png_size(mask)?;
-            if (width, height) != size {
-                bail!("{} is {width}x{height} pixels {expected}", mask.display());
-            }
-        }
-        let camera_file = match limits().read_camera_json(&files.camera, size) {
-            Err(error) if error.kind == IoErrorKind::CameraSize => {
-                bail!("{camera}: found {}, {expected}", error.found)
-            }
-            read => read?,
-        };
-        match files.depth_scale.or(camera_file.depth_scale) {
-            Some(depth_scale) => Ok((camera_file, depth_scale)),
-            None => bail!(
-                "{camera}: no depth_scale, expected this key or --depth-scale (millimeters per unit of the depth image)"
-            ),
-        }
     }
 }

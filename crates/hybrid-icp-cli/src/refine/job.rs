@@ -11,9 +11,10 @@ use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
+use crate::options::png;
 use crate::outputs::Files;
 use crate::picture::Picture;
-use crate::terminal::{say, warn};
+use crate::terminal::{check_stdout, say, warn};
 
 /// The pipeline and the outputs.
 #[derive(Debug, Args)]
@@ -30,7 +31,7 @@ pub(crate) struct JobOptions {
     alternatives: Option<PathBuf>,
     /// A PNG file for a picture: the depth around the object, with the model's outline at the
     /// initial pose (orange, dashed) and at the result (blue), and their MVE.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = png)]
     overlay: Option<PathBuf>,
     /// A file for the trace: one JSON object per iteration and line, with its pose as in a pose
     /// file. `hybrid-icp replay` runs it again.
@@ -41,6 +42,11 @@ pub(crate) struct JobOptions {
 impl JobOptions {
     /// Refines the initial pose of the inputs, or estimates a pose if there is none.
     pub(super) fn run(&self, inputs: &Inputs) -> anyhow::Result<()> {
+        inputs.files.unit();
+        let outputs = [&self.output, &self.alternatives, &self.overlay, &self.trace];
+        if outputs.iter().all(|path| path.is_none()) {
+            check_stdout()?;
+        }
         self.check_files(inputs)?;
         let pipeline = self.pipeline.choose()?;
         let trace_path = self.trace.as_ref();
@@ -54,6 +60,7 @@ impl JobOptions {
             camera,
             init: init_file,
             depth_scale,
+            warnings: of_files,
         } = inputs.read()?;
         let init = init_file.as_ref().map(|file| file.camera_from_object);
 
@@ -77,7 +84,9 @@ impl JobOptions {
             Some(_) => report::summary(&refined, &reason),
             None => report::summary_of_estimate(&refined, &reason),
         };
-        let mut warnings = warnings::about_units(&model, &observation, &from, inputs, depth_scale);
+        let units = warnings::about_units(&model, &observation, &from, inputs, depth_scale);
+        let mut warnings = of_files;
+        warnings.extend(units);
         warnings.extend(warnings::about_result(&refined));
         let report = Report::new(
             &pipeline.name,

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use clap::Args;
+use hicp_io::LengthUnit;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::inputs::{ImageFiles, Inputs, Region};
+use super::inputs::{ImageFiles, Inputs, MaskOptions, Region};
 use super::trace::TraceLines;
 use crate::choice::Pipeline;
 use crate::limits::limits;
@@ -82,23 +83,30 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
     let overrides: Vec<String> = header.get("set", "a list of strings")?;
     let origin = format!("the pipeline of {}", header.path.display());
     let pipeline = Pipeline::parse(&origin, header.text("toml")?, &overrides)?;
-    let unit = header.text("model_unit")?.parse();
     let inputs = Inputs {
         files: ImageFiles {
             model: header.text("model")?.into(),
-            model_unit: unit.map_err(|_| header.refuse("model_unit", "m, mm or cm"))?,
+            model_unit: header.unit("model_unit")?,
             depth: header.text("depth")?.into(),
             depth_scale: Some(header.get("depth_scale", "a number")?),
             camera: header.text("camera")?.into(),
+            depth_camera: header.get("depth-camera", "a string")?,
+            camera_from_depth: header.get("camera-from-depth", "a string")?,
         },
         region: match header.line.get("bbox") {
             Some(_) => Region::Box(header.get("bbox", "four numbers")?),
-            None => Region::Mask(header.text("mask")?.into()),
+            None => {
+                let least = header.get("mask_threshold", "a number")?;
+                let value = header.get("mask_value", "a number")?;
+                let options = MaskOptions::new(least, value);
+                Region::Mask(header.text("mask")?.into(), options.rule())
+            }
         },
         init: match header.line.get("init") {
             Some(_) => Some(header.text("init")?.into()),
             None => None,
         },
+        init_unit: header.unit("init_unit")?,
     };
     let read = inputs.read()?;
     let observation = inputs.observe(read.depth, read.mask, read.camera)?;
@@ -132,6 +140,12 @@ impl Header<'_> {
 
     fn text(&self, key: &str) -> anyhow::Result<String> {
         self.get(key, "a string")
+    }
+
+    fn unit(&self, key: &str) -> anyhow::Result<Option<LengthUnit>> {
+        let text: Option<String> = self.get(key, "a string")?;
+        let unit = text.map(|text| text.parse()).transpose();
+        unit.map_err(|_| self.refuse(key, "m, mm or cm"))
     }
 
     fn refuse(&self, key: &str, expected: &str) -> anyhow::Error {

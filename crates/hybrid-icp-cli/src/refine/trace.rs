@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::anyhow;
+use hicp_io::MaskRule;
 use hybrid_icp::Trace;
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
@@ -69,10 +70,16 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
         "pipeline": pipeline.name,
         "toml": pipeline.toml,
         "set": pipeline.overrides,
-        "model_unit": inputs.files.model_unit.to_string(),
+        "model_unit": inputs.files.unit().to_string(),
     });
-    if let Region::Box(bbox) = &inputs.region {
-        line["bbox"] = json!(bbox);
+    if let Some(unit) = inputs.init_unit {
+        line["init_unit"] = json!(unit.to_string());
+    }
+    match &inputs.region {
+        Region::Box(bbox) => line["bbox"] = json!(bbox),
+        Region::Mask(_, MaskRule::AtLeast(least)) => line["mask_threshold"] = json!(least),
+        Region::Mask(_, MaskRule::Equal(value)) => line["mask_value"] = json!(value),
+        Region::Mask(_, MaskRule::NotZero) => {}
     }
     for (option, path) in inputs.files() {
         let text = path.to_str().ok_or_else(|| {

@@ -53,11 +53,7 @@ pub(super) fn about_units(
         inputs.init.is_some() || !matches!(warning, Warning::BehindCamera { .. })
     });
     let files = &inputs.files;
-    let (unit, model, depth) = (
-        files.model_unit,
-        files.model.display(),
-        files.depth.display(),
-    );
+    let (unit, model, depth) = (files.unit(), files.model.display(), files.depth.display());
     let mask = inputs.mask_name();
     let (init, pose_unit) = match &inputs.init {
         Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hicp_io::LengthUnit;
+use hybrid_icp::core::{DepthImage, Isometry3, PinholeCamera};
 use hybrid_icp::raster::render_depth_image;
 
 use crate::common::*;
@@ -14,6 +15,102 @@ fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
     let rest = page.split(fence.as_str()).skip(1);
     rest.filter_map(|block| block.split("\n```").next())
         .collect()
+}
+
+/// Writes the files that the page "From what you have" names, in other formats.
+fn write_other_formats(scene: &Scene, depth: &DepthImage) {
+    let npy = |name: &str, header: &str, data: Vec<u8>| {
+        let header = format!("{header:<117}\n");
+        let start = [b"\x93NUMPY\x01\x00", &118_u16.to_le_bytes()[..]].concat();
+        scene.write(name, [&start, header.as_bytes(), &data].concat());
+    };
+    let (width, height) = (depth.width(), depth.height());
+    let floats = |meters: &[f32]| {
+        meters
+            .iter()
+            .flat_map(|z| z.to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let header =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    npy("depth.npy", &header, floats(depth.pixels()));
+    let rows = depth.pixels().chunks_exact(width as usize).rev();
+    let upside_down: Vec<u8> = rows.flat_map(floats).collect();
+    let pfm = format!("Pf\n{width} {height}\n-1.0\n");
+    scene.write("depth.pfm", [pfm.as_bytes(), &upside_down].concat());
+    let labels = depth.pixels().iter().zip(0..);
+    let labels = labels.flat_map(|(z, i)| [if *z > 0.0 { 3 } else { (i % 2) as u8 }; 3]);
+    let labels: Vec<u8> = labels.collect();
+    hicp_io::write_rgb_png(scene.path("labels.png"), width, height, &labels).unwrap();
+    scene.write(
+        "camera.yaml",
+        "image_width: 320\nimage_height: 240\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+         data: [400, 0, 161.5, 0, 402, 118, 0, 0, 1]\n",
+    );
+    let text = |pose: &Isometry3<f64>| {
+        let matrix = pose.to_homogeneous();
+        let rows = matrix.row_iter();
+        let rows = rows.map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(" "));
+        rows.collect::<Vec<_>>().join("\n")
+    };
+    let init = off(&truth(), 5);
+    scene.write("T.txt", text(&init));
+    let (t, q) = (init.translation, init.rotation.coords);
+    scene.write(
+        "tum.txt",
+        format!("{} {} {} {} {} {} {}", t.x, t.y, t.z, q.x, q.y, q.z, q.w),
+    );
+    scene.write("color.txt", "500 0 200\n0 500 150\n0 0 1\n");
+    let color = PinholeCamera::new(500.0, 500.0, 200.0, 150.0, 400, 300).unwrap();
+    let color_from_depth = Isometry3::translation(-0.02, 0.005, 0.0);
+    scene.write("color_from_depth.txt", text(&color_from_depth));
+    let seen = render_depth_image(&car(), &color, &(color_from_depth * truth()));
+    hicp_io::write_mask_png(scene.path("color_mask.png"), &mask_of(&seen)).unwrap();
+    scene.write(
+        "color_pose.json",
+        pose_json(&(color_from_depth * init)).to_string(),
+    );
+    let mesh = car();
+    let vertices: Vec<u8> = mesh
+        .vertices()
+        .iter()
+        .flat_map(|p| floats(p.coords.as_slice()))
+        .collect();
+    let corners: Vec<u8> = mesh
+        .triangles()
+        .iter()
+        .flatten()
+        .flat_map(|i| i.to_le_bytes())
+        .collect();
+    let json = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": mesh.vertices().len()},
+            {"bufferView": 1, "componentType": 5125, "type": "SCALAR", "count": 3 * mesh.triangles().len()},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": vertices.len()},
+            {"buffer": 0, "byteOffset": vertices.len(), "byteLength": corners.len()},
+        ],
+        "buffers": [{"byteLength": vertices.len() + corners.len()}],
+    });
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let chunk =
+        |kind: &[u8], data: &[u8]| [&(data.len() as u32).to_le_bytes(), kind, data].concat();
+    let chunks = [
+        chunk(b"JSON", &json),
+        chunk(b"BIN\0", &[vertices, corners].concat()),
+    ]
+    .concat();
+    let header = [
+        &b"glTF"[..],
+        &2_u32.to_le_bytes(),
+        &(12 + chunks.len() as u32).to_le_bytes(),
+    ];
+    scene.write("mug.glb", [header.concat(), chunks].concat());
 }
 
 /// Runs the `sh` blocks of a page. Blocks marked `bash` need data or tools that may be missing.
@@ -27,6 +124,7 @@ fn run_page(name: &str) {
     hicp_io::write_ply(scene.path("mug.ply"), &car(), LengthUnit::Millimeters).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &depth, 1.0).unwrap();
     std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
+    write_other_formats(&scene, &depth);
     let program = Path::new(env!("CARGO_BIN_EXE_hybrid-icp"));
     let path = format!(
         "{}:{}",
@@ -44,6 +142,11 @@ fn run_page(name: &str) {
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{name}: {block}\n{errors}");
     }
+}
+
+#[test]
+fn the_page_about_other_formats_runs() {
+    run_page("from-what-you-have.md");
 }
 
 #[test]
