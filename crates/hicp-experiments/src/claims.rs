@@ -1,5 +1,7 @@
 //! Claims, and the rules by which intervals decide them.
 
+use hybrid_icp::Preset;
+
 use crate::analysis::{Analysis, Interval, Metric};
 
 /// The verdict on a claim in a study.
@@ -76,10 +78,16 @@ pub(crate) struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Returns the variants whose names start with a prefix.
+    /// Returns the paper's variants whose names start with a prefix.
+    ///
+    /// Claims are about these, even if a study has more.
     pub(crate) fn family(self, prefix: &str) -> Vec<&'a str> {
         let names = self.analysis.variants().iter().map(String::as_str);
-        names.filter(|name| name.starts_with(prefix)).collect()
+        let of_paper = |name: &&str| Preset::PAPER.iter().any(|preset| preset.name() == *name);
+        names
+            .filter(|name| name.starts_with(prefix))
+            .filter(of_paper)
+            .collect()
     }
 
     /// Returns the labels of the single bins or levels.

@@ -139,7 +139,9 @@ impl IoError {
 
 impl fmt::Display for IoError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (path, found, expected) = (self.path.display(), &self.found, &self.expected);
+        // A line break in a name would start another message.
+        let path = self.path.display().to_string().replace(['\n', '\r'], "\\n");
+        let (found, expected) = (&self.found, &self.expected);
         match (self.kind, &self.place) {
             (IoErrorKind::Read, _) => write!(f, "cannot read {path}"),
             (IoErrorKind::Write, _) => write!(f, "cannot write {path}"),

@@ -14,7 +14,7 @@ use hybrid_icp::raster::render_depth_image;
 use hybrid_icp::score::{Score, Vsd};
 
 use crate::choice::PipelineArguments;
-use crate::outputs::Files;
+use crate::outputs::{Files, check_png};
 use crate::picture::Picture;
 use crate::refine::{report, warnings};
 use crate::terminal::{say, table, warn};
@@ -65,6 +65,7 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let files = Files::default().writes("--picture", [&arguments.picture]);
     files.check()?;
+    check_png("--picture", [&arguments.picture])?;
     let pipeline = arguments.pipeline.choose()?;
     let mut rng = rng(arguments.seed);
     let model = arguments.object.model()?;

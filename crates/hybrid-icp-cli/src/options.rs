@@ -1,7 +1,5 @@
 //! Parsers for the values of options.
 
-use std::path::PathBuf;
-
 /// Parses a finite number above 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     let value: Option<f64> = text.parse().ok();
@@ -16,15 +14,4 @@ pub(crate) fn finite(text: &str) -> Result<f64, String> {
     value
         .filter(|x| x.is_finite())
         .ok_or_else(|| "expected a finite number".to_owned())
-}
-
-/// Parses the name of a picture, which is written as PNG.
-pub(crate) fn png(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(found) if !found.eq_ignore_ascii_case("png") => {
-            Err("pictures are PNG files, expected a name that ends with .png".to_owned())
-        }
-        _ => Ok(path),
-    }
 }

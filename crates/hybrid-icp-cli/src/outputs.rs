@@ -5,6 +5,23 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
+/// Checks that pictures have the name of a PNG file, which they are.
+pub(crate) fn check_png<'a>(
+    option: &str,
+    paths: impl IntoIterator<Item = &'a PathBuf>,
+) -> anyhow::Result<()> {
+    for path in paths {
+        let extension = path.extension();
+        if extension.is_some_and(|found| !found.eq_ignore_ascii_case("png")) {
+            bail!(
+                "{option} names {}, expected a name that ends with .png",
+                path.display()
+            );
+        }
+    }
+    Ok(())
+}
+
 /// The files that a command reads and writes, with the options that name them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Files<'a> {

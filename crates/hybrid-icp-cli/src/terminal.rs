@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Prints a line to standard output.
@@ -21,12 +21,45 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
 
 /// Prints a warning to standard error. Ignores failures, because they cannot be reported.
 pub(crate) fn warn(text: impl Display) {
-    let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
+    let _ = writeln!(std::io::stderr().lock(), "warning: {}", printable(text));
 }
 
 /// Prints an error to standard error.
 pub(crate) fn complain(text: impl Display) {
-    let _ = writeln!(std::io::stderr().lock(), "error: {text}");
+    let _ = writeln!(std::io::stderr().lock(), "error: {}", printable(text));
+}
+
+/// Returns a message whose control characters are escaped, except for line breaks.
+///
+/// A file name may have them, and a terminal would obey them.
+fn printable(text: impl Display) -> String {
+    let text = text.to_string();
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c.is_control() && c != '\n' && c != '\t' {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    shown
+}
+
+/// Returns an error if the shell closed standard output (`>&-`), where a result would be lost.
+///
+/// Rust replaces a closed stream by `/dev/null`, open for reading and writing. Redirected output is
+/// open for writing only.
+pub(crate) fn check_stdout() -> anyhow::Result<()> {
+    let link = std::fs::read_link("/proc/self/fd/1").unwrap_or_default();
+    let info = std::fs::read_to_string("/proc/self/fdinfo/1").unwrap_or_default();
+    let flags = info
+        .lines()
+        .find_map(|line| line.strip_prefix("flags:")?.trim().chars().last());
+    if link.as_os_str() == "/dev/null" && flags == Some('2') {
+        bail!(
+            "standard output is closed, so that the result would be lost: expected --output FILE"
+        );
+    }
+    Ok(())
 }
 
 /// Returns a progress bar, which is invisible if standard error is not a terminal.

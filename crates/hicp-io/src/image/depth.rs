@@ -136,13 +136,20 @@ impl ReadLimits {
     pub fn read_raw_depth(&self, path: impl AsRef<Path>) -> Result<RawDepth, IoError> {
         let path = path.as_ref();
         let raster = Raster::read(self, path, EXPECTED)?;
-        let found = match (raster.channels, raster.integer_bits) {
-            (2.., _) => format!("{} numbers per pixel", raster.channels),
-            (_, Some(bits @ ..16)) => format!("{bits}-bit gray pixels"),
-            _ => {
+        let kind = match raster.channels {
+            1 if raster.background.is_some() => "palette",
+            1 => "gray",
+            2 => "gray + alpha",
+            3 => "RGB",
+            _ => "RGBA",
+        };
+        let found = match (kind, raster.integer_bits) {
+            ("gray", None | Some(16..)) => {
                 let path = path.to_owned();
                 return Ok(RawDepth { path, raster });
             }
+            (kind, Some(bits)) => format!("{bits}-bit {kind} pixels"),
+            (kind, None) => format!("floating-point {kind} pixels"),
         };
         let expected = "16-bit gray pixels, or one floating-point number per pixel";
         Err(IoError::new(path, None, found, expected))

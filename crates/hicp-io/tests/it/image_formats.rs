@@ -84,7 +84,7 @@ fn files_that_cannot_be_depth_are_refused_with_advice() {
         ("mask_u8.tiff", "8-bit gray pixels", "16-bit gray"),
         (
             "mask_cut_out.png",
-            "4 numbers per pixel",
+            "8-bit RGBA pixels",
             "one floating-point number",
         ),
         ("mask_bool.npy", "1-bit gray pixels", "16-bit gray"),

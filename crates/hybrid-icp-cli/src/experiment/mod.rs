@@ -14,6 +14,7 @@ use hybrid_icp::{Preset, UnknownPreset};
 use self::study::{StudyOptions, report};
 use crate::choice::Source;
 use crate::limits::pipeline_limits;
+use crate::terminal::warn;
 
 /// Rerun the paper's studies, on household objects or on custom meshes.
 ///
@@ -128,6 +129,12 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let threads = matches!(experiment, Experiment::Timing).then_some(1);
     let names = [experiment.name(), "cases"];
     options.run(&config, &subjects, &out, names, threads)?;
+    if experiment.is_binned() && poses < config.bins as u64 {
+        warn(format_args!(
+            "--poses {poses} fills the first {poses} of {0} bins of the initial VSD, expected {0} or more",
+            config.bins
+        ));
+    }
     report_folders(std::slice::from_ref(&out), &out)
 }
 

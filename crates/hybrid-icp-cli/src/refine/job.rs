@@ -11,8 +11,7 @@ use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
-use crate::options::png;
-use crate::outputs::Files;
+use crate::outputs::{Files, check_png};
 use crate::picture::Picture;
 use crate::terminal::{check_stdout, say, warn};
 
@@ -31,7 +30,7 @@ pub(crate) struct JobOptions {
     alternatives: Option<PathBuf>,
     /// A PNG file for a picture: the depth around the object, with the model's outline at the
     /// initial pose (orange, dashed) and at the result (blue), and their MVE.
-    #[arg(long, value_name = "FILE", value_parser = png)]
+    #[arg(long, value_name = "FILE")]
     overlay: Option<PathBuf>,
     /// A file for the trace: one JSON object per iteration and line, with its pose as in a pose
     /// file. `hybrid-icp replay` runs it again.
@@ -139,6 +138,7 @@ impl JobOptions {
         // A pose can be refined in place, because the result has the keys of a pose file.
         files
             .reads("--pipeline", self.pipeline.file())
-            .check_in_place("--output", "--init")
+            .check_in_place("--output", "--init")?;
+        check_png("--overlay", &self.overlay)
     }
 }

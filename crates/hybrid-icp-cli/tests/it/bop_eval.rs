@@ -497,6 +497,13 @@ fn bad_results_and_targets_name_their_place() {
     .unwrap();
     eval(&world, &["--targets", "gone.json"])
         .exits(1)
+        .complains(&["in.csv: none of", "rows has a target", "--split"]);
+    let mut rows = truth_as_results(&world);
+    rows.iter_mut()
+        .for_each(|row| (row.scene_id, row.im_id, row.obj_id) = (99, 0, 1));
+    write_results(world.path("in.csv"), &rows[..1]).unwrap();
+    eval(&world, &["--targets", "gone.json"])
+        .exits(1)
         .complains(&["none of the 1 targets could be evaluated", "--split"]);
     eval(&world, &["--split", "tset"])
         .exits(1)

@@ -33,6 +33,7 @@ mod inspect;
 mod killed_generator;
 mod no_regular_files;
 mod objects;
+mod other_formats;
 mod outputs;
 mod pipeline_limits;
 mod pipelines;

@@ -48,6 +48,20 @@ impl EvalJob<'_> {
         let dataset = self.dataset.open()?;
         let split = &self.dataset.split;
         let wanted = targets::choose(&dataset, split, self.targets)?;
+        let has_target = |row: &ResultRow| {
+            let of_frame = wanted.get(&(row.scene_id, row.im_id));
+            of_frame.is_some_and(|objects| objects.contains_key(&row.obj_id))
+        };
+        if let Some(first) = rows.first().filter(|_| !rows.iter().any(has_target)) {
+            bail!(
+                "{}: none of {} rows has a target; the first is object {} in image {} of scene {}: expected the --dataset, --split and --targets of these results",
+                self.results.display(),
+                rows.len(),
+                first.obj_id,
+                first.im_id,
+                first.scene_id
+            );
+        }
         let objects: BTreeSet<u32> = wanted.values().flat_map(|t| t.keys().copied()).collect();
         let pool = self.threads.pool(wanted.len())?;
         let scenes = Scenes::new(&dataset, split, pool.current_num_threads() + 1);

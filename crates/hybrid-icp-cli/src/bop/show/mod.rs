@@ -20,7 +20,7 @@ use super::options::{DatasetOptions, file_name};
 use super::{faults, models};
 use crate::limits::limits;
 use crate::options::positive;
-use crate::outputs::Files;
+use crate::outputs::{Files, check_png};
 use crate::picture::Picture;
 use crate::terminal::{say, table, warn};
 
@@ -89,6 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .writes("--out", [&arguments.out]);
     written.check()?;
     written.spare_dataset(&arguments.dataset.root, &arguments.dataset.split)?;
+    check_png("--out", [&arguments.out])?;
     let files = arguments.files()?;
     let dataset = arguments.dataset.open()?;
     let masks = arguments.masks()?;
