@@ -1,6 +1,7 @@
 //! Masks from bounding boxes: the measured pixels of a box without the plane around it.
 
-use hicp_core::{DepthImage, Mask, Matrix3, PinholeCamera, PixelRegion, Vector3};
+use hicp_core::internal::DepthPlane;
+use hicp_core::{DepthImage, Mask, PinholeCamera, PixelRegion, Vector3};
 
 /// Growth of the box on every side, relative to its longer side. The pixels around the box show
 /// what the object stands on or in front of.
@@ -93,9 +94,9 @@ fn pixels_of([x, y, width, height]: [f64; 4], by: f64, depth: &DepthImage) -> Pi
     }
 }
 
-/// A plane in an image, in which inverse depth is linear: 1/z = a + b u + c v.
+/// The plane around a box.
 struct Plane {
-    inverse_depth: Vector3<f64>,
+    plane: DepthPlane,
     /// Relative distance within which a pixel belongs to the plane.
     tolerance: f64,
 }
@@ -111,70 +112,43 @@ impl Plane {
             .isqrt()
             .max(1);
         let rows = (outer.v_min..outer.v_max).step_by(step);
-        let samples: Vec<(u32, u32, f64)> = rows
+        let pixels: Vec<Vector3<f64>> = rows
             .flat_map(|v| {
                 (outer.u_min..outer.u_max)
                     .step_by(step)
                     .map(move |u| (u, v))
             })
             .filter(|(u, v)| !inner.contains(*u, *v))
-            .filter_map(|(u, v)| Some((u, v, depth(u, v)?)))
+            .filter_map(|(u, v)| Some(Vector3::new(f64::from(u), f64::from(v), depth(u, v)?)))
             .collect();
-        if samples.len() < MIN_SAMPLES {
+        if pixels.len() < MIN_SAMPLES {
             return None;
         }
-        let mut residuals = Vec::with_capacity(samples.len());
-        let mut median = |plane: &Self| {
-            let of = |(u, v, z): &(u32, u32, f64)| plane.distance(*u, *v, *z).abs();
+        let distance = |plane: &DepthPlane, pixel: &Vector3<f64>| {
+            (pixel.z * plane.inverse_depth(pixel.x, pixel.y) - 1.0).abs()
+        };
+        let mut residuals = Vec::with_capacity(pixels.len());
+        let mut median = |plane: &DepthPlane| {
             residuals.clear();
-            residuals.extend(samples.iter().map(of));
+            residuals.extend(pixels.iter().map(|pixel| distance(plane, pixel)));
             let middle = residuals.len() / 2;
             *residuals.select_nth_unstable_by(middle, f64::total_cmp).1
         };
-        // A linear congruential generator: the same box gives the same plane.
-        let mut state = 1_u64;
-        let mut draw = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            samples[(state >> 33) as usize % samples.len()]
-        };
-        let planes = (0..ROUNDS).filter_map(|_| Self::fit(&[draw(), draw(), draw()]));
-        let planes: Vec<Self> = planes.collect();
-        let scored = planes.into_iter().map(|plane| (median(&plane), plane));
+        let planes = DepthPlane::through_three(&pixels, ROUNDS);
+        let scored = planes.map(|plane| (median(&plane), plane));
         let (spread, plane) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let near = |plane: &Self, spread: f64| {
-            let near = samples.iter();
-            let near = near.filter(|(u, v, z)| {
-                plane.distance(*u, *v, *z).abs() <= 3.0 * spread.max(0.1 * FINEST)
-            });
-            near.copied().collect::<Vec<_>>()
-        };
-        let plane = Self::fit(&near(&plane, spread))?;
+        let limit = 3.0 * spread.max(0.1 * FINEST);
+        let near = pixels
+            .iter()
+            .filter(|pixel| distance(&plane, pixel) <= limit);
+        let plane = DepthPlane::fit(near.copied())?;
         // The median of the absolute values is 0.67 standard deviations.
         let tolerance = (DEVIATIONS * median(&plane) / 0.6745).max(FINEST);
-        Some(Self { tolerance, ..plane })
-    }
-
-    /// Fits a plane by least squares of inverse depths.
-    fn fit(samples: &[(u32, u32, f64)]) -> Option<Self> {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for (u, v, z) in samples {
-            let row = Vector3::new(1.0, f64::from(*u), f64::from(*v));
-            normal += row * row.transpose();
-            right += row / *z;
-        }
-        Some(Self {
-            inverse_depth: normal.try_inverse()? * right,
-            tolerance: 0.0,
-        })
+        Some(Self { plane, tolerance })
     }
 
     /// Returns the distance of a depth behind the plane along the ray, relative to the plane's.
     fn distance(&self, u: u32, v: u32, z: f64) -> f64 {
-        z * self
-            .inverse_depth
-            .dot(&Vector3::new(1.0, f64::from(u), f64::from(v)))
-            - 1.0
+        z * self.plane.inverse_depth(f64::from(u), f64::from(v)) - 1.0
     }
 }

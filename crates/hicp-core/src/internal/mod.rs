@@ -3,12 +3,14 @@
 mod index;
 mod label;
 pub(crate) mod number;
+mod plane;
 mod suggest;
 mod vectorized;
 mod work;
 
 pub use index::index;
 pub use label::type_label;
+pub use plane::DepthPlane;
 pub use suggest::nearest_name;
 pub use vectorized::{VectorLoop, vectorized};
 pub use work::Work;

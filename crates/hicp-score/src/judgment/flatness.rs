@@ -1,6 +1,7 @@
 //! A comparison of the flatness of the measured and the rendered surface.
 
-use hicp_core::{Context, Isometry3, Matrix3, Observation, PixelRegion, RenderedView, Vector3};
+use hicp_core::internal::DepthPlane;
+use hicp_core::{Context, Isometry3, Observation, PixelRegion, RenderedView, Vector3};
 
 /// Largest number of compared pixels.
 const MAX_PIXELS: usize = 512;
@@ -185,21 +186,16 @@ fn nearest(distances: &mut [f64], share: f64) -> f64 {
 /// `scratch` is as long as `pixels`. If no plane fits, returns `None`. In an image the inverse
 /// depth of a plane is linear: 1/z = a + b u + c v.
 fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f64]) -> Option<f64> {
-    let mut plane = Vector3::zeros();
+    let mut plane = None;
     let mut limit = f64::INFINITY;
-    for round in 0..ROUNDS {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for pixel in pixels {
-            let z = depth(pixel);
-            if round == 0 || distance(&plane, pixel, z) <= limit {
-                let row = Vector3::new(1.0, pixel.u, pixel.v);
-                normal += row * row.transpose();
-                right += row / z;
-            }
-        }
-        plane = normal.try_inverse()? * right;
+    for _ in 0..ROUNDS {
+        let fitted = pixels.iter().filter(|pixel| {
+            plane.is_none_or(|plane| distance(&plane, pixel, depth(pixel)) <= limit)
+        });
+        let best = DepthPlane::fit(fitted.map(|p| Vector3::new(p.u, p.v, depth(p))))?;
+        plane = Some(best);
         for (distance_of, pixel) in scratch.iter_mut().zip(pixels) {
-            *distance_of = distance(&plane, pixel, depth(pixel));
+            *distance_of = distance(&best, pixel, depth(pixel));
         }
         limit = nearest(scratch, FITTED);
     }
@@ -209,8 +205,8 @@ fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f6
 /// Returns the distance of a depth from a plane, along the optical axis.
 ///
 /// It is infinite if the plane is not in front of the camera.
-fn distance(plane: &Vector3<f64>, pixel: &Pixel, z: f64) -> f64 {
-    let inverse = plane.x + plane.y * pixel.u + plane.z * pixel.v;
+fn distance(plane: &DepthPlane, pixel: &Pixel, z: f64) -> f64 {
+    let inverse = plane.inverse_depth(pixel.u, pixel.v);
     if inverse > 0.0 {
         (z - 1.0 / inverse).abs()
     } else {

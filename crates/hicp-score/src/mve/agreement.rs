@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hicp_core::internal::VectorLoop;
 
-use crate::mve::mask_trust::CERTAIN;
+use crate::mve::trust_map::CERTAIN;
 use crate::tolerances::{N_TOLERANCES, tolerances};
 
 /// Number of pixels counted at once.

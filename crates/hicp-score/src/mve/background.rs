@@ -1,6 +1,7 @@
 //! The plane behind an object, such as the table it stands on.
 
-use hicp_core::{Matrix3, Observation, Vector3};
+use hicp_core::internal::DepthPlane;
+use hicp_core::{Observation, Vector3};
 
 /// Width of the ring around the mask, as a share of the square root of the mask's area.
 const RING: f64 = 0.25;
@@ -16,9 +17,9 @@ const LEAST_HEIGHT_METERS: f64 = 0.004;
 /// Largest half width of the window over which heights are averaged, pixels.
 const MAX_HALF_WINDOW: usize = 4;
 
-/// A plane: 1/z = a + b u + c v, which is exact in an image.
+/// The plane around a mask.
 pub(crate) struct Background {
-    plane: Vector3<f64>,
+    plane: DepthPlane,
     noise: f64,
 }
 
@@ -47,32 +48,17 @@ impl Background {
             return None;
         }
         let near = LEAST_HEIGHT_METERS.max(2.5 * noise);
-        let on = |plane: &Vector3<f64>, pixel: &Vector3<f64>| height(plane, pixel).abs() < near;
-        let support = |plane: &Vector3<f64>| ring.iter().filter(|p| on(plane, p)).count();
-        let mut best = (0, Vector3::zeros());
-        let mut state = 1_usize;
-        let mut next = || {
-            // A fixed sequence keeps the result deterministic.
-            state = state.wrapping_mul(1_103_515_245).wrapping_add(12_345) % (1 << 31);
-            ring[(state >> 8) % ring.len()]
+        let near_plane = |plane: DepthPlane| {
+            let pixels = ring.iter().copied();
+            pixels.filter(move |pixel| height(&plane, pixel).abs() < near)
         };
-        for _ in 0..TRIES {
-            let three = [next(), next(), next()];
-            if let Some(plane) = fit(three.iter()) {
-                let count = support(&plane);
-                if count > best.0 {
-                    best = (count, plane);
-                }
-            }
-        }
+        let support = |plane: &DepthPlane| near_plane(*plane).count();
+        let mut plane = DepthPlane::through_three(&ring, TRIES).max_by_key(support)?;
         for _ in 0..2 {
-            let plane = fit(ring.iter().filter(|p| on(&best.1, p)))?;
-            best = (support(&plane), plane);
+            plane = DepthPlane::fit(near_plane(plane))?;
         }
-        (best.0 as f64 > LEAST_SHARE * ring.len() as f64).then_some(Self {
-            plane: best.1,
-            noise,
-        })
+        let found = support(&plane) as f64 > LEAST_SHARE * ring.len() as f64;
+        found.then_some(Self { plane, noise })
     }
 
     /// Returns the certainty that each of some pixels is not on the plane, 0 to 1.
@@ -126,28 +112,11 @@ impl Background {
 }
 
 /// Returns the distance of a pixel (u, v, z) in front of a plane, along the optical axis, meters.
-fn height(plane: &Vector3<f64>, pixel: &Vector3<f64>) -> f64 {
-    let inverse = plane.x + plane.y * pixel.x + plane.z * pixel.y;
+fn height(plane: &DepthPlane, pixel: &Vector3<f64>) -> f64 {
+    let inverse = plane.inverse_depth(pixel.x, pixel.y);
     if inverse > 0.0 {
         1.0 / inverse - pixel.z
     } else {
         f64::INFINITY
     }
-}
-
-/// Fits a plane to pixels by least squares of inverse depth.
-fn fit<'a>(pixels: impl Iterator<Item = &'a Vector3<f64>>) -> Option<Vector3<f64>> {
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for pixel in pixels {
-        // Steps of a hundred pixels keep the numbers of equal size.
-        let row = Vector3::new(1.0, pixel.x * 1e-2, pixel.y * 1e-2);
-        normal += row * row.transpose();
-        right += row / pixel.z;
-    }
-    let solution = normal.try_inverse()? * right;
-    Some(Vector3::new(
-        solution.x,
-        solution.y * 1e-2,
-        solution.z * 1e-2,
-    ))
 }

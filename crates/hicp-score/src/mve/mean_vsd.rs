@@ -6,8 +6,9 @@ use hicp_core::{Context, Isometry3, Observation, RenderedView};
 use crate::judgment::grid::Grid;
 use crate::judgment::insides::inside_share;
 use crate::mve::agreement::{Agreement, Found, Row, Weights};
-use crate::mve::mask_trust::{MaskTrust, TrustMap};
+use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
+use crate::mve::trust_map::TrustMap;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 

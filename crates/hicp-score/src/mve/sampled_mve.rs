@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
 
-use crate::mve::mask_trust::{CERTAIN, MaskTrust, TrustMap};
+use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
+use crate::mve::trust_map::{CERTAIN, TrustMap};
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, mean};
 

@@ -1,0 +1,310 @@
+//! The weights of the pixels of an imperfect mask.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use hicp_core::{Observation, PixelRegion};
+
+use crate::mve::background::Background;
+use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
+
+/// Width of the uncertain border, as a share of the square root of the mask's area.
+const BORDER: f32 = 0.25;
+
+/// Distance outside the mask up to which pixels in front of the background may show the object.
+const BEYOND_PIXELS: f32 = 4.0;
+
+/// Smallest step of depth at the border of an object, meters.
+const STEP_METERS: f64 = 0.01;
+
+/// Number of cells along the longer side of the grid on which weights are computed.
+const SIDE: usize = 128;
+
+/// Smallest share of the trust that the removal of a plane must leave.
+const LEAST_KEPT: f32 = 0.15;
+
+/// The weight of a pixel that certainly shows the object.
+pub(crate) const CERTAIN: u8 = 255;
+
+/// The weights of the pixels of a mask.
+pub(crate) struct TrustMap {
+    /// The mask's box and a border.
+    region: PixelRegion,
+    /// The weights of the pixels of the region, row by row.
+    ///
+    /// Masked pixels without a measured depth have the full weight, so that they do not count
+    /// against a pose.
+    weights: Vec<u8>,
+    /// The sum of the weights of measured pixels.
+    total: u64,
+    /// Standard deviation of the depth noise, meters.
+    noise: f64,
+}
+
+impl TrustMap {
+    /// Returns the map of an observation for objects of a diameter in meters.
+    ///
+    /// It is built once and shared. Cost: O(pixels of the mask's box).
+    pub(crate) fn of(observation: &Observation, diameter: f64) -> Arc<Self> {
+        observation
+            .derived()
+            .get_or_build(diameter.to_bits(), || Self::new(observation, diameter))
+    }
+
+    fn new(observation: &Observation, diameter: f64) -> Self {
+        let camera = observation.camera();
+        let region = widened(&observation.region(), camera.width(), camera.height());
+        // A coarse grid bounds the cost, which the first score of an observation pays.
+        let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
+        let width = region.width().div_ceil(step).max(1);
+        let cells = || {
+            let columns = (region.u_min..region.u_max).step_by(step);
+            let rows = (region.v_min..region.v_max).step_by(step);
+            rows.flat_map(move |v| columns.clone().map(move |u| (u, v)))
+        };
+        let (depth, mask) = (observation.depth(), observation.mask());
+        let masked: Vec<bool> = cells().map(|(u, v)| mask.get(u, v) == Some(true)).collect();
+        let depths: Vec<f32> = cells()
+            .map(|(u, v)| depth.get(u, v).unwrap_or(0.0))
+            .collect();
+        let area = masked.iter().filter(|on| **on).count() * step * step;
+        let distance_to = |value: bool| {
+            let start = masked
+                .iter()
+                .map(|on| if *on == value { 0.0 } else { f32::INFINITY });
+            let mut distances: Vec<f32> = start.collect();
+            to_zero(&mut distances, width, step as f32);
+            distances
+        };
+        let mut trust = distance_to(false);
+        let middle = middle_of(&depths, &trust);
+        let noise = noise_of(observation);
+        let plane = Background::around(observation, area, noise);
+        let doubt = 1.0 - certainty(&masked, &depths, width, noise);
+        let beyond = if plane.is_some() {
+            doubt * BEYOND_PIXELS
+        } else {
+            0.0
+        };
+        let scale = 1.0 / (doubt * BORDER * (area as f32).sqrt() + beyond).max(1.0);
+        let outside = distance_to(true);
+        for ((trust, outside), z) in trust.iter_mut().zip(outside).zip(&depths) {
+            let counts = *z > 0.0 && f64::from((*z - middle).abs()) <= diameter;
+            let ramp = ((*trust - outside + beyond) * scale).clamp(0.0, 1.0);
+            *trust = if counts { ramp * ramp } else { 0.0 };
+        }
+        if let Some(plane) = plane {
+            let off = plane.off_plane(cells().zip(depths.iter().copied()), width, step);
+            let kept = trust
+                .iter()
+                .zip(&off)
+                .map(|(trust, off)| trust * off)
+                .sum::<f32>();
+            // An object that is as flat as the plane cannot be separated from it.
+            let separable = kept > LEAST_KEPT * trust.iter().sum::<f32>();
+            for ((trust, off), on) in trust.iter_mut().zip(&off).zip(&masked) {
+                if separable {
+                    *trust *= off;
+                } else if !on {
+                    *trust = 0.0;
+                }
+            }
+        }
+        let mut weights = Vec::with_capacity(region.area());
+        let mut total = 0;
+        for v in region.v_min..region.v_max {
+            let start = (v - region.v_min) as usize / step * width;
+            for u in region.u_min..region.u_max {
+                let measured = depth.get(u, v).is_some_and(|z| z > 0.0);
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // At most 255.
+                let weight = match (measured, mask.get(u, v)) {
+                    (true, _) => {
+                        let column = (u - region.u_min) as usize / step;
+                        (trust[start + column] * f32::from(CERTAIN)) as u8
+                    }
+                    (false, Some(true)) => CERTAIN,
+                    _ => 0,
+                };
+                total += if measured { u64::from(weight) } else { 0 };
+                weights.push(weight);
+            }
+        }
+        Self {
+            region,
+            weights,
+            total,
+            noise,
+        }
+    }
+
+    /// Returns the distance behind the rendered surface from which on the camera sees through it.
+    pub(crate) fn seen_through_meters(&self) -> f64 {
+        VISIBILITY_TOLERANCE_METERS.max(2.0 * self.noise)
+    }
+
+    /// Returns the sum of the weights of measured pixels.
+    pub(crate) fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// Returns the same for every `factor`-th pixel of `observation`, computed once.
+    pub(crate) fn total_at(&self, observation: &Observation, diameter: f64, factor: u32) -> u64 {
+        struct Total(u64);
+        let key = diameter.to_bits() ^ u64::from(factor);
+        let total = observation.derived().get_or_build(key, || {
+            let (region, depth) = (&self.region, observation.depth());
+            let on_grid =
+                |from: u32, to: u32| (from.next_multiple_of(factor)..to).step_by(factor as usize);
+            let rows = on_grid(region.v_min, region.v_max);
+            let pixels =
+                rows.flat_map(|v| on_grid(region.u_min, region.u_max).map(move |u| (u, v)));
+            let measured = pixels.filter(|(u, v)| depth.get(*u, *v).is_some_and(|z| z > 0.0));
+            Total(measured.map(|(u, v)| u64::from(self.weight(u, v))).sum())
+        });
+        total.0
+    }
+
+    /// Returns the weight of a pixel.
+    pub(crate) fn weight(&self, u: u32, v: u32) -> u8 {
+        self.region.index(u, v).map_or(0, |i| self.weights[i])
+    }
+
+    /// Splits the columns `u..u + width` of a row at the borders of the mask's region.
+    ///
+    /// Returns the columns of each part, relative to `u`, and its weights.
+    pub(crate) fn parts(
+        &self,
+        v: u32,
+        u: u32,
+        width: usize,
+    ) -> impl Iterator<Item = (Range<usize>, Option<&[u8]>)> {
+        let region = &self.region;
+        let inside = (region.v_min..region.v_max).contains(&v);
+        let column = |edge: u32| (edge.saturating_sub(u) as usize).min(width);
+        let (from, to) = if inside {
+            (column(region.u_min), column(region.u_max))
+        } else {
+            (width, width)
+        };
+        let middle = (from < to).then(|| {
+            #[allow(clippy::cast_possible_truncation)] // A column of an image.
+            let first = region.index(u + from as u32, v).unwrap_or(0);
+            &self.weights[first..first + to - from]
+        });
+        [(0..from, None), (from..to, middle), (to..width, None)]
+            .into_iter()
+            .filter(|(columns, _)| !columns.is_empty())
+    }
+}
+
+/// Returns the certainty that the border of the mask is that of the object, 0 to 1.
+///
+/// It is 1 if the depth has a step, or is missing, at half of the border or more. A border that is
+/// too far outside crosses smooth background.
+fn certainty(masked: &[bool], depths: &[f32], width: usize, noise: f64) -> f32 {
+    let least = STEP_METERS.max(4.0 * noise);
+    let (mut border, mut steps) = (0.0_f32, 0.0_f32);
+    for index in 0..masked.len() {
+        let right = ((index + 1) % width > 0).then_some(index + 1);
+        for other in [right, Some(index + width)].into_iter().flatten() {
+            if other < masked.len() && masked[index] != masked[other] {
+                let (a, b) = (depths[index], depths[other]);
+                let step = a <= 0.0 || b <= 0.0 || f64::from((a - b).abs()) > least;
+                border += 1.0;
+                steps += f32::from(u8::from(step));
+            }
+        }
+    }
+    if border > 0.0 {
+        (4.0 * steps / border - 1.0).clamp(0.0, 1.0)
+    } else {
+        1.0
+    }
+}
+
+/// Widens a region by the border in which pixels outside the mask have a weight.
+fn widened(region: &PixelRegion, width: u32, height: u32) -> PixelRegion {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small constant.
+    let border = BEYOND_PIXELS as u32 + 1;
+    if region.is_empty() {
+        return *region;
+    }
+    PixelRegion {
+        u_min: region.u_min.saturating_sub(border),
+        v_min: region.v_min.saturating_sub(border),
+        u_max: (region.u_max + border).min(width),
+        v_max: (region.v_max + border).min(height),
+    }
+}
+
+/// Replaces infinite values by the distances, in pixels, to the nearest zero.
+///
+/// The values are `step` pixels apart. The error of this two-pass transform is at most 8 %.
+fn to_zero(distances: &mut [f32], width: usize, step: f32) {
+    let diagonal = std::f32::consts::SQRT_2 * step;
+    // The second pass is the first one, from the last pixel to the first.
+    for _ in 0..2 {
+        for index in 0..distances.len() {
+            let column = index % width;
+            let mut least = distances[index];
+            if column > 0 {
+                least = least.min(distances[index - 1] + step);
+            }
+            if index >= width {
+                least = least.min(distances[index - width] + step);
+                if column > 0 {
+                    least = least.min(distances[index - width - 1] + diagonal);
+                }
+                if column + 1 < width {
+                    least = least.min(distances[index - width + 1] + diagonal);
+                }
+            }
+            distances[index] = least;
+        }
+        distances.reverse();
+    }
+}
+
+/// Returns the median depth of the inner half of the mask, meters, from distances to its border.
+fn middle_of(depths: &[f32], distances: &[f32]) -> f32 {
+    let finite = distances.iter().copied().filter(|d| d.is_finite());
+    let inner = 0.5 * finite.fold(0.0, f32::max);
+    let pixels = depths.iter().zip(distances);
+    let within = pixels.filter(|(z, distance)| **z > 0.0 && **distance >= inner.max(1.0));
+    let mut inside: Vec<f32> = within.map(|(z, _)| *z).collect();
+    if inside.is_empty() {
+        return f32::INFINITY;
+    }
+    let middle = inside.len() / 2;
+    *inside.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+/// Returns the standard deviation of the depth noise inside the mask, meters.
+///
+/// It is computed from the median distance of about 500 pixels from the mean of their neighbors in
+/// the row.
+fn noise_of(observation: &Observation) -> f64 {
+    let region = observation.region();
+    let (depth, mask) = (observation.depth(), observation.mask());
+    let step = (region.area() / 512).isqrt().max(1);
+    let mut differences: Vec<f32> = Vec::with_capacity(1024);
+    for v in (region.v_min..region.v_max).step_by(step) {
+        for u in (region.u_min..region.u_max).step_by(step) {
+            let at = |u: u32| match (mask.get(u, v), depth.get(u, v)) {
+                (Some(true), Some(z)) if z > 0.0 => Some(z),
+                _ => None,
+            };
+            let around = (at(u.wrapping_sub(1)), at(u), at(u + 1));
+            if let (Some(left), Some(z), Some(right)) = around {
+                differences.push((z - 0.5 * (left + right)).abs());
+            }
+        }
+    }
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let middle = differences.len() / 2;
+    let median = *differences.select_nth_unstable_by(middle, f32::total_cmp).1;
+    // Of independent errors, the distance is larger by √1.5, and the median is 0.6745 of them.
+    f64::from(median) / (0.6745 * 1.5_f64.sqrt())
+}
