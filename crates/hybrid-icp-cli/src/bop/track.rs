@@ -1,23 +1,21 @@
 //! `hybrid-icp bop track`.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Error, bail};
 use clap::Args;
 use hicp_bop::{Fault, Scenes};
-use hicp_io::bop::{ResultRow, write_results};
+use hicp_io::bop::ResultRow;
 use hybrid_icp::core::{DepthImage, Isometry3, Model, PinholeCamera};
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
 use serde_json::{Value, json};
 
-use super::options::DatasetOptions;
+use super::faults;
+use super::follow::FollowOptions;
 use super::statistics::median;
-use super::{faults, init, models};
 use crate::options::positive;
-use crate::outputs::Files;
 use crate::pose_json::add_pose;
 use crate::terminal::{progress_bar, say};
 
@@ -30,7 +28,8 @@ use crate::terminal::{progress_bar, say};
 /// The output has one line of JSON per image: the pose (cam_R_m2c, cam_t_m2c in mm), the state
 /// (tracking, doubtful or lost), and the evidence. The score is the share of the visible pixels
 /// that agree with the pose. While an object is lost, its pose is a guess, and it is searched
-/// around it. deviation_mm is the standard deviation of the least determined displacement.
+/// around it, and the result file has no row. deviation_mm is the standard deviation of the least
+/// determined displacement.
 ///
 /// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
 /// image whose depth is missing or damaged is predicted. If a file is damaged, the exit code is 1,
@@ -39,30 +38,10 @@ use crate::terminal::{progress_bar, say};
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    dataset: DatasetOptions,
-    /// The id of the scene.
-    #[arg(long, value_name = "ID")]
-    scene: u32,
-    /// The id of the object.
-    #[arg(long, value_name = "ID")]
-    object: u32,
-    /// The rough pose in the first image: a pose file (JSON) or a result file (CSV), for example
-    /// of bop estimate. Of a result file, the row for that image and object with the highest score
-    /// is used.
-    #[arg(long, value_name = "FILE.json|FILE.csv")]
-    init: PathBuf,
-    /// The id of the image to start with; the scene's first if not given.
-    #[arg(long, value_name = "ID")]
-    first: Option<u32>,
+    follow: FollowOptions,
     /// Number of images per second. Images whose ids are not successive are further apart.
     #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive, allow_negative_numbers = true)]
     fps: f64,
-    /// The file for the lines.
-    #[arg(long, value_name = "OUT.jsonl")]
-    output: PathBuf,
-    /// Also write the poses of tracked and doubtful images as a result file, for bop eval.
-    #[arg(long, value_name = "OUT.csv")]
-    results: Option<PathBuf>,
 }
 
 const USAGE: &str = "\
@@ -84,29 +63,28 @@ struct Line {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.check_files()?;
-    let dataset = arguments.dataset.open()?;
-    let scenes = Scenes::new(&dataset, &arguments.dataset.split, 1);
-    let (scene_id, object) = (arguments.scene, arguments.object);
+    let follow = &arguments.follow;
+    follow.check_files(None)?;
+    let dataset = follow.dataset.open()?;
+    let scenes = Scenes::new(&dataset, &follow.dataset.split, 1);
+    let (scene_id, object) = (follow.scene, follow.object);
     let scene = scenes
         .get(scene_id)
         .map_err(|fault| Error::msg(fault.text))?;
-    let images = init::images(&scene, arguments.first)?;
-    let models_dir = dataset.models_dir()?;
-    let models = models::read(&models_dir, &BTreeSet::from([object]))?;
-    let model = models.by_id.get(&object).ok_or_else(|| {
-        let broken = models.broken.get(&object).cloned();
-        let cause = broken.or_else(|| models::missing(&models, &models_dir));
-        Error::msg(cause.unwrap_or_default())
-    })?;
-    let start = init::read(&arguments.init, (scene_id, images[0], object))?;
+    let images = follow.images(&scene)?;
+    let model = &follow.model(&dataset.models_dir()?)?.by_id[&object];
+    let start = follow.initial_pose(images[0])?;
     let progress = progress_bar(images.len(), "images");
     let (lines, faults) = arguments.track(&scenes, &images, model, &start)?;
     progress.finish_and_clear();
-    arguments.write(&lines)?;
+    let seen = lines.iter().filter(|l| l.tracked.state != TrackState::Lost);
+    follow.write(
+        lines.iter().map(|line| line.json(scene_id, object)),
+        seen.map(|line| line.row(scene_id, object)),
+    )?;
     say(format_args!(
         "{}: {} images of scene {scene_id}, object {object}{}",
-        arguments.output.display(),
+        follow.output.display(),
         lines.len(),
         summarize(&lines),
     ))?;
@@ -114,22 +92,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if damaged > 0 {
         bail!(
             "{damaged} files could not be used; in their images, {} has a predicted pose",
-            arguments.output.display()
+            follow.output.display()
         );
     }
     Ok(())
 }
 
 impl Arguments {
-    fn check_files(&self) -> anyhow::Result<()> {
-        let files = Files::default()
-            .reads("--init", [&self.init])
-            .writes("--output", [&self.output])
-            .writes("--results", &self.results);
-        files.check()?;
-        files.spare_dataset(&self.dataset.root, &self.dataset.split)
-    }
-
     /// Tracks the object through the images, in which unreadable ones show nothing.
     fn track(
         &self,
@@ -146,7 +115,7 @@ impl Arguments {
         let mut nothing = Arc::new(DepthImage::from_meters(1, 1, vec![0.0])?);
         let mut before = images[0];
         for im_id in images {
-            let depth = match scenes.read((self.scene, *im_id)) {
+            let depth = match scenes.read((self.follow.scene, *im_id)) {
                 Ok(image) => {
                     let camera = image.camera;
                     tracker.set_camera(camera);
@@ -173,28 +142,17 @@ impl Arguments {
         }
         Ok((lines, faults))
     }
-
-    fn write(&self, lines: &[Line]) -> anyhow::Result<()> {
-        let (scene, object) = (self.scene, self.object);
-        hicp_io::write_atomically(&self.output, |file| {
-            let mut lines = lines.iter();
-            lines.try_for_each(|line| writeln!(file, "{}", line.json(scene, object)))
-        })?;
-        if let Some(path) = &self.results {
-            let seen = lines.iter().filter(|l| l.tracked.state != TrackState::Lost);
-            let rows = seen.map(|line| {
-                let pose = line.tracked.camera_from_object;
-                let mut row = ResultRow::new(scene, line.im_id, object, pose);
-                row.score = line.tracked.agreement();
-                row
-            });
-            write_results(path, &rows.collect::<Vec<_>>())?;
-        }
-        Ok(())
-    }
 }
 
 impl Line {
+    /// Returns the row of a result file, with the agreement as its score.
+    fn row(&self, scene_id: u32, obj_id: u32) -> ResultRow {
+        let pose = self.tracked.camera_from_object;
+        let mut row = ResultRow::new(scene_id, self.im_id, obj_id, pose);
+        row.score = self.tracked.agreement();
+        row
+    }
+
     /// Returns the line of JSON.
     fn json(&self, scene_id: u32, obj_id: u32) -> Value {
         let Tracked {

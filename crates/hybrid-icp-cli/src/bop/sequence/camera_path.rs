@@ -4,19 +4,17 @@ use anyhow::Context as _;
 use hicp_io::bop::Scene;
 use hybrid_icp::fusion::CameraMotion;
 
-use crate::bop::init::images;
-
-/// Returns the images of a scene by ascending id, each with the camera's motion since the last.
+/// Returns images of a scene in the given order, each with the camera's motion since the last.
 ///
-/// The path starts with the scene's first image or with `first`. Each image needs a camera pose.
+/// Each image needs a camera pose.
 pub(super) fn camera_path(
     scene: &Scene,
-    first: Option<u32>,
+    images: &[u32],
 ) -> anyhow::Result<Vec<(u32, CameraMotion)>> {
     let file = scene.dir().join("scene_camera.json");
     let mut path = Vec::new();
     let mut before = None;
-    for im_id in images(scene, first)? {
+    for im_id in images.iter().copied() {
         let now = scene.camera_from_world(im_id)?;
         let motion = before.map_or(Ok(CameraMotion::none()), |before| {
             CameraMotion::new(now * before)

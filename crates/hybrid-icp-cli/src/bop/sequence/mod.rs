@@ -5,13 +5,12 @@ mod line;
 mod tracker;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context as _, Error, bail};
 use clap::{Arg, Args, ValueEnum};
 use hicp_bop::Scenes;
-use hicp_io::bop::{ResultRow, Scene, write_results};
+use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
 use hybrid_icp::{Calibration, SequentialEstimator, Warning};
@@ -20,11 +19,10 @@ use self::camera_path::camera_path;
 use self::line::Line;
 use self::tracker::Tracker;
 use super::advice::advice;
-use super::options::DatasetOptions;
+use super::follow::FollowOptions;
 use super::statistics::median;
-use super::{faults, init, models};
+use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
-use crate::outputs::Files;
 use crate::terminal::{progress_bar, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
@@ -47,26 +45,7 @@ use crate::terminal::{progress_bar, say, warn};
 #[command(mut_arg("pipeline", follows))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    dataset: DatasetOptions,
-    /// The id of the scene.
-    #[arg(long, value_name = "ID")]
-    scene: u32,
-    /// The id of the object.
-    #[arg(long, value_name = "ID")]
-    object: u32,
-    /// The rough pose in the first image: a pose file (JSON) or a result file (CSV). Of a result
-    /// file, the row for that image and object with the highest score is used.
-    #[arg(long, value_name = "FILE.json|FILE.csv")]
-    init: PathBuf,
-    /// The id of the image to start with; the scene's first if not given.
-    #[arg(long, value_name = "ID")]
-    first: Option<u32>,
-    /// The file for the lines.
-    #[arg(long, value_name = "OUT.jsonl")]
-    output: PathBuf,
-    /// Also write the fused poses as a result file, for bop eval.
-    #[arg(long, value_name = "OUT.csv")]
-    results: Option<PathBuf>,
+    follow: FollowOptions,
     /// The fusion of estimates: last-estimate, average, weighted-average, filtering-constant,
     /// filtering or most-confident.
     #[arg(long, value_name = "NAME", default_value = "weighted-average")]
@@ -106,27 +85,24 @@ Example:
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.check_files()?;
+    let follow = &arguments.follow;
+    follow.check_files(arguments.pipeline.file())?;
     let pipeline = arguments.pipeline.choose()?;
-    let dataset = arguments.dataset.open()?;
-    let scenes = Scenes::new(&dataset, &arguments.dataset.split, 1);
-    let (scene_id, object) = (arguments.scene, arguments.object);
+    let dataset = follow.dataset.open()?;
+    let scenes = Scenes::new(&dataset, &follow.dataset.split, 1);
+    let (scene_id, object) = (follow.scene, follow.object);
     let scene = scenes
         .get(scene_id)
         .map_err(|fault| Error::msg(fault.text))?;
-    let path = camera_path(&scene, arguments.first)?;
+    let path = camera_path(&scene, &follow.images(&scene)?)?;
     check_object(&scene, &path, object)?;
     let models_dir = dataset.models_dir()?;
-    let models = models::read(&models_dir, &BTreeSet::from([object]))?;
-    let model = models.by_id.get(&object).ok_or_else(|| {
-        let broken = models.broken.get(&object).cloned();
-        let cause = broken.or_else(|| models::missing(&models, &models_dir));
-        Error::msg(cause.unwrap_or_default())
-    })?;
-    let init = init::read(&arguments.init, (scene_id, path[0].0, object))?;
+    let models = follow.model(&models_dir)?;
+    let model = &models.by_id[&object];
+    let init = follow.initial_pose(path[0].0)?;
     let estimator = arguments
         .estimator(&pipeline, model, &init)
-        .with_context(|| format!("cannot start from the pose in {}", arguments.init.display()))?;
+        .with_context(|| format!("cannot start from the pose in {}", follow.init.display()))?;
 
     let start = Instant::now();
     let progress = progress_bar(path.len(), "images");
@@ -137,9 +113,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         progress.inc(1);
     }
     progress.finish_and_clear();
-    arguments.write(&lines)?;
+    follow.write(
+        lines.iter().map(|line| line.json(scene_id, object)),
+        lines
+            .iter()
+            .map(|line| ResultRow::new(scene_id, line.im_id, object, line.fused)),
+    )?;
 
-    let (output, method) = (arguments.output.display(), arguments.fuser);
+    let (output, method) = (follow.output.display(), arguments.fuser);
     say(format_args!(
         "{output}: {} images of scene {scene_id}, object {object}, {method} over {} in {:.1} s{}",
         lines.len(),
@@ -154,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         // One warning about the same number is enough.
         if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
             let advice = advice(&warning, Some("--init")).unwrap_or_else(|| match warning {
-                Warning::BehindCamera { .. } => format!("check {}", arguments.init.display()),
+                Warning::BehindCamera { .. } => format!("check {}", follow.init.display()),
                 _ => format!("check that {} is in mm", models_dir.display()),
             });
             warn(format_args!(
@@ -176,16 +157,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
-    fn check_files(&self) -> anyhow::Result<()> {
-        let files = Files::default()
-            .reads("--init", [&self.init])
-            .reads("--pipeline", self.pipeline.file())
-            .writes("--output", [&self.output])
-            .writes("--results", &self.results);
-        files.check()?;
-        files.spare_dataset(&self.dataset.root, &self.dataset.split)
-    }
-
     fn estimator(
         &self,
         pipeline: &Pipeline,
@@ -201,20 +172,6 @@ impl Arguments {
                 SequentialEstimator::calibrated(stage, method, &calibration, model, init)
             }
         }
-    }
-
-    fn write(&self, lines: &[Line]) -> anyhow::Result<()> {
-        let (scene, object) = (self.scene, self.object);
-        hicp_io::write_atomically(&self.output, |file| {
-            let mut lines = lines.iter();
-            lines.try_for_each(|line| writeln!(file, "{}", line.json(scene, object)))
-        })?;
-        if let Some(path) = &self.results {
-            let rows = lines.iter();
-            let rows = rows.map(|line| ResultRow::new(scene, line.im_id, object, line.fused));
-            write_results(path, &rows.collect::<Vec<_>>())?;
-        }
-        Ok(())
     }
 }
 
