@@ -7,6 +7,7 @@ mod matcher;
 mod motion;
 mod region;
 mod segments;
+mod tracked;
 
 use std::sync::Arc;
 
@@ -17,6 +18,7 @@ use self::finder::CLEARLY;
 use self::found::Found;
 use self::matcher::Matcher;
 use self::motion::Motion;
+pub use self::tracked::{TrackState, Tracked, TrackerConfig};
 
 /// Standard deviation of the pose at the start, in radii of the object and in radians.
 const START_RADII: f64 = 0.2;
@@ -26,90 +28,6 @@ const SEARCHED_RADII: f64 = 0.3;
 const SURE_DIAMETERS: f64 = 0.05;
 /// Largest deviation of a prediction near which an object is registered without a search.
 const NEAR_DIAMETERS: f64 = 0.4;
-
-/// The parameters of a [`Tracker`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct TrackerConfig {
-    /// Typical speed of the object relative to the camera, m/s.
-    pub meters_per_second: f64,
-    /// Typical angular speed, degrees per second.
-    pub degrees_per_second: f64,
-    /// The time in which the object changes its velocity, seconds.
-    pub memory_seconds: f64,
-    /// The time for which an object that is not seen stays [`TrackState::Doubtful`], seconds.
-    pub coast_seconds: f64,
-}
-
-impl Default for TrackerConfig {
-    /// 0.3 m/s and 90°/s, changing within 0.5 s. An object that is not seen for 0.1 s is lost.
-    fn default() -> Self {
-        Self {
-            meters_per_second: 0.3,
-            degrees_per_second: 90.0,
-            memory_seconds: 0.5,
-            coast_seconds: 0.1,
-        }
-    }
-}
-
-/// The degree of trust in the pose of a [`Tracked`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
-pub enum TrackState {
-    /// The image shows the object at the pose.
-    Tracking,
-    /// The pose may be off: the image does not determine it, or does not show it for some frames.
-    Doubtful,
-    /// The object is not seen. The pose is a guess from its last motion.
-    Lost,
-}
-
-impl TrackState {
-    /// Returns the name in files: the word in lower case.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tracking => "tracking",
-            Self::Doubtful => "doubtful",
-            Self::Lost => "lost",
-        }
-    }
-}
-
-/// The pose of the object in an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct Tracked {
-    /// The pose, meters.
-    pub camera_from_object: Isometry3<f64>,
-    /// The degree of trust in the pose.
-    pub state: TrackState,
-    /// The evidence for and against the pose.
-    pub evidence: Evidence,
-    /// Standard deviation of the least determined displacement of the object, meters.
-    ///
-    /// Rotations count by the object's radius, and those around declared axes of symmetry do not
-    /// count. It comes from the motion and the registration, without errors of the model.
-    pub deviation_meters: f64,
-}
-
-impl Tracked {
-    /// Returns the share of the object's visible pixels that agree with the pose, 0 to 1.
-    ///
-    /// Hidden and unmeasured pixels do not count. Without visible pixels it is 0.
-    #[must_use]
-    pub fn agreement(&self) -> f64 {
-        let (agrees, contradicts) = (self.evidence.agrees, self.evidence.contradicts());
-        if agrees > 0.0 {
-            agrees / (agrees + contradicts)
-        } else {
-            0.0
-        }
-    }
-}
 
 /// Follows a moving object from depth image to depth image, without masks.
 ///
@@ -152,6 +70,9 @@ pub struct Tracker {
     matcher: Matcher,
     config: TrackerConfig,
     motion: Option<Motion>,
+    /// The motion without a pose that a search found, until the state is
+    /// [`TrackState::Tracking`].
+    without_found: Option<Motion>,
     state: TrackState,
     /// Time since the image last showed the object, seconds.
     unseen: f64,
@@ -167,6 +88,7 @@ impl Tracker {
             matcher: Matcher::new(model.into(), camera),
             config,
             motion: None,
+            without_found: None,
             state: TrackState::Lost,
             unseen: 0.0,
             ambiguous: false,
@@ -179,6 +101,7 @@ impl Tracker {
     pub fn start(&mut self, camera_from_object: &Isometry3<f64>) {
         let motion = self.at_rest(camera_from_object, START_RADII);
         self.motion = Some(motion).filter(|_| se3::is_finite(camera_from_object));
+        self.without_found = None;
         self.state = TrackState::Doubtful;
         self.unseen = 0.0;
         self.ambiguous = false;
@@ -225,6 +148,9 @@ impl Tracker {
             0.0
         };
         motion.predict(seconds);
+        if let Some(motion) = &mut self.without_found {
+            motion.predict(seconds);
+        }
         let diameter = self.matcher.extent.diameter;
         let (lost, mut found) = (self.state == TrackState::Lost, None);
         if self.matcher.extent.deviation(&motion) < NEAR_DIAMETERS * diameter {
@@ -244,33 +170,40 @@ impl Tracker {
         let unsure = self.matcher.extent.deviation(&motion) > 2.0 * SURE_DIAMETERS * diameter;
         let search = |f: Found| !f.is_clear() && !f.is_hidden() && (unsure || !f.explains());
         if (lost && seen.is_none()) || found.is_none_or(search) {
-            let again = self.matcher.find(depth, mask, &motion)?;
+            // A pose that was found but not confirmed does not bound the search.
+            let around = self.without_found.unwrap_or(motion);
+            let again = self.matcher.find(depth, mask, &around)?;
             let better = |again: &Found| seen.is_none_or(|s| again.merit() > s.merit() + CLEARLY);
             if let Some(again) = again.filter(better) {
-                let (again, ambiguous) = self.matcher.settle(depth, mask, again, Some(&motion))?;
+                let (again, ambiguous) = self.matcher.settle(depth, mask, again, Some(&around))?;
                 (motion, seen) = (self.at(&again), Some(again));
-                self.ambiguous = ambiguous;
+                (self.ambiguous, self.without_found) = (ambiguous, Some(around));
             }
         }
-        self.motion = Some(motion);
         self.unseen = if seen.is_some() {
             0.0
         } else {
             self.unseen + seconds
         };
         let deviation = self.matcher.extent.deviation(&motion);
-        let sure = |f: Found| f.is_sure() && deviation < SURE_DIAMETERS * diameter;
+        let is_sure = |f: Found| f.is_sure() && deviation < SURE_DIAMETERS * diameter;
         self.state = match seen {
-            Some(found) if sure(found) && !self.ambiguous => TrackState::Tracking,
+            Some(found) if is_sure(found) && !self.ambiguous => TrackState::Tracking,
             Some(_) => TrackState::Doubtful,
             None if !lost && self.unseen <= self.config.coast_seconds => TrackState::Doubtful,
             None => TrackState::Lost,
         };
+        match self.state {
+            TrackState::Tracking => self.without_found = None,
+            TrackState::Doubtful => {}
+            TrackState::Lost => motion = self.without_found.take().unwrap_or(motion),
+        }
+        self.motion = Some(motion);
         Ok(Tracked {
             camera_from_object: *motion.pose(),
             state: self.state,
             evidence: seen.or(found).map(|f| f.evidence).unwrap_or_default(),
-            deviation_meters: deviation,
+            deviation_meters: self.matcher.extent.deviation(&motion),
         })
     }
 

@@ -56,8 +56,9 @@ impl Matcher {
             let observation =
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
+            let odds = |found: &Found| self.odds(found, Some(motion));
             if let Some(found) = found.filter(Found::stands_alone)
-                && best.is_none_or(|best| best.merit() < found.merit())
+                && best.is_none_or(|best| odds(&best) < odds(&found))
             {
                 best = Some(found);
             }
@@ -94,17 +95,20 @@ impl Matcher {
                 rivals.push(rival);
             }
         }
-        let odds = |rival: &Found| {
-            let away = motion.map_or(0.0, |motion| {
-                self.extent.distance(&rival.pose, motion.pose()) / self.extent.deviation(motion)
-            });
-            CLEAR_ODDS / CLEARLY * rival.merit() - 0.5 * away * away
-        };
+        let odds = |rival: &Found| self.odds(rival, motion);
         rivals.sort_by(|a, b| odds(b).total_cmp(&odds(a)));
         let ambiguous = rivals
             .get(1)
             .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
         Ok((rivals[0], ambiguous))
+    }
+
+    /// Returns the logarithm of the probability of a pose, up to a constant.
+    fn odds(&self, found: &Found, motion: Option<&Motion>) -> f64 {
+        let away = motion.map_or(0.0, |motion| {
+            self.extent.distance(&found.pose, motion.pose()) / self.extent.deviation(motion)
+        });
+        CLEAR_ODDS / CLEARLY * found.merit() - 0.5 * away * away
     }
 
     /// Returns whether a pose differs from others.

@@ -1,0 +1,88 @@
+//! The parameters and the results of a tracker.
+
+use hicp_core::Isometry3;
+use hicp_score::Evidence;
+
+/// The parameters of a [`Tracker`](crate::Tracker).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct TrackerConfig {
+    /// Typical speed of the object relative to the camera, m/s.
+    pub meters_per_second: f64,
+    /// Typical angular speed, degrees per second.
+    pub degrees_per_second: f64,
+    /// The time in which the object changes its velocity, seconds.
+    pub memory_seconds: f64,
+    /// The time for which an object that is not seen stays [`TrackState::Doubtful`], seconds.
+    pub coast_seconds: f64,
+}
+
+impl Default for TrackerConfig {
+    /// 0.3 m/s and 90°/s, changing within 0.5 s. An object that is not seen for 0.1 s is lost.
+    fn default() -> Self {
+        Self {
+            meters_per_second: 0.3,
+            degrees_per_second: 90.0,
+            memory_seconds: 0.5,
+            coast_seconds: 0.1,
+        }
+    }
+}
+
+/// The degree of trust in the pose of a [`Tracked`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum TrackState {
+    /// The image shows the object at the pose.
+    Tracking,
+    /// The pose may be off: the image does not determine it, or does not show it for some frames.
+    Doubtful,
+    /// The object is not seen. The pose is a guess from its last motion.
+    Lost,
+}
+
+impl TrackState {
+    /// Returns the name in files: the word in lower case.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracking => "tracking",
+            Self::Doubtful => "doubtful",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// The pose of the object in an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Tracked {
+    /// The pose, meters.
+    pub camera_from_object: Isometry3<f64>,
+    /// The degree of trust in the pose.
+    pub state: TrackState,
+    /// The evidence for and against the pose.
+    pub evidence: Evidence,
+    /// Standard deviation of the least determined displacement of the object, meters.
+    ///
+    /// Rotations count by the object's radius, and those around declared axes of symmetry do not
+    /// count. It comes from the motion and the registration, without errors of the model.
+    pub deviation_meters: f64,
+}
+
+impl Tracked {
+    /// Returns the share of the object's visible pixels that agree with the pose, 0 to 1.
+    ///
+    /// Hidden and unmeasured pixels do not count. Without visible pixels it is 0.
+    #[must_use]
+    pub fn agreement(&self) -> f64 {
+        let (agrees, contradicts) = (self.evidence.agrees, self.evidence.contradicts());
+        if agrees > 0.0 {
+            agrees / (agrees + contradicts)
+        } else {
+            0.0
+        }
+    }
+}
