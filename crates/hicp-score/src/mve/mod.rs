@@ -2,6 +2,7 @@
 
 pub(crate) mod agreement;
 pub(crate) mod background;
+pub(crate) mod distances;
 pub(crate) mod mask_trust;
 pub(crate) mod mean_vsd;
 pub(crate) mod occlusion;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use hicp_core::{Observation, PixelRegion};
 
 use crate::mve::background::Background;
+use crate::mve::distances::to_zero;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
 
 /// Width of the uncertain border, as a share of the square root of the mask's area.
@@ -234,34 +235,6 @@ fn widened(region: &PixelRegion, width: u32, height: u32) -> PixelRegion {
         v_min: region.v_min.saturating_sub(border),
         u_max: (region.u_max + border).min(width),
         v_max: (region.v_max + border).min(height),
-    }
-}
-
-/// Replaces infinite values by the distances, in pixels, to the nearest zero.
-///
-/// The values are `step` pixels apart. The error of this two-pass transform is at most 8 %.
-fn to_zero(distances: &mut [f32], width: usize, step: f32) {
-    let diagonal = std::f32::consts::SQRT_2 * step;
-    // The second pass is the first one, from the last pixel to the first.
-    for _ in 0..2 {
-        for index in 0..distances.len() {
-            let column = index % width;
-            let mut least = distances[index];
-            if column > 0 {
-                least = least.min(distances[index - 1] + step);
-            }
-            if index >= width {
-                least = least.min(distances[index - width] + step);
-                if column > 0 {
-                    least = least.min(distances[index - width - 1] + diagonal);
-                }
-                if column + 1 < width {
-                    least = least.min(distances[index - width + 1] + diagonal);
-                }
-            }
-            distances[index] = least;
-        }
-        distances.reverse();
     }
 }
 
