@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use hicp_core::DepthImage;
 use png::{BitDepth, ColorType, Transformations};
 
+use super::decode;
 use super::pixels;
 use super::raster::Raster;
 use crate::error::IoError;
@@ -135,7 +136,7 @@ impl ReadLimits {
     /// As for [`read_depth`].
     pub fn read_raw_depth(&self, path: impl AsRef<Path>) -> Result<RawDepth, IoError> {
         let path = path.as_ref();
-        let raster = Raster::read(self, path, EXPECTED)?;
+        let raster = decode::read(self, path, EXPECTED)?;
         let kind = match raster.channels {
             1 if raster.background.is_some() => "palette",
             1 => "gray",

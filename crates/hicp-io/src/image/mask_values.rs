@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hicp_core::Mask;
 
+use super::decode;
 use super::raster::Raster;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
@@ -61,7 +62,7 @@ impl ReadLimits {
     /// As for [`read_mask`].
     pub fn read_mask(&self, path: impl AsRef<Path>, rule: MaskRule) -> Result<MaskFile, IoError> {
         let path = path.as_ref();
-        let image = Raster::read(self, path, EXPECTED)?;
+        let image = decode::read(self, path, EXPECTED)?;
         let values = values(&image);
         let background = image.background.as_deref().unwrap_or_default();
         #[allow(

@@ -1,6 +1,7 @@
 //! Reading and writing of images: depth, masks and pictures.
 
 mod bmp;
+mod decode;
 mod depth;
 #[cfg(feature = "exr")]
 mod exr;
