@@ -1,10 +1,12 @@
 //! `Camera`.
 
+use std::path::PathBuf;
+
 use hybrid_icp::core::{Matrix3, PinholeCamera, PixelCenters};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
-use crate::errors;
+use crate::errors::{self, FileError};
 
 /// A pinhole camera without distortion, in the frame of OpenCV.
 ///
@@ -83,6 +85,37 @@ impl PyCamera {
         PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size.0, size.1)
             .map(Self)
             .map_err(errors::input)
+    }
+
+    /// Reads a camera from a file of BOP, ROS, OpenCV, RealSense, Open3D or NumPy.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     JSON, YAML, XML, text or NPY.
+    /// size : (int, int)
+    ///     Width and height of the image, pixels. A size in the file must be the same.
+    ///
+    /// Returns
+    /// -------
+    /// Camera
+    ///
+    /// Raises
+    /// ------
+    /// FileError
+    ///     If the file cannot be read, has no camera, or has lens distortion.
+    #[staticmethod]
+    fn from_file(py: Python<'_>, path: PathBuf, size: (u32, u32)) -> PyResult<Self> {
+        let file = py.detach(|| hicp_io::read_camera(&path, size));
+        let file = file.map_err(errors::file)?;
+        match file.distortion {
+            None => Ok(Self(file.camera)),
+            Some(distortion) => Err(FileError::new_err(format!(
+                "{}: found {distortion:?}, expected no distortion: undistort the images first, \
+                 with nearest-neighbor interpolation for depth, and use Camera.from_K",
+                path.display()
+            ))),
+        }
     }
 
     /// Horizontal focal length, pixels.

@@ -1,12 +1,13 @@
-//! Reads PNG files.
+//! Reads images and poses from files.
 
 use std::path::PathBuf;
 
+use hicp_io::{LengthUnit, MaskRule};
 use pyo3::prelude::*;
 
-use crate::array::Matrix;
+use crate::array::{self, Matrix};
 use crate::depth::{self, PyDepthImage};
-use crate::errors;
+use crate::errors::{self, InputError};
 
 /// Reads a 16-bit gray PNG as an array of meters.
 ///
@@ -38,5 +39,115 @@ pub(crate) fn read_depth_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyRes
 pub(crate) fn read_mask_png(py: Python<'_>, path: PathBuf) -> PyResult<Matrix<bool>> {
     py.detach(|| hicp_io::read_mask_png(&path))
         .map(|mask| depth::image(mask.width(), mask.pixels()))
+        .map_err(errors::file)
+}
+
+/// Reads a depth image as an array of meters, from a file of any supported format.
+///
+/// PNG, TIFF, NPY, NPZ, EXR, PGM and PFM files are recognized by their first bytes.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+/// scale : float, optional
+///     Meters per unit, such as 0.001 for integers of millimeters. Floating point is in meters if
+///     not given.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (H, W), float32
+///     Meters; 0 for pixels without a measurement.
+///
+/// Raises
+/// ------
+/// FileError
+///     If the file cannot be read, is not such an image, or has integers and `scale` is missing.
+#[pyfunction]
+#[pyo3(signature = (path, *, scale = None))]
+pub(crate) fn read_depth(
+    py: Python<'_>,
+    path: PathBuf,
+    scale: Option<f64>,
+) -> PyResult<Matrix<f32>> {
+    py.detach(|| hicp_io::read_depth(&path, scale.map(|meters| meters * 1000.0)))
+        .map(|image| depth::image(image.width(), image.pixels()))
+        .map_err(errors::file)
+}
+
+/// Reads a mask from a file of any supported format.
+///
+/// PNG, TIFF, BMP, NPY, NPZ and PGM files are recognized by their first bytes. If the opacity of an
+/// image varies, it is the value of its pixels.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+/// threshold : float, optional
+///     Smallest value on the object, such as 128 or 0.5. For soft masks and probabilities.
+/// value : float, optional
+///     Value on the object, such as 3. For label images.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (H, W), bool
+///     Pixels that are not 0, unless `threshold` or `value` is passed. A file with more than two
+///     values then raises an InputWarning.
+///
+/// Raises
+/// ------
+/// FileError
+///     If the file cannot be read, is not such an image, or has no pixel of the stated value.
+#[pyfunction]
+#[pyo3(signature = (path, *, threshold = None, value = None))]
+pub(crate) fn read_mask(
+    py: Python<'_>,
+    path: PathBuf,
+    threshold: Option<f64>,
+    value: Option<f64>,
+) -> PyResult<Matrix<bool>> {
+    let rule = match (threshold, value) {
+        (None, None) => MaskRule::NotZero,
+        (Some(least), None) => MaskRule::AtLeast(least),
+        (None, Some(value)) => MaskRule::Equal(value),
+        _ => {
+            let text = "threshold= and value= were both passed, expected one of them";
+            return Err(InputError::new_err(text));
+        }
+    };
+    let file = py.detach(|| hicp_io::read_mask(&path, rule));
+    let file = file.map_err(errors::file)?;
+    if let Some(warning) = file.warning {
+        errors::warn(py, &format!("{}: {warning}", path.display()))?;
+    }
+    Ok(depth::image(file.mask.width(), file.mask.pixels()))
+}
+
+/// Reads a pose from a JSON, YAML, text or NPY file.
+///
+/// The file has a 4x4 or 3x4 matrix, BOP's `cam_R_m2c` and `cam_t_m2c`, a rotation and a
+/// translation, a translation and a quaternion of stated order, or a TUM line.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+/// unit : {"m", "mm", "cm"}, optional
+///     Unit of the translation. If not given, "mm" for `cam_t_m2c` and "m" for all other forms.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (4, 4), float64
+///     The pose, meters.
+///
+/// Raises
+/// ------
+/// FileError
+///     If the file cannot be read or has no such pose.
+#[pyfunction]
+#[pyo3(signature = (path, *, unit = None))]
+pub(crate) fn read_pose(py: Python<'_>, path: PathBuf, unit: Option<&str>) -> PyResult<Matrix> {
+    let unit = unit.map(str::parse::<LengthUnit>).transpose();
+    let unit = unit.map_err(errors::input)?;
+    py.detach(|| hicp_io::read_pose(&path, unit))
+        .map(|file| Matrix::new(4, array::to_matrix(&file.camera_from_object).to_vec()))
         .map_err(errors::file)
 }

@@ -50,7 +50,7 @@ mod native {
     #[pymodule_export]
     use crate::fusion::{PyFuser, PyPoseEstimate, fuse};
     #[pymodule_export]
-    use crate::image::{read_depth_png, read_mask_png};
+    use crate::image::{read_depth, read_depth_png, read_mask, read_mask_png, read_pose};
     #[pymodule_export]
     use crate::model::PyModel;
     #[pymodule_export]

@@ -230,6 +230,32 @@ def test_an_image_from_a_file_equals_the_array_from_it(tmp_path):
         hi.DepthImage.from_png(tmp_path / "none.png", 0.0001)
 
 
+def test_files_of_numpy_are_read(tmp_path):
+    meters = np.linspace(0.5, 1.5, 48 * 64, dtype=np.float32).reshape(48, 64)
+    np.save(tmp_path / "depth.npy", meters)
+    assert np.array_equal(hi.read_depth(tmp_path / "depth.npy"), meters)
+    np.save(tmp_path / "units.npy", np.full((48, 64), 800, np.uint16))
+    assert (hi.read_depth(tmp_path / "units.npy", scale=0.001) == np.float32(0.8)).all()
+    with pytest.raises(hi.FileError, match="integers"):
+        hi.read_depth(tmp_path / "units.npy")
+    labels = np.tile(np.arange(4, dtype=np.uint8), (48, 16))
+    np.save(tmp_path / "labels.npy", labels)
+    assert np.array_equal(hi.read_mask(tmp_path / "labels.npy", value=3), labels == 3)
+    assert np.array_equal(hi.read_mask(tmp_path / "labels.npy", threshold=2), labels >= 2)
+    with pytest.warns(hi.InputWarning, match="the values 0, 1, 2 and 3"):
+        assert np.array_equal(hi.read_mask(tmp_path / "labels.npy"), labels > 0)
+    with pytest.raises(hi.InputError, match="both"):
+        hi.read_mask(tmp_path / "labels.npy", threshold=1, value=1)
+    pose = np.eye(4)
+    pose[:3, 3] = [100, -200, 800]
+    np.savetxt(tmp_path / "pose.txt", pose)
+    expected = np.diag([1, 1, 1, 1.0])
+    expected[:3, 3] = [0.1, -0.2, 0.8]
+    assert np.allclose(hi.read_pose(tmp_path / "pose.txt", unit="mm"), expected)
+    np.savetxt(tmp_path / "K.txt", CAMERA.K)
+    assert hi.Camera.from_file(tmp_path / "K.txt", (64, 48)) == CAMERA
+
+
 def test_pixel_centers_shift_the_principal_point():
     camera = hi.Camera(100, 100, 32, 24, 64, 48, pixel_centers="halves")
     assert (camera.cx, camera.cy) == (31.5, 23.5) and camera == CAMERA

@@ -58,8 +58,11 @@ from ._native import (
     mve,
     point_to_plane_step,
     point_to_point_step,
+    read_depth,
     read_depth_png,
+    read_mask,
     read_mask_png,
+    read_pose,
     render_depth,
     vsd,
 )
@@ -92,8 +95,11 @@ __all__ = [
     "mve",
     "point_to_plane_step",
     "point_to_point_step",
+    "read_depth",
     "read_depth_png",
+    "read_mask",
     "read_mask_png",
+    "read_pose",
     "render_depth",
     "vsd",
 ]
