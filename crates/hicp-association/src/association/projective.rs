@@ -1,13 +1,13 @@
 //! Projective data association.
 
-use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::internal::{VectorLoop, vectorized, whole};
 use hicp_core::{
     Context, Correspondences, Isometry3, Observation, Pair, Point3, RigidTransform, Surfel,
     UnitVector3, Vector3,
 };
 
 use crate::association::data_association::DataAssociation;
-use crate::association::pixel_projection::{PixelProjection, whole};
+use crate::association::pixel_projection::PixelProjection;
 
 /// Pairs a model point with the observed point at the pixel that it projects to.
 ///

@@ -6,6 +6,7 @@ pub(crate) mod number;
 mod plane;
 mod suggest;
 mod vectorized;
+mod whole;
 mod work;
 
 pub use index::index;
@@ -13,4 +14,5 @@ pub use label::type_label;
 pub use plane::DepthPlane;
 pub use suggest::nearest_name;
 pub use vectorized::{VectorLoop, vectorized};
+pub use whole::whole;
 pub use work::Work;

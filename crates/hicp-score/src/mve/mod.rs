@@ -2,6 +2,7 @@
 
 pub(crate) mod agreement;
 pub(crate) mod background;
+pub(crate) mod coarse_grid;
 pub(crate) mod distances;
 pub(crate) mod mask_trust;
 pub(crate) mod mean_vsd;

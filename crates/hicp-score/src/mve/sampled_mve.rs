@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Context, Isometry3, Model, Observation, Surfel, sample_surface};
+use hicp_core::internal::{VectorLoop, vectorized, whole};
+use hicp_core::{Context, Isometry3, Model, Observation, PinholeCamera, Surfel, sample_surface};
 
+use crate::mve::coarse_grid::CoarseGrid;
 use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
-use crate::mve::trust_map::{CERTAIN, TrustMap};
 use crate::score::Score;
 use crate::tolerances::{AgreementCounts, mean};
 
@@ -33,7 +34,7 @@ pub struct SampledMve {
     /// The depth buffer of the coarse image; all 0 between two poses.
     buffer: Vec<f32>,
     /// The pixels of the buffer that were written.
-    touched: Vec<usize>,
+    touched: Vec<u32>,
 }
 
 impl SampledMve {
@@ -80,95 +81,45 @@ impl SampledMve {
     }
 
     /// Fills the depth buffer at a pose.
-    fn splat(&mut self, coarse: &Observation, surface: &Surface, pose: &Isometry3<f64>) {
-        let camera = coarse.camera();
-        let (width, height) = (camera.width() as usize, camera.height() as usize);
-        if self.buffer.len() < width * height {
-            self.buffer.resize(width * height, 0.0);
-            self.touched.reserve(width * height);
+    fn splat(&mut self, camera: &PinholeCamera, surface: &Surface, pose: &Isometry3<f64>) {
+        let pixels = camera.width() as usize * camera.height() as usize;
+        if self.buffer.len() < pixels {
+            self.buffer.resize(pixels, 0.0);
+            self.touched.reserve(pixels);
         }
-        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let (fx, fy, cx, cy) = (
-            camera.fx() as f32,
-            camera.fy() as f32,
-            camera.cx() as f32,
-            camera.cy() as f32,
-        );
-        let eye = pose.inverse().translation.vector.cast::<f32>();
-        let pose: Isometry3<f32> = pose.cast();
-        let rotation = pose.rotation.to_rotation_matrix();
-        for surfel in &surface.surfels {
-            if surface.oriented && surfel.normal.dot(&(surfel.point.coords - eye)) >= 0.0 {
-                continue;
-            }
-            let p = rotation * surfel.point.coords + pose.translation.vector;
-            if p.z <= f32::EPSILON {
-                continue;
-            }
-            let (u, v) = (fx * p.x / p.z + cx + 0.5, fy * p.y / p.z + cy + 0.5);
-            // False for NaN.
-            if !(u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32) {
-                continue;
-            }
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            // Within the image.
-            let index = v as usize * width + u as usize;
-            let nearest = &mut self.buffer[index];
-            if *nearest <= 0.0 {
-                self.touched.push(index);
-                *nearest = p.z;
-            } else if p.z < *nearest {
-                *nearest = p.z;
-            }
-        }
+        vectorized(Splat {
+            surface,
+            camera,
+            pose,
+            buffer: &mut self.buffer,
+            touched: &mut self.touched,
+        });
     }
 
     /// Compares the depth buffer with the observation, and clears it.
-    fn compare(&mut self, fine: &Observation, coarse: &Observation, diameter: f64) -> f64 {
-        let camera = coarse.camera();
-        let width = camera.width() as usize;
-        let (depth, mask) = (coarse.depth().pixels(), coarse.mask().pixels());
+    fn compare(&mut self, grid: &CoarseGrid, diameter: f64) -> f64 {
         let mut correct = AgreementCounts::new(diameter);
         let mut outside = 0;
-        let factor = self.factor(fine);
-        let trust = (self.mask == MaskTrust::Imperfect).then(|| TrustMap::of(fine, diameter));
-        let (one, total, hidden_beyond) = match &trust {
-            Some(trust) => (
-                u64::from(CERTAIN),
-                trust.total_at(fine, diameter, factor),
-                -trust.seen_through_meters(),
-            ),
-            None => {
-                let hidden_beyond = self.occlusion.least_distance_behind();
-                (1, coarse.n_measured() as u64, hidden_beyond)
-            }
+        let hidden_beyond = match grid.seen_through_meters {
+            Some(meters) => -meters,
+            None => self.occlusion.least_distance_behind(),
         };
         for index in self.touched.drain(..) {
-            let z = f64::from(std::mem::take(&mut self.buffer[index]));
-            let measured = f64::from(depth[index]);
-            let x = ((index % width) as f64 - camera.cx()) / camera.fx();
-            let y = ((index / width) as f64 - camera.cy()) / camera.fy();
-            let behind = (z - measured) * (x * x + y * y + 1.0).sqrt();
-            let known = measured > 0.0;
-            let weight = match &trust {
-                Some(trust) => {
-                    #[allow(clippy::cast_possible_truncation)] // A pixel of an image.
-                    let (u, v) = ((index % width) as u32, (index / width) as u32);
-                    u64::from(trust.weight(u * factor, v * factor))
-                }
-                None => u64::from(mask[index]),
-            };
-            if weight > 0 && known {
-                correct.add(behind.abs(), weight);
+            let pixel = &grid.pixels[index as usize];
+            let z = f64::from(std::mem::take(&mut self.buffer[index as usize]));
+            let behind = (z - f64::from(pixel.measured)) * pixel.distance_per_depth;
+            let known = pixel.measured > 0.0;
+            if pixel.weight > 0 && known {
+                correct.add(behind.abs(), pixel.weight);
             }
             if !(known && behind > hidden_beyond) {
-                outside += one - weight;
+                outside += grid.one - pixel.weight;
             }
         }
-        if total == 0 {
+        if grid.total == 0 {
             return 1.0;
         }
-        mean(&correct.errors(total + outside))
+        mean(&correct.errors(grid.total + outside))
     }
 }
 
@@ -185,9 +136,14 @@ impl Score for SampledMve {
             return 1.0;
         };
         let coarse = observation.decimated(self.factor(observation));
+        let diameter = model.diameter();
+        let grid = match self.mask {
+            MaskTrust::Exact => CoarseGrid::exact(observation, &coarse),
+            MaskTrust::Imperfect => CoarseGrid::imperfect(observation, &coarse, diameter),
+        };
         let surface = Surface::of(model, self.samples);
-        self.splat(&coarse, &surface, camera_from_object);
-        self.compare(observation, &coarse, model.diameter())
+        self.splat(coarse.camera(), &surface, camera_from_object);
+        self.compare(&grid, diameter)
     }
 
     fn name(&self) -> &'static str {
@@ -195,9 +151,20 @@ impl Score for SampledMve {
     }
 }
 
+/// Number of samples projected at once.
+const LANES: usize = 16;
+
+/// Points and normals of some samples, by coordinate.
+///
+/// The last ones are padded with points that are not numbers.
+struct Block {
+    points: [[f32; LANES]; 3],
+    normals: [[f32; LANES]; 3],
+}
+
 /// The samples of a model.
 struct Surface {
-    surfels: Vec<Surfel>,
+    blocks: Vec<Block>,
     /// `true` if normals are certain to point out of the object.
     oriented: bool,
 }
@@ -205,8 +172,93 @@ struct Surface {
 impl Surface {
     fn of(model: &Model, samples: usize) -> Arc<Self> {
         model.derived().get_or_build(samples as u64, || Self {
-            surfels: sample_surface(model.mesh(), samples),
+            blocks: sample_surface(model.mesh(), samples)
+                .chunks(LANES)
+                .map(Block::new)
+                .collect(),
             oriented: model.mesh().is_closed(),
         })
+    }
+}
+
+impl Block {
+    fn new(surfels: &[Surfel]) -> Self {
+        let mut block = Self {
+            points: [[f32::NAN; LANES]; 3],
+            normals: [[0.0; LANES]; 3],
+        };
+        for (lane, surfel) in surfels.iter().enumerate() {
+            for axis in 0..3 {
+                block.points[axis][lane] = surfel.point[axis];
+                block.normals[axis][lane] = surfel.normal[axis];
+            }
+        }
+        block
+    }
+}
+
+/// The loop that writes the nearest sample of every pixel.
+struct Splat<'a> {
+    surface: &'a Surface,
+    camera: &'a PinholeCamera,
+    pose: &'a Isometry3<f64>,
+    buffer: &'a mut [f32],
+    touched: &'a mut Vec<u32>,
+}
+
+impl VectorLoop for Splat<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+    fn run(self) {
+        let camera = self.camera;
+        let [fx, fy, cx, cy] =
+            [camera.fx(), camera.fy(), camera.cx(), camera.cy()].map(|value| value as f32);
+        let (width, height) = (camera.width() as f32, camera.height() as f32);
+        let stride = camera.width();
+        let eye = self.pose.inverse().translation.vector.cast::<f32>();
+        let pose: Isometry3<f32> = self.pose.cast();
+        let rotation = pose.rotation.to_rotation_matrix();
+        let shift = pose.translation.vector;
+        for block in &self.surface.blocks {
+            let ([x, y, z], [a, b, c]) = (&block.points, &block.normals);
+            let (mut pixels, mut depths) = ([u32::MAX; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                let away = a[lane] * (x[lane] - eye.x)
+                    + b[lane] * (y[lane] - eye.y)
+                    + c[lane] * (z[lane] - eye.z);
+                let moved = |row: usize| {
+                    rotation[(row, 0)] * x[lane]
+                        + rotation[(row, 1)] * y[lane]
+                        + rotation[(row, 2)] * z[lane]
+                        + shift[row]
+                };
+                let depth = moved(2);
+                let u = fx * moved(0) / depth + cx + 0.5;
+                let v = fy * moved(1) / depth + cy + 0.5;
+                // False for NaN.
+                let inside = (depth > f32::EPSILON)
+                    & (u >= 0.0)
+                    & (v >= 0.0)
+                    & (u < width)
+                    & (v < height)
+                    & !(self.surface.oriented & (away >= 0.0));
+                let pixel = whole(v).wrapping_mul(stride).wrapping_add(whole(u));
+                pixels[lane] = if inside { pixel } else { u32::MAX };
+                depths[lane] = depth;
+            }
+            for lane in 0..LANES {
+                let Some(nearest) = self.buffer.get_mut(pixels[lane] as usize) else {
+                    continue;
+                };
+                if *nearest <= 0.0 {
+                    self.touched.push(pixels[lane]);
+                    *nearest = depths[lane];
+                } else if depths[lane] < *nearest {
+                    *nearest = depths[lane];
+                }
+            }
+        }
     }
 }

@@ -148,23 +148,6 @@ impl TrustMap {
         self.total
     }
 
-    /// Returns the same for every `factor`-th pixel of `observation`, computed once.
-    pub(crate) fn total_at(&self, observation: &Observation, diameter: f64, factor: u32) -> u64 {
-        struct Total(u64);
-        let key = diameter.to_bits() ^ u64::from(factor);
-        let total = observation.derived().get_or_build(key, || {
-            let (region, depth) = (&self.region, observation.depth());
-            let on_grid =
-                |from: u32, to: u32| (from.next_multiple_of(factor)..to).step_by(factor as usize);
-            let rows = on_grid(region.v_min, region.v_max);
-            let pixels =
-                rows.flat_map(|v| on_grid(region.u_min, region.u_max).map(move |u| (u, v)));
-            let measured = pixels.filter(|(u, v)| depth.get(*u, *v).is_some_and(|z| z > 0.0));
-            Total(measured.map(|(u, v)| u64::from(self.weight(u, v))).sum())
-        });
-        total.0
-    }
-
     /// Returns the weight of a pixel.
     pub(crate) fn weight(&self, u: u32, v: u32) -> u8 {
         self.region.index(u, v).map_or(0, |i| self.weights[i])
