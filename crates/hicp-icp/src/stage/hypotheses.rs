@@ -60,13 +60,13 @@ impl<'a> Hypotheses<'a> {
     /// Iterates over the neighbors of a pose.
     ///
     /// They are the pose itself, half turns around the axes of the object frame, and quarter turns
-    /// around the ray. Each is placed at the observed points. Those outside of the bound are left
-    /// out.
+    /// around the ray. Each is placed at the observed points, and also with the model's center
+    /// where that of the pose is. Those outside of the bound are left out.
     pub(crate) fn neighbors(
         &self,
         pose: &Isometry3<f64>,
     ) -> impl Iterator<Item = Isometry3<f64>> + use<'_> {
-        let rotation = pose.rotation;
+        let (rotation, center) = (pose.rotation, pose * self.model.center());
         let half = std::f64::consts::PI;
         let ray = UnitVector3::new_unchecked(self.ray);
         let about_object = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
@@ -76,7 +76,20 @@ impl<'a> Hypotheses<'a> {
         std::iter::once(rotation)
             .chain(about_object)
             .chain(about_ray)
-            .filter_map(|rotation| self.place(&rotation))
+            .flat_map(move |rotation| [self.place(&rotation), self.turn(&rotation, &center)])
+            .flatten()
+    }
+
+    /// Returns the pose with a rotation at which the model's center is at a point.
+    ///
+    /// Returns `None` if it is outside of the bound.
+    fn turn(&self, rotation: &UnitQuaternion<f64>, center: &Point3<f64>) -> Option<Isometry3<f64>> {
+        let translation = Translation3::from(center - rotation * self.model.center());
+        let pose = Isometry3::from_parts(translation, *rotation);
+        let bound = self.bound;
+        bound
+            .is_none_or(|bound| bound.contains(&self.init, &pose))
+            .then_some(pose)
     }
 
     /// Iterates over the hypotheses of a set of rotations, with `None` for those outside of the
