@@ -17,7 +17,7 @@ const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, a tr
 
 /// Reads a pose in any common form, as JSON, YAML, XML, text or NPY.
 ///
-/// - BOP's JSON, as [`read_pose_json`] reads it. Its translation is in millimeters.
+/// - BOP's JSON, as [`read_pose_json`](crate::read_pose_json) reads it. Its translation is in millimeters.
 /// - A 4×4 or 3×4 matrix, by rows.
 /// - An object with a rotation (`R`, `rotation`, `cam_R_m2c`: 3×3) and a translation (`t`,
 ///   `translation`, `position`, `cam_t_m2c`).

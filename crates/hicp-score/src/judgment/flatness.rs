@@ -32,7 +32,7 @@ const FLAT: f64 = 0.03;
 /// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer.
 /// The pixels are those of the mask with depth where the model is rendered, on a grid of at most
 /// 512. The plane minimizes the squares of inverse depths and is fitted repeatedly to the nearest
-///      eight tenths of the pixels.
+/// eight tenths of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -119,12 +119,12 @@ enum Inside {
 /// Refines the rows of a result file and returns four counts.
 ///
 /// They are the rows with a good MVE, those with a confidence of 0.95 or more, those with the
-/// warning `Flat`, and all rows.
-fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 4] {
+/// warning `Flat`, those with any warning, and all rows.
+fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 5] {
     let dataset = Dataset::open(root).unwrap();
     let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
     let mut refiner = Refiner::preset(Preset::Auto);
-    let mut counts = [0; 4];
+    let mut counts = [0; 5];
     for row in read_results(results).unwrap() {
         let model = folder.read(row.obj_id).unwrap().unwrap();
         let scene = dataset.scene("test", row.scene_id).unwrap();
@@ -155,18 +155,20 @@ fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 4] {
         counts[0] += usize::from(refined.mve < PAPER_ALPHA);
         counts[1] += usize::from(refined.confidence >= 0.95);
         counts[2] += count(|warning| matches!(warning, Warning::Flat { .. }));
-        counts[3] += 1;
+        counts[3] += usize::from(!warnings.is_empty());
+        counts[4] += 1;
     }
     counts
 }
 
 /// Results in the mask of something else have a low confidence.
 ///
-/// At least half of those on a wall also have a warning, and none on the correct object.
+/// Nineteen of twenty on a wall also have a warning, some of them that it may be a wall: a flat face
+/// of a model fits a wall as well as its own place. On the correct object, none has that warning.
 #[test]
 fn results_in_the_mask_of_something_else_have_a_low_confidence() {
     let Some(root) = root() else { return };
-    let (mut own, mut wall) = ([0; 4], [0; 4]);
+    let (mut own, mut wall) = ([0; 5], [0; 5]);
     for entry in std::fs::read_dir(root.join("results")).unwrap() {
         let file = entry.unwrap().path();
         for (sum, inside) in [(&mut own, Inside::Own), (&mut wall, Inside::Wall)] {
@@ -178,12 +180,12 @@ fn results_in_the_mask_of_something_else_have_a_low_confidence() {
     let file = root.join("results/cosypose_ycbv-test.csv");
     let other = found_in(&root, &file, Inside::Other);
     println!(
-        "good, confident, flat, all: on the correct object {own:?}, another {other:?}, a wall {wall:?}"
+        "good, confident, flat, warned of, all: on the correct object {own:?}, another {other:?}, a wall {wall:?}"
     );
-    assert!(own[2] == 0 && 10 * own[0] >= 9 * own[3], "{own:?}");
+    assert!(own[2] == 0 && 10 * own[0] >= 9 * own[4], "{own:?}");
     assert!(other[0] > 0 && other[1] == 0, "{other:?}");
     assert!(
-        wall[0] > 0 && wall[1] == 0 && 2 * wall[2] >= wall[0],
+        wall[0] > 0 && wall[1] == 0 && wall[2] > 0 && 20 * wall[3] >= 19 * wall[4],
         "{wall:?}"
     );
 }
