@@ -163,8 +163,9 @@ fn found_in(root: &Path, results: &Path, inside: Inside) -> [usize; 5] {
 
 /// Results in the mask of something else have a low confidence.
 ///
-/// Nineteen of twenty on a wall also have a warning, some of them that it may be a wall: a flat face
-/// of a model fits a wall as well as its own place. On the correct object, none has that warning.
+/// Nineteen of twenty on a wall also have a warning, some of them that it may be a wall: a flat
+/// face of a model fits a wall as well as its own place. On the correct object, none has that
+/// warning.
 #[test]
 fn results_in_the_mask_of_something_else_have_a_low_confidence() {
     let Some(root) = root() else { return };
@@ -180,7 +181,8 @@ fn results_in_the_mask_of_something_else_have_a_low_confidence() {
     let file = root.join("results/cosypose_ycbv-test.csv");
     let other = found_in(&root, &file, Inside::Other);
     println!(
-        "good, confident, flat, warned of, all: on the correct object {own:?}, another {other:?}, a wall {wall:?}"
+        "good, confident, flat, warned of, all: on the correct object {own:?}, \
+         another {other:?}, a wall {wall:?}"
     );
     assert!(own[2] == 0 && 10 * own[0] >= 9 * own[4], "{own:?}");
     assert!(other[0] > 0 && other[1] == 0, "{other:?}");
