@@ -2,7 +2,7 @@
 
 use hicp_core::Problem;
 
-/// A length in meters, or as a fraction of the model's diameter.
+/// A length in meters, or as a fraction of the diameter of the model or source cloud.
 ///
 /// A fraction fits objects of any size. Any value is valid: each component defines the meaning of
 /// negative lengths and NaN.
@@ -10,14 +10,14 @@ use hicp_core::Problem;
 pub enum Length {
     /// A length in meters.
     Meters(f32),
-    /// A fraction of the model's diameter.
+    /// A fraction of the diameter of the model or source cloud.
     Diameters(f32),
 }
 
 impl Length {
     /// Returns the length in meters for a problem.
     ///
-    /// If the problem has no model, a fraction of the diameter is NaN. Distances are never within
+    /// If the problem has no source, a fraction of the diameter is NaN. Distances are never within
     /// NaN, so an undefined gate rejects everything.
     #[must_use]
     pub fn meters(self, problem: &Problem<'_>) -> f32 {
@@ -25,8 +25,8 @@ impl Length {
             Self::Meters(length) => length,
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
             Self::Diameters(fraction) => problem
-                .model()
-                .map_or(f32::NAN, |model| fraction * model.diameter() as f32),
+                .source()
+                .map_or(f32::NAN, |source| fraction * source.diameter() as f32),
         }
     }
 }

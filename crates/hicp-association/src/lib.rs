@@ -38,12 +38,15 @@
 //! Selections from [`WithoutBoundary`] on select from the points of another selection, and
 //! [`Reciprocal`] from the pairs of another association. Filters and weights implement the same
 //! trait and chain as tuples, in order.
+//!
+//! [`estimate_normals`] and [`voxel_downsample`] prepare point clouds.
 
 // Image sizes and counts are converted to floating point; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
 
 mod association;
 mod boundary;
+mod cloud;
 mod filter;
 mod length;
 mod scratch;
@@ -52,6 +55,7 @@ mod selection;
 mod stride;
 
 pub use association::*;
+pub use cloud::*;
 pub use filter::*;
 pub use length::Length;
 pub use selection::*;

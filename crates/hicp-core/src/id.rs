@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The identity of an immutable [`Model`](crate::Model) or [`Observation`](crate::Observation)
-/// within this process.
+/// The identity of an immutable [`Model`](crate::Model), [`Observation`](crate::Observation) or
+/// [`Cloud`](crate::Cloud) within this process.
 ///
 /// Two values with the same id hold the same data. The number itself has no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -27,6 +27,7 @@
 // Counts and pixel coordinates are converted to floating point throughout; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
 
+mod cloud;
 mod correspondences;
 mod derived;
 mod id;
@@ -39,6 +40,7 @@ mod render;
 mod sensor;
 mod surfel;
 
+pub use cloud::Cloud;
 pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
 pub use id::Id;
@@ -60,7 +62,7 @@ pub use pose::rotation::{
 };
 pub use pose::rotation_grid::rotation_grid;
 pub use pose::{se3, so3};
-pub use problem::{Context, Iteration, Problem};
+pub use problem::{Context, Iteration, Problem, Source, Target};
 pub use render::{NO_TRIANGLE, RenderCache, RenderedView, Renderer};
 pub use sensor::camera::{
     CameraError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters,

@@ -1,53 +1,197 @@
 //! The two sides of a registration, and the context that components receive.
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 
+use crate::cloud::Cloud;
+use crate::derived::Derived;
 use crate::object::model::Model;
 use crate::render::{RenderCache, RenderedView};
 use crate::sensor::observation::Observation;
+use crate::surfel::Surfel;
 
-/// The two sides of a registration: the model (source, moves) and the observation (target, stands
-/// still).
+/// The side of a registration that moves.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum Source<'a> {
+    /// A mesh with its samples, in the object frame.
+    Model(&'a Model),
+    /// A point cloud, in its own frame.
+    Cloud(&'a Cloud),
+}
+
+impl<'a> Source<'a> {
+    /// The samples of a model, or the points of a cloud.
+    #[must_use]
+    pub fn surfels(&self) -> &'a [Surfel] {
+        match self {
+            Self::Model(model) => model.samples(),
+            Self::Cloud(cloud) => cloud.surfels(),
+        }
+    }
+
+    /// The diameter of the model or the cloud, meters.
+    #[must_use]
+    pub fn diameter(&self) -> f64 {
+        match self {
+            Self::Model(model) => model.diameter(),
+            Self::Cloud(cloud) => cloud.diameter(),
+        }
+    }
+}
+
+/// The side of a registration that stands still.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum Target<'a> {
+    /// A segmented depth image.
+    Observation(&'a Observation),
+    /// A point cloud.
+    Cloud(&'a Cloud),
+}
+
+impl<'a> Target<'a> {
+    /// Number of surfels.
+    #[must_use]
+    pub fn n_surfels(&self) -> usize {
+        match self {
+            Self::Observation(observation) => observation.n_surfels(),
+            Self::Cloud(cloud) => cloud.surfels().len(),
+        }
+    }
+
+    /// Returns the surfels on a pixel grid, or every `stride`²-th point of a cloud, with their
+    /// indices.
+    ///
+    /// Both are 1/`stride`² of all. A stride of 0 counts as 1.
+    #[must_use]
+    pub fn surfels(&self, stride: u32) -> Vec<(u32, Surfel)> {
+        match self {
+            Self::Observation(observation) => observation
+                .surfels(stride)
+                .map(|(index, surfel)| (index, *surfel))
+                .collect(),
+            Self::Cloud(cloud) => {
+                let step = (stride.max(1) as usize).saturating_pow(2);
+                (0..)
+                    .zip(cloud.surfels().iter().copied())
+                    .step_by(step)
+                    .collect()
+            }
+        }
+    }
+
+    /// Values derived from the observation or the cloud.
+    #[must_use]
+    pub fn derived(&self) -> &'a Derived {
+        match self {
+            Self::Observation(observation) => observation.derived(),
+            Self::Cloud(cloud) => cloud.derived(),
+        }
+    }
+}
+
+macro_rules! from {
+    ($($side:ident::$kind:ident),+) => {$(
+        impl<'a> From<&'a $kind> for $side<'a> {
+            fn from(side: &'a $kind) -> Self {
+                Self::$kind(side)
+            }
+        }
+
+        impl<'a> From<&'a Arc<$kind>> for $side<'a> {
+            fn from(side: &'a Arc<$kind>) -> Self {
+                Self::$kind(side)
+            }
+        }
+    )+};
+}
+from!(
+    Source::Model,
+    Source::Cloud,
+    Target::Observation,
+    Target::Cloud
+);
+
+/// The two sides of a registration: the source, which moves, and the target, which stands still.
+///
+/// The source is a model or a cloud, and the target an observation or a cloud. A pose takes
+/// coordinates of the source to those of the target. Names call it `camera_from_object`, after the
+/// paper; between two clouds, it is `target_from_source`.
 ///
 /// Either side may be absent. [`Problem::default`] has neither and serves pairs that come from
-/// elsewhere. If a component needs a side that is absent, it returns no pairs, no points or no
-/// agreement; it never guesses. The sides are methods, so that later kinds of source and target
-/// (point clouds, color) do not change this type.
+/// elsewhere. If a component needs a side or an image that is absent, it returns no pairs, no
+/// points or no agreement; it never guesses. Components that can work on some problems only name
+/// themselves in their method `unsupported`, and stages end with that name before they run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Problem<'a> {
-    model: Option<&'a Model>,
-    observation: Option<&'a Observation>,
+    source: Option<Source<'a>>,
+    target: Option<Target<'a>>,
 }
 
 impl<'a> Problem<'a> {
-    /// Combines a model with an observation.
+    /// Combines a model or a cloud with an observation or a cloud.
     #[must_use]
-    pub fn new(model: &'a Model, observation: &'a Observation) -> Self {
+    pub fn new(source: impl Into<Source<'a>>, target: impl Into<Target<'a>>) -> Self {
         Self {
-            model: Some(model),
-            observation: Some(observation),
+            source: Some(source.into()),
+            target: Some(target.into()),
         }
+    }
+
+    /// Returns the side that moves.
+    #[must_use]
+    #[inline]
+    pub fn source(&self) -> Option<Source<'a>> {
+        self.source
+    }
+
+    /// Returns the side that stands still.
+    #[must_use]
+    #[inline]
+    pub fn target(&self) -> Option<Target<'a>> {
+        self.target
     }
 
     /// Returns the object, if the source is a model.
     #[must_use]
     #[inline]
     pub fn model(&self) -> Option<&'a Model> {
-        self.model
+        match self.source? {
+            Source::Model(model) => Some(model),
+            Source::Cloud(_) => None,
+        }
     }
 
     /// Returns the segmented depth image, if the target is one.
     #[must_use]
     #[inline]
     pub fn observation(&self) -> Option<&'a Observation> {
-        self.observation
+        match self.target? {
+            Target::Observation(observation) => Some(observation),
+            Target::Cloud(_) => None,
+        }
     }
 
     /// Returns both sides, if the problem is a model and a depth image.
     #[must_use]
     #[inline]
     pub fn sides(&self) -> Option<(&'a Model, &'a Observation)> {
-        Some((self.model?, self.observation?))
+        Some((self.model()?, self.observation()?))
+    }
+
+    /// Returns `part` if the target is a cloud, for components that need a depth image.
+    #[must_use]
+    pub fn without_image(&self, part: &'static str) -> Option<&'static str> {
+        matches!(self.target, Some(Target::Cloud(_))).then_some(part)
+    }
+
+    /// Returns `part` if a side is a cloud, for components that need a mesh and a depth image.
+    #[must_use]
+    pub fn without_mesh_or_image(&self, part: &'static str) -> Option<&'static str> {
+        let mesh = !matches!(self.source, Some(Source::Cloud(_)));
+        self.without_image(part).or((!mesh).then_some(part))
     }
 }
 
@@ -66,7 +210,7 @@ pub struct Iteration<'a> {
     pub index: usize,
     /// The initial pose of the stage: `camera_from_object`.
     pub init: Isometry3<f64>,
-    /// The model and the observation.
+    /// The source and the target.
     pub problem: Problem<'a>,
 }
 
@@ -96,7 +240,7 @@ impl<'a> Iteration<'a> {
 /// ```
 #[derive(Debug)]
 pub struct Context<'a> {
-    /// The model and the observation.
+    /// The source and the target.
     pub problem: Problem<'a>,
     renders: &'a mut RenderCache,
 }

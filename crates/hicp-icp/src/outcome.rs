@@ -32,13 +32,18 @@ pub enum Termination {
     Stopped,
     /// A guard's score did not improve.
     ScoreNotImproved,
+    /// The named part cannot work on the two sides of the problem.
+    ///
+    /// It needs a mesh or a depth image, and there is a point cloud instead.
+    Unsupported(&'static str),
     /// A custom stop rule ended the stage for a custom reason, named as in traces and files
     /// (`snake_case`).
     Custom(&'static str),
 }
 
 impl Termination {
-    /// All reasons that the library defines, so all but [`Termination::Custom`].
+    /// All reasons that the library defines, so all but those with
+    /// a name inside.
     pub const ALL: [Self; 11] = [
         Self::Converged,
         Self::IterationLimit,
@@ -68,6 +73,7 @@ impl Termination {
             Self::Deadline => "deadline",
             Self::Stopped => "stopped",
             Self::ScoreNotImproved => "score_not_improved",
+            Self::Unsupported(_) => "unsupported",
             Self::Custom(name) => name,
         }
     }
@@ -87,7 +93,19 @@ impl Termination {
             Self::Deadline => "the time limit was reached",
             Self::Stopped => "the observer requested the stop",
             Self::ScoreNotImproved => "the score did not improve",
+            Self::Unsupported(_) => {
+                "a part of the pipeline needs a mesh or a depth image instead of a point cloud"
+            }
             Self::Custom(name) => name,
+        }
+    }
+
+    /// Returns the part that ended a stage with [`Termination::Unsupported`].
+    #[must_use]
+    pub fn unsupported_part(self) -> Option<&'static str> {
+        match self {
+            Self::Unsupported(part) => Some(part),
+            _ => None,
         }
     }
 }

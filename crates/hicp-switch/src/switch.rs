@@ -26,6 +26,9 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for Switch<W, A, M> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.switcher.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let event = self
             .switcher
             .regime(&mut session.workspace.context(problem), init);
@@ -61,6 +64,9 @@ impl<W: Switcher, S: Stage> Stage for SwitchAmong<W, S> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.switcher.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let event = self
             .switcher
             .regime(&mut session.workspace.context(problem), init);

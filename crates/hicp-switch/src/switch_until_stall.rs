@@ -40,6 +40,9 @@ impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let mut judge = |pose: &Isometry3<f64>, session: &mut Session<'_>| {
             let mut context = session.workspace.context(problem);
             self.score.score(&mut context, pose)

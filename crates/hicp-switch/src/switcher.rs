@@ -1,7 +1,7 @@
 //! The trait of switchers.
 
 use hicp_core::internal::type_label;
-use hicp_core::{Context, Isometry3};
+use hicp_core::{Context, Isometry3, Problem};
 use hicp_icp::{Regime, RegimeEvent};
 
 /// Selects the regime of the current estimate from the image (Dynamic Switching, §IV-A).
@@ -24,6 +24,14 @@ pub trait Switcher {
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
+
+    /// Returns the name of the part that cannot work on a problem, such as a projection between
+    /// point clouds.
+    ///
+    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
+        None
+    }
 }
 
 macro_rules! forward {
@@ -39,6 +47,10 @@ macro_rules! forward {
 
             fn name(&self) -> &'static str {
                 (**self).name()
+            }
+
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                (**self).unsupported(problem)
             }
         }
     )+};

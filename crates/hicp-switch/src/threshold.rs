@@ -1,6 +1,6 @@
 //! Switching by thresholds on a score.
 
-use hicp_core::{Context, Isometry3};
+use hicp_core::{Context, Isometry3, Problem};
 use hicp_icp::{Regime, RegimeEvent};
 use hicp_score::Score;
 
@@ -40,6 +40,10 @@ impl<S: Score> Switcher for Threshold<S> {
     fn name(&self) -> &'static str {
         "threshold"
     }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.score.unsupported(problem)
+    }
 }
 
 /// Selects among any number of regimes by thresholds on a score.
@@ -69,5 +73,9 @@ impl<S: Score> Switcher for Thresholds<S> {
 
     fn name(&self) -> &'static str {
         "thresholds"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.score.unsupported(problem)
     }
 }

@@ -69,6 +69,7 @@
 //! Cameras look along +z with x right and y down. Pixel centers are at integers. [`nalgebra`] is
 //! re-exported.
 
+mod align;
 mod calibration;
 mod checks;
 mod mask_in_box;
@@ -93,6 +94,10 @@ pub use hicp_raster as raster;
 pub use hicp_score as score;
 pub use hicp_switch as switch;
 
+pub use align::{
+    Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration,
+    UnknownRegistration, align,
+};
 pub use calibration::Calibration;
 pub use checks::{
     ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warning_of_runner_up,

@@ -11,6 +11,7 @@ mod allocations_custom;
 mod beyond;
 mod book;
 mod catalogue;
+mod clouds;
 mod concurrency;
 mod cross;
 mod custom_association;

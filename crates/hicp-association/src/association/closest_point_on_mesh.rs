@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Context, Correspondences, Facing, Isometry3, Model, Point3, Surfel, UnitVector3};
+use hicp_core::{
+    Context, Correspondences, Facing, Isometry3, Model, Point3, Problem, Surfel, UnitVector3,
+};
 
 use crate::association::data_association::DataAssociation;
 use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
@@ -74,6 +76,10 @@ impl DataAssociation for ClosestPointOnMesh {
 
     fn name(&self) -> &'static str {
         "closest-point-on-mesh"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }
 

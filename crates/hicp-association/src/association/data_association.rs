@@ -1,7 +1,7 @@
 //! The trait of data associations.
 
 use hicp_core::internal::type_label;
-use hicp_core::{Context, Correspondences, Isometry3, Surfel};
+use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 
 /// Pairs model points with observed points: Algorithm 1, line 1 (and the transform of line 2).
 ///
@@ -70,6 +70,14 @@ pub trait DataAssociation {
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
+
+    /// Returns the name of the part that cannot work on a problem, such as a projection between
+    /// point clouds.
+    ///
+    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
+        None
+    }
 }
 
 macro_rules! forward {
@@ -87,6 +95,10 @@ macro_rules! forward {
 
             fn name(&self) -> &'static str {
                 (**self).name()
+            }
+
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                (**self).unsupported(problem)
             }
         }
     )+};

@@ -1,7 +1,7 @@
 //! Nearest-neighbor data association.
 
 use hicp_core::internal::{VectorLoop, vectorized};
-use hicp_core::{Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel};
+use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel, Target};
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
@@ -63,12 +63,12 @@ impl NearestNeighbor {
 
     fn search<T: PointIndex>(
         &mut self,
-        observation: &Observation,
+        target: Target<'_>,
         source: &[Surfel],
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let observed = ObservedPoints::<T>::of(observation, self.targets);
+        let observed = ObservedPoints::<T>::of(target, self.targets);
         let last = &mut self.last.0;
         // Any element is a valid start, so elements of another run cost time at worst.
         last.resize(source.len(), 0);
@@ -100,16 +100,16 @@ impl DataAssociation for NearestNeighbor {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let Some(observation) = context.problem.observation() else {
+        let Some(target) = context.problem.target() else {
             return;
         };
         match self.index {
             SearchIndex::BoxTree => {
-                self.search::<PointTree>(observation, source, camera_from_object, pairs);
+                self.search::<PointTree>(target, source, camera_from_object, pairs);
             }
             #[cfg(feature = "kiddo")]
             SearchIndex::KdTree => {
-                self.search::<KdTree>(observation, source, camera_from_object, pairs);
+                self.search::<KdTree>(target, source, camera_from_object, pairs);
             }
         }
     }

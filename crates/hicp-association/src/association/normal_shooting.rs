@@ -65,10 +65,10 @@ impl DataAssociation for NormalShooting {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
-        let Some(observation) = context.problem.observation() else {
+        let Some(target) = context.problem.target() else {
             return;
         };
-        let observed = ObservedPoints::<PointTree>::of(observation, self.targets);
+        let observed = ObservedPoints::<PointTree>::of(target, self.targets);
         let mover = RigidTransform::new(camera_from_object);
         let limit = self
             .max_offset

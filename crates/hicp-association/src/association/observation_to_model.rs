@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Context, Correspondences, Isometry3, Model, Point3, Surfel, sample_surface};
+use hicp_core::{
+    Context, Correspondences, Isometry3, Model, Point3, Problem, Surfel, sample_surface,
+};
 
 use crate::association::data_association::DataAssociation;
 use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
@@ -84,6 +86,10 @@ impl DataAssociation for ObservationToModel {
 
     fn name(&self) -> &'static str {
         "observation-to-model"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }
 

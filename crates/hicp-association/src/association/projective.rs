@@ -2,8 +2,8 @@
 
 use hicp_core::internal::{VectorLoop, vectorized, whole};
 use hicp_core::{
-    Context, Correspondences, Isometry3, Observation, Pair, Point3, RigidTransform, Surfel,
-    UnitVector3, Vector3,
+    Context, Correspondences, Isometry3, Observation, Pair, Point3, Problem, RigidTransform,
+    Surfel, UnitVector3, Vector3,
 };
 
 use crate::association::data_association::DataAssociation;
@@ -43,6 +43,10 @@ impl DataAssociation for Projective {
 
     fn name(&self) -> &'static str {
         "projective"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_image(self.name())
     }
 }
 

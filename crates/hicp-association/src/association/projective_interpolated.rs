@@ -1,7 +1,8 @@
 //! Projective association between pixels.
 
 use hicp_core::{
-    Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel, UnitVector3,
+    Context, Correspondences, Isometry3, Observation, Pair, Problem, RigidTransform, Surfel,
+    UnitVector3,
 };
 
 use crate::association::data_association::DataAssociation;
@@ -68,6 +69,10 @@ impl DataAssociation for ProjectiveInterpolated {
 
     fn name(&self) -> &'static str {
         "projective-interpolated"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_image(self.name())
     }
 }
 

@@ -1,6 +1,8 @@
 //! Projective association with a search around the pixel.
 
-use hicp_core::{Context, Correspondences, Isometry3, Observation, Pair, RigidTransform, Surfel};
+use hicp_core::{
+    Context, Correspondences, Isometry3, Observation, Pair, Problem, RigidTransform, Surfel,
+};
 
 use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::PixelProjection;
@@ -61,6 +63,10 @@ impl DataAssociation for ProjectiveSearch {
 
     fn name(&self) -> &'static str {
         "projective-search"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_image(self.name())
     }
 }
 

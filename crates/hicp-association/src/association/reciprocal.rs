@@ -1,6 +1,6 @@
 //! Mutual nearest neighbors.
 
-use hicp_core::{Context, Correspondences, Isometry3, Point3, RigidTransform, Surfel};
+use hicp_core::{Context, Correspondences, Isometry3, Point3, Problem, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
@@ -73,5 +73,9 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
 
     fn name(&self) -> &'static str {
         "reciprocal"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }

@@ -1,6 +1,6 @@
 //! Rejection of pairs at the edge of the observed surface.
 
-use hicp_core::{Correspondences, Iteration};
+use hicp_core::{Correspondences, Iteration, Problem};
 
 use crate::boundary::{BoundaryMap, BoundaryRule};
 use crate::filter::outlier_filter::OutlierFilter;
@@ -60,5 +60,9 @@ impl OutlierFilter for BoundaryTargets {
 
     fn name(&self) -> &'static str {
         "boundary-targets"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_image(self.name())
     }
 }

@@ -1,7 +1,7 @@
 //! The trait of outlier filters, and their chains.
 
 use hicp_core::internal::type_label;
-use hicp_core::{Correspondences, Iteration};
+use hicp_core::{Correspondences, Iteration, Problem};
 
 /// Removes or re-weights pairs (the third and fourth ICP components, §II).
 ///
@@ -22,6 +22,14 @@ pub trait OutlierFilter {
     /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
+    }
+
+    /// Returns the name of the part that cannot work on a problem, such as a projection between
+    /// point clouds.
+    ///
+    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
+        None
     }
 
     /// Appends the names of the filters that this one applies, in order.
@@ -53,6 +61,10 @@ macro_rules! forward {
                 (**self).name()
             }
 
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                (**self).unsupported(problem)
+            }
+
             fn names(&self, names: &mut Vec<&'static str>) {
                 (**self).names(names);
             }
@@ -76,6 +88,10 @@ impl<T: OutlierFilter> OutlierFilter for Option<T> {
     fn names(&self, names: &mut Vec<&'static str>) {
         self.iter().for_each(|filter| filter.names(names));
     }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.as_ref()?.unsupported(problem)
+    }
 }
 
 /// Applies the members in order.
@@ -92,6 +108,10 @@ impl<T: OutlierFilter> OutlierFilter for Vec<T> {
 
     fn names(&self, names: &mut Vec<&'static str>) {
         self.iter().for_each(|filter| filter.names(names));
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.iter().find_map(|filter| filter.unsupported(problem))
     }
 }
 
@@ -112,6 +132,12 @@ macro_rules! chain {
             fn names(&self, names: &mut Vec<&'static str>) {
                 let ($($member,)+) = self;
                 $($member.names(names);)+
+            }
+
+            #[allow(non_snake_case)]
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                let ($($member,)+) = self;
+                None$(.or_else(|| $member.unsupported(problem)))+
             }
         }
     };

@@ -1,6 +1,6 @@
 //! Filters that change from iteration to iteration.
 
-use hicp_core::{Correspondences, Iteration};
+use hicp_core::{Correspondences, Iteration, Problem};
 
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -33,5 +33,11 @@ impl<F: OutlierFilter> OutlierFilter for Schedule<F> {
 
     fn name(&self) -> &'static str {
         "schedule"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.filters
+            .iter()
+            .find_map(|filter| filter.unsupported(problem))
     }
 }

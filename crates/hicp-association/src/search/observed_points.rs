@@ -1,15 +1,15 @@
-//! The observed surfels of a stride, searchable by position.
+//! The surfels of a target at a stride, searchable by position.
 
 use std::sync::Arc;
 
-use hicp_core::{Observation, Point3, Surfel};
+use hicp_core::{Point3, Surfel, Target};
 
 use crate::search::nearest::{Nearest, PointIndex, distance_squared};
 use crate::stride::Stride;
 
 /// The observed surfels of one stride with their indices, and an index over their positions.
 ///
-/// The index numbers the surfels from 0 in the order of the image.
+/// The index numbers the surfels from 0 in the order of the target.
 pub(crate) struct ObservedPoints<T> {
     surfels: Vec<(u32, Surfel)>,
     index: T,
@@ -18,14 +18,13 @@ pub(crate) struct ObservedPoints<T> {
 impl<T: PointIndex> ObservedPoints<T> {
     /// Returns the points of a stride.
     ///
-    /// They are built once per observation, stride and kind of index, and shared by all threads and
+    /// They are built once per target, stride and kind of index, and shared by all threads and
     /// hypotheses.
-    pub(crate) fn of(observation: &Observation, targets: Stride) -> Arc<Self> {
-        let stride = targets.pixels(observation.n_surfels());
-        observation.derived().get_or_build(u64::from(stride), || {
-            let surfels: Vec<(u32, Surfel)> =
-                observation.surfels(stride).map(|(i, s)| (i, *s)).collect();
-            // An observation's surfels are finite by construction.
+    pub(crate) fn of(target: Target<'_>, targets: Stride) -> Arc<Self> {
+        let stride = targets.pixels(target.n_surfels());
+        target.derived().get_or_build(u64::from(stride), || {
+            let surfels = target.surfels(stride);
+            // Surfels of observations and clouds are finite by construction.
             let points: Vec<Point3<f32>> = surfels.iter().map(|(_, s)| s.point).collect();
             let index = T::new(&points);
             Self { surfels, index }
@@ -43,7 +42,7 @@ impl<T: PointIndex> ObservedPoints<T> {
         &self.index
     }
 
-    /// Returns a surfel that the index found, and its pixel index in the observation.
+    /// Returns a surfel that the index found, and its index in the target.
     #[inline(always)]
     pub(crate) fn get(&self, element: u32) -> (u32, Surfel) {
         self.surfels[element as usize]

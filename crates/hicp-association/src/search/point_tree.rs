@@ -49,6 +49,11 @@ impl PointTree {
         }
     }
 
+    /// Returns the indices of the points such that near ones follow each other.
+    pub(crate) fn order(&self) -> &[u32] {
+        self.tree.order()
+    }
+
     /// Returns the nearest point.
     #[inline(always)]
     pub(crate) fn nearest(&self, query: &Point3<f32>) -> Option<Nearest> {
@@ -87,6 +92,7 @@ impl PointTree {
     }
 
     /// Replaces the content of `found` by the `count` nearest points, nearest first.
+    #[inline(always)]
     pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Nearest>) {
         found.clear();
         if count == 0 {

@@ -4,7 +4,8 @@ use hicp_core::{Context, Isometry3, Surfel};
 
 use crate::selection::point_selection::PointSelection;
 
-/// Selects all of the model's area-uniform surface samples, visible or not.
+/// Selects all of the model's area-uniform surface samples, visible or not, or all points of a
+/// cloud.
 ///
 /// It is the literal reading of O in §III-A. Nearest-neighbor association drags points of the
 /// hidden side onto the visible surface. If the model can be rendered,
@@ -20,8 +21,8 @@ impl PointSelection for AllSamples {
         _camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        if let Some(model) = context.problem.model() {
-            source.extend_from_slice(model.samples());
+        if let Some(side) = context.problem.source() {
+            source.extend_from_slice(side.surfels());
         }
     }
 

@@ -1,6 +1,6 @@
 //! Subsets with evenly distributed normals.
 
-use hicp_core::{Context, Isometry3, Surfel, UnitVector3};
+use hicp_core::{Context, Isometry3, Problem, Surfel, UnitVector3};
 
 use crate::scratch::Scratch;
 use crate::selection::all_samples::AllSamples;
@@ -95,6 +95,10 @@ impl<P: PointSelection> PointSelection for NormalSpace<P> {
 
     fn name(&self) -> &'static str {
         "normal-space"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Selection of the observed points.
 
-use hicp_core::{Context, Isometry3, RigidTransform, Surfel, se3};
+use hicp_core::{Context, Isometry3, Problem, RigidTransform, Surfel, se3};
 
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
@@ -53,5 +53,9 @@ impl PointSelection for ObservedSurface {
 
     fn name(&self) -> &'static str {
         "observed-surface"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_image(self.name())
     }
 }

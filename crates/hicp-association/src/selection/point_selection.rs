@@ -1,7 +1,7 @@
 //! The trait of point selections.
 
 use hicp_core::internal::type_label;
-use hicp_core::{Context, Isometry3, Surfel};
+use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 /// Selects the model points oᵢ that a stage registers (the first of the five ICP components, §II).
 ///
@@ -28,6 +28,14 @@ pub trait PointSelection {
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }
+
+    /// Returns the name of the part that cannot work on a problem, such as a projection between
+    /// point clouds.
+    ///
+    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
+        None
+    }
 }
 
 macro_rules! forward {
@@ -44,6 +52,10 @@ macro_rules! forward {
 
             fn name(&self) -> &'static str {
                 (**self).name()
+            }
+
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                (**self).unsupported(problem)
             }
         }
     )+};

@@ -1,6 +1,6 @@
 //! Random subsets.
 
-use hicp_core::{Context, Isometry3, Surfel};
+use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 use crate::selection::all_samples::AllSamples;
 use crate::selection::point_selection::PointSelection;
@@ -56,6 +56,10 @@ impl<P: PointSelection> PointSelection for RandomSample<P> {
 
     fn name(&self) -> &'static str {
         "random-sample"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }
 

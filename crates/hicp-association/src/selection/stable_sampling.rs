@@ -1,6 +1,6 @@
 //! Subsets that keep the object from sliding.
 
-use hicp_core::{Context, Isometry3, Matrix6, Point3, Surfel, Vector3, Vector6};
+use hicp_core::{Context, Isometry3, Matrix6, Point3, Problem, Surfel, Vector3, Vector6};
 
 use crate::scratch::Scratch;
 use crate::selection::all_samples::AllSamples;
@@ -81,6 +81,10 @@ impl<P: PointSelection> PointSelection for StableSampling<P> {
 
     fn name(&self) -> &'static str {
         "stable-sampling"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }
 

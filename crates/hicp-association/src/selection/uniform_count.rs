@@ -1,6 +1,6 @@
 //! Evenly spaced subsets.
 
-use hicp_core::{Context, Isometry3, Surfel};
+use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::{keep_positions, spread};
@@ -46,5 +46,9 @@ impl<P: PointSelection> PointSelection for UniformCount<P> {
 
     fn name(&self) -> &'static str {
         "uniform-count"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }

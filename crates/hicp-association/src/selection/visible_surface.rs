@@ -1,6 +1,6 @@
 //! Selection of the visible points.
 
-use hicp_core::{Context, Isometry3, Point3, Surfel, UnitVector3};
+use hicp_core::{Context, Isometry3, Point3, Problem, Surfel, UnitVector3};
 
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
@@ -80,5 +80,9 @@ impl PointSelection for VisibleSurface {
 
     fn name(&self) -> &'static str {
         "visible-surface"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }

@@ -1,6 +1,6 @@
 //! One point per cell of a grid.
 
-use hicp_core::{Context, Isometry3, Surfel};
+use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 use crate::length::Length;
 use crate::scratch::Scratch;
@@ -91,5 +91,9 @@ impl<P: PointSelection> PointSelection for VoxelGrid<P> {
 
     fn name(&self) -> &'static str {
         "voxel-grid"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.inner.unsupported(problem)
     }
 }

@@ -1,6 +1,6 @@
 //! Selection away from silhouettes and depth edges.
 
-use hicp_core::{Context, Isometry3, Surfel};
+use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 use crate::boundary::BoundaryRule;
 use crate::selection::point_selection::PointSelection;
@@ -79,5 +79,9 @@ impl<P: PointSelection> PointSelection for WithoutBoundary<P> {
 
     fn name(&self) -> &'static str {
         "without-boundary"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }

@@ -55,6 +55,9 @@ impl<C: Score> Stage for Descent<C> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let kept = Outcome::kept(init, Termination::ScoreNotImproved);
         let seen = problem.sides().filter(|(_, o)| o.n_surfels() > 0);
         let Some((model, _)) = seen else {

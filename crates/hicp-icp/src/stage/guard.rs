@@ -26,6 +26,9 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let outcome = self.stage.run(problem, init, session);
         if outcome.verdict != Verdict::Refined {
             return outcome;
@@ -69,6 +72,9 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let first = self
             .score
             .score(&mut session.workspace.context(problem), init);

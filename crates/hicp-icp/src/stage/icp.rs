@@ -75,9 +75,12 @@ where
         let workspace = &mut *session.workspace;
         let (source, pairs) = (&mut workspace.source, &mut workspace.pairs);
         let mut context = Context::new(*problem, &mut workspace.renders);
+        let unsupported = (self.selection.unsupported(problem))
+            .or_else(|| self.association.unsupported(problem))
+            .or_else(|| self.filter.unsupported(problem));
         source.clear();
         let finite = se3::is_finite(init);
-        if finite {
+        if finite && unsupported.is_none() {
             self.selection.select(&mut context, init, source);
         }
         self.stop.start();
@@ -87,6 +90,9 @@ where
         let mut first = None;
         let mut evaluations = 0;
         let termination = loop {
+            if let Some(part) = unsupported {
+                break Termination::Unsupported(part);
+            }
             let iteration = Iteration::new(evaluations, init, *problem);
             pairs.begin(&candidate, source.len());
             if finite {

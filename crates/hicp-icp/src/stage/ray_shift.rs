@@ -29,6 +29,9 @@ impl Stage for RayShift {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = problem.without_mesh_or_image(self.name()) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let mut outcome = Outcome::kept(init, Termination::NoPairs);
         let Some((model, observation)) = problem.sides() else {
             return outcome;

@@ -367,6 +367,9 @@ impl<S: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, E, R,
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
         let clock = Clock::start(self.options.time_limit);
         let ignored = self.options.start == Start::Ignored;
         let mut local = match self.options.start {

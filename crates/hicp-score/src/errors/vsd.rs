@@ -1,6 +1,6 @@
 //! Visible Surface Discrepancy, and the errors of invalid inputs.
 
-use hicp_core::{Context, DistanceImage, Isometry3, Mask, RenderedView};
+use hicp_core::{Context, DistanceImage, Isometry3, Mask, Problem, RenderedView};
 use thiserror::Error;
 
 use crate::score::Score;
@@ -215,5 +215,9 @@ impl Score for Vsd {
 
     fn name(&self) -> &'static str {
         "vsd"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }

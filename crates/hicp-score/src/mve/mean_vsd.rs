@@ -1,7 +1,7 @@
 //! The mean VSD estimate.
 
 use hicp_core::internal::vectorized;
-use hicp_core::{Context, Isometry3, Observation, RenderedView};
+use hicp_core::{Context, Isometry3, Observation, Problem, RenderedView};
 
 use crate::judgment::grid::Grid;
 use crate::judgment::insides::inside_share;
@@ -177,5 +177,9 @@ impl Score for MeanVsd {
 
     fn name(&self) -> &'static str {
         "mve"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use hicp_core::internal::{VectorLoop, vectorized, whole};
-use hicp_core::{Context, Isometry3, Model, Observation, PinholeCamera, Surfel, sample_surface};
+use hicp_core::{
+    Context, Isometry3, Model, Observation, PinholeCamera, Problem, Surfel, sample_surface,
+};
 
 use crate::mve::coarse_grid::CoarseGrid;
 use crate::mve::mask_trust::MaskTrust;
@@ -148,6 +150,10 @@ impl Score for SampledMve {
 
     fn name(&self) -> &'static str {
         "sampled-mve"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        problem.without_mesh_or_image(self.name())
     }
 }
 

@@ -1,0 +1,355 @@
+//! One call from two point clouds to the pose between them.
+
+use std::str::FromStr;
+
+use hicp_association::{
+    AllSamples, MaxDistance, NearestNeighbor, SearchIndex, Stride, estimate_normals,
+    voxel_downsample,
+};
+use hicp_core::internal::nearest_name;
+use hicp_core::{
+    Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, Vector3,
+};
+use hicp_icp::{
+    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Workspace,
+};
+use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
+use hicp_raster::Rasterizer;
+use thiserror::Error;
+
+/// Share of the source points with a counterpart below which a warning follows.
+const LITTLE_OVERLAP: f64 = 0.3;
+
+/// Gates of a registration without a stated one, as shares of the source's diameter.
+const GATES: [f32; 2] = [0.1, 0.02];
+
+/// The preparation of points for a registration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudOptions {
+    /// Edge of the cubic cells in which points are replaced by their mean, meters; `None` keeps all
+    /// points ([`voxel_downsample`]).
+    pub voxel_meters: Option<f32>,
+    /// Number of neighbors from which absent normals are estimated ([`estimate_normals`]).
+    pub neighbors: usize,
+}
+
+impl Default for CloudOptions {
+    /// All points, and normals from 20 neighbors.
+    fn default() -> Self {
+        Self {
+            voxel_meters: None,
+            neighbors: 20,
+        }
+    }
+}
+
+impl CloudOptions {
+    /// Creates a cloud from points in meters, with unit normals if there are any.
+    ///
+    /// Points that are not finite or whose normal cannot be estimated are skipped
+    /// ([`Cloud::n_skipped`]).
+    ///
+    /// # Errors
+    ///
+    /// [`NormalCount`] if there are normals, but not one per point.
+    pub fn cloud(
+        &self,
+        points: &[Point3<f32>],
+        normals: Option<&[UnitVector3<f32>]>,
+    ) -> Result<Cloud, NormalCount> {
+        if let Some(normals) = normals
+            && normals.len() != points.len()
+        {
+            return Err(NormalCount {
+                normals: normals.len(),
+                points: points.len(),
+            });
+        }
+        let surfel = |(point, normal): (&_, _)| Surfel {
+            point: *point,
+            normal,
+        };
+        let (points, normals) = match self.voxel_meters {
+            Some(edge) => voxel_downsample(points, normals, edge),
+            None => (points.to_vec(), normals.map(<[_]>::to_vec)),
+        };
+        let Some(normals) = normals else {
+            let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
+            let normals = estimate_normals(&points, self.neighbors).into_iter();
+            let normals = normals.map(|normal| normal.unwrap_or(unknown));
+            let cloud = Cloud::new(points.iter().zip(normals).map(surfel));
+            return Ok(cloud.with_normals_from(self.neighbors));
+        };
+        Ok(Cloud::new(points.iter().zip(normals).map(surfel)))
+    }
+}
+
+/// The number of normals of a cloud differs from that of its points.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("there are {normals} normals for {points} points; expected one normal per point, or none")]
+pub struct NormalCount {
+    /// Number of normals.
+    pub normals: usize,
+    /// Number of points.
+    pub points: usize,
+}
+
+/// The error that a registration of two clouds minimizes, over nearest neighbors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Registration {
+    /// [`PointToPoint`], which needs no normals.
+    PointToPoint,
+    /// [`PointToPlane`], with the normals of the target.
+    #[default]
+    PointToPlane,
+    /// [`Generalized`] ICP (GICP), plane to plane, with the normals of both.
+    Generalized,
+}
+
+impl Registration {
+    /// All registrations.
+    pub const ALL: [Self; 3] = [Self::PointToPoint, Self::PointToPlane, Self::Generalized];
+
+    /// Returns the name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PointToPoint => "point-to-point",
+            Self::PointToPlane => "point-to-plane",
+            Self::Generalized => "gicp",
+        }
+    }
+
+    /// Builds the pipeline: every source point to its nearest target point, at most `max_distance`
+    /// meters away, until a step moves less than 0.1 mm and 0.01°, or 100 iterations.
+    ///
+    /// `None` runs twice, with a tenth and with a fiftieth of the source's diameter: it bridges
+    /// large offsets, and then leaves out points without a counterpart.
+    #[must_use]
+    pub fn build(self, max_distance: Option<f32>) -> BoxedStage {
+        match self {
+            Self::PointToPoint => stages(PointToPoint, max_distance),
+            Self::PointToPlane => stages(PointToPlane, max_distance),
+            Self::Generalized => stages(Generalized::default(), max_distance),
+        }
+    }
+}
+
+fn stages<M>(metric: M, max_distance: Option<f32>) -> BoxedStage
+where
+    M: ErrorMetric + Clone + Send + 'static,
+{
+    let stage = |filter| Icp {
+        selection: AllSamples,
+        association: NearestNeighbor::new(Stride::Pixels(1), SearchIndex::BoxTree),
+        filter,
+        metric: metric.clone(),
+        stop: (SmallMotion::default(), IterationLimit(100)),
+    };
+    match max_distance {
+        Some(meters) => Box::new(stage(MaxDistance::meters(meters))),
+        None => Box::new(Cascade(
+            GATES
+                .map(|gate| stage(MaxDistance::diameters(gate)))
+                .to_vec(),
+        )),
+    }
+}
+
+impl FromStr for Registration {
+    type Err = UnknownRegistration;
+
+    fn from_str(name: &str) -> Result<Self, UnknownRegistration> {
+        let named = Self::ALL.into_iter().find(|found| found.name() == name);
+        named.ok_or_else(|| UnknownRegistration {
+            name: name.to_owned(),
+            suggestion: nearest_name(name, Self::ALL.map(Self::name)),
+        })
+    }
+}
+
+/// A name that no registration has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "no registration is named {name:?}{} The names are: {}",
+    suggestion.map_or_else(|| ".".to_owned(), |name| format!("; did you mean {name:?}?")),
+    Registration::ALL.map(Registration::name).join(", ")
+)]
+pub struct UnknownRegistration {
+    /// The name given.
+    pub name: String,
+    /// The name nearest to it, if one is near.
+    pub suggestion: Option<&'static str>,
+}
+
+/// One of the two clouds of a registration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub enum CloudSide {
+    /// The cloud that moves.
+    Source,
+    /// The cloud that stands still.
+    Target,
+}
+
+impl std::fmt::Display for CloudSide {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Source => "source",
+            Self::Target => "target",
+        })
+    }
+}
+
+/// A reason not to trust the registration of two clouds.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum CloudWarning {
+    /// Points were skipped: they are not finite, or have no normal because their neighbors lie on a
+    /// line.
+    #[error("{side}: {count} points were skipped: they are not finite or determine no normal")]
+    PointsSkipped {
+        /// The cloud.
+        side: CloudSide,
+        /// Number of points.
+        count: usize,
+    },
+    /// There were no normals, so they were estimated.
+    #[error("{side}: no normals: estimated from {neighbors} neighbors")]
+    NormalsEstimated {
+        /// The cloud.
+        side: CloudSide,
+        /// Number of neighbors.
+        neighbors: usize,
+    },
+    /// A part of the pipeline needs a mesh or a depth image.
+    #[error(
+        "the part `{part}` of the pipeline needs a mesh and a depth image, not point clouds: the initial pose was kept"
+    )]
+    Unsupported {
+        /// Name of the part.
+        part: &'static str,
+    },
+    /// Few points of the source have a counterpart in the target.
+    #[error(
+        "{:.0} % of the source points have a counterpart in the target: do not trust the pose",
+        fitness * 100.0
+    )]
+    LittleOverlap {
+        /// Share of the source points with a counterpart.
+        fitness: f64,
+    },
+    /// The pairs do not determine all six directions, as on a plane or a cylinder.
+    #[error("the clouds do not determine every direction of the pose")]
+    Undetermined,
+}
+
+/// The pose between two clouds, and how well they fit.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Alignment {
+    /// The pose, in its field `camera_from_object`, with the reason why the pipeline ended and the
+    /// quality.
+    pub outcome: Outcome,
+    /// The reasons not to trust the pose, if there are any.
+    pub warnings: Vec<CloudWarning>,
+}
+
+impl Alignment {
+    /// Returns the pose: it takes coordinates of the source to those of the target, meters.
+    #[must_use]
+    pub fn target_from_source(&self) -> Isometry3<f64> {
+        self.outcome.camera_from_object
+    }
+
+    /// Returns the share of the source points that have a counterpart, 0 to 1.
+    #[must_use]
+    pub fn fitness(&self) -> f64 {
+        self.outcome.quality.map_or(0.0, |quality| quality.fitness)
+    }
+
+    /// Returns the root mean square of the distances of pairs, meters; `None` without pairs.
+    #[must_use]
+    pub fn rmse(&self) -> Option<f64> {
+        self.outcome.quality.map(|quality| quality.point_rmse)
+    }
+
+    /// Returns the 6×6 covariance of the pose for ξ = [ρ; φ] (translation first, meters and
+    /// radians), a left perturbation in the frame of the target.
+    ///
+    /// `None` if a direction is not determined.
+    #[must_use]
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        self.outcome
+            .quality
+            .and_then(|quality| quality.covariance())
+    }
+}
+
+/// Registers two point clouds from an initial pose `target_from_source`, in meters.
+///
+/// Either side may also be a [`Model`](hicp_core::Model) or an
+/// [`Observation`](hicp_core::Observation). The pipeline is a [`Registration`] or any stage. If a
+/// part of it needs an image or a mesh that is absent, the outcome keeps the initial pose and names
+/// the part. Never fails on data: without overlap, the outcome states that no pairs were found.
+///
+/// ```
+/// use hybrid_icp::core::{Isometry3, Point3};
+/// use hybrid_icp::{CloudOptions, Registration, align};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let height = |x: f32, y: f32| 2.0 + 0.1 * (5.0 * x).sin() * (4.0 * y).cos();
+/// let scan = |dx: f32| -> Vec<_> {
+///     let grid = (0..1600).map(|i| ((i % 40) as f32 * 0.05, (i / 40) as f32 * 0.05));
+///     grid.map(|(x, y)| Point3::new(x + dx, y, height(x, y))).collect()
+/// };
+/// let options = CloudOptions::default();
+/// let (source, target) = (options.cloud(&scan(0.0), None)?, options.cloud(&scan(0.03), None)?);
+/// let mut pipeline = Registration::PointToPlane.build(None);
+/// let found = align(&source, &target, &Isometry3::identity(), &mut pipeline);
+/// assert!((found.target_from_source().translation.x - 0.03).abs() < 1e-4);
+/// assert!(found.fitness() > 0.9);
+/// # Ok(()) }
+/// ```
+pub fn align<'a>(
+    source: impl Into<Source<'a>>,
+    target: impl Into<Target<'a>>,
+    init: &Isometry3<f64>,
+    pipeline: &mut (impl Stage + ?Sized),
+) -> Alignment {
+    let (source, target) = (source.into(), target.into());
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let mut observer = ();
+    let mut session = Session::new(&mut workspace, &mut observer);
+    let outcome = pipeline.run(&Problem::new(source, target), init, &mut session);
+    let mut warnings = Vec::new();
+    if let Source::Cloud(cloud) = source {
+        warnings.extend(warnings_of(CloudSide::Source, cloud));
+    }
+    if let Target::Cloud(cloud) = target {
+        warnings.extend(warnings_of(CloudSide::Target, cloud));
+    }
+    let mut alignment = Alignment { outcome, warnings };
+    let fitness = alignment.fitness();
+    if let Some(part) = outcome.termination.unsupported_part() {
+        alignment.warnings.push(CloudWarning::Unsupported { part });
+    } else if fitness < LITTLE_OVERLAP {
+        alignment
+            .warnings
+            .push(CloudWarning::LittleOverlap { fitness });
+    } else if alignment.covariance().is_none() {
+        alignment.warnings.push(CloudWarning::Undetermined);
+    }
+    alignment
+}
+
+/// Returns the warnings about the preparation of a cloud.
+fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item = CloudWarning> {
+    let count = cloud.n_skipped();
+    let skipped = (count > 0).then_some(CloudWarning::PointsSkipped { side, count });
+    let estimated = cloud.normals_from();
+    let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
+    skipped.into_iter().chain(estimated)
+}

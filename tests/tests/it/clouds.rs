@@ -1,0 +1,277 @@
+//! Registration of point clouds: recovery, equivariance, hostile input, parts that need an image.
+
+use hicp_sim::Household;
+use hybrid_icp::association::{
+    AllSamples, BoundaryTargets, Length, MaxDistance, NearestNeighbor, Projective, Reciprocal,
+    VisibleSurface, VoxelGrid, estimate_normals, voxel_downsample,
+};
+use hybrid_icp::core::{
+    Cloud, Isometry3, Model, Point3, Problem, Surfel, Vector3, sample_surface, se3,
+};
+use hybrid_icp::icp::{Guard, Icp, IterationLimit, SmallMotion, Stage, Termination};
+use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::score::MeanVsd;
+use hybrid_icp::{Alignment, CloudOptions, CloudWarning, Preset, Registration, align};
+use proptest::prelude::*;
+
+fn mug() -> Model {
+    Household::Mug.model().unwrap()
+}
+
+/// Returns points of the mug's surface without normals.
+fn points(count: usize) -> Vec<Point3<f32>> {
+    let surfels = sample_surface(mug().mesh(), count);
+    surfels.iter().map(|surfel| surfel.point).collect()
+}
+
+fn moved(points: &[Point3<f32>], pose: &Isometry3<f64>) -> Vec<Point3<f32>> {
+    let point = |p: &Point3<f32>| (pose * p.cast::<f64>()).cast();
+    points.iter().map(point).collect()
+}
+
+fn cloud(points: &[Point3<f32>]) -> Cloud {
+    CloudOptions::default().cloud(points, None).unwrap()
+}
+
+fn registered(source: &Cloud, target: &Cloud, init: &Isometry3<f64>) -> [Alignment; 3] {
+    Registration::ALL.map(|kind| align(source, target, init, &mut *kind.build(None)))
+}
+
+fn pose(angles: [f64; 3], shift: [f64; 3]) -> Isometry3<f64> {
+    Isometry3::new(Vector3::from(shift), Vector3::from(angles))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// The same points, moved by up to 10° and 10 mm.
+    #[test]
+    fn a_known_transform_is_recovered(
+        angles in prop::array::uniform3(-0.1..0.1), shift in prop::array::uniform3(-0.006..0.006),
+    ) {
+        let (points, truth) = (points(2000), pose(angles, shift));
+        let (source, target) = (cloud(&points), cloud(&moved(&points, &truth)));
+        for found in registered(&source, &target, &Isometry3::identity()) {
+            let (angle, distance) = se3::pose_distance(&found.target_from_source(), &truth);
+            prop_assert!(angle.to_degrees() < 0.02 && distance < 2e-5, "{angle} {distance}");
+            prop_assert!(found.fitness() > 0.999 && found.rmse().unwrap() < 1e-4);
+            prop_assert!(found.covariance().is_some());
+        }
+    }
+
+    /// A motion of the target and of the initial pose moves the result.
+    #[test]
+    fn results_move_with_the_target(
+        angles in prop::array::uniform3(-3.0..3.0), shift in prop::array::uniform3(-1.0..1.0),
+    ) {
+        let target = moved(&points(1500), &pose([0.05, -0.04, 0.06], [0.004, 0.003, -0.005]));
+        let motion = pose(angles, shift);
+        let source = cloud(&points(1200));
+        let still = registered(&source, &cloud(&target), &Isometry3::identity());
+        let carried = registered(&source, &cloud(&moved(&target, &motion)), &motion);
+        for (still, carried) in still.iter().zip(carried) {
+            let expected = motion * still.target_from_source();
+            let (angle, distance) = se3::pose_distance(&carried.target_from_source(), &expected);
+            prop_assert!(angle.to_degrees() < 0.05 && distance < 1e-4, "{angle} {distance}");
+        }
+    }
+}
+
+/// Every pose stays finite, and every result says what is wrong.
+#[test]
+fn hostile_clouds_end_in_an_honest_outcome() {
+    let good = cloud(&points(1000));
+    let repeated = |point: Point3<f32>| cloud(&vec![point; 50]);
+    let line: Vec<_> = (0..50)
+        .map(|i| Point3::new(0.01 * i as f32, 0.0, 0.5))
+        .collect();
+    let nan = [f32::NAN, f32::INFINITY, 1e30].map(|x| Point3::new(x, 0.0, 0.0));
+    for bad in [
+        cloud(&[]),
+        cloud(&[Point3::origin()]),
+        repeated(Point3::new(0.1, 0.2, 0.3)),
+        cloud(&line),
+        cloud(&nan),
+    ] {
+        for (source, target) in [(&bad, &good), (&good, &bad), (&bad, &bad)] {
+            for found in registered(source, target, &Isometry3::identity()) {
+                assert_eq!(found.target_from_source(), Isometry3::identity());
+                assert_eq!(found.outcome.termination, Termination::NoPairs);
+                assert_eq!((found.fitness(), found.rmse()), (0.0, None));
+                let little = CloudWarning::LittleOverlap { fitness: 0.0 };
+                assert!(found.warnings.contains(&little));
+            }
+        }
+    }
+    let mut with_nan = points(1000);
+    with_nan.extend(nan);
+    let cloud = cloud(&with_nan);
+    assert_eq!((cloud.surfels().len(), cloud.n_skipped()), (1000, 3));
+}
+
+#[test]
+fn clouds_without_overlap_are_not_trusted() {
+    let far = moved(&points(1000), &Isometry3::translation(1.0, 0.0, 0.0));
+    for found in registered(&cloud(&points(1000)), &cloud(&far), &Isometry3::identity()) {
+        assert_eq!(found.outcome.termination, Termination::NoPairs);
+        assert_eq!(found.fitness(), 0.0);
+    }
+    let nan = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    let found = &registered(&cloud(&far), &cloud(&far), &nan)[0];
+    assert_eq!(found.outcome.termination, Termination::NoPairs);
+}
+
+/// A plane leaves three directions open. They must not move, and the covariance must not exist.
+#[test]
+fn a_coplanar_cloud_does_not_slide() {
+    let plate: Vec<_> = (0..1600)
+        .map(|i| Point3::new((i % 40) as f32 * 0.01, (i / 40) as f32 * 0.01, 0.5))
+        .collect();
+    let (source, target) = (
+        cloud(&plate),
+        cloud(&moved(&plate, &Isometry3::translation(0.0, 0.0, 0.004))),
+    );
+    let mut pipeline = Registration::PointToPlane.build(None);
+    let found = align(&source, &target, &Isometry3::identity(), &mut pipeline);
+    let shift = found.target_from_source().translation.vector;
+    assert!(
+        (shift - Vector3::new(0.0, 0.0, 0.004)).norm() < 1e-4,
+        "{shift}"
+    );
+    assert!(found.covariance().is_none());
+    assert!(found.warnings.contains(&CloudWarning::Undetermined));
+}
+
+#[test]
+fn lengths_in_diameters_measure_the_source_cloud() {
+    let (source, target) = (cloud(&points(500)), cloud(&points(10)));
+    let problem = Problem::new(&source, &target);
+    let expected = hybrid_icp::core::diameter(&points(500)) as f32;
+    assert_eq!(Length::Diameters(0.5).meters(&problem), 0.5 * expected);
+}
+
+fn stop() -> (SmallMotion, IterationLimit) {
+    (SmallMotion::default(), IterationLimit(20))
+}
+
+/// Each part names itself, also inside of other parts, and the initial pose is kept.
+#[test]
+fn parts_that_need_an_image_are_named() {
+    let source = cloud(&points(500));
+    let nearest = || Icp {
+        selection: AllSamples,
+        association: NearestNeighbor::default(),
+        filter: (),
+        metric: PointToPlane,
+        stop: stop(),
+    };
+    let projective = Icp {
+        selection: AllSamples,
+        association: Reciprocal::new(Projective),
+        filter: (),
+        metric: PointToPlane,
+        stop: stop(),
+    };
+    let visible = Icp {
+        selection: VoxelGrid::new(VisibleSurface::default(), Length::Meters(0.01)),
+        association: NearestNeighbor::default(),
+        filter: (),
+        metric: PointToPlane,
+        stop: stop(),
+    };
+    let boundary = Icp {
+        selection: AllSamples,
+        association: NearestNeighbor::default(),
+        filter: (
+            MaxDistance::meters(0.1),
+            vec![Some(BoundaryTargets::default())],
+        ),
+        metric: PointToPlane,
+        stop: stop(),
+    };
+    let guard = Guard {
+        stage: nearest(),
+        score: MeanVsd::default(),
+    };
+    let stages: [(Box<dyn Stage>, _); 7] = [
+        (Box::new(projective), "projective"),
+        (Box::new(visible), "visible-surface"),
+        (Box::new(boundary), "boundary-targets"),
+        (Box::new(guard), "mve"),
+        (Preset::Hybrid.build(), "mve"),
+        (Preset::Local.build(), "mve"),
+        (Preset::Auto.build(), "mve"),
+    ];
+    for (mut stage, part) in stages {
+        let init = Isometry3::translation(0.001, 0.0, 0.0);
+        let found = align(&source, &source, &init, &mut *stage);
+        assert_eq!(found.outcome.termination, Termination::Unsupported(part));
+        assert_eq!(found.target_from_source(), init);
+        assert!(found.warnings.contains(&CloudWarning::Unsupported { part }));
+    }
+    let found = align(&source, &source, &Isometry3::identity(), &mut nearest());
+    assert_eq!(found.outcome.termination, Termination::Converged);
+    assert_eq!(found.fitness(), 1.0);
+}
+
+/// A model registers with a cloud, too.
+#[test]
+fn a_model_is_a_source_for_a_cloud() {
+    let (model, truth) = (mug(), pose([0.03, 0.02, -0.04], [0.002, -0.003, 0.002]));
+    let target = cloud(&moved(&points(5000), &truth));
+    let mut pipeline = Registration::PointToPlane.build(None);
+    let found = align(&model, &target, &Isometry3::identity(), &mut pipeline);
+    let (angle, distance) = se3::pose_distance(&found.target_from_source(), &truth);
+    assert!(
+        angle.to_degrees() < 0.5 && distance < 1e-3,
+        "{angle} {distance}"
+    );
+}
+
+#[test]
+fn estimated_normals_are_those_of_the_surface() {
+    let sphere: Vec<_> = (0..4000)
+        .map(|i| {
+            let (z, turn) = (1.0 - (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963_2);
+            let radius = (1.0 - z * z).sqrt();
+            Point3::new(radius * turn.cos(), radius * turn.sin(), z)
+        })
+        .collect();
+    for (point, normal) in sphere.iter().zip(estimate_normals(&sphere, 10)) {
+        // The origin is the center, and normals face it.
+        assert!(normal.unwrap().dot(&point.coords) < -0.999, "{point}");
+    }
+    assert!(estimate_normals(&sphere, 2).iter().all(Option::is_none));
+    assert!(estimate_normals(&sphere, 0).iter().all(Option::is_none));
+}
+
+#[test]
+fn voxels_hold_the_mean_of_their_points() {
+    let points = [
+        [0.0, 0.0, 0.0],
+        [0.3, 0.0, 0.0],
+        [5.2, 0.1, 0.0],
+        [f32::NAN, 0.0, 0.0],
+    ];
+    let points = points.map(Point3::from);
+    let (means, _) = voxel_downsample(&points, None, 1.0);
+    assert_eq!(means, [Point3::new(0.15, 0.0, 0.0), points[2]]);
+    for edge in [0.0, -1.0, f32::NAN, 1e-9] {
+        assert_eq!(voxel_downsample(&points, None, edge).0.len(), 4);
+    }
+    assert_eq!(voxel_downsample(&[], None, 1.0).0, []);
+    let up = Vector3::z_axis();
+    let normals = [up, up, up, -up];
+    let (_, normals) = voxel_downsample(&points, Some(&normals), 1.0);
+    assert_eq!(normals.unwrap(), [up, up]);
+    let surfel = |point| Surfel { point, normal: up };
+    let given = Cloud::new(points.map(surfel));
+    assert_eq!((given.n_skipped(), given.normals_from()), (1, None));
+    let error = CloudOptions::default().cloud(&points, Some(&[up]));
+    assert!(
+        error
+            .unwrap_err()
+            .to_string()
+            .contains("1 normals for 4 points")
+    );
+}
