@@ -122,25 +122,16 @@ impl Scene {
         Some(self.info.as_ref()?.get(&im_id)?)
     }
 
-    /// Returns the path of the depth image of an image.
+    /// Returns the path of the depth image of an image: PNG, or TIFF as in ITODD.
     ///
     /// # Errors
     ///
-    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is no depth image. Another
-    /// [`IoError`] if it is a TIFF file, which is not supported.
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is no depth image.
     pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
         let png = self.dir.join(format!("depth/{im_id:06}.png"));
-        if !is_absent(&png) {
-            return Ok(png);
-        }
-        for extension in ["tif", "tiff"] {
-            let path = png.with_extension(extension);
-            if !is_absent(&path) {
-                let found = format!("a file with the extension {extension:?}");
-                return Err(IoError::new(path, None, found, ".png"));
-            }
-        }
-        Err(IoError::missing(png, "depth image"))
+        let paths = ["png", "tif", "tiff"].map(|extension| png.with_extension(extension));
+        let found = paths.into_iter().find(|path| !is_absent(path));
+        found.ok_or_else(|| IoError::missing(png, "depth image"))
     }
 
     /// Reads the depth image of an image, meters.
@@ -148,14 +139,17 @@ impl Scene {
     /// # Errors
     ///
     /// As for [`Scene::depth_path`], [`Scene::camera`] and
-    /// [`read_depth_png`](crate::read_depth_png). Also if the camera does not state `depth_scale`.
+    /// [`read_depth`](crate::read_depth). Also if the camera does not state `depth_scale`.
     pub fn read_depth(&self, im_id: u32) -> Result<DepthImage, IoError> {
         let path = self.depth_path(im_id)?;
         let scale = self.camera(im_id)?.depth_scale.ok_or_else(|| {
             let expected = "one, to read depth images";
             self.camera_error(&format!("$.{im_id}"), "no `depth_scale`", expected)
         })?;
-        self.limits.read_depth_png(path, scale)
+        match path.extension().is_some_and(|extension| extension == "png") {
+            true => self.limits.read_depth_png(path, scale),
+            false => self.limits.read_raw_depth(path)?.scaled(Some(scale)),
+        }
     }
 
     /// Returns the path of an image's color or gray image, or `None` if neither exists.
@@ -270,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_tiff_depth_images_and_a_missing_depth_scale() {
+    fn errors_name_damaged_tiff_depth_images_and_a_missing_depth_scale() {
         let (_dir, scene) = scene(&[
             ("scene_camera.json", CAMERA),
             ("depth/000010.tif", ""),
@@ -280,7 +274,7 @@ mod tests {
         let scene = scene.unwrap();
         assert!(matches!(
             scene.read_depth(10),
-            Err(IoError { found, .. }) if found.contains("\"tif\"")
+            Err(IoError { path, .. }) if path.ends_with("depth/000010.tif")
         ));
         assert!(
             matches!(scene.read_depth(2), Err(IoError { place: Some(Place::Field(key)), .. }) if key == "$.2")
@@ -305,10 +299,7 @@ mod tests {
         assert!(folder(opened.read_depth(2).unwrap_err()));
         assert!(folder(opened.read_visible_mask(2, 0).unwrap_err()));
         assert!(opened.color_path(2).unwrap().ends_with("gray/000002.png"));
-        assert!(matches!(
-            opened.read_depth(10),
-            Err(IoError { found, .. }) if found.contains("\"tiff\"")
-        ));
+        assert!(folder(opened.read_depth(10).unwrap_err()));
         for name in ["scene_gt.json", "scene_gt_info.json"] {
             let path = dir.path().join(name);
             fs::create_dir(&path).unwrap();

@@ -1,5 +1,6 @@
 //! Depth images and masks that other programs wrote (`tests/fixtures/make.py`).
 
+use hicp_io::bop::Scene;
 use hicp_io::{MaskRule, read_depth, read_mask};
 
 use crate::common::fixture;
@@ -262,5 +263,26 @@ fn a_real_frame_is_the_same_in_every_format() {
             .unwrap_err()
             .to_string();
         assert!(error.contains(found), "{error}");
+    }
+}
+
+#[test]
+fn scenes_of_bop_may_have_depth_as_tiff() {
+    let dir = tempfile::tempdir().unwrap();
+    let camera = r#"{"1": {"cam_K": [600,0,2,0,600,2,0,0,1], "depth_scale": 1.0}}"#;
+    std::fs::write(dir.path().join("scene_camera.json"), camera).unwrap();
+    std::fs::create_dir(dir.path().join("depth")).unwrap();
+    for extension in ["tif", "tiff"] {
+        let path = dir
+            .path()
+            .join("depth/000001.png")
+            .with_extension(extension);
+        std::fs::copy(fixture("depth_u16_big_endian.tiff"), &path).unwrap();
+        let depth = Scene::open(dir.path()).unwrap().read_depth(1).unwrap();
+        assert_eq!(
+            depth,
+            read_depth(fixture("depth_u16.tiff"), Some(1.0)).unwrap()
+        );
+        std::fs::remove_file(path).unwrap();
     }
 }
