@@ -20,7 +20,8 @@ pub struct Layout<'a> {
     pub variants: Vec<&'a str>,
     /// Number of cases of each object.
     pub cases: u64,
-    /// Number of bins of the initial VSD. Binned cases cycle through them.
+    /// Number of bins of the initial VSD. Binned cases cycle through them, or are spread evenly if
+    /// they are fewer.
     pub bins: usize,
     /// `true` if the cases of each setting are binned.
     pub is_binned: Vec<bool>,
@@ -52,11 +53,18 @@ impl Layout<'_> {
     /// Returns the object of the n-th case of a run, and the index of the case within the object.
     pub(crate) fn case(&self, n: usize) -> (usize, u64) {
         let (n, cases, objects) = (n as u64, self.cases, self.objects.len() as u64);
+        let (object, case) = match self.is_interleaved {
+            true => (n % objects, n / objects),
+            false => (n / cases, n % cases),
+        };
+        // The index of a case determines its bin.
+        let bins = self.bins as u64;
+        let is_sparse = cases < bins && self.is_binned.contains(&true);
         #[allow(clippy::cast_possible_truncation)] // An index of an object.
-        match self.is_interleaved {
-            true => ((n % objects) as usize, n / objects),
-            false => ((n / cases) as usize, n % cases),
-        }
+        (
+            object as usize,
+            if is_sparse { case * bins / cases } else { case },
+        )
     }
 
     /// Returns the n-th row of a run without its figures. After the last one, returns `None`.

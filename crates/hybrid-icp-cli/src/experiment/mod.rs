@@ -131,7 +131,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     options.run(&config, &subjects, &out, names, threads)?;
     if experiment.is_binned() && poses < config.bins as u64 {
         warn(format_args!(
-            "--poses {poses} fills the first {poses} of {0} bins of the initial VSD, expected {0} or more",
+            "--poses {poses} fills {poses} of {0} bins of the initial VSD, expected {0} or more",
             config.bins
         ));
     }
