@@ -201,6 +201,7 @@ mod book {
         BuildYourOwn: "docs/book/build-your-own.md",
         Trust: "docs/book/trust.md",
         Sequences: "docs/book/sequences.md",
+        FromWhatYouHave: "docs/from-what-you-have.md",
         Presets: "docs/presets.md"
     );
 }

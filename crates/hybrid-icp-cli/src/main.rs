@@ -3,6 +3,7 @@
 //! Exit codes: 0 if the command succeeded, 1 if something failed, 2 if the command line is wrong,
 //! 130 if the program was interrupted. A message names the cause of a failure.
 
+mod align;
 mod bop;
 mod choice;
 mod demo;
@@ -44,6 +45,7 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp estimate --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json
+  hybrid-icp align a.ply b.pcd --output moved.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
   hybrid-icp bop show --dataset bop/ycbv --scene 50 --image 1 \\
@@ -64,6 +66,7 @@ enum Command {
     Refine(refine::Arguments),
     Estimate(refine::estimate::Arguments),
     Replay(refine::replay::Arguments),
+    Align(align::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
     Bop(bop::Command),
@@ -83,6 +86,7 @@ fn main() -> ExitCode {
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Estimate(arguments) => refine::estimate::run(&arguments),
         Command::Replay(arguments) => refine::replay::run(&arguments),
+        Command::Align(arguments) => align::run(&arguments),
         Command::Bop(command) => bop::run(&command),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Pipelines(arguments) => pipelines::run(&arguments),

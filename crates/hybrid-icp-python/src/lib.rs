@@ -15,6 +15,7 @@
 //! The doc comments of this crate become the docstrings, in the format of NumPy. The file
 //! `python/hybrid_icp/_native.pyi` has the types, and `stubtest` compares it with the module.
 
+mod align;
 mod array;
 mod batch;
 mod bop;
@@ -39,6 +40,8 @@ mod tracker;
 #[pyo3::pymodule]
 #[pyo3(name = "_native")]
 mod native {
+    #[pymodule_export]
+    use crate::align::{PyAlignment, align, read_cloud};
     #[pymodule_export]
     use crate::bop::{PyDatasetRefiner, read_images, result_header};
     #[pymodule_export]

@@ -44,7 +44,10 @@ def test_the_examples_of_the_readmes_improve_a_pose(readme):
     assert "Result(refined" in run("smoke.py", readme)
 
 
-@pytest.mark.parametrize("page", ["book/first-refinement.md", "coming-from.md", "python.md"])
+PAGES = ["book/first-refinement.md", "coming-from.md", "from-what-you-have.md", "python.md"]
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     from scene import bracket, scene
@@ -56,11 +59,15 @@ def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
     head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     rows = [f"{x} {y} {z}" for x, y, z in vertices] + [f"3 {a} {b} {c}" for a, b, c in faces]
     (tmp_path / "mug.ply").write_text(head + "\n".join(rows) + "\n")
+    cloud = "\n".join(rows[: len(vertices)])
+    for name in ["a.ply", "b.pcd"]:  # Text, recognized by its content.
+        (tmp_path / name).write_text(cloud)
     monkeypatch.chdir(tmp_path)
     names = {
         "depth_m": frame.depth, "mask": frame.mask, "masks": [frame.mask], "K": frame.camera.K,
         "T_co": frame.rough, "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model,
-        "grasp": lambda pose: None,
+        "grasp": lambda pose: None, "T_ts": np.eye(4),
+        "source_points": vertices / 1000, "target_points": vertices / 1000 + 0.001,
     }
     blocks = (FOLDER.parents[2] / "docs" / page).read_text().split("```python\n")[1:]
     assert blocks

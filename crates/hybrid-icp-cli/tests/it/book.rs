@@ -125,6 +125,7 @@ fn run_page(name: &str) {
     hicp_io::write_depth_png(scene.path("depth.png"), &depth, 1.0).unwrap();
     std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
     write_other_formats(&scene, &depth);
+    write_clouds(scene.folder.path(), &truth());
     let program = Path::new(env!("CARGO_BIN_EXE_hybrid-icp"));
     let path = format!(
         "{}:{}",

@@ -9,6 +9,7 @@
     reason = "helpers of tests"
 )]
 
+mod align;
 mod book;
 mod bop_chain;
 mod bop_compare;

@@ -35,6 +35,7 @@ A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
 
 from ._errors import FileError, HybridIcpError, InputError, InputWarning
 from ._native import (
+    Alignment,
     Camera,
     DepthImage,
     Fuser,
@@ -52,12 +53,14 @@ from ._native import (
     Tracker,
     add,
     adi,
+    align,
     fuse,
     mspd,
     mssd,
     mve,
     point_to_plane_step,
     point_to_point_step,
+    read_cloud,
     read_depth,
     read_depth_png,
     read_mask,
@@ -68,6 +71,7 @@ from ._native import (
 )
 
 __all__ = [
+    "Alignment",
     "Camera",
     "DepthImage",
     "FileError",
@@ -89,12 +93,14 @@ __all__ = [
     "Tracker",
     "add",
     "adi",
+    "align",
     "fuse",
     "mspd",
     "mssd",
     "mve",
     "point_to_plane_step",
     "point_to_point_step",
+    "read_cloud",
     "read_depth",
     "read_depth_png",
     "read_mask",

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "Alignment",
     "Camera",
     "DatasetRefiner",
     "DepthImage",
@@ -26,12 +27,14 @@ __all__ = [
     "Tracker",
     "add",
     "adi",
+    "align",
     "fuse",
     "mspd",
     "mssd",
     "mve",
     "point_to_plane_step",
     "point_to_point_step",
+    "read_cloud",
     "read_depth",
     "read_depth_png",
     "read_images",
@@ -66,6 +69,25 @@ class _OnStageEnd(Protocol):
     def on_stage_end(self, event: StageEvent, /) -> object: ...
 
 _Observer = Union[Callable[[IterationEvent], object], _OnIteration, _OnRegime, _OnStageEnd]
+
+@final
+class Alignment:
+    @property
+    def T_ts(self) -> _Array: ...
+    @property
+    def outcome(self) -> _Outcome: ...
+    @property
+    def termination(self) -> str: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def fitness(self) -> float: ...
+    @property
+    def rmse(self) -> float | None: ...
+    @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def warnings(self) -> list[str]: ...
 
 @final
 class Camera:
@@ -416,6 +438,18 @@ class Tracked:
     @property
     def deviation(self) -> float: ...
 
+def align(
+    source: npt.ArrayLike,
+    target: npt.ArrayLike,
+    T_ts: npt.ArrayLike | None = None,
+    *,
+    source_normals: npt.ArrayLike | None = None,
+    target_normals: npt.ArrayLike | None = None,
+    method: Literal["point-to-plane", "point-to-point", "gicp"] = "point-to-plane",
+    max_distance: float | None = None,
+    voxel: float | None = None,
+    neighbors: int = 20,
+) -> Alignment: ...
 def add(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...
 def adi(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...
 def mssd(T_est: npt.ArrayLike, T_gt: npt.ArrayLike, model: Model) -> float: ...
@@ -446,6 +480,9 @@ def point_to_point_step(
 def point_to_plane_step(
     sources: npt.ArrayLike, targets: npt.ArrayLike, normals: npt.ArrayLike
 ) -> tuple[_Array, float]: ...
+def read_cloud(
+    path: _Path, unit: _Unit = "m"
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32] | None]: ...
 def read_depth(path: _Path, *, scale: float | None = None) -> npt.NDArray[np.float32]: ...
 def read_depth_png(path: _Path, scale: float) -> npt.NDArray[np.float32]: ...
 def read_mask(

@@ -6,7 +6,9 @@ use std::process::Command;
 
 use hicp_io::LengthUnit;
 use hicp_sim::{Household, perturb, rng};
-use hybrid_icp::core::{DepthImage, Isometry3, Mask, PinholeCamera, TriMesh, Vector3, se3};
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, PinholeCamera, Point3, TriMesh, Vector3, sample_surface, se3,
+};
 use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
 
@@ -104,6 +106,23 @@ pub(crate) fn off(pose: &Isometry3<f64>, seed: u64) -> Isometry3<f64> {
 
 pub(crate) fn car() -> TriMesh {
     Household::Car.solid().to_mesh().unwrap()
+}
+
+/// Writes 3,000 points of the car as `a.ply`, and 4,000 others, moved, as `b.pcd`.
+///
+/// Both are PLY files: readers recognize the content, not the name.
+pub(crate) fn write_clouds(folder: &Path, motion: &Isometry3<f64>) {
+    for (name, count, pose) in [
+        ("a.ply", 3000, &Isometry3::identity()),
+        ("b.pcd", 4000, motion),
+    ] {
+        let surfels = sample_surface(&car(), count);
+        let moved = surfels
+            .iter()
+            .map(|s| (pose * s.point.cast::<f64>()).cast());
+        let points: Vec<Point3<f32>> = moved.collect();
+        hicp_io::write_point_cloud_ply(folder.join(name), &points, None).unwrap();
+    }
 }
 
 pub(crate) fn mask_of(depth: &DepthImage) -> Mask {

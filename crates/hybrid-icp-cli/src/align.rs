@@ -1,0 +1,142 @@
+//! `hybrid-icp align`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use hicp_io::{LengthUnit, PointCloud};
+use hybrid_icp::core::{Isometry3, Matrix6};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{CloudOptions, Registration, align};
+use serde_json::json;
+
+use crate::limits::limits;
+use crate::options::positive;
+use crate::outputs::Files;
+use crate::pose_json::add_pose;
+use crate::terminal::{check_stdout, say, warn};
+
+/// Register two point clouds: find the pose that moves one onto the other.
+///
+/// The result is JSON. It has the pose, from source to target, as matrix (4x4, meters) and as
+/// cam_R_m2c and cam_t_m2c (mm), so that it can be the --init of another run. It also has the
+/// outcome (refined or kept_initial), termination, iterations, fitness (share of the source points
+/// with a counterpart), rmse_m, the 6x6 covariance (translation first, meters and radians; null if
+/// a direction is not determined), and the warnings that are also on standard error.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  hybrid-icp align a.ply b.pcd --init pose.json --output moved.json")]
+pub(crate) struct Arguments {
+    /// The cloud to move: PLY, PCD, XYZ, CSV, NPY or NPZ.
+    #[arg(value_name = "SOURCE")]
+    source: PathBuf,
+    /// The cloud that stands still.
+    #[arg(value_name = "TARGET")]
+    target: PathBuf,
+    /// Unit of the coordinates of both clouds: m, mm or cm.
+    #[arg(long, value_name = "UNIT", default_value_t = LengthUnit::Meters)]
+    unit: LengthUnit,
+    /// The rough pose, source to target, in the forms of `refine`. If not given, the clouds are
+    /// taken as they are.
+    #[arg(long, value_name = "FILE")]
+    init: Option<PathBuf>,
+    /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all
+    /// other forms.
+    #[arg(long, value_name = "UNIT", requires = "init")]
+    init_unit: Option<LengthUnit>,
+    /// The error to minimize: point-to-point, point-to-plane or gicp.
+    #[arg(long, value_name = "NAME", default_value_t = Registration::default().name().to_owned())]
+    method: String,
+    /// Largest distance of a pair, meters. If not given: a tenth of the source's diameter, then a
+    /// fiftieth.
+    #[arg(long, value_name = "METERS", value_parser = positive)]
+    max_distance: Option<f64>,
+    /// Replace the points in cubic cells of this edge by their mean first, meters.
+    #[arg(long, value_name = "METERS", value_parser = positive)]
+    voxel: Option<f64>,
+    /// Number of neighbors from which normals are estimated if a file has none.
+    #[arg(long, value_name = "N", default_value_t = CloudOptions::default().neighbors)]
+    neighbors: usize,
+    /// The file for the JSON result; standard output if not given.
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments { init, output, .. } = arguments;
+    if output.is_none() {
+        check_stdout()?;
+    }
+    Files::default()
+        .writes("--output", output)
+        .reads("SOURCE", [&arguments.source])
+        .reads("TARGET", [&arguments.target])
+        .reads("--init", init)
+        .check_in_place("--output", "--init")?;
+    let method: Registration = arguments.method.parse()?;
+    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+    let meters = |length: Option<f64>| length.map(|length| length as f32);
+    let options = CloudOptions {
+        voxel_meters: meters(arguments.voxel),
+        neighbors: arguments.neighbors,
+    };
+    let read = |path| -> anyhow::Result<_> {
+        let PointCloud { points, normals } = limits().read_cloud(path, arguments.unit)?;
+        Ok(options.cloud(&points, normals.as_deref())?)
+    };
+    let (source, target) = (read(&arguments.source)?, read(&arguments.target)?);
+    let init = match init {
+        Some(path) => {
+            limits()
+                .read_pose(path, arguments.init_unit)?
+                .camera_from_object
+        }
+        None => Isometry3::identity(),
+    };
+    let mut pipeline = method.build(meters(arguments.max_distance));
+    let found = align(&source, &target, &init, &mut pipeline);
+
+    let warnings: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+    let (pose, termination) = (found.target_from_source(), found.outcome.termination);
+    let refined = found.outcome.verdict == Verdict::Refined;
+    let rows = |m: Matrix6<f64>| [0, 1, 2, 3, 4, 5].map(|i| [0, 1, 2, 3, 4, 5].map(|j| m[(i, j)]));
+    let matrix = pose.to_homogeneous();
+    let matrix = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| matrix[(i, j)]));
+    let mut report = json!({
+        "method": method.name(),
+        "matrix": matrix,
+        "outcome": if refined { "refined" } else { "kept_initial" },
+        "termination": termination.name(),
+        "reason": termination.explain(),
+        "iterations": found.outcome.iterations,
+        "n_pairs": found.outcome.n_pairs(),
+        "fitness": found.fitness(),
+        "rmse_m": found.rmse(),
+        "covariance": found.covariance().map(rows),
+        "source_points": source.surfels().len(),
+        "target_points": target.surfels().len(),
+        "warnings": warnings,
+    });
+    add_pose(&mut report, &pose);
+    warnings.iter().for_each(warn);
+    let json = serde_json::to_string_pretty(&report)?;
+    let Some(path) = output else {
+        return say(json);
+    };
+    hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+    let fit = match found.rmse() {
+        Some(rmse) => format!("fitness {:.3}, RMSE {rmse:.3e} m", found.fitness()),
+        None => "no pairs".to_owned(),
+    };
+    say(format!(
+        "{}: {fit}, {} iterations: {}",
+        if refined {
+            "refined"
+        } else {
+            "kept the initial pose"
+        },
+        found.outcome.iterations,
+        termination.explain()
+    ))
+}

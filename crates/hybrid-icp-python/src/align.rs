@@ -1,0 +1,247 @@
+//! Registration of point clouds.
+
+use std::path::PathBuf;
+
+use hicp_io::{LengthUnit, PointCloud};
+use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3, Vector3};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{Alignment, CloudOptions, Registration};
+use pyo3::prelude::*;
+
+use crate::array::{self, Matrix, Motion};
+use crate::errors::{self, InputError};
+
+/// The result of a registration of two point clouds, from `align`.
+///
+/// If the pose could not be refined, `T_ts` has the numbers that were passed, and `outcome` is
+/// "kept_initial". This is not an error.
+#[pyclass(frozen, module = "hybrid_icp", name = "Alignment")]
+#[derive(Debug)]
+pub(crate) struct PyAlignment {
+    alignment: Alignment,
+    matrix: [f64; 16],
+}
+
+#[pymethods]
+#[allow(non_snake_case)] // T_ts names the frames of the pose, as in Python.
+impl PyAlignment {
+    /// The pose, target from source, shape (4, 4), float64, meters.
+    #[getter]
+    fn T_ts(&self) -> Matrix {
+        Matrix::new(4, self.matrix.to_vec())
+    }
+
+    /// "refined", or "kept_initial" if the pose was not changed.
+    #[getter]
+    fn outcome(&self) -> &'static str {
+        match self.alignment.outcome.verdict {
+            Verdict::Refined => "refined",
+            Verdict::KeptInitial(_) => "kept_initial",
+        }
+    }
+
+    /// The reason why the registration ended, such as "converged" or "no_pairs".
+    #[getter]
+    fn termination(&self) -> &'static str {
+        self.alignment.outcome.termination.name()
+    }
+
+    /// Number of iterations.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.alignment.outcome.iterations
+    }
+
+    /// Share of the source points that have a counterpart, 0 to 1.
+    #[getter]
+    fn fitness(&self) -> f64 {
+        self.alignment.fitness()
+    }
+
+    /// Root mean square of the distances of pairs, meters; None without pairs.
+    #[getter]
+    fn rmse(&self) -> Option<f64> {
+        self.alignment.rmse()
+    }
+
+    /// Covariance of the pose, shape (6, 6), float64; None if a direction is not determined.
+    ///
+    /// Translation first, meters and radians; a left perturbation in the frame of the target.
+    #[getter]
+    fn covariance(&self) -> Option<Matrix> {
+        self.alignment.covariance().as_ref().map(Matrix::from)
+    }
+
+    /// Reasons not to trust the pose, as sentences; empty if there are none.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        let warnings = self.alignment.warnings.iter();
+        warnings.map(ToString::to_string).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let (outcome, fitness) = (self.outcome(), self.fitness());
+        format!(
+            "Alignment({outcome}, {}, fitness {fitness:.3})",
+            self.termination()
+        )
+    }
+}
+
+/// Registers two point clouds: finds the pose that moves the source onto the target.
+///
+/// Points that are not finite are skipped, with a warning in the result. Absent normals are
+/// estimated, which is a warning, too.
+///
+/// Parameters
+/// ----------
+/// source, target : array_like, shape (N, 3), float32
+///     Points, meters.
+/// T_ts : array_like, shape (4, 4), optional
+///     The rough pose, target from source, meters. The default is the identity.
+/// source_normals, target_normals : array_like, shape (N, 3), float32, optional
+///     One normal per point, of any length above 0. Points whose normal is zero are skipped.
+/// method : {"point-to-plane", "point-to-point", "gicp"}, optional
+///     The error to minimize.
+/// max_distance : float, optional
+///     Largest distance of a pair, meters. The default is a tenth of the diameter of the source,
+///     then a fiftieth.
+/// voxel : float, optional
+///     Edge of the cubic cells in which points are replaced by their mean first, meters.
+/// neighbors : int, optional
+///     Number of neighbors from which normals are estimated.
+///
+/// Returns
+/// -------
+/// Alignment
+///     The pose and how well the clouds fit.
+#[pyfunction]
+#[pyo3(signature = (source, target, T_ts = None, *, source_normals = None, target_normals = None, method = "point-to-plane", max_distance = None, voxel = None, neighbors = 20))]
+#[allow(non_snake_case, clippy::too_many_arguments)]
+pub(crate) fn align(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    target: &Bound<'_, PyAny>,
+    T_ts: Option<&Bound<'_, PyAny>>,
+    source_normals: Option<&Bound<'_, PyAny>>,
+    target_normals: Option<&Bound<'_, PyAny>>,
+    method: &str,
+    max_distance: Option<f32>,
+    voxel: Option<f32>,
+    neighbors: usize,
+) -> PyResult<PyAlignment> {
+    let method: Registration = method.parse().map_err(errors::input)?;
+    for (name, length) in [("max_distance", max_distance), ("voxel", voxel)] {
+        if let Some(length) = length.filter(|x| !(x.is_finite() && *x > 0.0)) {
+            let text = format!("{name} is {length}, expected a finite number above 0, meters");
+            return Err(InputError::new_err(text));
+        }
+    }
+    let options = CloudOptions {
+        voxel_meters: voxel,
+        neighbors,
+    };
+    let source = Points::read(source, source_normals, "source")?;
+    let target = Points::read(target, target_normals, "target")?;
+    let init = match T_ts {
+        Some(pose) => array::motion(pose, "T_ts")?,
+        None => Motion {
+            isometry: Isometry3::identity(),
+            matrix: array::to_matrix(&Isometry3::identity()),
+        },
+    };
+    let alignment = py.detach(|| -> PyResult<_> {
+        let (source, target) = (source.cloud(&options)?, target.cloud(&options)?);
+        let mut pipeline = method.build(max_distance);
+        Ok(hybrid_icp::align(
+            &source,
+            &target,
+            &init.isometry,
+            &mut pipeline,
+        ))
+    })?;
+    let matrix = match alignment.outcome.verdict {
+        Verdict::Refined => array::to_matrix(&alignment.target_from_source()),
+        // The numbers that were passed, which can be orthogonal only to their precision.
+        Verdict::KeptInitial(_) => init.matrix,
+    };
+    Ok(PyAlignment { alignment, matrix })
+}
+
+/// Reads a point cloud in meters, from a file of any supported format.
+///
+/// PLY, PCD, XYZ, CSV, NPY and NPZ files are recognized by their first bytes.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+/// unit : {"m", "mm", "cm"}, optional
+///     Unit of the coordinates in the file.
+///
+/// Returns
+/// -------
+/// points : numpy.ndarray, shape (N, 3), float32
+///     Points, meters.
+/// normals : numpy.ndarray, shape (N, 3), float32, or None
+///     Their normals, if the file has them.
+///
+/// Raises
+/// ------
+/// FileError
+///     If the file is malformed, or not a point cloud.
+#[pyfunction]
+#[pyo3(signature = (path, unit = "m"))]
+pub(crate) fn read_cloud(
+    py: Python<'_>,
+    path: PathBuf,
+    unit: &str,
+) -> PyResult<(Matrix<f32>, Option<Matrix<f32>>)> {
+    let unit: LengthUnit = unit.parse().map_err(errors::input)?;
+    let PointCloud { points, normals } = py
+        .detach(|| hicp_io::read_cloud(&path, unit))
+        .map_err(errors::file)?;
+    let points = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let normals = normals.map(|normals| normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect());
+    let matrix = |numbers| Matrix::new(3, numbers);
+    Ok((matrix(points), normals.map(matrix)))
+}
+
+/// The arrays of a cloud.
+struct Points {
+    points: Vec<Point3<f32>>,
+    normals: Option<Vec<UnitVector3<f32>>>,
+}
+
+impl Points {
+    fn read(
+        points: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let triples = |array: &Bound<'_, PyAny>, name: &str| -> PyResult<Vec<[f32; 3]>> {
+            let expected = "an (N, 3) array of float32";
+            let (numbers, _) = array::numbers::<f32>(array, &[None, Some(3)], name, expected)?;
+            Ok(numbers
+                .chunks_exact(3)
+                .map(|p| [p[0], p[1], p[2]])
+                .collect())
+        };
+        // A zero normal becomes NaN, and its point is skipped.
+        let unit = |n| UnitVector3::new_normalize(Vector3::from(n));
+        let normals = normals
+            .map(|array| triples(array, &format!("{name}_normals")))
+            .transpose()?;
+        Ok(Self {
+            points: triples(points, name)?
+                .into_iter()
+                .map(Point3::from)
+                .collect(),
+            normals: normals.map(|normals| normals.into_iter().map(unit).collect()),
+        })
+    }
+
+    fn cloud(&self, options: &CloudOptions) -> PyResult<Cloud> {
+        let cloud = options.cloud(&self.points, self.normals.as_deref());
+        cloud.map_err(errors::input)
+    }
+}
