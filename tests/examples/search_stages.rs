@@ -19,11 +19,9 @@ use hicp_sim::{CaseConfig, CaseMaker, Corruption, Household, InitialPose, SimRng
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hicp_tests::{camera, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Point3, Problem, Vector3, rotation_grid};
-use hybrid_icp::icp::{
-    BoxedStage, Cascade, HypothesisSearch, SearchOptions, Session, Stage, Start, Workspace,
-};
+use hybrid_icp::icp::{BoxedStage, Cascade, SearchOptions, Session, Stage, Workspace};
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::score::{MeanVsd, SampledMve, Score, mssd};
+use hybrid_icp::score::{MeanVsd, Score, mssd};
 use hybrid_icp::{Preset, Refiner, Warning, presets};
 
 /// Rotations from which rivals of the truth are found.
@@ -108,50 +106,59 @@ fn even(seen: &Seen<'_>) -> Vec<Isometry3<f64>> {
 }
 
 /// Runs the parts of a search one by one and counts those that still have the truth.
-fn stages(runner: &mut Runner, seen: &Seen<'_>, found: &mut [usize; 5]) {
-    let options = SearchOptions {
-        start: Start::Ignored,
-        refined: 1000,
-        spacing_degrees: 0.0,
-        ..SearchOptions::default()
-    };
-    let preset = presets::search();
-    let (mut local, mut explore) = (preset.stage, preset.explore);
-    let nothing = || Cascade(Vec::<BoxedStage>::new());
-    let mut placed = HypothesisSearch::new(
-        nothing(),
-        nothing(),
-        SampledMve::lenient(),
-        MeanVsd::lenient(),
-        options,
-    );
-    runner.run(&mut placed, seen, &seen.truth);
-    let all: Vec<_> = placed.ranked().map(|(_, pose)| *pose).collect();
-    let mut spaced = HypothesisSearch::new(
-        nothing(),
-        nothing(),
-        SampledMve::lenient(),
-        MeanVsd::lenient(),
-        SearchOptions {
-            start: Start::Ignored,
-            ..SearchOptions::default()
-        },
-    );
-    runner.run(&mut spaced, seen, &seen.truth);
-    let best: Vec<_> = spaced.ranked().map(|(_, pose)| *pose).collect();
-    let mut reaches = |init: &Isometry3<f64>| seen.right(&runner.run(&mut local, seen, init).1);
-    found[0] += usize::from(all.iter().any(&mut reaches));
-    found[1] += usize::from(best.iter().any(&mut reaches));
-    let mut explored: Vec<_> = best
+fn stages(runner: &mut Runner, seen: &Seen<'_>, found: &mut [usize; STAGES.len()]) {
+    let options = SearchOptions::default();
+    let (all, most) = (options.hypotheses, options.aligned);
+    let mut search = presets::estimate_with(Cascade(Vec::<BoxedStage>::new()));
+    (search.options.aligned, search.options.refined) = (all, 1);
+    runner.run(&mut search, seen, &seen.truth);
+    let placed: Vec<_> = search.ranked().map(|(_, pose)| *pose).collect();
+    let mut aligned: Vec<(f64, Isometry3<f64>)> = Vec::new();
+    for pose in &placed[..most.min(placed.len())] {
+        let pose = runner.run(&mut search.align, seen, pose).1;
+        let mut context = runner.workspace.context(&seen.problem());
+        aligned.push((search.ranking.score(&mut context, &pose), pose));
+    }
+    aligned.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Vec<Isometry3<f64>> = Vec::new();
+    for (_, pose) in aligned {
+        let degrees = |other: &Isometry3<f64>| other.rotation.angle_to(&pose.rotation).to_degrees();
+        let apart = |other| degrees(other) >= options.spacing_degrees;
+        if best.len() < options.refined && best.iter().all(apart) {
+            best.push(pose);
+        }
+    }
+    let explored = best
         .iter()
-        .map(|init| runner.run(&mut explore, seen, init))
-        .collect();
-    let mut reaches = |init: &Isometry3<f64>| seen.right(&runner.run(&mut local, seen, init).1);
-    found[2] += usize::from(explored.iter().any(|(_, pose)| reaches(pose)));
-    explored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let chosen = explored.first().map(|(_, pose)| *pose);
-    found[3] += usize::from(chosen.is_some_and(|pose| reaches(&pose)));
+        .map(|pose| runner.run(&mut search.explore, seen, pose).1);
+    let explored: Vec<_> = explored.collect();
+    let mut local = presets::local();
+    let mut whole = presets::estimate_with(presets::local());
+    let chosen = runner.run(&mut whole, seen, &seen.truth).1;
+    let mut reaches = |poses: &[Isometry3<f64>]| {
+        let mut poses = poses.iter();
+        poses.any(|pose| seen.right(&runner.run(&mut local, seen, pose).1))
+    };
+    let have = [
+        reaches(&placed),
+        reaches(&placed[..most.min(placed.len())]),
+        reaches(&best),
+        reaches(&explored),
+        seen.right(&chosen),
+    ];
+    for (count, has) in found.iter_mut().zip(have) {
+        *count += usize::from(has);
+    }
 }
+
+/// The stages of a search that can lose the truth.
+const STAGES: [&str; 5] = [
+    "placement",
+    "ranking",
+    "alignment",
+    "exploration",
+    "choice and `local`",
+];
 
 #[derive(Default)]
 struct Counts {
@@ -182,11 +189,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let first: u64 = words.next().map_or(Ok(0), |text| text.parse())?;
 
     let mut counts = Counts::default();
-    let mut found = [0; 5];
+    let mut found = [0; STAGES.len()];
     let mut analyzed = 0;
     let mut runner = Runner {
         workspace: Workspace::new(Rasterizer::default()),
-        score: MeanVsd::lenient(),
+        score: MeanVsd::imperfect_mask(),
     };
     let mut local = presets::local();
     let mut presets = [Preset::Search, Preset::Auto, Preset::Auto, Preset::Local]
@@ -265,8 +272,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     println!("{} cases, the truth wins {}\n", counts.cases, counts.won);
     println!("| stage | truth still there, of {analyzed} |\n|---|---|");
-    let names = ["placement", "ranking", "cheap steps", "choice and `local`"];
-    for (name, found) in names.iter().zip(found) {
+    for (name, found) in STAGES.iter().zip(found) {
         println!("| {name} | {found} |");
     }
     println!(

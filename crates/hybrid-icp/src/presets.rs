@@ -45,7 +45,7 @@
 mod beyond;
 
 pub use beyond::{
-    CloudToModelIcp, Explore, Far, GatedIcp, HybridVisible, Local, Near, Search, auto,
+    Align, CloudToModelIcp, Explore, Far, GatedIcp, HybridVisible, Local, Near, Search, auto,
     estimate_with, hybrid_visible, local, search, search_with,
 };
 

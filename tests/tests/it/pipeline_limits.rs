@@ -75,7 +75,7 @@ fn a_count_of_a_billion_is_refused_with_its_field() {
                 "type = \"hypothesis-search\"\nrefined = 1000000000\nstage = {ICP}\nexplore = {ICP}\n"
             ),
             "my.toml:2: refined",
-            "1000000000, up to 50000000356 iterations in all",
+            "1000000000, up to 50000001406 iterations in all",
         ),
     ] {
         assert_eq!(message(&text), format!("{field}: found {found}, {RAISE}"));
@@ -272,6 +272,7 @@ fn the_largest_counts_are_refused_or_end() {
             ("alternate", "max_steps"),
             ("anderson", "max_steps"),
             ("gauss-newton", "iterations"),
+            ("hypothesis-search", "aligned"),
             ("hypothesis-search", "hypotheses"),
             ("hypothesis-search", "refined"),
             ("k-nearest", "k"),

@@ -105,20 +105,26 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_stage("hypothesis-search", |p| {
         p.about = "Runs a local stage; where its score stays bad, runs it again from the best of \
-            many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking and \
-            refined × explore.";
+            many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking, \
+            aligned × align and refined × explore.";
         let search = HypothesisSearch::new(
             p.part::<BoxedStage>("stage", None, "refines locally")?,
-            p.part::<BoxedStage>("explore", None, "refines hypotheses, cheaply")?,
-            p.part::<BoxedScore>("ranking", "sampled-mve", "ranks hypotheses")?,
-            p.part::<BoxedScore>("score", "mve", "judges poses")?,
+            p.part::<BoxedStage>("align", "ray-shift", "moves many hypotheses, very cheaply")?,
+            p.part::<BoxedStage>("explore", None, "refines the best of them, cheaply")?,
+            (
+                p.part::<BoxedScore>("ranking", "sampled-mve", "ranks hypotheses")?,
+                p.part::<BoxedScore>("score", "mve", "judges poses")?,
+            ),
             search_options(p)?,
         );
-        // The local stage runs from the initial pose and from the best hypothesis.
-        let local = p.iterations_of("stage").fold(0, u64::max).saturating_mul(2);
+        // The local stage runs from the initial pose and from the best hypotheses.
+        let local = p.iterations_of("stage").fold(0, u64::max).saturating_mul(3);
         let explore = p.iterations_of("explore").fold(0, u64::max);
         let explored = explore.saturating_mul(search.options.refined as u64);
+        let align = p.iterations_of("align").fold(0, u64::max);
+        let aligned = align.saturating_mul(search.options.aligned as u64);
         let total = local.saturating_add(search.options.hypotheses as u64);
+        let total = total.saturating_add(aligned);
         p.takes("refined", total.saturating_add(explored))?;
         Ok(search)
     });
@@ -211,11 +217,12 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
         threshold: p.number("threshold", FACTOR, 0.1, "searches above this score")?,
-        good_enough: p.number("good_enough", FACTOR, 0.05, "score that ends it")?,
+        good_enough: p.number("good_enough", FACTOR, 0.03, "score that ends it")?,
         min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
         rotations: p.word("rotations", &rotations, tried)?,
-        hypotheses: p.limited(Hypotheses, "hypotheses", 0, 256, "rotations to rank")?,
-        refined: p.count("refined", 0, 12, "hypotheses that are refined")?,
+        hypotheses: p.limited(Hypotheses, "hypotheses", 0, 1000, "rotations to rank")?,
+        aligned: p.count("aligned", 0, 256, "hypotheses that are aligned")?,
+        refined: p.count("refined", 0, 24, "hypotheses that are refined")?,
         spacing_degrees: p.number("spacing_degrees", DEGREES, 20.0, least)?,
         ..SearchOptions::default()
     };

@@ -16,7 +16,7 @@ pub(crate) struct CoarsePixel {
     pub(crate) distance_per_depth: f64,
 }
 
-/// The pixels of a decimated observation.
+/// The pixels of a decimated observation, without most of the noise.
 pub(crate) struct CoarseGrid {
     pub(crate) pixels: Vec<CoarsePixel>,
     /// The weight of a pixel that certainly shows the object.
@@ -27,6 +27,11 @@ pub(crate) struct CoarseGrid {
     /// for an exact mask.
     pub(crate) seen_through_meters: Option<f64>,
 }
+
+/// Number of pixels along a side of the window whose median is the depth of a coarse pixel.
+///
+/// They are half a coarse pixel apart.
+const WINDOW: u32 = 5;
 
 impl CoarseGrid {
     /// Returns the grid of an exact mask. It is built once and shared.
@@ -82,10 +87,35 @@ fn pixels(
         let y = (f64::from(v) - camera.cy()) / camera.fy();
         let place = (u * factor, v * factor);
         CoarsePixel {
-            measured: *z,
+            measured: median_around(fine, place, factor).unwrap_or(*z),
             weight: weight(index, place),
             distance_per_depth: (x * x + y * y + 1.0).sqrt(),
         }
     });
     pixels.collect()
+}
+
+/// Returns the median depth around a pixel of the mask.
+///
+/// The window is two coarse pixels wide. Only masked pixels count.
+fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> Option<f32> {
+    let (depth, mask) = (fine.depth(), fine.mask());
+    if factor == 1 || mask.get(u, v) != Some(true) || depth.get(u, v)? <= 0.0 {
+        return None;
+    }
+    let mut window = [0.0; (WINDOW * WINDOW) as usize];
+    let mut count = 0;
+    let offset = |step: u32, from: u32| (from + factor * step / 2).wrapping_sub(factor);
+    for (a, b) in (0..WINDOW).flat_map(|b| (0..WINDOW).map(move |a| (a, b))) {
+        let (a, b) = (offset(a, u), offset(b, v));
+        if mask.get(a, b) == Some(true)
+            && let Some(z) = depth.get(a, b)
+            && z > 0.0
+        {
+            window[count] = z;
+            count += 1;
+        }
+    }
+    let window = &mut window[..count];
+    Some(*window.select_nth_unstable_by(count / 2, f32::total_cmp).1)
 }

@@ -57,10 +57,16 @@ fn by_definition(
             *nearest = nearest.min(p.z);
         }
     }
+    let factor = (observation.camera().fx() / camera.fx()).round() as u32;
     let mut differences = Vec::new();
     let mut outside = 0;
     for ((u, v), z) in seen {
-        let measured = f64::from(coarse.depth().get(u, v).unwrap());
+        let place = (u * factor, v * factor);
+        let measured = match coarse.mask().get(u, v) {
+            Some(true) if factor > 1 => median_around(observation, place, factor),
+            _ => coarse.depth().get(u, v).unwrap(),
+        };
+        let measured = f64::from(measured);
         let ray = ((f64::from(u) - cx) / fx)
             .hypot((f64::from(v) - cy) / fy)
             .hypot(1.0);
@@ -81,6 +87,24 @@ fn by_definition(
         }
     });
     errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+/// Returns the upper median of 25 masked depths, half a coarse pixel apart; 0 at a hole.
+fn median_around(observation: &Observation, (u, v): (u32, u32), factor: u32) -> f32 {
+    if observation.depth().get(u, v) == Some(0.0) {
+        return 0.0;
+    }
+    let mut depths = Vec::new();
+    for (x, y) in (0..5).flat_map(|y| (0..5).map(move |x| (x, y))) {
+        let moved = |from: u32, step: u32| (from + factor * step / 2).checked_sub(factor);
+        if let (Some(u), Some(v)) = (moved(u, x), moved(v, y))
+            && observation.mask().get(u, v) == Some(true)
+        {
+            depths.extend(observation.depth().get(u, v).filter(|z| *z > 0.0));
+        }
+    }
+    depths.sort_by(f32::total_cmp);
+    depths[depths.len() / 2]
 }
 
 /// Returns the wedge without its last triangle.

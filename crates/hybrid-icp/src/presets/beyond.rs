@@ -7,7 +7,7 @@
 
 use hicp_association::{
     AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel, Projective,
-    Stride, VisibleSurface,
+    Stride, UniformCount, VisibleSurface,
 };
 use hicp_icp::{
     Cascade, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp, IterationLimit,
@@ -41,10 +41,12 @@ pub type Local = Cascade<(
     Descent<MeanVsd>,
     Guard<GatedIcp<PointToPlane>, MeanVsd>,
 )>;
+/// The stage that aligns hypotheses.
+pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
 /// The stage that refines hypotheses.
-pub type Explore = SwitchUntilStall<MeanVsd, Near, CloudToModelIcp<PointToPoint>>;
+pub type Explore = Descent<SampledMve>;
 /// The type of [`search`], [`auto`] and [`search_with`].
-pub type Search = HypothesisSearch<Local, Explore, SampledMve, MeanVsd>;
+pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
@@ -176,34 +178,63 @@ pub fn local() -> Local {
     ))
 }
 
-/// Creates the stage that refines hypotheses: two steps with fewer points.
-fn explore() -> Explore {
-    SwitchUntilStall {
-        score: MeanVsd::imperfect_mask(),
-        alpha: PAPER_ALPHA,
-        aligned: near(PointToPlane, 1000),
-        misaligned: observed((150, 2000), PointToPoint, coarse()),
-        max_steps: 2,
-        min_gain: 0.01,
-        good_enough: 0.02,
+/// Creates the score that ranks hypotheses.
+fn ranking() -> SampledMve {
+    let mut score = SampledMve::imperfect_mask();
+    (score.samples, score.pixels) = (800, 150);
+    score
+}
+
+/// Creates the stage that moves many hypotheses to the image: few points, and no render.
+///
+/// Points of the far side are paired, too, but the symmetric metric skips them by their normals.
+fn align() -> Align {
+    Icp {
+        selection: UniformCount {
+            inner: AllSamples,
+            count: 200,
+        },
+        association: Projective,
+        filter: MaxDistance::diameters(TAU_DIAMETERS),
+        metric: Symmetric,
+        stop: (Divergence::count_aware(), coarse(), IterationLimit(10)),
     }
+}
+
+/// Creates the stage that refines hypotheses. It lowers the ranking score directly.
+fn explore() -> Explore {
+    Descent {
+        score: ranking(),
+        good_enough: 0.0,
+        first_step: 0.1,
+        last_step: 0.0125,
+        min_gain: 0.0,
+        evaluations: 120,
+    }
+}
+
+/// Creates a search that ends with `stage`.
+fn search_from<S>(
+    stage: S,
+    options: SearchOptions,
+) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd> {
+    let scores = (ranking(), MeanVsd::imperfect_mask());
+    HypothesisSearch::new(stage, align(), explore(), scores, options)
 }
 
 /// A search without an initial pose that ends with `stage`, as in
 /// [`Refiner::estimate`](crate::Refiner::estimate).
 #[must_use]
-pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, MeanVsd> {
-    HypothesisSearch::new(
-        stage,
-        explore(),
-        SampledMve::imperfect_mask(),
-        MeanVsd::imperfect_mask(),
-        SearchOptions {
-            start: Start::Ignored,
-            good_enough: 0.02,
-            ..SearchOptions::default()
-        },
-    )
+pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd> {
+    let options = SearchOptions {
+        start: Start::Ignored,
+        good_enough: 0.035,
+        hypotheses: 512,
+        aligned: 128,
+        refined: 12,
+        ..SearchOptions::default()
+    };
+    search_from(stage, options)
 }
 
 /// [`local`], followed by a search if its score stays above a threshold.
@@ -221,19 +252,13 @@ pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Explore, SampledMve, Me
 /// ```
 #[must_use]
 pub fn search_with(options: SearchOptions) -> Search {
-    HypothesisSearch::new(
-        local(),
-        explore(),
-        SampledMve::imperfect_mask(),
-        MeanVsd::imperfect_mask(),
-        options,
-    )
+    search_from(local(), options)
 }
 
 /// `search`: [`local`], followed by a search if its score stays above 0.1.
 ///
-/// The search ranks 256 rotations and refines 12 of them. The result can be far from the initial
-/// pose, also at a pose that is equivalent by symmetry.
+/// The search ranks 1000 rotations, aligns 256 of them and refines 24. The result can be far from
+/// the initial pose, also at a pose that is equivalent by symmetry.
 #[must_use]
 pub fn search() -> Search {
     search_with(SearchOptions::default())
@@ -241,14 +266,15 @@ pub fn search() -> Search {
 
 /// `auto`: [`local`], followed by a search if its score stays above 0.2.
 ///
-/// The search ranks 128 rotations and refines six of them. A hypothesis replaces
-/// the local pose if its score is better by 0.02; the result can then be far from the initial pose.
+/// The search ranks 256 rotations, aligns 64 of them and refines six. A hypothesis replaces the
+/// local pose if its score is better by 0.02; the result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.2,
         good_enough: 0.1,
-        hypotheses: 128,
+        hypotheses: 256,
+        aligned: 64,
         refined: 6,
         ..SearchOptions::default()
     })

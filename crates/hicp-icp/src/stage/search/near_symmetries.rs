@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use hicp_core::{Isometry3, Matrix3, Model, Observation, Point3, Surfel, UnitQuaternion, Vector3};
 
-use crate::stage::distinct::Distinct;
+use crate::stage::search::distinct::Distinct;
 
 /// Number of surface samples that are compared, at most 256.
 const SAMPLES: usize = 256;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::stage::hypotheses::Rotations;
+use crate::stage::search::hypotheses::Rotations;
 use crate::stop::motion::Bound;
 
 /// The use of the initial pose by a [`HypothesisSearch`](crate::HypothesisSearch).
@@ -40,7 +40,9 @@ pub struct SearchOptions {
     pub rotations: Rotations,
     /// Number of these rotations.
     pub hypotheses: usize,
-    /// Number of best ranked hypotheses to refine, and a third as many look-alikes of the best.
+    /// Number of best ranked hypotheses to align.
+    pub aligned: usize,
+    /// Number of best aligned hypotheses to refine, and a third as many look-alikes of the best.
     pub refined: usize,
     /// The smallest angle between the rotations of refined hypotheses, degrees.
     ///
@@ -51,24 +53,28 @@ pub struct SearchOptions {
     /// The longest time of a run. At the limit, the best pose so far is returned with
     /// [`Termination::Deadline`](crate::Termination::Deadline).
     ///
-    /// Results then depend on the clock; `hypotheses` and `refined` are budgets that do not. The
-    /// clock is read between hypotheses, so a run exceeds the limit by at most one of them.
+    /// Results then depend on the clock; `hypotheses`, `aligned` and `refined` are budgets that do
+    /// not. The clock is read between hypotheses, so a run exceeds the limit by at most one of
+    /// them.
     pub time_limit: Option<Duration>,
 }
 
 impl Default for SearchOptions {
-    /// 256 rotations of SO(3), of which 12 at least 20° apart are refined, without a bound.
+    /// 1000 rotations of SO(3), without a bound.
+    ///
+    /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
     /// The search starts above a score of 0.1, and a hypothesis must be better by 0.02.
     fn default() -> Self {
         Self {
             start: Start::Refined,
             threshold: 0.1,
-            good_enough: 0.05,
+            good_enough: 0.03,
             min_gain: 0.02,
             rotations: Rotations::Even,
-            hypotheses: 256,
-            refined: 12,
+            hypotheses: 1000,
+            aligned: 256,
+            refined: 24,
             spacing_degrees: 20.0,
             bound: None,
             time_limit: None,

@@ -62,10 +62,7 @@ impl<'a> Hypotheses<'a> {
     /// They are the pose itself, half turns around the axes of the object frame, and quarter turns
     /// around the ray. Each is placed at the observed points, and also with the model's center
     /// where that of the pose is. Those outside of the bound are left out.
-    pub(crate) fn neighbors(
-        &self,
-        pose: &Isometry3<f64>,
-    ) -> impl Iterator<Item = Isometry3<f64>> + use<'_> {
+    fn neighbors(&self, pose: &Isometry3<f64>) -> impl Iterator<Item = Isometry3<f64>> + use<'_> {
         let (rotation, center) = (pose.rotation, pose * self.model.center());
         let half = std::f64::consts::PI;
         let ray = UnitVector3::new_unchecked(self.ray);
@@ -90,6 +87,16 @@ impl<'a> Hypotheses<'a> {
         bound
             .is_none_or(|bound| bound.contains(&self.init, &pose))
             .then_some(pose)
+    }
+
+    /// Iterates over the neighbors of the initial and the local pose, and the local pose itself.
+    pub(crate) fn around_both<'b>(
+        &'b self,
+        local: &'b Isometry3<f64>,
+    ) -> impl Iterator<Item = Isometry3<f64>> + 'b {
+        let neighbors = [&self.init, local].into_iter();
+        let neighbors = neighbors.flat_map(|pose| self.neighbors(pose));
+        neighbors.chain(std::iter::once(*local))
     }
 
     /// Iterates over the hypotheses of a set of rotations, with `None` for those outside of the

@@ -1,6 +1,6 @@
 //! The best of many scored poses, at a distance from each other.
 
-use hicp_core::{Isometry3, so3};
+use hicp_core::Isometry3;
 
 /// The largest number of listed poses: the list is kept in order.
 const MAX_LENGTH: usize = 10_000;
@@ -17,9 +17,9 @@ impl Shortlist {
         self.poses.clear();
     }
 
-    /// Iterates over the scores and poses, best first.
-    pub(crate) fn iter(&self) -> std::slice::Iter<'_, (f64, Isometry3<f64>)> {
-        self.poses.iter()
+    /// Returns the scores and poses, best first.
+    pub(crate) fn poses(&self) -> &[(f64, Isometry3<f64>)] {
+        &self.poses
     }
 
     /// Inserts a pose, unless it is too near to a better one or not among the best `limit`.
@@ -40,9 +40,11 @@ impl Shortlist {
         if place >= limit {
             return;
         }
+        // The cosine of half the angle between two rotations.
+        let limit_cosine = (0.5 * spacing_degrees.to_radians()).cos();
         let near = |other: &(f64, Isometry3<f64>)| {
-            let turn = other.1.rotation * pose.rotation.inverse();
-            other.1.rotation == pose.rotation || so3::angle(&turn).to_degrees() < spacing_degrees
+            let cosine = other.1.rotation.coords.dot(&pose.rotation.coords).abs();
+            other.1.rotation == pose.rotation || cosine > limit_cosine
         };
         if self.poses[..place].iter().any(near) {
             return;
@@ -71,7 +73,8 @@ mod tests {
             list.insert(*score, pose, 3, spacing_degrees);
         }
         let turned = |pose: &Isometry3<f64>| pose.rotation.angle().to_degrees().round();
-        list.iter()
+        list.poses()
+            .iter()
             .map(|(score, pose)| (*score, turned(pose)))
             .collect()
     }

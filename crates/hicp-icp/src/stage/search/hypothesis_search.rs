@@ -1,0 +1,311 @@
+//! The stage that searches.
+
+use hicp_core::{Isometry3, Observation, Problem, se3};
+use hicp_score::Score;
+
+use crate::outcome::{Outcome, Termination, Verdict};
+use crate::session::Session;
+use crate::stage::search::distinct::Distinct;
+use crate::stage::search::found::{Found, FoundPoses};
+use crate::stage::search::hypotheses::Hypotheses;
+use crate::stage::search::look_alikes::LookAlikes;
+use crate::stage::search::options::{SearchOptions, Start};
+use crate::stage::search::run::{Clock, Run};
+use crate::stage::search::shortlist::Shortlist;
+use crate::stage::stage_trait::Stage;
+
+/// Runs a local stage, and searches if its score stays bad.
+///
+/// 1. **Rank**: hypotheses are rotations from [`SearchOptions::rotations`], and neighbors of the
+///    initial and the local pose. Each is placed such that its visible centroid is the observed
+///    one. The best are kept.
+/// 2. **Align**: a stage that costs as much as some scores moves each to the image. The best that
+///    differ are kept.
+/// 3. **Try**: the local stage refines the best of the first 32. If that is good enough, the others
+///    are not aligned, and nothing is explored.
+/// 4. **Explore**: a stage that costs some hundred scores refines each.
+/// 5. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
+///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
+///    local pose is good, because the score of a rotated mug is good, too. If the image shows
+///    enough of what tells the two poses apart, it costs only a projection of 256 points.
+/// 6. **Finish**: the local stage refines the two best poses that differ.
+///
+/// The best pose is returned if it beats the local pose. The others are in
+/// [`Workspace::alternatives`](crate::Workspace::alternatives).
+///
+/// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image, also
+/// at an equivalent pose of an object that looks the same from several sides.
+///
+/// **Contract**: the score of the returned pose is never above that of the local stage's pose. A
+/// local stage in a [`Guard`](crate::Guard) is never worse than the initial pose. With a bound, a
+/// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
+///
+/// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
+/// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
+/// three times. The near symmetries of a model are found once, in some 10 ms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HypothesisSearch<S, A, E, R, C> {
+    /// Refines the initial pose, and the best hypotheses.
+    pub stage: S,
+    /// Moves many hypotheses to the image, at the cost of some scores.
+    pub align: A,
+    /// Refines the best hypotheses at low cost.
+    pub explore: E,
+    /// Ranks hypotheses; lower is better.
+    pub ranking: R,
+    /// Scores poses; lower is better.
+    pub score: C,
+    /// Range, budget and conditions.
+    pub options: SearchOptions,
+    /// The best placed hypotheses, and the best aligned ones.
+    ranked: Shortlist,
+    aligned: Shortlist,
+    alike: LookAlikes,
+    found: FoundPoses,
+}
+
+impl<S, A, E, R, C> HypothesisSearch<S, A, E, R, C> {
+    /// Creates the stage.
+    #[must_use]
+    pub fn new(
+        stage: S,
+        align: A,
+        explore: E,
+        (ranking, score): (R, C),
+        options: SearchOptions,
+    ) -> Self {
+        Self {
+            stage,
+            align,
+            explore,
+            ranking,
+            score,
+            options,
+            ranked: Shortlist::default(),
+            aligned: Shortlist::default(),
+            alike: LookAlikes::default(),
+            found: FoundPoses::default(),
+        }
+    }
+
+    /// Iterates over the hypotheses that the last search ranked best, with their scores.
+    ///
+    /// The best comes first. Their number is at most [`SearchOptions::aligned`].
+    pub fn ranked(&self) -> impl Iterator<Item = &(f64, Isometry3<f64>)> {
+        self.ranked.poses().iter()
+    }
+}
+
+impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, A, E, R, C> {
+    /// Adds a pose to the list of those found, unless it lies outside of the bound.
+    fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, finished: bool) {
+        let pose = &outcome.camera_from_object;
+        if run.allows(pose) {
+            let score = run.score(&mut self.score, pose);
+            self.found.add(
+                Found {
+                    score,
+                    outcome,
+                    finished,
+                },
+                &run.distinct,
+            );
+        }
+    }
+
+    /// Returns whether the best pose found scores at most `enough`.
+    fn has(&self, enough: f64) -> bool {
+        self.found.best().is_some_and(|best| best.score <= enough)
+    }
+
+    /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
+    fn rank(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
+        self.ranked.clear();
+        let options = self.options;
+        let Some(from) = Hypotheses::new(run.problem, run.init, options.bound) else {
+            return;
+        };
+        let local = (options.start == Start::Refined).then_some(local);
+        let hypotheses = local
+            .into_iter()
+            .flat_map(|local| from.around_both(local))
+            .map(Some)
+            .chain(from.of(options.rotations, options.hypotheses));
+        for pose in hypotheses {
+            if run.is_over() {
+                return;
+            }
+            if let Some(pose) = pose {
+                let score = run.score(&mut self.ranking, &pose);
+                self.ranked.insert(score, pose, options.aligned, 0.0);
+            }
+        }
+    }
+
+    /// Aligns poses and adds the best that differ to the list.
+    fn align(&mut self, run: &mut Run<'_, '_>, ranked: &[(f64, Isometry3<f64>)]) {
+        for (score, start) in ranked {
+            if run.is_over() {
+                return;
+            }
+            let pose = run.refine(&mut self.align, start).camera_from_object;
+            let aligned = run.score(&mut self.ranking, &pose);
+            let (score, pose) = if aligned < *score {
+                (aligned, pose)
+            } else {
+                (*score, *start)
+            };
+            let options = &self.options;
+            self.aligned
+                .insert(score, pose, options.refined, options.spacing_degrees);
+        }
+    }
+
+    /// Refines the best aligned pose with the local stage.
+    fn try_best(&mut self, run: &mut Run<'_, '_>) {
+        if let Some((_, pose)) = self.aligned.poses().first()
+            && !run.is_over()
+        {
+            let outcome = Outcome::refined(*pose, Termination::Converged);
+            let next = run.refine(&mut self.stage, pose);
+            self.add(run, outcome.then(next), true);
+        }
+    }
+
+    /// Searches the whole range for poses.
+    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
+        self.rank(run, local);
+        let ranked = std::mem::take(&mut self.ranked);
+        let (first, others) = ranked.poses().split_at(FIRST.min(ranked.poses().len()));
+        self.aligned.clear();
+        self.align(run, first);
+        self.try_best(run);
+        if !self.has(self.options.good_enough) {
+            self.align(run, others);
+            self.explore(run, self.options.good_enough);
+        }
+        self.ranked = ranked;
+    }
+
+    /// Refines the aligned poses at low cost, until one is good enough.
+    fn explore(&mut self, run: &mut Run<'_, '_>, enough: f64) {
+        let aligned = std::mem::take(&mut self.aligned);
+        for (_, start) in aligned.poses() {
+            if run.is_over() || self.has(enough) {
+                break;
+            }
+            let outcome = run.refine(&mut self.explore, start);
+            // A hypothesis that the stage keeps is still another pose than the initial one.
+            let verdict = Verdict::Refined;
+            self.add(run, Outcome { verdict, ..outcome }, false);
+        }
+        self.aligned = aligned;
+    }
+
+    /// Refines the best of all poses found by the local stage.
+    fn finish(&mut self, run: &mut Run<'_, '_>) {
+        for _ in 0..FINALISTS {
+            if run.is_over() {
+                return;
+            }
+            let Some(explored) = self.found.next(FINAL_GAP) else {
+                return;
+            };
+            let next = run.refine(&mut self.stage, &explored.camera_from_object);
+            self.add(run, explored.then(next), true);
+        }
+    }
+}
+
+/// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
+const FIRST: usize = 32;
+/// Number of distinct poses that the local stage refines, and the largest gap in score between them
+/// and the best one.
+const FINALISTS: usize = 2;
+const FINAL_GAP: f64 = 0.05;
+
+impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, A, E, R, C> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        if let Some(part) = self.score.unsupported(problem) {
+            return Outcome::kept(init, Termination::Unsupported(part));
+        }
+        let clock = Clock::start(self.options.time_limit);
+        let ignored = self.options.start == Start::Ignored;
+        let mut local = match self.options.start {
+            Start::Refined => self.stage.run(problem, init, session),
+            Start::Ignored => Outcome::kept(init, Termination::NoPairs),
+        };
+        self.found.clear();
+        session.workspace.alternatives.clear();
+        let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
+        let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
+            return local;
+        };
+        if !se3::is_finite(init) {
+            return local;
+        }
+        let mut run = Run {
+            problem,
+            init,
+            bound: self.options.bound,
+            distinct: Distinct::of(model),
+            clock,
+            iterations: local.iterations,
+            stopped: local.termination == Termination::Stopped,
+            session,
+        };
+        if !run.allows(&local.camera_from_object) {
+            local = Outcome::kept(init, Termination::OutOfBounds);
+        }
+        let mut score = f64::INFINITY;
+        if !ignored {
+            self.add(&mut run, local, true);
+            score = self.found.best().map_or(score, |found| found.score);
+        }
+        let bad = score > self.options.threshold;
+        if bad {
+            self.search(&mut run, &local.camera_from_object);
+        }
+        if let Some(best) = self.found.best() {
+            let mut alike = std::mem::take(&mut self.alike);
+            let scores = (&mut self.ranking, &mut self.score);
+            let listed = alike.list(&mut run, &best, scores, &self.options);
+            self.aligned.clear();
+            self.align(&mut run, listed.poses());
+            self.alike = alike;
+            self.explore(&mut run, f64::NEG_INFINITY);
+        }
+        self.finish(&mut run);
+        let mut returned = local;
+        if let Some(best) = self.found.best()
+            && best.score < score - self.options.min_gain
+        {
+            (returned, score) = (best.outcome, best.score);
+        }
+        self.found.list_alternatives(
+            &returned.camera_from_object,
+            score,
+            &run.distinct,
+            &mut run.session.workspace.alternatives,
+        );
+        if bad && run.clock.is_over() {
+            returned.termination = Termination::Deadline;
+            if returned.verdict != Verdict::Refined {
+                returned.verdict = Verdict::KeptInitial(Termination::Deadline);
+            }
+        }
+        Outcome {
+            iterations: run.iterations,
+            ..returned
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "hypothesis-search"
+    }
+}

@@ -1,0 +1,65 @@
+//! A search in progress.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use hicp_core::{Isometry3, Problem};
+use hicp_score::Score;
+
+use crate::outcome::{Outcome, Termination};
+use crate::session::Session;
+use crate::stage::search::distinct::Distinct;
+use crate::stage::stage_trait::Stage;
+use crate::stop::motion::Bound;
+
+/// The inputs of a search, and what it has spent.
+pub(crate) struct Run<'a, 's> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) init: &'a Isometry3<f64>,
+    pub(crate) bound: Option<Bound>,
+    pub(crate) distinct: Arc<Distinct>,
+    pub(crate) clock: Clock,
+    pub(crate) session: &'a mut Session<'s>,
+    pub(crate) iterations: usize,
+    /// `true` if the observer requested the end.
+    pub(crate) stopped: bool,
+}
+
+impl Run<'_, '_> {
+    /// Scores a pose.
+    pub(crate) fn score(&mut self, score: &mut impl Score, pose: &Isometry3<f64>) -> f64 {
+        score.score(&mut self.session.workspace.context(self.problem), pose)
+    }
+
+    /// Runs a stage and counts its iterations.
+    pub(crate) fn refine(&mut self, stage: &mut impl Stage, start: &Isometry3<f64>) -> Outcome {
+        let outcome = stage.run(self.problem, start, self.session);
+        self.iterations += outcome.iterations;
+        self.stopped |= outcome.termination == Termination::Stopped;
+        outcome
+    }
+
+    /// Returns whether a pose lies within the bound.
+    pub(crate) fn allows(&self, pose: &Isometry3<f64>) -> bool {
+        self.bound.is_none_or(|b| b.contains(self.init, pose))
+    }
+
+    /// Returns whether the observer or the time limit ends the search.
+    pub(crate) fn is_over(&self) -> bool {
+        self.stopped || self.clock.is_over()
+    }
+}
+
+/// The deadline of a run.
+pub(crate) struct Clock(Option<(Instant, Duration)>);
+
+impl Clock {
+    pub(crate) fn start(limit: Option<Duration>) -> Self {
+        Self(limit.map(|limit| (Instant::now(), limit)))
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        self.0
+            .is_some_and(|(begun, limit)| begun.elapsed() >= limit)
+    }
+}
