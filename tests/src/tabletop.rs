@@ -1,6 +1,7 @@
 //! Simulated cases with the troubles of a robot cell: objects on a table that hide each other,
 //! boards in front of them, depth noise and imperfect masks.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use hicp_sim::{
@@ -8,6 +9,7 @@ use hicp_sim::{
     RelativeGaussian, SimError, SimRng, perturb, rotation, stream,
 };
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera};
+use hybrid_icp::nalgebra::Vector3;
 use rand::RngExt;
 
 use crate::camera;
@@ -119,10 +121,7 @@ impl Tabletop {
     ///
     /// If a model cannot be built.
     pub fn new(objects: &[Household]) -> Result<Self, SimError> {
-        let named = objects
-            .iter()
-            .map(|object| Ok((object.name().to_owned(), object.model()?)));
-        Ok(Self::of(named.collect::<Result<_, SimError>>()?))
+        Self::stretched(objects, Proportions::default())
     }
 
     /// Creates the scenes of any models.
@@ -171,12 +170,7 @@ impl Tabletop {
             }
             let corruption = Corruption {
                 occluded_share,
-                sensor: DepthSensor {
-                    noise: DepthNoise::Relative(RelativeGaussian {
-                        percent: noise_percent,
-                    }),
-                    ..DepthSensor::default()
-                },
+                sensor: sensor(noise_percent),
                 ..Corruption::default()
             };
             let (depth, visible) = corruption.apply(&case)?;
@@ -197,19 +191,15 @@ impl Tabletop {
         Ok(seen)
     }
 
-    /// Returns the same objects in other proportions, which look alike but are wrong.
+    /// Creates the scenes of some household objects in other proportions.
     ///
     /// # Errors
     ///
     /// If a model cannot be built.
-    pub fn look_alikes(objects: &[Household]) -> Result<Self, SimError> {
-        let others = Proportions {
-            width: 1.12,
-            height: 0.92,
-        };
+    pub fn stretched(objects: &[Household], proportions: Proportions) -> Result<Self, SimError> {
         let named = objects
             .iter()
-            .map(|object| Ok((object.name().to_owned(), object.model_with(others)?)));
+            .map(|object| Ok((object.name().to_owned(), object.model_with(proportions)?)));
         Ok(Self::of(named.collect::<Result<_, SimError>>()?))
     }
 }
@@ -227,6 +217,31 @@ impl Seen {
             mask,
             self.camera,
         )?)
+    }
+
+    /// Replaces the image by a wall through the object, up to 40° from facing the camera.
+    ///
+    /// # Errors
+    ///
+    /// Never with the sizes of a scene.
+    pub fn walled(&self, random: &mut SimRng) -> Result<Self, SimError> {
+        let slope = (40.0 * random.random::<f64>()).to_radians().tan();
+        let (sin, cos) = (TAU * random.random::<f64>()).sin_cos();
+        let normal = Vector3::new(slope * cos, slope * sin, 1.0);
+        let distance = normal.dot(&self.truth.translation.vector);
+        let (width, height) = (self.depth.width(), self.depth.height());
+        let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+        let wall = pixels.map(|(u, v)| {
+            let ray = self.camera.unproject(f64::from(u), f64::from(v), 1.0);
+            (distance / normal.dot(&ray.coords)) as f32
+        });
+        let wall = DepthImage::from_meters(width, height, wall.collect())?;
+        let depth = sensor(self.noise_percent).measure(random, &wall, &self.camera)?;
+        Ok(Self {
+            depth: Arc::new(depth),
+            visible: self.visible.clone(),
+            ..*self
+        })
     }
 
     /// Returns a start at the mean error of an estimator (6.2 mm, 9.5°), times a factor.
@@ -247,4 +262,13 @@ impl Seen {
 
 fn count(mask: &Mask) -> usize {
     mask.pixels().iter().filter(|on| **on).count()
+}
+
+fn sensor(noise_percent: f64) -> DepthSensor {
+    DepthSensor {
+        noise: DepthNoise::Relative(RelativeGaussian {
+            percent: noise_percent,
+        }),
+        ..DepthSensor::default()
+    }
 }

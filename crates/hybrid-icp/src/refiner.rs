@@ -28,7 +28,8 @@ pub struct Refinement {
     pub mve: f64,
     /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
     ///
-    /// Accept a pose with 0.95 or more ([`ACCEPTED`](crate::ACCEPTED)).
+    /// At most a half if a search found another pose that explains the image equally well. Accept a
+    /// pose with 0.95 or more ([`ACCEPTED`](crate::ACCEPTED)).
     pub confidence: f64,
     /// The largest distance to expect of a surface point from its true place, meters.
     pub expected_error_meters: f64,
@@ -237,16 +238,20 @@ impl<S: Stage> Refiner<S> {
         let mut context = self.workspace.context(problem);
         let mve = self.score.score(&mut context, pose);
         let (evidence, confidence) = Confidence::at(&mut context, pose, mve);
+        let flatness = Flatness::at(&mut context, pose);
+        let runner_up = self.workspace.alternatives().first().copied();
+        let ambiguous = runner_up.is_some_and(|other| other.is_ambiguous());
         Refinement {
             outcome,
             mve_initial: mve_initial.unwrap_or(mve),
             mve,
-            confidence: confidence.probability,
+            // Two poses that explain the image equally well are equally likely.
+            confidence: confidence.probability * if ambiguous { 0.5 } else { 1.0 },
             expected_error_meters: confidence.error_meters,
             expected_error_degrees: confidence.error_degrees,
-            flatness: Flatness::at(&mut context, pose),
+            flatness,
             evidence,
-            runner_up: self.workspace.alternatives().first().copied(),
+            runner_up,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use hicp_sim::{Household, SimRng, stream};
+use hicp_sim::{Household, Proportions, SimRng, stream};
 use hicp_tests::symmetric_pose_distance;
 use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
 use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
@@ -50,17 +50,20 @@ pub enum Kind {
     LookAlike,
     /// A refinement with the model of another object.
     OtherClass,
+    /// A refinement in the image of a wall.
+    Wall,
 }
 
 impl Kind {
     /// Every kind, with its name in tables.
-    pub const ALL: [(Self, &str); 6] = [
+    pub const ALL: [(Self, &str); 7] = [
         (Self::Near, "near start"),
         (Self::Turned, "any rotation"),
         (Self::Estimated, "no start"),
         (Self::Unrefined, "not refined"),
         (Self::LookAlike, "look-alike"),
         (Self::OtherClass, "other class"),
+        (Self::Wall, "a wall"),
     ];
 }
 
@@ -106,34 +109,47 @@ impl Case {
     }
 }
 
+/// Factors of width and height by which the objects of the fit are stretched.
+const STRETCHES: [(f64, f64); 3] = [(1.0, 1.0), (0.8, 1.2), (1.25, 0.85)];
+
 /// Simulates cases of some objects until there are `count`.
 ///
-/// Every visible object gets several poses, each with another random kind of mask.
+/// If `stretched`, two of three scenes have the objects in other proportions. Every visible object
+/// gets several poses, each with another random kind of mask.
 pub fn simulate(
     objects: &[Household],
+    stretched: bool,
     seed: u64,
     count: usize,
 ) -> Result<Vec<Case>, Box<dyn Error>> {
-    let scenes = Tabletop::new(objects)?;
-    let alike = Tabletop::look_alikes(objects)?;
+    let stretches = &STRETCHES[..if stretched { 3 } else { 1 }];
+    let scenes = |factor: (f64, f64)| {
+        stretches.iter().map(move |(width, height)| {
+            let (width, height) = (width * factor.0, height * factor.1);
+            Tabletop::stretched(objects, Proportions { width, height })
+        })
+    };
+    let all: Vec<Tabletop> = scenes((1.0, 1.0)).collect::<Result<_, _>>()?;
+    let all_alike: Vec<Tabletop> = scenes((1.12, 0.92)).collect::<Result<_, _>>()?;
     let mut refiners = PRESETS.map(Refiner::preset);
     let mut cases = Vec::new();
-    for scene in seed.. {
+    for (scene, (scenes, alike)) in (seed..).zip(all.iter().zip(&all_alike).cycle()) {
         for (place, seen) in (0..).zip(scenes.scene(scene)?) {
             let mut random = stream(scene, &["confidence"], place);
             let others = scenes.objects.len();
             let other = (seen.model + random.random_range(1..others)) % others;
-            let models = [&scenes, &scenes, &alike].map(|s| &s.objects[seen.model].1);
-            let [own, _, alike] = models;
+            let own = &scenes.objects[seen.model].1;
+            let alike = &alike.objects[seen.model].1;
             let kinds = [
                 (Kind::Near, own),
                 (Kind::Near, own),
                 (Kind::Turned, own),
                 (Kind::Estimated, own),
                 (Kind::OtherClass, &scenes.objects[other].1),
-                match place % 2 {
-                    0 => (Kind::Unrefined, own),
-                    _ => (Kind::LookAlike, alike),
+                match place % 4 {
+                    0 | 2 => (Kind::Unrefined, own),
+                    1 => (Kind::LookAlike, alike),
+                    _ => (Kind::Wall, own),
                 },
             ];
             for (kind, model) in kinds {
@@ -165,10 +181,13 @@ fn case(
     random: &mut SimRng,
 ) -> Result<Case, Box<dyn Error>> {
     let mask = MaskKind::ALL[random.random_range(0..MaskKind::ALL.len())];
-    let observation = seen.observe(mask)?;
+    let observation = match kind {
+        Kind::Wall => seen.walled(random)?.observe(mask)?,
+        _ => seen.observe(mask)?,
+    };
     let factor = 2.0 * random.random::<f64>();
     let init = match kind {
-        Kind::Near | Kind::Unrefined | Kind::LookAlike => seen.near(random, factor),
+        Kind::Near | Kind::Unrefined | Kind::LookAlike | Kind::Wall => seen.near(random, factor),
         _ => seen.turned(random, own, model),
     };
     let refined = match kind {
@@ -177,7 +196,7 @@ fn case(
         _ => refiner.refine(model, &observation, &init),
     };
     let truth = match kind {
-        Kind::LookAlike | Kind::OtherClass => None,
+        Kind::LookAlike | Kind::OtherClass | Kind::Wall => None,
         _ => Some(&seen.truth),
     };
     let sides = (model, &observation);

@@ -22,10 +22,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .and_then(|text| text.parse().ok())
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
-        Some("fit") => fit::print(&cases::simulate(&Household::TUNING, 0, count)?),
-        Some("tuning") => report(&cases::simulate(&Household::TUNING, 1 << 20, count)?),
+        Some("fit") => fit::print(&cases::simulate(&Household::TUNING, true, 0, count)?),
+        Some("tuning") => report(&cases::simulate(&Household::TUNING, false, 1 << 20, count)?),
         _ => {
-            report(&cases::simulate(&Household::TEST, 0, count)?);
+            report(&cases::simulate(&Household::TEST, false, 0, count)?);
             if let Some(cases) = real::cases() {
                 println!("\n## Real frames\n");
                 report(&cases);
