@@ -122,22 +122,26 @@ pub(crate) fn matrix6(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix6<
     Ok(Matrix6::from_row_slice(&numbers))
 }
 
-/// Reads points from an array of shape (N, 3), meters.
-pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point3<f32>>> {
-    let expected = "an (N, 3) array of finite float32";
+/// Reads the rows of an array of shape (N, 3), which may have any numbers.
+pub(crate) fn triples(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point3<f32>>> {
+    let expected = "an (N, 3) array of float32";
     let (numbers, _) = numbers::<f32>(value, &[None, Some(3)], name, expected)?;
-    if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
-        return Err(InputError::new_err(format!(
-            "{name}[{}, {}] is {}, expected finite numbers",
-            index / 3,
-            index % 3,
-            numbers[index]
-        )));
+    let rows = numbers.chunks_exact(3);
+    Ok(rows.map(|p| Point3::new(p[0], p[1], p[2])).collect())
+}
+
+/// Reads points from an array of shape (N, 3), meters, which must be finite.
+pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point3<f32>>> {
+    let points = triples(value, name)?;
+    for (row, point) in points.iter().enumerate() {
+        if let Some(column) = point.iter().position(|x| !x.is_finite()) {
+            return Err(InputError::new_err(format!(
+                "{name}[{row}, {column}] is {}, expected finite numbers",
+                point[column]
+            )));
+        }
     }
-    Ok(numbers
-        .chunks_exact(3)
-        .map(|p| Point3::new(p[0], p[1], p[2]))
-        .collect())
+    Ok(points)
 }
 
 /// A rigid motion with the numbers that it was created from.

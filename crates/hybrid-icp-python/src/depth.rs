@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hybrid_icp::core::{DepthImage, Mask};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, unexpected};
+use crate::camera::PyCamera;
 use crate::errors::{self, InputError};
 
 const EXPECTED_DEPTH: &str =
@@ -87,6 +88,37 @@ impl PyDepthImage {
         py.detach(|| hicp_io::read_depth_png(&path, scale * 1000.0))
             .map(|image| Self(Arc::new(image)))
             .map_err(errors::file)
+    }
+
+    /// Projects the points of a depth sensor into a camera; the nearest point of a pixel counts.
+    ///
+    /// Pixels without points are missing. `Observation(image, image.to_numpy() > 0, camera)` is
+    /// the observation of a cloud that shows the object alone.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array_like, shape (N, 3), float32
+    ///     Points, meters. Those that are not finite or not in the image are skipped.
+    /// camera : Camera
+    /// T_cp : array_like, shape (4, 4), optional
+    ///     The pose of the points' frame, camera from points, meters. The default is the identity.
+    ///
+    /// Returns
+    /// -------
+    /// DepthImage
+    #[staticmethod]
+    #[pyo3(signature = (points, camera, T_cp = None))]
+    #[allow(non_snake_case)]
+    fn from_points(
+        points: &Bound<'_, PyAny>,
+        camera: &PyCamera,
+        T_cp: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let points = array::triples(points, "points")?;
+        let pose = T_cp.map(|pose| array::motion(pose, "T_cp")).transpose()?;
+        let pose = pose.map_or_else(Isometry3::identity, |pose| pose.isometry);
+        let image = DepthImage::from_points(points, &camera.0, &pose);
+        Ok(Self(Arc::new(image)))
     }
 
     /// Image width, pixels.

@@ -4,4 +4,5 @@ pub(crate) mod camera;
 pub(crate) mod image;
 pub(crate) mod normals;
 pub(crate) mod observation;
+pub(crate) mod projection;
 pub(crate) mod region;

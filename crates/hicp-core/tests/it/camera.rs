@@ -1,8 +1,8 @@
 //! Tests of the pinhole camera, and of the distances of its pixels.
 
 use hicp_core::{
-    CameraError, DepthImage, ImageError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH,
-    Matrix3, PinholeCamera, PixelCenters, Point3,
+    CameraError, DepthImage, ImageError, Isometry3, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE,
+    MIN_FOCAL_LENGTH, Matrix3, PinholeCamera, PixelCenters, Point3, Vector3,
 };
 
 fn camera() -> PinholeCamera {
@@ -252,5 +252,35 @@ fn a_scaled_down_camera_keeps_the_rays_of_every_nth_pixel() {
             camera.unproject(4.0 * u, 4.0 * v, 0.7),
         );
         assert!((a - b).norm() < 1e-15, "{a} {b}");
+    }
+}
+
+/// The points of all pixels, moved, make the same image again. Nearer points hide others.
+#[test]
+fn the_points_of_a_depth_image_project_to_the_same_image() {
+    let camera = camera();
+    let depth = |i: u32| {
+        if i.is_multiple_of(3) {
+            0.0
+        } else {
+            0.5 + (i % 97) as f32 * 0.01
+        }
+    };
+    let image = DepthImage::collect(640, 480, (0..640 * 480).map(depth)).unwrap();
+    let moved = Isometry3::new(Vector3::new(0.1, -2.0, 0.7), Vector3::new(0.3, -0.2, 1.0));
+    let mut points = Vec::new();
+    for (index, z) in (0_u32..).zip(image.pixels()) {
+        let pixel = (f64::from(index % 640), f64::from(index / 640));
+        let point = |depth| (moved * camera.unproject(pixel.0, pixel.1, depth)).cast::<f32>();
+        if *z > 0.0 {
+            points.extend([f64::from(*z), 3.0, -1.0].map(point));
+        }
+    }
+    for x in [f32::NAN, f32::INFINITY, f32::MAX] {
+        points.extend([Point3::new(x, 0.0, 0.0), Point3::new(0.0, 0.0, x)]);
+    }
+    let found = DepthImage::from_points(points, &camera, &moved.inverse());
+    for (found, expected) in found.pixels().iter().zip(image.pixels()) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     }
 }
