@@ -1,5 +1,7 @@
 //! Points with normals that no image belongs to.
 
+use nalgebra::{Point3, UnitVector3, Vector3};
+
 use crate::derived::Derived;
 use crate::id::Id;
 use crate::object::diameter::diameter;
@@ -34,14 +36,29 @@ impl Cloud {
     /// Skips surfels that are not finite, or beyond [`MAX_COORDINATE_METERS`]. A cloud without
     /// points is valid: a registration with it ends with "no pairs".
     pub fn new(surfels: impl IntoIterator<Item = Surfel>) -> Self {
+        Self::of(surfels, |surfel| {
+            surfel.normal.iter().all(|x| x.is_finite())
+        })
+    }
+
+    /// Creates a cloud without normals, which must be the source of a metric that does not use
+    /// them, such as point-to-point or point-to-plane.
+    ///
+    /// Its normals are NaN, so that another metric or filter finds no step or no pairs. Skips
+    /// points as [`Cloud::new`] does.
+    pub fn without_normals(points: impl IntoIterator<Item = Point3<f32>>) -> Self {
+        let normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
+        let surfels = points.into_iter().map(|point| Surfel { point, normal });
+        Self::of(surfels, |_| true).with_normals_from(0)
+    }
+
+    fn of(surfels: impl IntoIterator<Item = Surfel>, has_normal: impl Fn(&Surfel) -> bool) -> Self {
+        let within = |x: &f32| x.abs() <= MAX_COORDINATE_METERS;
         let mut n_given = 0;
         let surfels: Vec<Surfel> = surfels
             .into_iter()
             .inspect(|_| n_given += 1)
-            .filter(|surfel| {
-                let within = |x: &f32| x.abs() <= MAX_COORDINATE_METERS;
-                surfel.point.iter().all(within) && surfel.normal.iter().all(|x| x.is_finite())
-            })
+            .filter(|surfel| surfel.point.iter().all(within) && has_normal(surfel))
             .collect();
         Self {
             id: Id::next(),
@@ -79,7 +96,8 @@ impl Cloud {
         self.n_skipped
     }
 
-    /// Number of neighbors from which the normals were estimated; `None` if they were given.
+    /// Number of neighbors from which the normals were estimated; `None` if they were given, and 0
+    /// if there are none.
     #[must_use]
     pub fn normals_from(&self) -> Option<usize> {
         self.neighbors

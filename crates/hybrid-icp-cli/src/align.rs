@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Isometry3, Matrix6};
 use hybrid_icp::icp::Verdict;
@@ -54,8 +55,9 @@ pub(crate) struct Arguments {
     /// Replace the points in cubic cells of this edge by their mean first, meters.
     #[arg(long, value_name = "METERS", value_parser = positive)]
     voxel: Option<f64>,
-    /// Number of neighbors from which normals are estimated if a file has none.
+    /// Number of neighbors from which normals are estimated if a file has none, at least 3.
     #[arg(long, value_name = "N", default_value_t = CloudOptions::default().neighbors)]
+    #[arg(value_parser = RangedU64ValueParser::<usize>::new().range(3..))]
     neighbors: usize,
     /// The file for the JSON result; standard output if not given.
     #[arg(long, value_name = "FILE")]
@@ -81,11 +83,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         voxel_meters: meters(arguments.voxel),
         neighbors: arguments.neighbors,
     };
-    let read = |path| -> anyhow::Result<_> {
+    let read = |path, options: CloudOptions| -> anyhow::Result<_> {
         let PointCloud { points, normals } = limits().read_cloud(path, arguments.unit)?;
         Ok(options.cloud(&points, normals.as_deref())?)
     };
-    let (source, target) = (read(&arguments.source)?, read(&arguments.target)?);
+    let source = read(&arguments.source, options.for_source_of(method))?;
+    let target = read(&arguments.target, options)?;
     let init = match init {
         Some(path) => {
             limits()

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use hicp_io::{LengthUnit, PointCloud};
-use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3, Vector3};
+use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
 use hybrid_icp::icp::Verdict;
 use hybrid_icp::{Alignment, CloudOptions, Registration};
 use pyo3::prelude::*;
@@ -91,7 +91,7 @@ impl PyAlignment {
 /// Registers two point clouds: finds the pose that moves the source onto the target.
 ///
 /// Points that are not finite are skipped, with a warning in the result. Absent normals are
-/// estimated, which is a warning, too.
+/// estimated if the method needs them, which is a warning, too.
 ///
 /// Parameters
 /// ----------
@@ -109,7 +109,7 @@ impl PyAlignment {
 /// voxel : float, optional
 ///     Edge of the cubic cells in which points are replaced by their mean first, meters.
 /// neighbors : int, optional
-///     Number of neighbors from which normals are estimated.
+///     Number of neighbors from which normals are estimated, at least 3.
 ///
 /// Returns
 /// -------
@@ -137,6 +137,10 @@ pub(crate) fn align(
             return Err(InputError::new_err(text));
         }
     }
+    if neighbors < 3 {
+        let text = format!("neighbors is {neighbors}, expected at least 3");
+        return Err(InputError::new_err(text));
+    }
     let options = CloudOptions {
         voxel_meters: voxel,
         neighbors,
@@ -151,7 +155,8 @@ pub(crate) fn align(
         },
     };
     let alignment = py.detach(|| -> PyResult<_> {
-        let (source, target) = (source.cloud(&options)?, target.cloud(&options)?);
+        let source = source.cloud(&options.for_source_of(method))?;
+        let target = target.cloud(&options)?;
         let mut pipeline = method.build(max_distance);
         Ok(hybrid_icp::align(
             &source,
@@ -218,24 +223,13 @@ impl Points {
         normals: Option<&Bound<'_, PyAny>>,
         name: &str,
     ) -> PyResult<Self> {
-        let triples = |array: &Bound<'_, PyAny>, name: &str| -> PyResult<Vec<[f32; 3]>> {
-            let expected = "an (N, 3) array of float32";
-            let (numbers, _) = array::numbers::<f32>(array, &[None, Some(3)], name, expected)?;
-            Ok(numbers
-                .chunks_exact(3)
-                .map(|p| [p[0], p[1], p[2]])
-                .collect())
-        };
         // A zero normal becomes NaN, and its point is skipped.
-        let unit = |n| UnitVector3::new_normalize(Vector3::from(n));
+        let unit = |n: Point3<f32>| UnitVector3::new_normalize(n.coords);
         let normals = normals
-            .map(|array| triples(array, &format!("{name}_normals")))
+            .map(|array| array::triples(array, &format!("{name}_normals")))
             .transpose()?;
         Ok(Self {
-            points: triples(points, name)?
-                .into_iter()
-                .map(Point3::from)
-                .collect(),
+            points: array::triples(points, name)?,
             normals: normals.map(|normals| normals.into_iter().map(unit).collect()),
         })
     }

@@ -36,6 +36,7 @@ def test_hostile_points_keep_the_pose():
     for arguments, text in [
         ({"method": "icp"}, "no registration is named"),
         ({"voxel": 0.0}, "voxel is 0, expected a finite number above 0, meters"),
+        ({"neighbors": 2}, "neighbors is 2, expected at least 3"),
         ({"source_normals": source[1:]}, "expected one normal per point"),
         ({"T_ts": np.zeros((4, 4))}, "T_ts"),
     ]:
@@ -54,3 +55,17 @@ def test_clouds_of_files_are_read_in_meters(tmp_path):
     assert np.array_equal(read, points) and normals is None
     with pytest.raises(hi.FileError, match="missing.ply"):
         hi.read_cloud("missing.ply")
+
+
+def test_a_cloud_becomes_an_observation(scene):
+    v, u = np.nonzero(scene.depth)
+    z = scene.depth[v, u].astype(float)
+    K = scene.camera.K
+    points = np.stack([(u - K[0, 2]) / K[0, 0] * z, (v - K[1, 2]) / K[1, 1] * z, z], axis=1)
+    image = hi.DepthImage.from_points(np.vstack([points, [[np.nan] * 3]]), scene.camera)
+    assert np.abs(image.to_numpy() - scene.depth).max() < 1e-6
+    moved = pose([0.1, 0.2, 0.3], [1, 2, 3])
+    points = points @ moved[:3, :3].T + moved[:3, 3]
+    image = hi.DepthImage.from_points(points, scene.camera, np.linalg.inv(moved))
+    assert np.abs(image.to_numpy() - scene.depth).max() < 1e-5
+    assert hi.Observation(image, image.to_numpy() > 0, scene.camera).n_measured == len(points)

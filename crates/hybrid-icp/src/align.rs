@@ -30,6 +30,9 @@ pub struct CloudOptions {
     /// points ([`voxel_downsample`]).
     pub voxel_meters: Option<f32>,
     /// Number of neighbors from which absent normals are estimated ([`estimate_normals`]).
+    ///
+    /// 0 leaves them out ([`Cloud::without_normals`]). Use it for sources only:
+    /// [`CloudOptions::for_source_of`].
     pub neighbors: usize,
 }
 
@@ -44,6 +47,20 @@ impl Default for CloudOptions {
 }
 
 impl CloudOptions {
+    /// Returns these options for the source of a registration.
+    ///
+    /// If the error does not depend on the normals of the source, they are left out to save time.
+    #[must_use]
+    pub fn for_source_of(self, registration: Registration) -> Self {
+        match registration {
+            Registration::Generalized => self,
+            Registration::PointToPoint | Registration::PointToPlane => Self {
+                neighbors: 0,
+                ..self
+            },
+        }
+    }
+
     /// Creates a cloud from points in meters, with unit normals if there are any.
     ///
     /// Points that are not finite or whose normal cannot be estimated are skipped
@@ -74,6 +91,9 @@ impl CloudOptions {
             None => (points.to_vec(), normals.map(<[_]>::to_vec)),
         };
         let Some(normals) = normals else {
+            if self.neighbors == 0 {
+                return Ok(Cloud::without_normals(points));
+            }
             let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
             let normals = estimate_normals(&points, self.neighbors).into_iter();
             let normals = normals.map(|normal| normal.unwrap_or(unknown));
@@ -349,7 +369,7 @@ pub fn align<'a>(
 fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item = CloudWarning> {
     let count = cloud.n_skipped();
     let skipped = (count > 0).then_some(CloudWarning::PointsSkipped { side, count });
-    let estimated = cloud.normals_from();
+    let estimated = cloud.normals_from().filter(|neighbors| *neighbors > 0);
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
     skipped.into_iter().chain(estimated)
 }

@@ -275,3 +275,27 @@ fn voxels_hold_the_mean_of_their_points() {
             .contains("1 normals for 4 points")
     );
 }
+
+/// Sources without normals register as they do with them, if the error does not need them.
+/// Otherwise the initial pose is kept.
+#[test]
+fn absent_normals_of_the_source_are_never_used() {
+    let options = CloudOptions::default();
+    let target = cloud(&points(4000));
+    let init = Isometry3::translation(0.002, -0.001, 0.003);
+    for kind in Registration::ALL {
+        let full = options.cloud(&points(2000), None).unwrap();
+        let bare = options
+            .for_source_of(kind)
+            .cloud(&points(2000), None)
+            .unwrap();
+        let found = |source| align(source, &target, &init, &mut *kind.build(None));
+        assert_eq!(found(&full).outcome, found(&bare).outcome);
+        let without = Cloud::without_normals(points(2000));
+        if kind == Registration::Generalized {
+            assert_eq!(found(&without).target_from_source(), init);
+        } else {
+            assert_eq!(found(&full).outcome, found(&without).outcome);
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Normals of unorganized points.
 
 use hicp_core::internal::{VectorLoop, vectorized};
-use hicp_core::{Matrix3, Point3, UnitVector3, Vector3};
+use hicp_core::{Point3, UnitVector3, Vector3};
 
 use crate::search::nearest::{Nearest, PointIndex};
 use crate::search::point_tree::PointTree;
@@ -16,7 +16,7 @@ const LINE: f64 = 1e-8;
 /// line or in one place, if there are fewer than three, and for points that are not finite.
 ///
 /// 10 to 20 neighbors suit most scans. Fewer follow finer detail, more suppress noise. Cost:
-/// O(n log n + n k), about 2 µs per point on one core for 20 neighbors.
+/// O(n log n + n k), about 1 µs per point on one core for 20 neighbors.
 #[must_use]
 pub fn estimate_normals(points: &[Point3<f32>], k: usize) -> Vec<Option<UnitVector3<f32>>> {
     let finite = |point: &Point3<f32>| point.iter().all(|x| x.is_finite());
@@ -31,6 +31,12 @@ pub fn estimate_normals(points: &[Point3<f32>], k: usize) -> Vec<Option<UnitVect
     normals
 }
 
+/// Number of points whose neighbors bound the next search.
+const RECENT: usize = 16;
+
+/// Covers the rounding of a squared distance.
+const SLACK: f32 = 1e-5;
+
 struct Planes<'a, F> {
     points: &'a [Point3<f32>],
     k: usize,
@@ -43,15 +49,69 @@ impl<F: FnMut(usize, Option<UnitVector3<f32>>)> VectorLoop for Planes<'_, F> {
     #[inline(always)]
     fn run(mut self) {
         let tree = PointTree::new(self.points);
-        let mut neighbors: Vec<Nearest> = Vec::with_capacity(self.k.min(self.points.len()));
+        let k = self.k.min(self.points.len());
+        let mut neighbors: Vec<Nearest> = Vec::with_capacity(3 * k);
+        let mut recent = Recent::default();
         // Neighbors in the order of the tree share its nodes.
         for element in tree.order() {
             let point = &self.points[*element as usize];
-            tree.nearest_n(point, self.k, &mut neighbors);
+            tree.gather(point, k, [0.0, recent.bound(point)], &mut neighbors);
+            if neighbors.len() < k {
+                tree.gather(point, k, [0.0, f32::MAX], &mut neighbors);
+            }
+            let farthest = neighbors.iter().map(|near| near.distance_squared);
+            recent.add(point, farthest.fold(0.0, f32::max).sqrt());
             let offsets = (neighbors.iter())
                 .map(|near| (self.points[near.element as usize] - point).cast::<f64>());
             (self.take)(*element as usize, plane_normal(offsets, &point.coords));
         }
+    }
+}
+
+/// The last points, and the radii within which their nearest ones lie.
+///
+/// If k points are within r of a point, k points are within r + d of a place at the distance d from
+/// it. This bounds the next search.
+struct Recent {
+    points: [[f32; RECENT]; 3],
+    radii: [f32; RECENT],
+    next: usize,
+}
+
+impl Default for Recent {
+    fn default() -> Self {
+        Self {
+            points: [[0.0; RECENT]; 3],
+            radii: [f32::INFINITY; RECENT],
+            next: 0,
+        }
+    }
+}
+
+impl Recent {
+    /// Returns a squared distance within which the nearest points of `place` lie.
+    #[inline(always)]
+    fn bound(&self, place: &Point3<f32>) -> f32 {
+        let mut distances = [0.0; RECENT];
+        for (points, place) in self.points.iter().zip(place.iter()) {
+            for (distance, point) in distances.iter_mut().zip(points) {
+                *distance += (point - place) * (point - place);
+            }
+        }
+        for (distance, radius) in distances.iter_mut().zip(&self.radii) {
+            *distance = distance.sqrt() + radius;
+        }
+        let radius = distances.iter().copied().fold(f32::INFINITY, f32::min);
+        (radius * radius * (1.0 + SLACK)).min(f32::MAX)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, point: &Point3<f32>, radius: f32) {
+        for (points, coordinate) in self.points.iter_mut().zip(point.iter()) {
+            points[self.next] = *coordinate;
+        }
+        self.radii[self.next] = radius;
+        self.next = (self.next + 1) % RECENT;
     }
 }
 
@@ -77,11 +137,17 @@ fn plane_normal(
             *square += product;
         }
     }
-    let mean = sum / count;
+    let [x, y, z] = [sum.x / count, sum.y / count, sum.z / count];
     let [xx, xy, xz, yy, yz, zz] = squares;
-    let scatter = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - sum * mean.transpose();
-    let normal = least_direction(&scatter)?.cast::<f32>();
-    let normal = UnitVector3::try_new(normal, 0.0)?;
+    let normal = least_direction([
+        xx - sum.x * x,
+        xy - sum.x * y,
+        xz - sum.x * z,
+        yy - sum.y * y,
+        yz - sum.y * z,
+        zz - sum.z * z,
+    ])?;
+    let normal = UnitVector3::try_new(normal.cast::<f32>(), 0.0)?;
     Some(if normal.dot(place) > 0.0 {
         -normal
     } else {
@@ -89,33 +155,62 @@ fn plane_normal(
     })
 }
 
-/// Returns the eigenvector of the smallest eigenvalue of a positive semidefinite matrix.
+/// Returns the eigenvector of the smallest eigenvalue of a positive semidefinite matrix, given as
+/// xx, xy, xz, yy, yz, zz.
 ///
 /// Returns `None` if two of the eigenvalues are zero. The adjugate has the same eigenvectors, and
 /// as eigenvalues the products of the other two: the wanted one is the largest. Its powers approach
 /// the projection on it.
 #[inline(always)]
-fn least_direction(matrix: &Matrix3<f64>) -> Option<Vector3<f64>> {
-    let trace = matrix.trace();
-    let m = matrix / trace;
-    let (a, b, c) = (m.column(0), m.column(1), m.column(2));
-    let mut power = Matrix3::from_columns(&[b.cross(&c), c.cross(&a), a.cross(&b)]);
+fn least_direction(matrix: [f64; 6]) -> Option<Vector3<f64>> {
+    let trace = matrix[0] + matrix[3] + matrix[5];
+    let [a, b, c, d, e, f] = matrix.map(|entry| entry / trace);
+    let adjugate = [
+        d * f - e * e,
+        c * e - b * f,
+        b * e - c * d,
+        a * f - c * c,
+        b * c - a * e,
+        a * d - b * b,
+    ];
     // The trace is the sum of the products of two eigenvalues each. False for NaN.
-    let determined = trace > 0.0 && power.trace() > LINE;
+    let products = adjugate[0] + adjugate[3] + adjugate[5];
+    let determined = trace > 0.0 && products > LINE;
     if !determined {
         return None;
     }
+    // A square of trace 1 has a trace of at least ⅓, so that nothing vanishes.
+    let mut power = adjugate.map(|entry| entry / products);
     for _ in 0..5 {
-        power /= power.trace();
-        power *= power;
+        let [a, b, c, d, e, f] = power;
+        power = [
+            a * a + b * b + c * c,
+            a * b + b * d + c * e,
+            a * c + b * e + c * f,
+            b * b + d * d + e * e,
+            b * c + d * e + e * f,
+            c * c + e * e + f * f,
+        ];
     }
-    let diagonal = power.diagonal();
-    Some(power.column(diagonal.imax()).normalize())
+    let [a, b, c, d, e, f] = power;
+    let column = if a >= d && a >= f {
+        Vector3::new(a, b, c)
+    } else if d >= f {
+        Vector3::new(b, d, e)
+    } else {
+        Vector3::new(c, e, f)
+    };
+    Some(column.normalize())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hicp_core::Matrix3;
+
+    fn least_direction_of(m: &Matrix3<f64>) -> Option<Vector3<f64>> {
+        least_direction([m.m11, m.m12, m.m13, m.m22, m.m23, m.m33])
+    }
 
     #[test]
     fn the_direction_of_least_variance_is_that_of_the_library() {
@@ -131,7 +226,7 @@ mod tests {
                 continue;
             }
             let expected = library.eigenvectors.column(library.eigenvalues.imin());
-            let found = least_direction(&matrix).unwrap();
+            let found = least_direction_of(&matrix).unwrap();
             assert!(found.dot(&expected).abs() > 1.0 - 1e-9, "{seed}");
         }
         let line = Vector3::new(1.0, 2.0, 3.0);
@@ -140,7 +235,7 @@ mod tests {
             line * line.transpose(),
             Matrix3::repeat(f64::NAN),
         ] {
-            assert_eq!(least_direction(&flat), None);
+            assert_eq!(least_direction_of(&flat), None);
         }
     }
 }

@@ -25,6 +25,12 @@ impl Nearest {
         element: u32::MAX,
     };
 
+    /// Returns a number with the order of [`Nearest::precedes`]. The distance must not be negative.
+    #[inline(always)]
+    pub(crate) fn key(&self) -> u64 {
+        u64::from(self.distance_squared.to_bits()) << 32 | u64::from(self.element)
+    }
+
     /// Compares by distance. Of equally near points, the first precedes.
     #[inline(always)]
     pub(crate) fn precedes(&self, other: &Self) -> bool {

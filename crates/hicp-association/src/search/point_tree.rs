@@ -94,21 +94,49 @@ impl PointTree {
     /// Replaces the content of `found` by the `count` nearest points, nearest first.
     #[inline(always)]
     pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Nearest>) {
+        self.gather(query, count, [-1.0, f32::MAX], found);
+        found.sort_unstable_by_key(Nearest::key);
+    }
+
+    /// Replaces the content of `found` by the `count` nearest points in any order, but only by
+    /// those within the squared distance `within[1]`, which must be finite.
+    ///
+    /// It ends early if there are `count` points within the squared distance `within[0]`. Then they
+    /// are any such points. This matters if many points lie in one place.
+    #[inline(always)]
+    pub(crate) fn gather(
+        &self,
+        query: &Point3<f32>,
+        count: usize,
+        within: [f32; 2],
+        found: &mut Vec<Nearest>,
+    ) {
         found.clear();
         if count == 0 {
             return;
         }
-        self.visit(query, f32::MAX, |next| {
-            if found.len() < count || found.last().is_some_and(|last| next.precedes(last)) {
-                found.truncate(count - 1);
-                let position = found.partition_point(|other| other.precedes(&next));
-                found.insert(position, next);
+        let [enough, mut bound] = within;
+        // Selecting now and then costs less than keeping the points in order.
+        let full = count.saturating_mul(3);
+        let select = |found: &mut Vec<Nearest>| {
+            let (_, last, _) = found.select_nth_unstable_by_key(count - 1, Nearest::key);
+            let last = last.distance_squared;
+            found.truncate(count);
+            last
+        };
+        self.visit(query, bound, |next| {
+            found.push(next);
+            if found.len() >= full {
+                bound = select(found);
+                if bound <= enough {
+                    bound = -1.0;
+                }
             }
-            match found.last() {
-                Some(last) if found.len() == count => last.distance_squared,
-                _ => f32::MAX,
-            }
+            bound
         });
+        if found.len() > count {
+            select(found);
+        }
     }
 
     /// Passes points to `take` until no other point is within the squared distance that `take`
@@ -193,6 +221,12 @@ mod tests {
                     for n in [0, 1, 3, 20] {
                         tree.nearest_n(query, n, &mut found);
                         assert_eq!(found, all[..n.min(all.len())]);
+                        let within = all[n.min(all.len() - 1)].distance_squared;
+                        for bound in [within, f32::MAX] {
+                            tree.gather(query, n, [-1.0, bound], &mut found);
+                            found.sort_unstable_by_key(Nearest::key);
+                            assert_eq!(found, all[..n.min(all.len())]);
+                        }
                     }
                 }
             }

@@ -39,7 +39,7 @@ fn two_clouds_are_registered_and_the_result_is_an_initial_pose() {
         assert!(run_.out.starts_with("refined: fitness "), "{}", run_.out);
         assert!(
             run_.err
-                .contains("source: no normals: estimated from 20 neighbors"),
+                .contains("target: no normals: estimated from 20 neighbors"),
             "{}",
             run_.err
         );
@@ -94,6 +94,7 @@ fn wrong_arguments_are_refused() {
     };
     refused(&["b.pcd", "--method", "gipc"], "did you mean \"gicp\"?");
     refused(&["none.ply"], "none.ply");
+    refused(&["b.pcd", "--neighbors", "2"], "2 is not in 3..");
     refused(
         &["b.pcd", "--output", "b.pcd"],
         "--output and TARGET both name",
