@@ -37,6 +37,7 @@ except ImportError as error:  # Its wheel requires the system's libusb-1.0, libG
     print(f"peers: skipped the rows of Open3D: {error}", file=sys.stderr)
     o3d = None
 
+import clouds
 import scaling
 import vsd
 
@@ -44,14 +45,15 @@ GATE = 0.03  # meters, as in our rows
 TRANSLATION_EPS = 1e-4  # meters
 ROTATION_EPS = math.radians(0.01)
 MAX_ITERATIONS = 100
+DATA = Path(os.environ.get("HICP_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
 
 class Ours:
     """Our program, which replies to one command at a time."""
 
-    def __init__(self, program, folder, noise):
+    def __init__(self, *command):
         self.process = subprocess.Popen(
-            [program, folder, str(noise)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def send(self, command):
@@ -374,6 +376,7 @@ def main():
     parser.add_argument("--instances", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--noise", type=float, default=0.0, help="depth noise, percent of the depth")
+    parser.add_argument("--clouds", action="store_true", help="only the table of point clouds")
     parser.add_argument("--no-scaling", action="store_true", help="skip the measurements of `bop refine`")
     arguments = parser.parse_args()
     vsd.check()
@@ -385,20 +388,23 @@ def main():
         f"median of {arguments.rounds} rounds each. Python {platform.python_version()}, numpy {np.__version__}, "
         f"Open3D {o3d.__version__ if o3d else 'missing'}, small_gicp {version('small_gicp')}."
     ]
+    arguments.no_scaling |= arguments.clouds
     if not arguments.no_scaling:
         scaled = scaling.report(programs, work / "scaling")  # Before this process is limited to one core.
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # Our program inherits it.
-    program = programs / "examples" / "peers"
-    folder = work / "instances"
-    ours = Ours(program, folder, arguments.noise)
-    results, covariances = measure(ours, folder, arguments.instances, arguments.rounds)
-    text += [
-        table(results),
-        f"Not counted: normals and covariances of small_gicp's two clouds, {covariances * 1e3:.1f} ms (its GICP needs "
-        "them; ours uses the surfels' normals, which `observe` computes).",
-        ratios(results),
-    ]
+    program = programs / "examples"
+    if not arguments.clouds:
+        folder = work / "instances"
+        ours = Ours(program / "peers", folder, str(arguments.noise))
+        results, covariances = measure(ours, folder, arguments.instances, arguments.rounds)
+        text += [
+            table(results),
+            f"Not counted: normals and covariances of small_gicp's two clouds, {covariances * 1e3:.1f} ms (its GICP "
+            "needs them; ours uses the surfels' normals, which `observe` computes).",
+            ratios(results),
+        ]
+    text.append(clouds.report(Ours(program / "peer_clouds"), DATA, work / "clouds", arguments.rounds, o3d))
     if not arguments.no_scaling:
         text.append(scaled)
     document = "\n\n".join(text) + "\n"

@@ -13,7 +13,7 @@ use crate::venv;
 /// The table goes to the terminal and to `target/peers/peers.md`.
 pub(crate) fn run(options: &[&str]) -> Result<()> {
     execute(&mut cargo(
-        "build --release --package hicp-benches --example peers",
+        "build --release --package hicp-benches --example peers --example peer_clouds",
     ))?;
     execute(&mut cargo("build --release --bin hybrid-icp"))?;
     let venv = target().join("peers/venv");
