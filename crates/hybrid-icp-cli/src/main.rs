@@ -45,6 +45,8 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp estimate --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json
+  hybrid-icp doctor --model mug.ply --model-unit mm --depth depth.png \\
+      --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
   hybrid-icp align a.ply b.pcd --output moved.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
@@ -65,6 +67,7 @@ enum Command {
     Demo(demo::Arguments),
     Refine(refine::Arguments),
     Estimate(refine::estimate::Arguments),
+    Doctor(refine::doctor::Arguments),
     Replay(refine::replay::Arguments),
     Align(align::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
@@ -85,6 +88,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Refine(arguments) => refine::run(&arguments),
         Command::Estimate(arguments) => refine::estimate::run(&arguments),
+        Command::Doctor(arguments) => refine::doctor::run(&arguments),
         Command::Replay(arguments) => refine::replay::run(&arguments),
         Command::Align(arguments) => align::run(&arguments),
         Command::Bop(command) => bop::run(&command),

@@ -72,6 +72,7 @@
 mod align;
 mod calibration;
 mod checks;
+mod diagnosis;
 mod mask_in_box;
 mod preset;
 pub mod presets;
@@ -103,6 +104,7 @@ pub use checks::{
     ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warning_of_runner_up,
     warnings, warnings_of_model, warnings_of_result,
 };
+pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;
 pub use mask_in_box::mask_in_box;
 pub use preset::{Preset, UnknownPreset};

@@ -38,6 +38,8 @@ pub struct MaskFile {
     /// For [`MaskRule::NotZero`]: the values and the options that choose among them, if there are
     /// more than two values or none is 0.
     pub warning: Option<String>,
+    /// With a warning: the distinct values but 0 in ascending order, at most 256.
+    pub values: Vec<f64>,
 }
 
 /// Reads a mask of any supported format, recognized by its first bytes.
@@ -82,11 +84,15 @@ impl ReadLimits {
             MaskRule::Equal(number) => value == number,
         };
         let pixels: Vec<bool> = values.clone().map(selected).collect();
-        let mut warning = None;
+        let (mut warning, mut distinct) = (None, Vec::new());
         if rule == MaskRule::NotZero {
             let found = Values::of(values);
             let no_background = !found.distinct.iter().any(|value| is_background(*value));
             warning = found.warning(no_background);
+            if warning.is_some() {
+                distinct = found.distinct;
+                distinct.retain(|value| !is_background(*value));
+            }
         } else if !pixels.contains(&true) {
             let found = format!("no pixel that fits {rule:?}");
             let expected = format!("one of {}", Values::of(values).names());
@@ -94,7 +100,12 @@ impl ReadLimits {
         }
         let mask = Mask::new(image.width, image.height, pixels);
         let mask = mask.map_err(|error| IoError::unusable(path, "mask", error))?;
-        Ok(MaskFile { mask, warning })
+        let values = distinct;
+        Ok(MaskFile {
+            mask,
+            warning,
+            values,
+        })
     }
 }
 

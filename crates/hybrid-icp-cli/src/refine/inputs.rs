@@ -113,6 +113,39 @@ impl MaskOptions {
     }
 }
 
+/// The files of a refinement: object, image, mask and initial pose.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct RefineFiles {
+    #[command(flatten)]
+    pub(crate) files: ImageFiles,
+    /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
+    /// the object, or opaque if the opacity varies.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) mask: PathBuf,
+    #[command(flatten)]
+    mask_options: MaskOptions,
+    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
+    /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
+    /// order, as JSON, YAML, text or NPY; or a TUM line (x y z qx qy qz qw).
+    #[arg(long, value_name = "FILE")]
+    init: PathBuf,
+    /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all
+    /// other forms.
+    #[arg(long, value_name = "UNIT")]
+    init_unit: Option<LengthUnit>,
+}
+
+impl RefineFiles {
+    pub(crate) fn inputs(&self) -> Inputs {
+        Inputs {
+            files: self.files.clone(),
+            region: Region::Mask(self.mask.clone(), self.mask_options.rule()),
+            init: Some(self.init.clone()),
+            init_unit: self.init_unit,
+        }
+    }
+}
+
 /// The part of the image that shows the object.
 #[derive(Clone, Debug)]
 pub(crate) enum Region {
@@ -172,7 +205,7 @@ impl Inputs {
         };
         let (file_mask, bbox) = match &self.region {
             Region::Mask(path, rule) => {
-                let MaskFile { mask, warning } = limits.read_mask(path, *rule)?;
+                let MaskFile { mask, warning, .. } = limits.read_mask(path, *rule)?;
                 let (width, height) = (mask.width(), mask.height());
                 if (width, height) != depth_size && depth_camera.is_none() {
                     let (w, h) = depth_size;

@@ -83,9 +83,9 @@ impl JobOptions {
             Some(_) => report::summary(&refined, &reason),
             None => report::summary_of_estimate(&refined, &reason),
         };
-        let units = warnings::about_units(&model, &observation, &from, inputs, depth_scale);
+        let of_inputs = warnings::about_inputs(&model, &observation, &from, inputs, depth_scale);
         let mut warnings = of_files;
-        warnings.extend(units);
+        warnings.extend(of_inputs);
         warnings.extend(warnings::about_result(&refined));
         let report = Report::new(
             &pipeline.name,

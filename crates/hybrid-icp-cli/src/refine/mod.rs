@@ -1,5 +1,6 @@
 //! `hybrid-icp refine`, and the parts that it shares with `hybrid-icp estimate`.
 
+pub(crate) mod doctor;
 pub(crate) mod estimate;
 mod inputs;
 mod job;
@@ -8,12 +9,9 @@ pub(crate) mod report;
 mod trace;
 pub(crate) mod warnings;
 
-use std::path::PathBuf;
-
 use clap::Args;
-use hicp_io::LengthUnit;
 
-use self::inputs::{ImageFiles, Inputs, MaskOptions, Region};
+use self::inputs::RefineFiles;
 use self::job::JobOptions;
 
 /// Refine one pose in one depth image.
@@ -28,22 +26,7 @@ use self::job::JobOptions;
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    files: ImageFiles,
-    /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
-    /// the object, or opaque if the opacity varies.
-    #[arg(long, value_name = "FILE")]
-    mask: PathBuf,
-    #[command(flatten)]
-    mask_options: MaskOptions,
-    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
-    /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
-    /// order, as JSON, YAML, text or NPY; or a TUM line (x y z qx qy qz qw).
-    #[arg(long, value_name = "FILE")]
-    init: PathBuf,
-    /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all
-    /// other forms.
-    #[arg(long, value_name = "UNIT")]
-    init_unit: Option<LengthUnit>,
+    files: RefineFiles,
     #[command(flatten)]
     job: JobOptions,
 }
@@ -68,11 +51,5 @@ pose.json:   {\"cam_R_m2c\": [1, 0, 0, 0, 1, 0, 0, 0, 1],
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let inputs = Inputs {
-        files: arguments.files.clone(),
-        region: Region::Mask(arguments.mask.clone(), arguments.mask_options.rule()),
-        init: Some(arguments.init.clone()),
-        init_unit: arguments.init_unit,
-    };
-    arguments.job.run(&inputs)
+    arguments.job.run(&arguments.files.inputs())
 }

@@ -3,12 +3,15 @@
 
 use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{Refinement, Warning};
+use hybrid_icp::{Diagnosis, Fault, Refinement, Warning};
 
 use super::inputs::Inputs;
 
 /// The largest depth of a `DepthImage`.
 const MAX_DEPTH_METERS: f32 = 1000.0;
+
+/// The end of warnings about inputs that contradict each other.
+const DOCTOR: &str = "`hybrid-icp doctor` looks for the cause";
 
 /// Returns the reason for the outcome of a refinement.
 ///
@@ -37,17 +40,17 @@ pub(crate) fn reason(
     format!("{cause}, so that {ended}")
 }
 
-/// Returns warnings about units that do not fit together, with the files and options to check.
+/// Returns warnings about inputs that do not fit together, with the files and options to check.
 ///
 /// `pose` is the initial pose, or the estimated one if there is none.
-pub(super) fn about_units(
-    model: &Model,
+pub(super) fn about_inputs(
+    object: &Model,
     observation: &Observation,
     pose: &Isometry3<f64>,
     inputs: &Inputs,
     depth_scale: f64,
 ) -> Vec<String> {
-    let warnings = hybrid_icp::warnings(model, observation, pose).into_iter();
+    let warnings = hybrid_icp::warnings(object, observation, pose).into_iter();
     // If nothing was found, there is no pose to warn of.
     let warnings = warnings.filter(|warning| {
         inputs.init.is_some() || !matches!(warning, Warning::BehindCamera { .. })
@@ -61,23 +64,36 @@ pub(super) fn about_units(
     };
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
-        Warning::BehindCamera { .. } => format!("{init}: {warning}"),
+        Warning::BehindCamera { .. } => format!("{init}: {warning}: {DOCTOR}"),
         Warning::NoDepth => format!(
             "{depth}: {warning} at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): \
              check --depth-scale and {mask}"
         ),
         Warning::Depth { .. } => format!(
-            "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}"
+            "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}; {DOCTOR}"
         ),
         Warning::Mask { .. } | Warning::Sliver { .. } => {
-            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}")
+            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}; {DOCTOR}")
         }
         _ => format!("{model}: {warning}"),
     };
-    warnings.map(in_words).collect()
+    let mut warnings: Vec<String> = warnings.map(in_words).collect();
+    // The other facts are among the warnings above.
+    for fault in Diagnosis::facts(object, observation) {
+        match fault {
+            Fault::MaskEmpty => warnings.push(format!("{mask}: {fault}: {}", fault.fix())),
+            Fault::MeshInsideOut => warnings.push(format!("{model}: {fault}: {}", fault.fix())),
+            _ => {}
+        }
+    }
+    warnings
 }
 
 /// Returns warnings about a refined pose that should not be trusted.
 pub(crate) fn about_result(refined: &Refinement) -> Vec<String> {
-    refined.warnings().iter().map(ToString::to_string).collect()
+    let in_words = |warning: &Warning| match warning {
+        Warning::Unexplained { .. } => format!("{warning}; {DOCTOR}"),
+        _ => warning.to_string(),
+    };
+    refined.warnings().iter().map(in_words).collect()
 }

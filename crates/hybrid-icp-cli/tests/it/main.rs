@@ -26,6 +26,7 @@ mod bop_warnings;
 mod command_line;
 mod common;
 mod demo;
+mod doctor;
 mod estimate;
 mod experiment;
 mod faults;

@@ -1,0 +1,179 @@
+//! `hybrid-icp doctor`.
+
+use hicp_io::{LengthUnit, pose_to_bop};
+use hybrid_icp::core::{DepthImage, Isometry3};
+use serde_json::{Value, json};
+
+use crate::common::*;
+
+/// Runs `doctor` with the arguments of a scene, and returns its text and its JSON.
+fn examine(scene: &Scene) -> (String, Value) {
+    let pairs = scene
+        .arguments
+        .iter()
+        .filter(|(option, _)| *option != "--output");
+    let mut words: Vec<_> = vec!["doctor".into()];
+    words.extend(pairs.flat_map(|(option, value)| [(*option).into(), value.clone()]));
+    let text = run(scene.folder.path(), &words).exits(0).out;
+    words.push("--json".into());
+    let json = run(scene.folder.path(), &words).exits(0).out;
+    (text, serde_json::from_str(&json).unwrap())
+}
+
+/// Asserts that a fault is named first, with an option that corrects it.
+#[track_caller]
+fn names(scene: &Scene, fault: &str, option: Option<&str>) {
+    let (text, json) = examine(scene);
+    let first = &json["faults"][0];
+    assert_eq!(first["fault"], fault, "{text}");
+    assert_eq!(first["option"], json!(option), "{text}");
+    assert!(
+        text.starts_with("fault: ") && text.contains("  fix: "),
+        "{text}"
+    );
+    if let Some(option) = option {
+        assert!(text.contains(&format!("option: {option}")), "{text}");
+    }
+}
+
+/// Writes another initial pose.
+fn posed(change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) -> Scene {
+    let scene = Scene::new();
+    let pose = change(off(&truth(), 5));
+    scene.write("init.json", pose_json(&pose).to_string());
+    scene
+}
+
+#[test]
+fn clean_inputs_have_no_fault() {
+    let (text, json) = examine(&Scene::new());
+    assert_eq!(json["faults"], json!([]));
+    assert!(text.starts_with("no fault found (score 0."), "{text}");
+}
+
+#[test]
+fn wrong_units_and_scales_are_named_with_the_option_that_corrects_them() {
+    let mesh = |unit: &str| Scene::new().with("--model-unit", unit);
+    for (scene, fault, option) in [
+        (mesh("mm"), "mesh_scale", "--model-unit m"),
+        (mesh("cm"), "mesh_scale", "--model-unit m"),
+        (
+            Scene::new().with("--depth-scale", "1"),
+            "depth_scale",
+            "--depth-scale 0.1",
+        ),
+        (
+            Scene::new().with("--depth-scale", "0.001"),
+            "depth_scale",
+            "--depth-scale 0.1",
+        ),
+        // All depths are beyond 1 km and count as missing.
+        (
+            Scene::new().with("--depth-scale", "1000"),
+            "depth_scale",
+            "--depth-scale 0.1",
+        ),
+    ] {
+        names(&scene, fault, Some(option));
+    }
+    let scene = Scene::new();
+    let (rotation, millimeters) = pose_to_bop(&off(&truth(), 5));
+    let meters = millimeters.map(|t| t / 1000.0);
+    let pose = json!({"cam_R_m2c": rotation, "cam_t_m2c": meters});
+    scene.write("init.json", pose.to_string());
+    names(&scene, "translation_scale", Some("--init-unit m"));
+    // The option of the diagnosis corrects the refinement.
+    let refined = scene.with("--init-unit", "m").result();
+    assert!(refined["confidence"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn wrong_poses_are_named() {
+    let turn = Isometry3::rotation(std::f64::consts::PI * hybrid_icp::core::Vector3::x());
+    names(&posed(|pose| pose.inverse()), "pose_inverted", None);
+    names(&posed(|pose| turn * pose), "opengl_pose", None);
+    let transposed =
+        |pose: Isometry3<f64>| Isometry3::from_parts(pose.translation, pose.rotation.inverse());
+    names(&posed(transposed), "rotation_transposed", None);
+}
+
+#[test]
+fn wrong_masks_and_images_are_named() {
+    let mask = hicp_io::read_mask_png(Scene::new().path("mask.png")).unwrap();
+    let masked = |value: &dyn Fn(usize, bool) -> u8| {
+        let scene = Scene::new();
+        let pixels = mask.pixels().iter().enumerate();
+        let pixels: Vec<u8> = pixels.flat_map(|(i, set)| [value(i, *set); 3]).collect();
+        hicp_io::write_rgb_png(scene.path("mask.png"), mask.width(), mask.height(), &pixels)
+            .unwrap();
+        scene
+    };
+    names(&masked(&|_, set| u8::from(!set)), "mask_inverted", None);
+    names(&masked(&|_, _| 0), "mask_empty", None);
+    names(&masked(&|_, _| 1), "mask_too_large", None);
+    let label = |i: usize, set: bool| if set { 3 } else { (i / 4000 % 3) as u8 };
+    names(&masked(&label), "mask_labels", Some("--mask-value 3"));
+    let soft = |i: usize, set: bool| {
+        if set {
+            250 - (i % 50) as u8
+        } else {
+            (i % 40) as u8
+        }
+    };
+    names(&masked(&soft), "mask_soft", Some("--mask-threshold 125"));
+
+    let depth = hicp_io::read_depth_png(Scene::new().path("depth.png"), 0.1).unwrap();
+    let measured = |meters: &dyn Fn(f32) -> f32| {
+        let scene = Scene::new();
+        let (width, height) = (depth.width(), depth.height());
+        let values = depth.pixels().iter().map(|z| meters(*z)).collect();
+        let image = DepthImage::from_meters(width, height, values).unwrap();
+        hicp_io::write_depth_png(scene.path("depth.png"), &image, 0.1).unwrap();
+        scene
+    };
+    names(&measured(&|z| 6.5 - z), "depth_inverted", None);
+    names(
+        &measured(&|z| if z > 0.0 { 0.01 / z } else { 0.0 }),
+        "disparity",
+        None,
+    );
+
+    let scene = Scene::new();
+    let camera: Value = serde_json::from_str(FLAT_CAMERA).unwrap();
+    let doubled = |key: &str| json!(2.0 * camera[key].as_f64().unwrap());
+    let camera =
+        json!({"fx": doubled("fx"), "fy": doubled("fy"), "cx": doubled("cx"), "cy": doubled("cy")});
+    scene.write("camera.json", camera.to_string());
+    names(&scene, "intrinsics", None);
+
+    let scene = Scene::new();
+    let mesh = car();
+    let turned = mesh
+        .triangles()
+        .iter()
+        .map(|[a, b, c]| [*a, *c, *b])
+        .collect();
+    let mesh = hybrid_icp::core::TriMesh::new(mesh.vertices().to_vec(), turned).unwrap();
+    hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
+    names(&scene, "mesh_inside_out", None);
+}
+
+#[test]
+fn an_output_file_has_the_json() {
+    let scene = Scene::new().with("--model-unit", "mm");
+    let (_, json) = examine(&scene);
+    let words = scene
+        .arguments
+        .iter()
+        .flat_map(|(option, value)| [(*option).into(), value.clone()]);
+    let words = std::iter::once("doctor".into()).chain(words);
+    let told = run(scene.folder.path(), words).exits(0);
+    assert!(
+        told.out
+            .starts_with("fault: the mesh is 1000 times too small"),
+        "{}",
+        told.out
+    );
+    let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), json);
+}

@@ -1,0 +1,245 @@
+//! A diagnosis of the inputs of a refinement.
+
+mod fault;
+mod hypotheses;
+mod images;
+mod inputs;
+mod scales;
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use hicp_core::{Facing, Isometry3, Model, Observation, Problem, TriMesh};
+use hicp_icp::{Session, Stage, Workspace};
+use hicp_raster::Rasterizer;
+use hicp_score::{Flatness, MeanVsd, Score};
+
+pub use fault::Fault;
+
+use self::inputs::Inputs;
+use crate::checks::warnings;
+use crate::presets::{self, Local};
+use crate::warning::Warning;
+
+/// Smallest improvement of the score that names a fault.
+const CLEAR: f64 = 0.05;
+/// The same for distances along the ray, which differ little from depths.
+const CLEAR_RAY: f64 = 0.03;
+/// Share of the distance: a move by it is as costly as a move by the diameter.
+const DISTANCE: f64 = 0.2;
+
+/// Number of corrections that are refined: those with the lowest MVE at the initial pose.
+const TRIALS: usize = 8;
+/// A corrected score below which a flat measured surface is no reason to doubt the mask.
+const EXPLAINED: f64 = 0.15;
+/// The same as a share of the score of the inputs as they are.
+const MUCH_BETTER: f64 = 0.4;
+
+/// A fault, and the evidence for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Finding {
+    /// The fault.
+    pub fault: Fault,
+    /// The score of the corrected inputs, to compare with [`Diagnosis::score`]. `None` if the fault
+    /// is a fact that needs no comparison.
+    pub score: Option<f64>,
+}
+
+/// The probable faults of the inputs of a refinement.
+///
+/// Each of some 25 hypotheses corrects the inputs as if they had one fault. A short refinement then
+/// scores the corrected inputs, if their initial pose explains the image better than most others. A
+/// fault is named if its correction improves the score clearly.
+///
+/// The score is the MVE of the refined pose, plus the mean distance in diameters by which the
+/// refinement moved the object's points. It is 1 if the numbers of the inputs exclude each other
+/// ([`warnings`](crate::warnings)).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Diagnosis {
+    /// The faults, the most probable one first. Empty if none is probable.
+    pub findings: Vec<Finding>,
+    /// The score of the inputs as they are: 0 is perfect, 1 the worst.
+    pub score: f64,
+}
+
+impl Diagnosis {
+    /// Examines inputs; `init` is camera from object, meters.
+    ///
+    /// The pose may be off by some millimeters and degrees, as those of detectors are. Inputs
+    /// without a fault can still give a bad pose. Deterministic. Cost: about 9 refinements and 30
+    /// scores.
+    ///
+    /// ```
+    /// use hybrid_icp::{Diagnosis, Fault, core::*};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let corners = [[-0.1, -0.1, 0.], [0.1, -0.1, 0.], [0.1, 0.1, 0.], [-0.1, 0.1, 0.]].map(Point3::from);
+    /// # let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 2, 1], [0, 3, 2]])?);
+    /// # let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
+    /// // A plate half a meter away, but the depth was read at ten times its scale.
+    /// let shown = |i: usize| (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64));
+    /// let depth = (0..64 * 64).map(|i| if shown(i) { 5.0 } else { 0.0 }).collect();
+    /// let depth = DepthImage::from_meters(64, 64, depth)?;
+    /// let mask = Mask::new(64, 64, (0..64 * 64).map(shown).collect())?;
+    /// let observation = Observation::new(depth, mask, camera)?;
+    /// let init = Isometry3::translation(0.0, 0.0, 0.503);
+    /// let diagnosis = Diagnosis::of(&model, &observation, &init);
+    /// assert_eq!(diagnosis.fault(), Some(&Fault::DepthScale { factor: 0.1 }));
+    /// # Ok(()) }
+    /// ```
+    #[must_use]
+    pub fn of(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Self {
+        let inputs = Inputs {
+            model: Cow::Borrowed(model),
+            depth: Arc::clone(observation.shared_depth()),
+            mask: Cow::Borrowed(observation.mask()),
+            camera: *observation.camera(),
+            init: *init,
+        };
+        let facts = Self::facts(model, observation);
+        let fact = |fault| Finding { fault, score: None };
+        if facts.contains(&Fault::MaskEmpty) {
+            let findings = facts.into_iter().map(fact).collect();
+            return Self {
+                findings,
+                score: 1.0,
+            };
+        }
+        let mut judge = Judge::default();
+        let (score, flat) = judge.refined(&inputs);
+        let mut trials = Vec::new();
+        for (fault, inputs) in hypotheses::ALL.iter().flat_map(|of| of(&inputs)) {
+            trials.push((judge.initial(&inputs), fault, inputs));
+        }
+        trials.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut found = Vec::new();
+        for (_, fault, inputs) in trials.into_iter().take(TRIALS) {
+            let handicap = hypotheses::handicap(&fault);
+            let (corrected, _) = judge.refined(&inputs);
+            let is_named = match fault {
+                // Pixels without a measurement have no effect on the score.
+                Fault::MaskTooLarge { outside } if outside > 0.5 => corrected < 0.5,
+                Fault::RayDistance => corrected + CLEAR_RAY < score,
+                _ => corrected + handicap + CLEAR < score,
+            };
+            if is_named {
+                let score = Some(corrected);
+                found.push((corrected + handicap, Finding { fault, score }));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = found.first().map(|(score, _)| *score);
+        let mut findings: Vec<_> = found.into_iter().map(|(_, finding)| finding).collect();
+        let explained = best.is_some_and(|best| best < EXPLAINED.max(MUCH_BETTER * score));
+        if flat && !explained {
+            findings.insert(0, fact(Fault::PlaneInMask { share: 1.0 }));
+        }
+        findings.extend(facts.into_iter().map(fact));
+        Self { findings, score }
+    }
+
+    /// Returns the faults that need no comparison: an empty mask, a mask without depth, and a mesh
+    /// that is inside out.
+    ///
+    /// Cost: O(triangles).
+    #[must_use]
+    pub fn facts(model: &Model, observation: &Observation) -> Vec<Fault> {
+        let mut facts = Vec::new();
+        if observation.region().is_empty() {
+            facts.push(Fault::MaskEmpty);
+        } else if observation.n_measured() == 0 {
+            facts.push(Fault::NoDepth);
+        }
+        if is_inside_out(model.mesh()) {
+            facts.push(Fault::MeshInsideOut);
+        }
+        facts
+    }
+
+    /// Returns the most probable fault.
+    #[must_use]
+    pub fn fault(&self) -> Option<&Fault> {
+        self.findings.first().map(|finding| &finding.fault)
+    }
+}
+
+/// Scores inputs.
+struct Judge {
+    stage: Local,
+    workspace: Workspace,
+}
+
+impl Default for Judge {
+    fn default() -> Self {
+        Self {
+            stage: presets::local(),
+            workspace: Workspace::new(Rasterizer::default()),
+        }
+    }
+}
+
+impl Judge {
+    /// Returns the observation, or `None` if the numbers of the inputs exclude each other.
+    fn observation(inputs: &Inputs<'_>) -> Option<Observation> {
+        let depth = Arc::clone(&inputs.depth);
+        let observation = Observation::new(depth, inputs.mask.as_ref().clone(), inputs.camera);
+        let observation = observation.ok()?;
+        let excluded = |warning: &Warning| !matches!(warning, Warning::CoarseCoordinates { .. });
+        let warnings = warnings(&inputs.model, &observation, &inputs.init);
+        (!warnings.iter().any(excluded)).then_some(observation)
+    }
+
+    /// Returns the MVE of the initial pose.
+    fn initial(&mut self, inputs: &Inputs<'_>) -> f64 {
+        let Some(observation) = Self::observation(inputs) else {
+            return 1.0;
+        };
+        let problem = Problem::new(inputs.model.as_ref(), &observation);
+        let mut context = self.workspace.context(&problem);
+        MeanVsd::default().score(&mut context, &inputs.init)
+    }
+
+    /// Returns the score, and whether a plane explains the depth better than the model does.
+    fn refined(&mut self, inputs: &Inputs<'_>) -> (f64, bool) {
+        let (model, init) = (inputs.model.as_ref(), &inputs.init);
+        let Some(observation) = Self::observation(inputs) else {
+            return (1.0, false);
+        };
+        let problem = Problem::new(model, &observation);
+        let (stage, observer) = (&mut self.stage, &mut ());
+        let mut session = Session::new(&mut self.workspace, observer);
+        let refined = stage.run(&problem, init, &mut session).camera_from_object;
+        let mut context = self.workspace.context(&problem);
+        let mut mve = |pose| MeanVsd::default().score(&mut context, pose);
+        let samples = model.samples().iter();
+        let samples = samples.map(|sample| sample.point.cast::<f64>());
+        let moved: f64 = samples.map(|p| (refined * p - init * p).norm()).sum();
+        let length = model.diameter().min(DISTANCE * (init * model.center()).z);
+        let moved = moved / (model.samples().len().max(1) as f64 * length);
+        let score = mve(init).min(mve(&refined) + moved);
+        let flat = Flatness::at(&mut context, &refined).is_some_and(|flat| flat.is_flat());
+        (score, flat)
+    }
+}
+
+/// Returns whether the triangles of a mesh face inward.
+///
+/// An open mesh is judged by the volume that it would enclose.
+fn is_inside_out(mesh: &TriMesh) -> bool {
+    if mesh.is_closed() {
+        return mesh.facing() == Facing::Inward;
+    }
+    let Some(origin) = mesh.used_points().next() else {
+        return false;
+    };
+    let corners = (0..mesh.triangles().len()).map(|triangle| mesh.corners(triangle));
+    let volumes = corners.map(|corners| {
+        let [a, b, c] = corners.map(|p| (p - origin).cast::<f64>());
+        a.dot(&b.cross(&c))
+    });
+    let (sum, size) = volumes.fold((0.0, 0.0), |(sum, size), v| (sum + v, size + v.abs()));
+    sum < -0.2 * size
+}

@@ -1,0 +1,113 @@
+//! Hypotheses about units, scales and resolutions.
+
+use std::borrow::Cow;
+
+use hicp_core::{Model, ModelConfig, PinholeCamera, TriMesh};
+
+use super::fault::Fault;
+use super::inputs::{Inputs, decimal, median, nearest};
+
+/// Factors between decimal units of meshes.
+pub(super) const DECIMAL: [f64; 6] = [1e-3, 1e-2, 0.1, 10.0, 100.0, 1000.0];
+/// Inches in millimeters, centimeters and meters.
+const INCHES: [f64; 3] = [25.4, 2.54, 0.0254];
+/// Widths and heights of images.
+#[rustfmt::skip]
+const SIZES: [[f64; 2]; 24] = [
+    [320., 240.], [424., 240.], [480., 270.], [512., 424.], [640., 360.], [640., 400.],
+    [640., 480.], [640., 512.], [640., 576.], [720., 540.], [800., 600.], [848., 480.],
+    [960., 540.], [1024., 768.], [1024., 1024.], [1280., 720.], [1280., 800.], [1280., 960.],
+    [1280., 1024.], [1440., 1080.], [1600., 1200.], [1920., 1080.], [2048., 1536.], [3840., 2160.],
+];
+/// Factors between images of the same shape.
+const FACTORS: [f64; 8] = [0.25, 1.0 / 3.0, 0.5, 0.75, 1.5, 2.0, 3.0, 4.0];
+/// Mantissas of usual depth scales.
+const MANTISSAS: [f64; 6] = [1.0, 2.0, 2.5, 4.0, 5.0, 8.0];
+
+pub(super) fn mesh_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    let model = &inputs.model;
+    let angle = (inputs.n_masked() as f64).sqrt() / inputs.camera.fx();
+    // The camera is outside of the bounding sphere, and the mask fits the diameter.
+    let plausible = |factor: &f64| {
+        let z = (inputs.init * (model.center() * *factor)).z;
+        let seen = angle * z / (factor * model.diameter());
+        z > factor * model.radius() && (0.04..1.2).contains(&seen)
+    };
+    let scaled = |factor: f64| {
+        let vertices = model.mesh().vertices().iter();
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let vertices = vertices.map(|p| (p.cast::<f64>() * factor).cast::<f32>());
+        let mesh = TriMesh::new(vertices.collect(), model.mesh().triangles().to_vec()).ok()?;
+        let config = ModelConfig {
+            samples: model.samples().len(),
+            diameter: Some(model.diameter() * factor),
+            ..ModelConfig::default()
+        };
+        let model = Cow::Owned(Model::with_config(mesh, config));
+        let inputs = Inputs {
+            model,
+            ..inputs.clone()
+        };
+        Some((Fault::MeshScale { factor }, inputs))
+    };
+    let factors = DECIMAL.into_iter().chain(INCHES).filter(plausible);
+    factors.filter_map(scaled).collect()
+}
+
+pub(super) fn depth_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    let ratio = inputs.median(|rendered, measured| rendered / measured);
+    let factor = ratio.and_then(|ratio| nearest(ratio, decimal(&MANTISSAS), 0.1));
+    let factor = factor.filter(|factor| !(0.6..1.6).contains(factor));
+    let scaled = |factor| {
+        let inputs = inputs.with_depth(|_, _, z| factor * z);
+        (Fault::DepthScale { factor }, inputs)
+    };
+    factor.map(scaled).into_iter().collect()
+}
+
+pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    let pixels = inputs.depth.pixels().iter().zip(inputs.mask.pixels());
+    let depths = pixels.filter(|(z, set)| **set && **z > 0.0);
+    let middle = median(depths.map(|(z, _)| f64::from(*z)).collect());
+    let ratio = middle.map(|middle| middle / inputs.init.translation.z);
+    let factor = ratio.and_then(|ratio| nearest(ratio, decimal(&[1.0]), 0.8));
+    let factor = factor.filter(|factor| *factor != 1.0);
+    let scaled = |factor| {
+        let inputs = inputs.with_scaled_translation(factor);
+        (Fault::TranslationScale { factor }, inputs)
+    };
+    factor.map(scaled).into_iter().collect()
+}
+
+/// The principal point is near the middle of the image that the intrinsics belong to.
+///
+/// The images of another resolution are scaled by axis, or cropped on two sides.
+pub(super) fn intrinsics<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    let old = inputs.camera;
+    let (width, height) = (f64::from(old.width()), f64::from(old.height()));
+    let same_shape = FACTORS.map(|factor| [width / factor, height / factor]);
+    let sizes = SIZES.into_iter().filter(|[w, h]| w * height != h * width);
+    let centered = |[w, h]: &[f64; 2]| {
+        let off = |center: f64, side: f64| (2.0 * center / side - 1.0).abs();
+        off(old.cx(), *w).max(off(old.cy(), *h)) < 0.12
+    };
+    let sizes = same_shape.into_iter().chain(sizes).filter(centered);
+    let corrected = sizes.flat_map(|[w, h]| {
+        let (x, y) = (width / w, height / h);
+        let scaled = [old.fx() * x, old.fy() * y, old.cx() * x, old.cy() * y];
+        let s = x.max(y);
+        let (cx, cy) = (old.cx() - w / 2.0, old.cy() - h / 2.0);
+        let (cx, cy) = (cx * s + width / 2.0, cy * s + height / 2.0);
+        let cropped = (x != y).then_some([old.fx() * s, old.fy() * s, cx, cy]);
+        std::iter::once(scaled).chain(cropped)
+    });
+    let found = corrected.filter_map(|[fx, fy, cx, cy]| {
+        let camera = PinholeCamera::new(fx, fy, cx, cy, old.width(), old.height()).ok()?;
+        let inputs = Inputs {
+            camera,
+            ..inputs.clone()
+        };
+        Some((Fault::Intrinsics { fx, fy, cx, cy }, inputs))
+    });
+    found.collect()
+}
