@@ -120,7 +120,8 @@ impl fmt::Display for Accepts {
 
 impl Accepts {
     /// Returns the default as the catalog states it; `None` if the parameter is required.
-    pub(crate) fn default(&self) -> Option<String> {
+    #[must_use]
+    pub fn default(&self) -> Option<String> {
         match self {
             Self::Number { default, .. } => default.map(|number| number.to_string()),
             Self::Count { default, .. } => default.map(|count| count.to_string()),

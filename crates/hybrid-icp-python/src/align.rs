@@ -4,89 +4,12 @@ use std::path::PathBuf;
 
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
-use hybrid_icp::icp::Verdict;
-use hybrid_icp::{Alignment, CloudOptions, Registration};
+use hybrid_icp::{CloudOptions, Registration};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, Motion};
 use crate::errors::{self, InputError};
-
-/// The result of a registration of two point clouds, from `align`.
-///
-/// If the pose could not be refined, `T_ts` has the numbers that were passed, and `outcome` is
-/// "kept_initial". This is not an error.
-#[pyclass(frozen, module = "hybrid_icp", name = "Alignment")]
-#[derive(Debug)]
-pub(crate) struct PyAlignment {
-    alignment: Alignment,
-    matrix: [f64; 16],
-}
-
-#[pymethods]
-#[allow(non_snake_case)] // T_ts names the frames of the pose, as in Python.
-impl PyAlignment {
-    /// The pose, target from source, shape (4, 4), float64, meters.
-    #[getter]
-    fn T_ts(&self) -> Matrix {
-        Matrix::new(4, self.matrix.to_vec())
-    }
-
-    /// "refined", or "kept_initial" if the pose was not changed.
-    #[getter]
-    fn outcome(&self) -> &'static str {
-        match self.alignment.outcome.verdict {
-            Verdict::Refined => "refined",
-            Verdict::KeptInitial(_) => "kept_initial",
-        }
-    }
-
-    /// The reason why the registration ended, such as "converged" or "no_pairs".
-    #[getter]
-    fn termination(&self) -> &'static str {
-        self.alignment.outcome.termination.name()
-    }
-
-    /// Number of iterations.
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.alignment.outcome.iterations
-    }
-
-    /// Share of the source points that have a counterpart, 0 to 1.
-    #[getter]
-    fn fitness(&self) -> f64 {
-        self.alignment.fitness()
-    }
-
-    /// Root mean square of the distances of pairs, meters; None without pairs.
-    #[getter]
-    fn rmse(&self) -> Option<f64> {
-        self.alignment.rmse()
-    }
-
-    /// Covariance of the pose, shape (6, 6), float64; None if a direction is not determined.
-    ///
-    /// Translation first, meters and radians; a left perturbation in the frame of the target.
-    #[getter]
-    fn covariance(&self) -> Option<Matrix> {
-        self.alignment.covariance().as_ref().map(Matrix::from)
-    }
-
-    /// Reasons not to trust the pose, as sentences; empty if there are none.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        let warnings = self.alignment.warnings.iter();
-        warnings.map(ToString::to_string).collect()
-    }
-
-    fn __repr__(&self) -> String {
-        let (outcome, fitness) = (self.outcome(), self.fitness());
-        format!(
-            "Alignment({outcome}, {}, fitness {fitness:.3})",
-            self.termination()
-        )
-    }
-}
+use crate::results;
 
 /// Registers two point clouds: finds the pose that moves the source onto the target.
 ///
@@ -118,8 +41,8 @@ impl PyAlignment {
 #[pyfunction]
 #[pyo3(signature = (source, target, T_ts = None, *, source_normals = None, target_normals = None, method = "point-to-plane", max_distance = None, voxel = None, neighbors = 20))]
 #[allow(non_snake_case, clippy::too_many_arguments)]
-pub(crate) fn align(
-    py: Python<'_>,
+pub(crate) fn align<'py>(
+    py: Python<'py>,
     source: &Bound<'_, PyAny>,
     target: &Bound<'_, PyAny>,
     T_ts: Option<&Bound<'_, PyAny>>,
@@ -129,7 +52,7 @@ pub(crate) fn align(
     max_distance: Option<f32>,
     voxel: Option<f32>,
     neighbors: usize,
-) -> PyResult<PyAlignment> {
+) -> PyResult<Bound<'py, PyAny>> {
     let method: Registration = method.parse().map_err(errors::input)?;
     for (name, length) in [("max_distance", max_distance), ("voxel", voxel)] {
         if let Some(length) = length.filter(|x| !(x.is_finite() && *x > 0.0)) {
@@ -149,10 +72,7 @@ pub(crate) fn align(
     let target = Points::read(target, target_normals, "target")?;
     let init = match T_ts {
         Some(pose) => array::motion(pose, "T_ts")?,
-        None => Motion {
-            isometry: Isometry3::identity(),
-            matrix: array::to_matrix(&Isometry3::identity()),
-        },
+        None => Motion::new(Isometry3::identity()),
     };
     let alignment = py.detach(|| -> PyResult<_> {
         let source = source.cloud(&options.for_source_of(method))?;
@@ -165,12 +85,7 @@ pub(crate) fn align(
             &mut pipeline,
         ))
     })?;
-    let matrix = match alignment.outcome.verdict {
-        Verdict::Refined => array::to_matrix(&alignment.target_from_source()),
-        // The numbers that were passed, which can be orthogonal only to their precision.
-        Verdict::KeptInitial(_) => init.matrix,
-    };
-    Ok(PyAlignment { alignment, matrix })
+    results::alignment(py, &alignment, &init)
 }
 
 /// Reads a point cloud in meters, from a file of any supported format.

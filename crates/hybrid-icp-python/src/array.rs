@@ -64,6 +64,30 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     ))
 }
 
+/// Returns anything with `__array__`, such as a tensor or a picture, as a NumPy array.
+///
+/// Masked arrays are refused, because NumPy would ignore their mask. If the conversion fails, as it
+/// does for a tensor on a GPU, the error has the advice of its library.
+pub(crate) fn as_array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if value.cast::<PyUntypedArray>().is_ok() {
+        let masked = value.py().import("numpy.ma")?.getattr("MaskedArray")?;
+        if value.is_instance(&masked)? {
+            return Err(InputError::new_err(format!(
+                "{name} is a masked array, expected a plain one, such as {name}.filled(0)"
+            )));
+        }
+        return Ok(value.clone());
+    }
+    if !value.hasattr("__array__")? {
+        return Ok(value.clone());
+    }
+    let numpy = value.py().import("numpy")?;
+    numpy.call_method1("asarray", (value,)).map_err(|error| {
+        let reason = error.value(value.py());
+        InputError::new_err(format!("{name} is {}: {reason}", describe(value)))
+    })
+}
+
 /// Returns the array if it is aligned, and a copy otherwise (for a field of packed records).
 pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match value.cast::<PyUntypedArray>() {
@@ -149,6 +173,13 @@ pub(crate) fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Point
 pub(crate) struct Motion {
     pub(crate) isometry: Isometry3<f64>,
     pub(crate) matrix: [f64; 16],
+}
+
+impl Motion {
+    pub(crate) fn new(isometry: Isometry3<f64>) -> Self {
+        let matrix = to_matrix(&isometry);
+        Self { isometry, matrix }
+    }
 }
 
 /// Reads a rigid motion from a 4×4 matrix, meters.

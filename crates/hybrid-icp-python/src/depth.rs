@@ -143,6 +143,10 @@ impl PyDepthImage {
         image(self.0.width(), self.0.pixels())
     }
 
+    fn __getnewargs__(&self) -> (Matrix<f32>,) {
+        (self.to_numpy(),)
+    }
+
     fn __repr__(&self) -> String {
         format!("DepthImage({}x{})", self.0.width(), self.0.height())
     }
@@ -162,6 +166,7 @@ pub(crate) fn shared(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<A
 
 /// Reads a depth image, meters, in one pass.
 fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
+    let value = &array::as_array("depth", value)?;
     let array = value
         .cast::<PyUntypedArray>()
         .map_err(|_| unexpected("depth", value, EXPECTED_DEPTH))?;
@@ -216,13 +221,13 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
         return Ok(Mask::full(depth.width(), depth.height()));
     };
     let expected = "an (H, W) array of bool or uint8, not zero on the object";
+    let value = &array::as_array("mask", value)?;
     let (set, size) = if let Ok(mask) = value.extract::<PyReadonlyArray2<'_, bool>>() {
         (array::row_major(&mask.as_array()), size(&mask.as_array())?)
     } else if let Ok(mask) = value.extract::<PyReadonlyArray2<'_, u8>>() {
-        (
-            mask.as_array().iter().map(|m| *m != 0).collect(),
-            size(&mask.as_array())?,
-        )
+        let mask = mask.as_array();
+        warn_of_labels(value, &mask)?;
+        (mask.iter().map(|m| *m != 0).collect(), size(&mask)?)
     } else {
         return Err(unexpected("mask", value, expected));
     };
@@ -235,6 +240,22 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
         )));
     }
     Mask::new(size.0, size.1, set).map_err(errors::input)
+}
+
+/// Warns of a mask with several values above 0.
+fn warn_of_labels(value: &Bound<'_, PyAny>, mask: &ArrayView2<'_, u8>) -> PyResult<()> {
+    let mut seen = [false; 256];
+    mask.iter().for_each(|m| seen[usize::from(*m)] = true);
+    let values: Vec<usize> = (1..256).filter(|m| seen[*m]).collect();
+    if let [first, _, .., last] | [first, last] = values[..] {
+        let text = format!(
+            "mask has {} values from {first} to {last}: expected one object; pass mask == N for a \
+             label image, or mask >= 128 for a soft mask",
+            values.len()
+        );
+        errors::warn(value.py(), &text)?;
+    }
+    Ok(())
 }
 
 /// Returns the median of the positive depths, or `None` if there are none.

@@ -7,6 +7,7 @@ use hybrid_icp::fusion::{
     PoseEstimate, SymmetryAware, Transport, UnitCovariance,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
 use crate::errors;
@@ -86,6 +87,15 @@ impl PyPoseEstimate {
     /// float
     fn mahalanobis_squared(&self, other: &Self) -> f64 {
         self.0.mahalanobis_squared(&other.0)
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<((Matrix, Matrix), Bound<'py, PyDict>)> {
+        let options = PyDict::new(py);
+        options.set_item("mve", self.mve())?;
+        Ok(((self.T_co(), self.covariance()), options))
     }
 
     fn __repr__(&self) -> String {

@@ -22,7 +22,6 @@ mod bop;
 mod camera;
 mod depth;
 mod errors;
-mod events;
 mod fusion;
 mod image;
 mod model;
@@ -30,10 +29,11 @@ mod mutex;
 mod observation;
 mod observer;
 mod pipeline;
-mod result;
+mod results;
 mod score;
 mod sequential;
 mod step;
+mod toml;
 mod tracker;
 
 /// The native module that the package re-exports.
@@ -41,15 +41,13 @@ mod tracker;
 #[pyo3(name = "_native")]
 mod native {
     #[pymodule_export]
-    use crate::align::{PyAlignment, align, read_cloud};
+    use crate::align::{align, read_cloud};
     #[pymodule_export]
     use crate::bop::{PyDatasetRefiner, read_images, result_header};
     #[pymodule_export]
     use crate::camera::PyCamera;
     #[pymodule_export]
     use crate::depth::PyDepthImage;
-    #[pymodule_export]
-    use crate::events::{PyIterationEvent, PyRegimeEvent, PyStageEvent};
     #[pymodule_export]
     use crate::fusion::{PyFuser, PyPoseEstimate, fuse};
     #[pymodule_export]
@@ -61,13 +59,13 @@ mod native {
     #[pymodule_export]
     use crate::pipeline::PyPipeline;
     #[pymodule_export]
-    use crate::result::PyResultOf;
-    #[pymodule_export]
     use crate::score::{add, adi, mspd, mssd, mve, render_depth, vsd};
     #[pymodule_export]
-    use crate::sequential::{PySequentialEstimator, PySequentialStep};
+    use crate::sequential::PySequentialEstimator;
     #[pymodule_export]
     use crate::step::{point_to_plane_step, point_to_point_step};
     #[pymodule_export]
-    use crate::tracker::{PyTracked, PyTracker};
+    use crate::toml::parts;
+    #[pymodule_export]
+    use crate::tracker::PyTracker;
 }

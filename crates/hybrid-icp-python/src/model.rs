@@ -3,15 +3,19 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use hicp_bop::ModelFolder;
 use hicp_io::LengthUnit;
+use hicp_io::bop::Dataset;
 use hybrid_icp::core::{
     MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, Point3, Symmetries, SymmetryAxis,
     TriMesh, Vector3,
 };
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::warnings_of_model;
+use numpy::PyArrayMethods;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
 use crate::errors::{self, InputError};
@@ -55,6 +59,9 @@ pub(crate) struct PyModel {
     /// Computed for the first pose error.
     points: OnceLock<ModelPoints>,
 }
+
+/// The positional and the named arguments that create a model again.
+type Arguments<'py> = ((Matrix<f32>, Matrix<u32>), Bound<'py, PyDict>);
 
 /// The arguments that both constructors have in addition to the mesh.
 struct Options<'a, 'py> {
@@ -123,6 +130,128 @@ impl PyModel {
         options.model(py, mesh)
     }
 
+    /// Reads a model of a BOP dataset, with its diameter and its symmetries.
+    ///
+    /// Parameters
+    /// ----------
+    /// folder : str or os.PathLike
+    ///     The dataset, or its folder of models.
+    /// obj_id : int
+    ///     The number of the object.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    ///
+    /// Raises
+    /// ------
+    /// FileError
+    ///     If a file cannot be read, or there is no such model.
+    #[staticmethod]
+    fn from_bop(py: Python<'_>, folder: PathBuf, obj_id: u32) -> PyResult<Self> {
+        let model = py
+            .detach(|| {
+                let models = match folder.join("models").is_dir() {
+                    true => Dataset::open(&folder)?.models_dir()?.to_path_buf(),
+                    false => folder.clone(),
+                };
+                ModelFolder::open(models)?.read(obj_id)
+            })
+            .map_err(errors::file)?;
+        model.map(Self::of).ok_or_else(|| {
+            let folder = folder.display();
+            errors::FileError::new_err(format!("{folder}: no model of object {obj_id}"))
+        })
+    }
+
+    /// Creates a model from a mesh of trimesh, or from anything with `vertices` and `faces`.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : trimesh.Trimesh
+    /// unit : {"m", "mm", "cm"}
+    ///     Unit of its coordinates.
+    /// samples, diameter, symmetries, symmetry_axes
+    ///     As for `Model`.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    #[staticmethod]
+    #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new()))]
+    fn from_trimesh(
+        py: Python<'_>,
+        mesh: &Bound<'_, PyAny>,
+        unit: &str,
+        samples: usize,
+        diameter: Option<f64>,
+        symmetries: Option<&Bound<'_, PyAny>>,
+        symmetry_axes: Vec<([f64; 3], [f64; 3])>,
+    ) -> PyResult<Self> {
+        let (vertices, faces) = (mesh.getattr("vertices")?, mesh.getattr("faces")?);
+        let (vertices, faces) = (&vertices, &faces);
+        Self::new(
+            py,
+            vertices,
+            faces,
+            unit,
+            samples,
+            diameter,
+            symmetries,
+            symmetry_axes,
+        )
+    }
+
+    /// Returns the pose that is equivalent by a declared symmetry and nearest to another pose.
+    ///
+    /// Parameters
+    /// ----------
+    /// T_co : array_like, shape (4, 4)
+    ///     Camera from object, meters.
+    /// reference : array_like, shape (4, 4)
+    ///     Camera from object, meters, such as the pose in the previous image.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, shape (4, 4), float64
+    ///     Camera from object, meters.
+    #[allow(non_snake_case)]
+    fn nearest_equivalent(
+        &self,
+        T_co: &Bound<'_, PyAny>,
+        reference: &Bound<'_, PyAny>,
+    ) -> PyResult<Matrix> {
+        let pose = array::motion(T_co, "T_co")?.isometry;
+        let reference = array::motion(reference, "reference")?.isometry;
+        let symmetries = self.model.symmetries();
+        let nearest = symmetries.nearest_equivalent(&pose, &reference);
+        Ok(Matrix::from(&nearest))
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Arguments<'py>> {
+        let symmetries = self.model.symmetries();
+        let options = PyDict::new(py);
+        options.set_item("samples", self.model.samples().len())?;
+        options.set_item("diameter", self.model.diameter())?;
+        let discrete = symmetries.discrete.iter().flat_map(array::to_matrix);
+        let matrices = Matrix::new(16, discrete.collect()).into_pyobject(py)?;
+        options.set_item(
+            "symmetries",
+            matrices.reshape([symmetries.discrete.len(), 4, 4])?,
+        )?;
+        let axes = symmetries.continuous.iter();
+        let axes = axes.map(|axis| (*axis.direction().as_ref(), axis.offset().coords));
+        let axes: Vec<([f64; 3], [f64; 3])> = axes.map(|(a, o)| (a.into(), o.into())).collect();
+        options.set_item("symmetry_axes", axes)?;
+        Ok(((self.vertices(), self.faces()), options))
+    }
+
+    fn _repr_png_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py()
+            .import("hybrid_icp._pictures")?
+            .call_method1("of_model", (slf,))
+    }
+
     /// The vertices, shape (V, 3), float32, meters, object frame.
     #[getter]
     fn vertices(&self) -> Matrix<f32> {
@@ -167,6 +296,13 @@ impl PyModel {
 }
 
 impl PyModel {
+    fn of(model: Model) -> Self {
+        Self {
+            model,
+            points: OnceLock::new(),
+        }
+    }
+
     /// Returns the points for pose errors, computed on the first call.
     pub(crate) fn points(&self) -> &ModelPoints {
         self.points.get_or_init(|| ModelPoints::new(&self.model))
@@ -240,10 +376,7 @@ impl<'a, 'py> Options<'a, 'py> {
             let unit = self.unit.to_string();
             errors::warn(py, &format!("{warning}: check unit={unit:?}"))?;
         }
-        Ok(PyModel {
-            model,
-            points: OnceLock::new(),
-        })
+        Ok(PyModel::of(model))
     }
 }
 

@@ -9,6 +9,7 @@ use crate::array::{self, Matrix};
 use crate::camera::PyCamera;
 use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
+use crate::model::PyModel;
 
 /// A segmented depth image, for refining poses.
 ///
@@ -139,6 +140,72 @@ impl PyObservation {
             normals.extend_from_slice(surfel.normal.as_slice());
         }
         (Matrix::new(3, points), Matrix::new(3, normals))
+    }
+
+    /// Returns the measured minus the rendered depth at the pose of a result.
+    ///
+    /// Parameters
+    /// ----------
+    /// result : Result
+    /// model : Model, optional
+    ///     By default, the model that was refined.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, shape (H, W), float32
+    ///     Meters; NaN where nothing was measured or rendered.
+    #[pyo3(signature = (result, *, model = None))]
+    fn residuals<'py>(
+        slf: &Bound<'py, Self>,
+        result: &Bound<'py, PyAny>,
+        model: Option<&Bound<'py, PyModel>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("hybrid_icp._pictures")?;
+        module.call_method1("residuals", (slf, result, model))
+    }
+
+    /// Creates an observation from a depth image and an intrinsic calibration of Open3D.
+    ///
+    /// Parameters
+    /// ----------
+    /// depth : open3d.geometry.Image
+    ///     Depth in integers of `scale` meters, or in floats of meters.
+    /// intrinsic : open3d.camera.PinholeCameraIntrinsic
+    /// mask : array_like, shape (H, W), bool or uint8, optional
+    ///     Nonzero on the object. By default, every pixel.
+    /// scale : float, optional
+    ///     Meters per unit of integers.
+    ///
+    /// Returns
+    /// -------
+    /// Observation
+    #[staticmethod]
+    #[pyo3(signature = (depth, intrinsic, mask = None, *, scale = 0.001))]
+    fn from_open3d(
+        py: Python<'_>,
+        depth: &Bound<'_, PyAny>,
+        intrinsic: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+        scale: f64,
+    ) -> PyResult<Self> {
+        let depth = py.import("numpy")?.call_method1("asarray", (depth,))?;
+        let kind: String = depth.getattr("dtype")?.getattr("kind")?.extract()?;
+        let size = (intrinsic.getattr("width")?, intrinsic.getattr("height")?);
+        let calibration = intrinsic.getattr("intrinsic_matrix")?;
+        let camera = py
+            .get_type::<PyCamera>()
+            .call_method1("from_K", (calibration, size))?;
+        let scale = (kind != "f").then_some(scale);
+        Self::new(py, &depth, mask, camera.extract()?, scale)
+    }
+
+    fn __getnewargs__(&self) -> (PyDepthImage, Matrix<bool>, PyCamera) {
+        (self.image(), self.mask(), self.camera())
+    }
+
+    fn _repr_png_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("hybrid_icp._pictures")?;
+        module.call_method1("of_observation", (slf,))
     }
 
     fn __repr__(&self) -> String {

@@ -5,10 +5,9 @@ use std::ops::ControlFlow;
 use hybrid_icp::Trace;
 use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
 use pyo3::prelude::*;
-use pyo3::types::PyBool;
 
 use crate::errors::InputError;
-use crate::events::{PyIterationEvent, PyRegimeEvent, PyStageEvent};
+use crate::results::{self, Record};
 
 /// The methods of an observer, in the order of [`Watch::methods`].
 const METHODS: [&str; 3] = ["on_iteration", "on_regime", "on_stage_end"];
@@ -56,26 +55,36 @@ impl Watch {
     }
 
     /// Calls a method. `False` and exceptions stop the run.
-    fn call<E>(&mut self, method: usize, event: impl FnOnce() -> E)
-    where
-        E: for<'py> IntoPyObject<'py>,
-    {
+    fn call(&mut self, method: usize, event: impl for<'py> FnOnce(Python<'py>) -> Record<'py>) {
         let (Some(method), None) = (&self.methods[method], &self.raised) else {
             return;
         };
-        Python::attach(|py| match method.bind(py).call1((event(),)) {
-            Ok(answer) => {
-                let answer = answer.cast::<PyBool>();
-                self.stopped |= answer.is_ok_and(|answer| !answer.is_true());
+        Python::attach(|py| {
+            let answer = event(py).and_then(|event| method.bind(py).call1((event,)));
+            match answer.and_then(|answer| goes_on(&answer)) {
+                Ok(goes_on) => self.stopped |= !goes_on,
+                Err(error) => self.raised = Some(error),
             }
-            Err(error) => self.raised = Some(error),
         });
+    }
+}
+
+/// Reads the answer of an observer: a bool of Python or NumPy, or None to go on.
+fn goes_on(answer: &Bound<'_, PyAny>) -> PyResult<bool> {
+    // Extraction also accepts `numpy.bool_`.
+    match answer.extract() {
+        Ok(goes_on) => Ok(goes_on),
+        Err(_) if answer.is_none() => Ok(true),
+        Err(_) => Err(InputError::new_err(format!(
+            "the observer returned {}, expected True, None, or False to stop",
+            crate::array::describe(answer)
+        ))),
     }
 }
 
 impl Observer for Watch {
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
-        self.call(0, || PyIterationEvent::new(event));
+        self.call(0, |py| results::iteration(py, event));
         if self.stopped || self.raised.is_some() {
             ControlFlow::Break(())
         } else {
@@ -85,11 +94,11 @@ impl Observer for Watch {
 
     fn on_regime(&mut self, event: &RegimeEvent) {
         self.trace.on_regime(event);
-        self.call(1, || PyRegimeEvent::new(event));
+        self.call(1, |py| results::regime(py, event));
     }
 
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {
         self.trace.on_stage_end(event);
-        self.call(2, || PyStageEvent::new(event));
+        self.call(2, |py| results::stage_event(py, event));
     }
 }

@@ -15,7 +15,7 @@ use crate::model::PyModel;
 use crate::mutex::locked;
 use crate::observation::PyObservation;
 use crate::observer::Watch;
-use crate::result::PyResultOf;
+use crate::{results, toml};
 
 const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], meters";
 
@@ -31,8 +31,8 @@ const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], mete
 ///     also search for the object: "search" unless the refined pose explains the image well, "auto"
 ///     only if it explains the image badly. "hybrid" is Hybrid ICP as in the paper, and
 ///     "hybrid-visible" is a variant of it.
-/// overrides : sequence of str, optional
-///     Fields to set, such as "threshold=0.3" of "auto" or "times=3" of "hybrid".
+/// overrides : dict, or sequence of str, optional
+///     Fields to set, such as `{"threshold": 0.3}` of "auto" or `["times=3"]` of "hybrid".
 ///
 /// Raises
 /// ------
@@ -44,7 +44,7 @@ const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], mete
 /// >>> from hybrid_icp import Pipeline
 /// >>> Pipeline()
 /// Pipeline('auto')
-/// >>> Pipeline(overrides=["threshold=0.3"]).name
+/// >>> Pipeline(overrides={"threshold": 0.3}).name
 /// 'auto threshold=0.3'
 /// >>> Pipeline("hybrid")
 /// Pipeline('hybrid')
@@ -67,10 +67,10 @@ type Pickled = (Py<PyAny>, (String, String, Vec<String>));
 #[allow(non_snake_case)]
 impl PyPipeline {
     #[new]
-    #[pyo3(signature = (name = "auto", *, overrides = Vec::new()))]
-    fn new(name: &str, overrides: Vec<String>) -> PyResult<Self> {
+    #[pyo3(signature = (name = "auto", *, overrides = None))]
+    fn new(name: &str, overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let preset: Preset = name.parse().map_err(errors::input)?;
-        Self::parse(name, preset.toml().to_owned(), overrides)
+        Self::parse(name, preset.toml().to_owned(), toml::overrides(overrides)?)
     }
 
     /// Creates a pipeline by name, like `Pipeline(name)`.
@@ -79,15 +79,15 @@ impl PyPipeline {
     /// ----------
     /// name : str
     ///     One of `Pipeline.presets()`.
-    /// overrides : sequence of str, optional
+    /// overrides : dict, or sequence of str, optional
     ///     Fields to set, as for `Pipeline`.
     ///
     /// Returns
     /// -------
     /// Pipeline
     #[staticmethod]
-    #[pyo3(signature = (name, *, overrides = Vec::new()))]
-    fn preset(name: &str, overrides: Vec<String>) -> PyResult<Self> {
+    #[pyo3(signature = (name, *, overrides = None))]
+    fn preset(name: &str, overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         Self::new(name, overrides)
     }
 
@@ -97,7 +97,7 @@ impl PyPipeline {
     /// ----------
     /// text_or_path : str or os.PathLike
     ///     A path object, a string that ends with ".toml", or the text itself.
-    /// overrides : sequence of str, optional
+    /// overrides : dict, or sequence of str, optional
     ///     Fields to set, as for `Pipeline`.
     ///
     /// Returns
@@ -123,8 +123,12 @@ impl PyPipeline {
     /// ... ''')
     /// Pipeline('text')
     #[staticmethod]
-    #[pyo3(signature = (text_or_path, *, overrides = Vec::new()))]
-    fn from_toml(text_or_path: &Bound<'_, PyAny>, overrides: Vec<String>) -> PyResult<Self> {
+    #[pyo3(signature = (text_or_path, *, overrides = None))]
+    fn from_toml(
+        text_or_path: &Bound<'_, PyAny>,
+        overrides: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let overrides = toml::overrides(overrides)?;
         let path = match text_or_path.extract::<String>() {
             Ok(text) if !text.trim_end().ends_with(".toml") || text.contains('\n') => {
                 return Self::parse("text", text, overrides);
@@ -140,6 +144,56 @@ impl PyPipeline {
         };
         let text = PipelineFile::read_text(&path).map_err(errors::file)?;
         Self::parse(&path.to_string_lossy(), text, overrides)
+    }
+
+    /// Creates a pipeline of one ICP stage from its parts.
+    ///
+    /// A part is its name, or a dict with its name as "type" and its parameters. `parts` returns
+    /// all of them.
+    ///
+    /// Parameters
+    /// ----------
+    /// selection, association, metric : str or dict
+    ///     The points to register, how they are paired, and the error to minimize.
+    /// filter, stop : list of str or dict, optional
+    ///     Outlier filters and weights, and stop rules, in order.
+    ///
+    /// Returns
+    /// -------
+    /// Pipeline
+    ///
+    /// Examples
+    /// --------
+    /// >>> from hybrid_icp import Pipeline
+    /// >>> Pipeline.icp(
+    /// ...     selection="visible-surface",
+    /// ...     association="projective",
+    /// ...     metric="point-to-plane",
+    /// ...     filter=[{"type": "max-distance", "limit": 0.25, "unit": "diameters"}],
+    /// ... )
+    /// Pipeline('icp')
+    #[staticmethod]
+    #[pyo3(signature = (*, selection, association, metric, filter = None, stop = None))]
+    fn icp(
+        selection: &Bound<'_, PyAny>,
+        association: &Bound<'_, PyAny>,
+        metric: &Bound<'_, PyAny>,
+        filter: Option<&Bound<'_, PyAny>>,
+        stop: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let mut text = "type = \"icp\"\n".to_owned();
+        for (name, part) in [
+            ("selection", Some(selection)),
+            ("association", Some(association)),
+            ("metric", Some(metric)),
+            ("filter", filter),
+            ("stop", stop),
+        ] {
+            if let Some(part) = part {
+                text += &format!("{name} = {}\n", toml::value(part)?);
+            }
+        }
+        Self::parse("icp", text, Vec::new())
     }
 
     /// Returns the names of the pipelines that ship with the library, Hybrid ICP first.
@@ -215,22 +269,22 @@ impl PyPipeline {
     /// >>> bool(abs(result.T_co[2, 3] - 0.5) < 1e-4)
     /// True
     #[pyo3(signature = (model, observation, T_co, observer = None))]
-    fn refine(
+    fn refine<'py>(
         &self,
-        py: Python<'_>,
-        model: &Bound<'_, PyModel>,
+        py: Python<'py>,
+        model: &Bound<'py, PyModel>,
         observation: &Bound<'_, PyObservation>,
         T_co: &Bound<'_, PyAny>,
         observer: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyResultOf> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let init = array::motion(T_co, "T_co")?;
-        let (model, observation) = (model.get(), observation.get());
-        warn(py, model, observation, [&init].into_iter())?;
+        let (object, observation) = (model.get(), observation.get());
+        warn(py, object, observation, [&init].into_iter())?;
         let mut watch = Watch::new(observer)?;
         let mut refiner = self.take()?;
         let refinement = py.detach(|| {
             refiner.refine_observed(
-                &model.model,
+                &object.model,
                 &observation.observation,
                 &init.isometry,
                 &mut watch,
@@ -239,7 +293,7 @@ impl PyPipeline {
         let others = refiner.alternatives().to_vec();
         self.put_back([refiner]);
         let stages = watch.finish()?.stages;
-        Ok(PyResultOf::new(&init, refinement, stages, others))
+        results::result(model, &init, &refinement, &stages, &others)
     }
 
     /// Finds the pose of an object in its mask, without an initial pose.
@@ -274,17 +328,17 @@ impl PyPipeline {
     /// >>> result = Pipeline("local").estimate(model, Observation(depth, depth > 0, camera))
     /// >>> bool(result.mve < 0.1 and abs(result.T_co[2, 3] - 0.5) < 1e-3)
     /// True
-    fn estimate(
+    fn estimate<'py>(
         &self,
-        py: Python<'_>,
-        model: &Bound<'_, PyModel>,
+        py: Python<'py>,
+        model: &Bound<'py, PyModel>,
         observation: &Bound<'_, PyObservation>,
-    ) -> PyResult<PyResultOf> {
-        let (model, observation) = (model.get(), observation.get());
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (object, observation) = (model.get(), observation.get());
         let mut refiner = self.take()?;
         let (refinement, trace) = py.detach(|| {
             let mut trace = Trace::new();
-            let (model, observation) = (&model.model, &observation.observation);
+            let (model, observation) = (&object.model, &observation.observation);
             (
                 refiner.estimate_observed(model, observation, &mut trace),
                 trace,
@@ -292,12 +346,13 @@ impl PyPipeline {
         });
         let others = refiner.alternatives().to_vec();
         self.put_back([refiner]);
-        let identity = Isometry3::identity();
-        let start = Motion {
-            isometry: identity,
-            matrix: array::to_matrix(&identity),
-        };
-        Ok(PyResultOf::new(&start, refinement, trace.stages, others))
+        results::result(
+            model,
+            &Motion::new(Isometry3::identity()),
+            &refinement,
+            &trace.stages,
+            &others,
+        )
     }
 
     /// Refines many poses of one object in one image, on several threads.
@@ -324,29 +379,29 @@ impl PyPipeline {
     /// InputWarning
     ///     As for `refine`, if no pose fits the image.
     #[pyo3(signature = (model, observation, T_co, threads = None))]
-    fn refine_batch(
+    fn refine_batch<'py>(
         &self,
-        py: Python<'_>,
-        model: &Bound<'_, PyModel>,
+        py: Python<'py>,
+        model: &Bound<'py, PyModel>,
         observation: &Bound<'_, PyObservation>,
         T_co: &Bound<'_, PyAny>,
         threads: Option<usize>,
-    ) -> PyResult<Vec<PyResultOf>> {
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let inits = array::motions(T_co, "T_co", EXPECTED_POSES, 1.0)?;
         let threads = match threads {
             Some(0) => return Err(InputError::new_err("threads is 0, expected 1 or more")),
             Some(threads) => threads,
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
-        let (model, observation) = (model.get(), observation.get());
-        warn(py, model, observation, inits.iter())?;
+        let (object, observation) = (model.get(), observation.get());
+        warn(py, object, observation, inits.iter())?;
         let poses: Vec<Isometry3<f64>> = inits.iter().map(|init| init.isometry).collect();
         let mut refiners = (0..threads.min(poses.len()))
             .map(|_| self.take())
             .collect::<PyResult<Vec<_>>>()?;
         let refined = py.detach(|| {
             batch::run(
-                &model.model,
+                &object.model,
                 &observation.observation,
                 &poses,
                 &mut refiners,
@@ -354,11 +409,34 @@ impl PyPipeline {
         });
         self.put_back(refiners);
         let results = inits.iter().zip(refined?);
-        Ok(results
+        results
             .map(|(init, (refinement, stages, others))| {
-                PyResultOf::new(init, refinement, stages, others)
+                results::result(model, init, &refinement, &stages, &others)
             })
-            .collect())
+            .collect()
+    }
+
+    /// Refines poses of any objects in any images, on several threads.
+    ///
+    /// Parameters
+    /// ----------
+    /// items : iterable of (Model, Observation, T_co)
+    ///     T_co has the shape (4, 4): camera from object, meters.
+    /// threads : int, optional
+    ///     Number of threads. The default is the number that the machine runs at once.
+    ///
+    /// Returns
+    /// -------
+    /// list of Result
+    ///     In the order of the items, with the bits of single calls of `refine`.
+    #[pyo3(signature = (items, threads = None))]
+    fn refine_many<'py>(
+        slf: &Bound<'py, Self>,
+        items: &Bound<'py, PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("hybrid_icp._many")?;
+        module.call_method1("refine", (slf, items, threads))
     }
 
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Pickled> {

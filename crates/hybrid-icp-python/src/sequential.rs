@@ -2,8 +2,8 @@
 
 use std::sync::Mutex;
 
+use hybrid_icp::SequentialEstimator;
 use hybrid_icp::fusion::FusionMethod;
-use hybrid_icp::{SequentialEstimator, SequentialEvent, SequentialStep};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
@@ -13,6 +13,7 @@ use crate::model::PyModel;
 use crate::mutex::locked;
 use crate::observation::PyObservation;
 use crate::pipeline::PyPipeline;
+use crate::results;
 
 /// Estimates the pose of a static object from the images of a moving camera (§V of the paper).
 ///
@@ -79,18 +80,18 @@ impl PySequentialEstimator {
     /// -------
     /// SequentialStep
     #[pyo3(signature = (observation, T_nc = None, covariance = None))]
-    fn step(
+    fn step<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         observation: &Bound<'_, PyObservation>,
         T_nc: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PySequentialStep> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let motion = fusion::motion(T_nc, covariance)?;
         let (model, observation) = (&self.model.get().model, &observation.get().observation);
         // Release the GIL first: another thread may hold the lock for a whole step.
         let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
-        Ok(PySequentialStep::new(&step))
+        results::sequential_step(py, &step)
     }
 
     /// Moves the camera without an image.
@@ -137,55 +138,5 @@ impl PySequentialEstimator {
     fn estimate(&self, py: Python<'_>) -> Option<PyPoseEstimate> {
         py.detach(|| locked(&self.estimator).estimate())
             .map(PyPoseEstimate)
-    }
-}
-
-/// The pose of the object after one image, in the camera frame of that image.
-#[pyclass(frozen, get_all, module = "hybrid_icp", name = "SequentialStep")]
-#[derive(Debug)]
-#[allow(non_snake_case)]
-pub(crate) struct PySequentialStep {
-    /// The fused pose, shape (4, 4), float64, meters. While there is no estimate, the initial pose
-    /// moved with the camera.
-    T_co: Matrix,
-    /// Its covariance of ξ = [ρ; φ], shape (6, 6), float64; None while there is no estimate.
-    covariance: Option<Matrix>,
-    /// The pose that ICP started from, shape (4, 4), float64, meters: the last fused pose, moved
-    /// with the camera.
-    T_init: Matrix,
-    /// The pose that ICP found in this image alone, shape (4, 4), float64, meters.
-    T_registered: Matrix,
-    /// The reason why the registration ended.
-    termination: &'static str,
-    /// The mean VSD estimate of `T_registered`; None if it was not scored.
-    mve: Option<f64>,
-    /// The result of `Fuser.update`, or "no_estimate" or "refused".
-    event: &'static str,
-}
-
-impl PySequentialStep {
-    fn new(step: &SequentialStep) -> Self {
-        Self {
-            T_co: (&step.camera_from_object).into(),
-            covariance: step.covariance.as_ref().map(Matrix::from),
-            T_init: (&step.init).into(),
-            T_registered: (&step.outcome.camera_from_object).into(),
-            termination: step.outcome.termination.name(),
-            mve: step.mve,
-            event: match &step.event {
-                SequentialEvent::Estimated(update) => update.name(),
-                SequentialEvent::NoEstimate(_) => "no_estimate",
-                SequentialEvent::Refused(_) => "refused",
-                _ => "other",
-            },
-        }
-    }
-}
-
-#[pymethods]
-impl PySequentialStep {
-    fn __repr__(&self) -> String {
-        let t = self.T_co.translation();
-        format!("SequentialStep({}, t = {t} m)", self.event)
     }
 }

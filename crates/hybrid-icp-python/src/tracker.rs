@@ -1,16 +1,15 @@
-//! `Tracker` and `Tracked`.
+//! `Tracker`.
 
-use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use hybrid_icp::{Tracked, Tracker, TrackerConfig};
+use hybrid_icp::{Tracker, TrackerConfig};
 use pyo3::prelude::*;
 
-use crate::array::{self, Matrix};
+use crate::array;
 use crate::camera::PyCamera;
 use crate::model::PyModel;
 use crate::mutex::locked;
-use crate::{depth, errors};
+use crate::{depth, errors, results};
 
 /// Tracks a moving object from depth image to depth image, without masks.
 ///
@@ -93,21 +92,21 @@ impl PyTracker {
     /// InputError
     ///     If the sizes of the image, the mask and the camera differ.
     #[pyo3(signature = (depth, seconds, mask = None, *, scale = None))]
-    fn step(
+    fn step<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         depth: &Bound<'_, PyAny>,
         seconds: f64,
         mask: Option<&Bound<'_, PyAny>>,
         scale: Option<f64>,
-    ) -> PyResult<PyTracked> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let depth = depth::shared(depth, scale)?;
         let mask = mask
             .map(|mask| depth::mask(Some(mask), &depth))
             .transpose()?;
         // Release the GIL first: another thread may hold the lock for a whole step.
         let tracked = py.detach(|| locked(&self.0).step(&depth, seconds, mask.as_ref()));
-        tracked.map(PyTracked).map_err(errors::input)
+        results::tracked(py, &tracked.map_err(errors::input)?)
     }
 
     /// Starts again from a rough pose in the next image.
@@ -120,50 +119,5 @@ impl PyTracker {
         let init = array::motion(T_co, "T_co")?.isometry;
         py.detach(|| locked(&self.0).start(&init));
         Ok(())
-    }
-}
-
-/// The pose of a tracked object in an image.
-#[pyclass(frozen, module = "hybrid_icp", name = "Tracked")]
-#[derive(Debug)]
-pub(crate) struct PyTracked(Tracked);
-
-#[pymethods]
-#[allow(non_snake_case)]
-impl PyTracked {
-    /// The pose, camera from object, shape (4, 4), float64, meters.
-    #[getter]
-    fn T_co(&self) -> Matrix {
-        (&self.0.camera_from_object).into()
-    }
-
-    /// "tracking", "doubtful" (the image does not determine the pose, or does not show the object
-    /// for some frames) or "lost" (the pose is a guess).
-    #[getter]
-    fn state(&self) -> &'static str {
-        self.0.state.name()
-    }
-
-    /// Share of the object's visible pixels that agree with the pose, 0 to 1.
-    #[getter]
-    fn agreement(&self) -> f64 {
-        self.0.agreement()
-    }
-
-    /// Evidence for and against the pose, as in `Result.evidence`.
-    #[getter]
-    fn evidence(&self) -> BTreeMap<&'static str, f64> {
-        BTreeMap::from(self.0.evidence.named())
-    }
-
-    /// Standard deviation of the least determined displacement of the object, meters.
-    #[getter]
-    fn deviation(&self) -> f64 {
-        self.0.deviation_meters
-    }
-
-    fn __repr__(&self) -> String {
-        let t = self.T_co().translation();
-        format!("Tracked({}, t = {t} m)", self.state())
     }
 }

@@ -41,7 +41,7 @@ def test_every_public_item_is_documented(name, item):
         return
     parameters = inspect.signature(item).parameters if has_signature(item) else []
     for parameter in set(parameters) - {"self", "args", "kwargs"}:
-        documented = text.split("Parameters\n----------\n")
+        documented = re.split(r"(?:Parameters|Attributes)\n----------\n", text)
         found = len(documented) == 2 and parameter in documented[1]
         assert found, f"{name}: {parameter} is not documented"
 
@@ -56,7 +56,7 @@ def has_signature(item):
 
 def entries(text):
     """Returns (name and type, description) of the parameters and returned values."""
-    section = r"^(?:Parameters|Returns)\n-+\n(.*?)(?=^\w[\w ]*\n-{3,}$|\Z)"
+    section = r"^(?:Parameters|Attributes|Returns)\n-+\n(.*?)(?=^\w[\w ]*\n-{3,}$|\Z)"
     found = []
     for body in re.findall(section, text, re.MULTILINE | re.DOTALL):
         found += re.findall(r"^(\S.*)\n((?:^(?:[ ]{4}.*)?\n?)*)", body, re.MULTILINE)

@@ -113,6 +113,52 @@ impl Symmetries {
         continuous.max(1).saturating_mul(self.discrete.len() + 1)
     }
 
+    /// Returns the pose that is equivalent to `pose` and nearest to `reference`.
+    ///
+    /// It has the smallest angle to `reference`, and of several the smallest distance. Rotations
+    /// around an axis are not limited to the
+    /// steps of [`Symmetries::motions`]. Cost: O([`Symmetries::n_motions`]).
+    ///
+    /// ```
+    /// use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, Vector3};
+    /// let mut symmetries = Symmetries::default();
+    /// symmetries.continuous.push(SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap());
+    /// let turned = Isometry3::rotation(Vector3::z() * 1.234);
+    /// let nearest = symmetries.nearest_equivalent(&turned, &Isometry3::identity());
+    /// assert!(nearest.rotation.angle() < 1e-6);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// As [`Symmetries::motions`].
+    #[must_use]
+    pub fn nearest_equivalent(
+        &self,
+        pose: &Isometry3<f64>,
+        reference: &Isometry3<f64>,
+    ) -> Isometry3<f64> {
+        let between = |pose: &Isometry3<f64>| {
+            let angle = pose.rotation.angle_to(&reference.rotation);
+            let distance = (pose.translation.vector - reference.translation.vector).norm();
+            (angle, distance)
+        };
+        let mut best = *pose;
+        for motion in self.motions() {
+            let mut other = pose * motion;
+            for axis in &self.continuous {
+                let turn = reference.rotation.inverse() * other.rotation;
+                let twist = turn.imag().dot(&axis.direction());
+                other *= axis.rotation(-2.0 * twist.atan2(turn.w));
+            }
+            let ((angle, distance), (least, nearest)) = (between(&other), between(&best));
+            // Angles of equal rotations differ by rounding.
+            if angle < least - 1e-6 || (angle < least + 1e-6 && distance < nearest) {
+                best = other;
+            }
+        }
+        best
+    }
+
     /// Returns the symmetry motions as BOP expands them, the identity first.
     ///
     /// Every continuous symmetry becomes [`CONTINUOUS_STEPS`] rotations, each composed with every

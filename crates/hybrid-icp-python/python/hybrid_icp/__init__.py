@@ -35,21 +35,14 @@ A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
 
 from ._errors import FileError, HybridIcpError, InputError, InputWarning
 from ._native import (
-    Alignment,
     Camera,
     DepthImage,
     Fuser,
-    IterationEvent,
     Model,
     Observation,
     Pipeline,
     PoseEstimate,
-    RegimeEvent,
-    Result,
     SequentialEstimator,
-    SequentialStep,
-    StageEvent,
-    Tracked,
     Tracker,
     add,
     adi,
@@ -58,6 +51,7 @@ from ._native import (
     mspd,
     mssd,
     mve,
+    parts,
     point_to_plane_step,
     point_to_point_step,
     read_cloud,
@@ -69,9 +63,20 @@ from ._native import (
     render_depth,
     vsd,
 )
+from ._results import (
+    Alignment,
+    Alternative,
+    IterationEvent,
+    RegimeEvent,
+    Result,
+    SequentialStep,
+    StageEvent,
+    Tracked,
+)
 
 __all__ = [
     "Alignment",
+    "Alternative",
     "Camera",
     "DepthImage",
     "FileError",
@@ -98,6 +103,7 @@ __all__ = [
     "mspd",
     "mssd",
     "mve",
+    "parts",
     "point_to_plane_step",
     "point_to_point_step",
     "read_cloud",

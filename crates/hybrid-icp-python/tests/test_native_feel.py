@@ -1,0 +1,216 @@
+"""Tests what Python users expect: pickles, arrays of other libraries, pictures and plain arguments."""
+
+import copy
+import math
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+
+import hybrid_icp as hi
+from conftest import ROOT, many
+
+
+@pytest.fixture(scope="module")
+def result(scene):
+    return hi.Pipeline().refine(scene.model, scene.observation, scene.rough)
+
+
+def refine(pipeline, model, observation, T_co):
+    return pipeline.refine(model, observation, T_co)
+
+
+def test_everything_can_be_pickled_and_copied(scene, result):
+    symmetric = hi.Model(
+        scene.model.vertices,
+        scene.model.faces,
+        symmetries=[np.diag([-1.0, -1, 1, 1])],
+        symmetry_axes=[((0, 0, 1), (0.01, 0, 0))],
+    )
+    for twin in (lambda x: pickle.loads(pickle.dumps(x)), copy.copy, copy.deepcopy):
+        model, observation = twin(scene.model), twin(scene.observation)
+        assert np.array_equal(model.vertices, scene.model.vertices)
+        assert np.array_equal(model.faces, scene.model.faces)
+        assert model.diameter == scene.model.diameter
+        assert twin(scene.observation.image) == scene.observation.image
+        assert np.array_equal(observation.mask, scene.observation.mask)
+        assert observation.camera == scene.camera
+        again = twin(hi.Pipeline()).refine(model, observation, scene.rough)
+        assert again.to_dict() == result.to_dict() == twin(result).to_dict()
+        stage = result.stages[0]
+        assert twin(stage).to_dict() == stage.to_dict() and repr(twin(stage)) == repr(stage)
+        turned = scene.true @ np.diag([-1.0, -1, 1, 1])
+        assert np.allclose(twin(symmetric).nearest_equivalent(turned, scene.true), scene.true)
+        estimate = twin(hi.PoseEstimate(scene.true, np.eye(6), mve=0.1))
+        assert np.allclose(estimate.T_co, scene.true) and estimate.mve == 0.1
+
+
+def test_a_process_pool_has_the_bits_of_this_process(scene):
+    poses, pipeline = many(scene, 3), hi.Pipeline("local")
+    with ProcessPoolExecutor(2) as pool:
+        jobs = [
+            pool.submit(refine, pipeline, scene.model, scene.observation, pose) for pose in poses
+        ]
+        remote = [job.result().to_dict() for job in jobs]
+    here = [refine(pipeline, scene.model, scene.observation, pose).to_dict() for pose in poses]
+    assert remote == here
+
+
+@pytest.mark.parametrize("stop", [False, np.False_, np.bool_(False)])
+def test_an_observer_stops_the_run_with_any_false(scene, stop):
+    pipeline = hi.Pipeline("projective-point-to-plane")
+    arguments = scene.model, scene.observation, scene.rough
+    assert pipeline.refine(*arguments, lambda event: stop).termination == "stopped"
+    full = pipeline.refine(*arguments)
+    for go_on in (None, True, np.True_):
+        assert pipeline.refine(*arguments, lambda event, go_on=go_on: go_on).to_dict() == full.to_dict()
+
+
+@pytest.mark.parametrize("answer", [0, "no", [], np.zeros(2)])
+def test_other_answers_of_an_observer_are_refused(scene, answer):
+    with pytest.raises(hi.InputError, match="the observer returned .*, expected True, None, or False"):
+        hi.Pipeline().refine(scene.model, scene.observation, scene.rough, lambda event: answer)
+
+
+class Tensor:
+    """An array of another library, on a GPU or not."""
+
+    def __init__(self, values, device="cpu"):
+        self.values, self.device = values, device
+
+    def __array__(self, dtype=None, copy=None):
+        if self.device != "cpu":
+            raise TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu().")
+        return np.asarray(self.values, dtype)
+
+
+def test_anything_with_an_array_is_an_array(scene, result):
+    observation = hi.Observation(Tensor(scene.depth), Tensor(scene.mask), scene.camera)
+    pose = Tensor(scene.rough)
+    assert hi.Pipeline().refine(scene.model, observation, pose).to_dict() == result.to_dict()
+    gpu = Tensor(scene.depth, "cuda")
+    with pytest.raises(hi.InputError, match=r"depth is a Tensor: .*Use Tensor\.cpu"):
+        hi.Observation(gpu, scene.mask, scene.camera)
+    with pytest.raises(hi.InputError, match="depth is an array of int64 with shape"):
+        hi.Observation(Tensor(scene.depth.astype(np.int64)), scene.mask, scene.camera)
+
+
+def test_masked_arrays_and_label_images_are_caught(scene):
+    masked = np.ma.masked_less(scene.depth, 0.1)
+    with pytest.raises(hi.InputError, match=r"depth is a masked array, .*depth\.filled"):
+        hi.Observation(masked, scene.mask, scene.camera)
+    labels = scene.mask.astype(np.uint8)
+    labels[:5] = 7
+    with pytest.warns(hi.InputWarning, match="mask has 2 values from 1 to 7: expected one object"):
+        hi.Observation(scene.depth, labels, scene.camera)
+
+
+def test_overrides_are_a_dict_or_assignments(scene):
+    fields = hi.Pipeline("hybrid", overrides={"times": 3})
+    assert fields.name == hi.Pipeline("hybrid", overrides=["times=3"]).name == "hybrid times=3"
+    with pytest.raises(hi.InputError, match="overrides is a str, expected a dict such as"):
+        hi.Pipeline("hybrid", overrides="times=3")
+    with pytest.raises(hi.InputError, match="times"):
+        hi.Pipeline("hybrid", overrides={"times": "three"})
+
+
+def test_a_pipeline_of_parts_has_the_bits_of_its_file(scene):
+    filters = [{"type": "max-distance", "limit": 0.25, "unit": "diameters"}]
+    parts = {"selection": "visible-surface", "association": "projective", "metric": "point-to-plane"}
+    made = hi.Pipeline.icp(**parts, filter=filters, stop=["convergence", "iteration-limit"])
+    text = 'type = "icp"\n' + "".join(f'{name} = "{part}"\n' for name, part in parts.items())
+    text += 'filter = [{ type = "max-distance", limit = 0.25, unit = "diameters" }]\n'
+    text += 'stop = ["convergence", "iteration-limit"]\n'
+    read = hi.Pipeline.from_toml(text)
+    runs = [p.refine(scene.model, scene.observation, scene.rough).to_dict() for p in (made, read)]
+    assert runs[0] == runs[1]
+    with pytest.raises(hi.InputError, match="point-to-plane"):
+        hi.Pipeline.icp(**{**parts, "metric": "point-to-plain"})
+
+
+def test_the_catalog_of_parts_is_that_of_the_documentation():
+    page = (ROOT / "docs" / "catalogue.md").read_text(encoding="utf-8")
+    parts = hi.parts()
+    assert len(parts) == page.count("\n### ") and len(parts) > 30
+    for part in parts:
+        assert f"### {part['type']} (" in page and part["about"] in page
+        for parameter in part["parameters"]:
+            assert f"| `{parameter['name']}` |" in page and parameter["meaning"] in page
+
+
+def test_many_items_have_the_bits_of_single_calls_in_order(scene):
+    pipeline = hi.Pipeline("local")
+    items = [(scene.model, scene.observation, pose) for pose in many(scene, 5)]
+    together = pipeline.refine_many(iter(items), threads=2)
+    assert [r.to_dict() for r in together] == [pipeline.refine(*i).to_dict() for i in items]
+    assert pipeline.refine_many([]) == []
+
+
+def test_an_overlay_and_residuals_show_where_the_pose_is(scene, result):
+    painted = result.overlay(scene.observation)
+    assert painted.shape == (240, 320, 3) and painted.dtype == np.uint8
+    contour = (painted == (0, 220, 0)).all(axis=2)
+    assert 50 < contour.sum() < scene.mask.sum()
+    photo = np.full((240, 320), 9, np.uint8)
+    over = result.overlay(scene.observation, photo)
+    assert ((over == (0, 220, 0)).all(axis=2) == contour).all() and (over[~contour] == 9).all()
+    with pytest.raises(hi.InputError, match=r"image is an array of float64 .*expected uint8"):
+        result.overlay(scene.observation, photo / 255)
+    residuals = scene.observation.residuals(result)
+    assert residuals.dtype == np.float32 and np.nanmedian(np.abs(residuals)) < 0.001
+    sent = pickle.loads(pickle.dumps(result))
+    with pytest.raises(hi.InputError, match="expected model="):
+        scene.observation.residuals(sent)
+    again = scene.observation.residuals(sent, model=scene.model)
+    assert np.array_equal(again, residuals, equal_nan=True)
+
+
+def test_notebooks_show_pictures_and_tables(scene, result):
+    for item in (scene.model, scene.observation):
+        assert item._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+    table = result._repr_html_()
+    assert "confidence" in table and table.startswith("<table>")
+
+
+def test_an_equivalent_pose_is_near_the_reference(scene):
+    axis = ((0, 0, 1), (0.02, -0.01, 0))
+    model = hi.Model(scene.model.vertices, scene.model.faces, symmetry_axes=[axis])
+    result = hi.Pipeline("local").refine(model, scene.observation, scene.true)
+    for angle in (0.3, 2.0, -3.0):
+        turn, offset = np.eye(4), np.array([0.02, -0.01, 0])
+        turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+        turn[:3, 3] = offset - turn[:3, :3] @ offset
+        found = result.canonical_pose(result.T_co @ turn)
+        assert np.allclose(found, result.T_co @ turn, atol=1e-9)
+
+
+def test_models_of_a_dataset_have_their_symmetries(dataset):
+    folder = dataset[0]
+    numbers = [int(path.stem[4:]) for path in (folder / "models").glob("obj_*.ply")]
+    models = [hi.Model.from_bop(folder, number) for number in numbers]
+    assert models and all(0.01 < model.diameter < 1 for model in models)
+    same = hi.Model.from_bop(folder / "models", numbers[0])
+    assert np.array_equal(same.vertices, models[0].vertices)
+    with pytest.raises(hi.FileError, match="no model of object 999"):
+        hi.Model.from_bop(folder, 999)
+
+
+class Mesh:
+    def __init__(self, model):
+        self.vertices, self.faces = 1000 * model.vertices, model.faces
+
+
+class Intrinsic:
+    def __init__(self, camera):
+        self.width, self.height, self.intrinsic_matrix = camera.width, camera.height, camera.K
+
+
+def test_meshes_and_images_of_other_libraries_are_read(scene):
+    model = hi.Model.from_trimesh(Mesh(scene.model), unit="mm")
+    assert math.isclose(model.diameter, scene.model.diameter, rel_tol=1e-5)
+    millimeters = Tensor((scene.depth * 1000).round().astype(np.uint16))
+    for depth in (Tensor(scene.depth), millimeters):
+        observation = hi.Observation.from_open3d(depth, Intrinsic(scene.camera), scene.mask)
+        assert np.allclose(observation.depth, scene.depth, atol=6e-4)
+        assert observation.camera == scene.camera
