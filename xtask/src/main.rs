@@ -45,9 +45,9 @@ cargo xtask COMMAND
   look PAGE.html...
             takes pictures of pages, 400 and 1,400 pixels wide, into target/look; needs Chromium
 
-  python [--ray] [--open3d] [PYTEST OPTIONS]
-            builds and tests the Python module: pytest, doctests, mypy, examples; --ray and --open3d add the
-            tests that need these packages; needs Python 3, and network access on the first run
+  python [--ray] [--open3d] [--rerun] [PYTEST OPTIONS]
+            builds and tests the Python module: pytest, doctests, mypy, examples; --ray, --open3d and --rerun add
+            the tests that need these packages; needs Python 3, and network access on the first run
   wheel     builds the Python wheel, prints its size, and tries it in a new environment
 
   bench [--save NAME | --against NAME] [FILTER]

@@ -13,7 +13,7 @@ pub(crate) const PACKAGE: &str = "crates/hybrid-icp-python";
 
 /// Large packages, installed on request. Without them, the tests that need them are skipped with a
 /// message.
-const EXTRAS: [&str; 2] = ["--ray", "--open3d"];
+const EXTRAS: [&str; 3] = ["--ray", "--open3d", "--rerun"];
 
 /// Runs pytest with the doctests and examples (Ray waits forever for processes that it cannot
 /// start, hence the timeout), and mypy on the stubs, the examples and the benches.
@@ -24,13 +24,13 @@ const TESTS: [&str; 4] = [
     "-m mypy.stubtest hybrid_icp._native --ignore-disjoint-bases",
 ];
 
-/// Tests the module with all [`EXTRAS`], or without them and with a message if they cannot be
+/// Tests the module with Ray and Open3D, or without them and with a message if they cannot be
 /// installed.
 pub(crate) fn check_all() -> Result<()> {
-    let installed = !has_python() || tools(&EXTRAS).inspect_err(|error| {
+    let installed = !has_python() || tools(&EXTRAS[..2]).inspect_err(|error| {
         println!("xtask python: SKIPPED the tests with Ray and Open3D, which cannot be installed: {error:#}");
     }).is_ok();
-    check(if installed { &EXTRAS } else { &[] })
+    check(if installed { &EXTRAS[..2] } else { &[] })
 }
 
 /// Tests the module. `options` are [`EXTRAS`] and options of pytest. Skips with a message without

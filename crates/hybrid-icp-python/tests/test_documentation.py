@@ -9,9 +9,9 @@ import pytest
 
 import hybrid_icp as hi
 from conftest import ROOT
-from hybrid_icp import bop
+from hybrid_icp import adapters, bop, plot, rerun
 
-PUBLIC = [(name, getattr(module, name)) for module in (hi, bop) for name in module.__all__]
+PUBLIC = [(name, getattr(module, name)) for module in (hi, bop, adapters, plot, rerun) for name in module.__all__]
 PACKAGE = ROOT / "crates" / "hybrid-icp-python"
 
 #: The units of arrays, and the words for arrays without a unit.

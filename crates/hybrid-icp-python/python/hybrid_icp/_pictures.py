@@ -79,6 +79,21 @@ def of_model(model: Model) -> bytes:
     return png(np.repeat(values[..., None], 3, axis=2))
 
 
+def pairs(
+    observation: Observation, T_co: npt.ArrayLike, model: Model, count: int
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Returns observed and rendered points, meters, at up to `count` pixels that have both."""
+    from ._native import render_depth
+
+    camera = observation.camera
+    rendered, measured = render_depth(model, camera, T_co), observation.depth
+    v, u = np.nonzero((rendered > 0) & (measured > 0) & observation.mask)
+    step = max(len(v) // max(count, 1), 1)
+    v, u = v[::step], u[::step]
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 0 * u + 1], axis=1)
+    return rays * measured[v, u, None], rays * rendered[v, u, None]
+
+
 def residuals(
     observation: Observation, result: Result, model: Model | None
 ) -> npt.NDArray[np.float32]:
