@@ -1,4 +1,4 @@
-"""Tests what Python users expect: pickles, arrays of other libraries, pictures and plain arguments."""
+"""Tests what Python users expect: pickles, foreign arrays, pictures and plain arguments."""
 
 import copy
 import math
