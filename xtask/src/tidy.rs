@@ -24,7 +24,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-experiments", 6),
     ("hicp-bop", 6),
     ("hybrid-icp-cli", 7),
-    ("hybrid-icp-python", 7),
+    ("hybrid-icp-python", 8),
 ];
 
 /// Libraries that only one crate may depend on.

@@ -29,6 +29,7 @@ mod mutex;
 mod observation;
 mod observer;
 mod pipeline;
+mod program;
 mod results;
 mod score;
 mod sequential;
@@ -58,6 +59,8 @@ mod native {
     use crate::observation::PyObservation;
     #[pymodule_export]
     use crate::pipeline::PyPipeline;
+    #[pymodule_export]
+    use crate::program::run_program;
     #[pymodule_export]
     use crate::score::{add, adi, mspd, mssd, mve, render_depth, vsd};
     #[pymodule_export]

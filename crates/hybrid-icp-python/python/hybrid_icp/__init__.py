@@ -33,6 +33,8 @@ A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
 ('refined', True)
 """
 
+from importlib.metadata import version as _version
+
 from ._errors import FileError, HybridIcpError, InputError, InputWarning
 from ._native import (
     Camera,
@@ -115,3 +117,5 @@ __all__ = [
     "render_depth",
     "vsd",
 ]
+
+__version__ = _version("hybrid-icp")

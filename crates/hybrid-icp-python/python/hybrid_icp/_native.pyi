@@ -6,7 +6,7 @@ from typing import Any, Literal, Protocol, TypedDict, Union, final
 import numpy as np
 import numpy.typing as npt
 from ._results import Alignment, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
-__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'vsd']
+__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
 _Array = npt.NDArray[np.float64]
 _Unit = Literal['m', 'mm', 'cm']
 _Axis = tuple[Sequence[float], Sequence[float]]
@@ -1217,6 +1217,9 @@ def mve(model: Model, observation: Observation, T_co: npt.ArrayLike, *, occlusio
     float
         The mean over τ = 5 %, …, 50 % of the diameter.
     """
+
+def run_program(words: Sequence[str]) -> int:
+    """Runs the program with the words of its command line, and returns the exit code."""
 
 def render_depth(model: Model, camera: Camera, T_co: npt.ArrayLike) -> npt.NDArray[np.float32]:
     """Renders the depth of a model at a pose.
