@@ -12,6 +12,7 @@ mod licenses;
 mod look;
 mod miri;
 mod mutants;
+mod package;
 mod peers;
 mod pictures;
 mod process;
@@ -49,6 +50,8 @@ cargo xtask COMMAND
             builds and tests the Python module: pytest, doctests, mypy, examples; --ray, --open3d and --rerun add
             the tests that need these packages; needs Python 3, and network access on the first run
   wheel     builds the Python wheel, prints its size, and tries it in a new environment
+
+  package   packages all crates and tests each from its archive; prints what the metadata lacks
 
   bench [--save NAME | --against NAME] [FILTER]
             runs the benches whose id contains FILTER, saves them as a baseline, or compares them with one
@@ -97,6 +100,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["bless"] => deviations::bless(),
         ["python", options @ ..] => python::check(options),
         ["wheel"] => python::pack(),
+        ["package"] => package::check(),
         ["bench", options @ ..] => bench::run(options),
         ["counts"] => counts::check(),
         ["counts", "--bless"] => counts::bless(),

@@ -22,5 +22,4 @@ mod nested_selections;
 mod projective;
 mod selections;
 
-#[path = "../../../hicp-core/tests/it/support/mod.rs"]
 mod support;

@@ -606,6 +606,10 @@ fn invalid_configurations_are_not_run() {
 #[test]
 fn the_committed_configurations_are_read() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/study");
+    if !docs.is_dir() {
+        eprintln!("SKIPPED: the package has no {}", docs.display());
+        return;
+    }
     for name in ["beyond", "sequential", "sequential/calibrated"] {
         let folder = tempfile::tempdir().unwrap();
         std::fs::copy(

@@ -16,5 +16,4 @@ mod registration;
 mod script;
 mod stop_rules;
 
-#[path = "../../../hicp-core/tests/it/support/mod.rs"]
 mod support;

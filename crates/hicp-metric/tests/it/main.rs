@@ -31,5 +31,4 @@ mod solvers;
 mod symmetric;
 mod wrappers;
 
-#[path = "../../../hicp-core/tests/it/support/mod.rs"]
 mod support;

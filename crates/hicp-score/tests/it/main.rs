@@ -21,5 +21,4 @@ mod rendered;
 mod sampled_mve;
 mod vsd;
 
-#[path = "../../../hicp-core/tests/it/support/mod.rs"]
 mod support;

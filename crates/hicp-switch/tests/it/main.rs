@@ -4,5 +4,4 @@
 
 mod switch;
 
-#[path = "../../../hicp-core/tests/it/support/mod.rs"]
 mod support;
