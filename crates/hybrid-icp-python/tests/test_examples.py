@@ -1,6 +1,8 @@
 """Runs the examples, and the Python blocks of the READMEs and the book."""
 
 import csv
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -73,3 +75,15 @@ def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
     assert blocks
     for block in blocks:
         exec(compile(block.split("```")[0], page, "exec"), names)
+
+
+@pytest.mark.parametrize("notebook", sorted((FOLDER / "notebooks").glob("*.ipynb")), ids=str)
+def test_the_code_of_the_notebooks_runs_and_their_pictures_are_stored(notebook):
+    pytest.importorskip("matplotlib")
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert any("image/png" in out.get("data", {}) for cell in code for out in cell["outputs"])
+    text = "\n".join("".join(cell["source"]) for cell in code)
+    command = [sys.executable, "-c", text]
+    environment = {**os.environ, "MPLBACKEND": "Agg"}
+    subprocess.run(command, check=True, cwd=notebook.parent, env=environment, timeout=300)
