@@ -61,7 +61,7 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// Makes a release build of half the time. Whether a command works does not depend on its speed.
+/// Makes a release build take less time. Whether a command works does not depend on its speed.
 fn quickly_built(command: &mut Command) -> &mut Command {
     command
         .env("CARGO_PROFILE_RELEASE_LTO", "off")
