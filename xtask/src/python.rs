@@ -15,6 +15,9 @@ pub(crate) const PACKAGE: &str = "crates/hybrid-icp-python";
 /// message.
 const EXTRAS: [&str; 3] = ["--ray", "--open3d", "--rerun"];
 
+/// Links with zig, so that the wheel also runs on Linux distributions of 2018 and later.
+const OLD_GLIBC: &str = "--zig --compatibility manylinux_2_28";
+
 /// Runs pytest with the doctests and examples (Ray waits forever for processes that it cannot
 /// start, hence the timeout), and mypy on the stubs, the examples and the benches.
 const TESTS: [&str; 4] = [
@@ -61,7 +64,12 @@ pub(crate) fn check(options: &[&str]) -> Result<()> {
 /// Builds the wheel as it is published and tries it in a new environment: the README's example must
 /// improve a pose.
 pub(crate) fn pack() -> Result<()> {
-    let wheel = wheel(&tools(&[])?, "release")?;
+    let options = if cfg!(target_os = "linux") {
+        OLD_GLIBC
+    } else {
+        ""
+    };
+    let wheel = wheel(&tools(&["--wheel"])?, "release", options)?;
     let python = venv::fresh(&target().join("python/fresh"))?;
     execute(venv::pip(&python).arg(&wheel))?;
     execute(Command::new(&python).args([&format!("{PACKAGE}/examples/smoke.py"), "README.md"]))?;
@@ -73,7 +81,7 @@ pub(crate) fn pack() -> Result<()> {
 /// Returns the environment with the tools, the extras, and the module built in a profile.
 pub(crate) fn with_module(extras: &[&str], profile: &str) -> Result<PathBuf> {
     let python = tools(extras)?;
-    let wheel = wheel(&python, profile)?;
+    let wheel = wheel(&python, profile, "")?;
     execute(
         venv::pip(&python)
             .args(["--force-reinstall", "--no-deps"])
@@ -94,14 +102,21 @@ fn tools(extras: &[&str]) -> Result<PathBuf> {
     venv::environment(&venv, &files.collect::<Vec<_>>())
 }
 
-/// Builds a wheel and returns its path.
-fn wheel(python: &PathBuf, profile: &str) -> Result<PathBuf> {
+/// Builds a wheel with more options of maturin, and returns its path.
+fn wheel(python: &PathBuf, profile: &str, options: &str) -> Result<PathBuf> {
     let folder = target().join("python/wheels").join(profile);
     let _ = std::fs::remove_dir_all(&folder);
     let mut maturin = Command::new(python);
     maturin
         .args("-m maturin build --quiet --locked --profile".split(' '))
         .arg(profile);
+    // maturin looks for zig on the path.
+    let tools = python.parent().unwrap_or(python).to_owned();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let places = std::iter::once(tools).chain(std::env::split_paths(&path));
+    maturin
+        .args(options.split_whitespace())
+        .env("PATH", std::env::join_paths(places)?);
     execute(maturin.arg("--out").arg(&folder).current_dir(PACKAGE))?;
     let entries = std::fs::read_dir(&folder).context("maturin wrote no wheel")?;
     let mut paths = entries.flatten().map(|entry| entry.path());
