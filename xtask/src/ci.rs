@@ -61,7 +61,8 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// Makes a release build take less time. Whether a command works does not depend on its speed.
+/// Builds with less optimization, which takes less time. Only the result of the command is checked,
+/// not its speed.
 fn quickly_built(command: &mut Command) -> &mut Command {
     command
         .env("CARGO_PROFILE_RELEASE_LTO", "off")

@@ -153,7 +153,7 @@ pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
 /// window : int, optional
 ///     Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
 /// transport : {"adjoint", "kept"}, optional
-///     Whether covariances are transformed with the camera motion ("adjoint") or not ("kept").
+///     "adjoint" transforms covariances with the camera motion, "kept" does not.
 ///
 /// Examples
 /// --------

@@ -116,8 +116,8 @@ impl Symmetries {
     /// Returns the pose that is equivalent to `pose` and nearest to `reference`.
     ///
     /// It has the smallest angle to `reference`, and of several the smallest distance. Rotations
-    /// around an axis are not limited to the
-    /// steps of [`Symmetries::motions`]. Cost: O([`Symmetries::n_motions`]).
+    /// around an axis are not limited to the steps of [`Symmetries::motions`]. Cost:
+    /// O([`Symmetries::n_motions`]).
     ///
     /// ```
     /// use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, Vector3};

@@ -18,9 +18,10 @@ pub const N_FEATURES: usize = CURVES.len();
 ///
 /// The model is a scorecard: each feature of the [`Evidence`], the [`Misfit`] and the score adds
 /// log-odds from a piecewise linear curve. The curves are fitted on simulated cases with imperfect
-/// masks, noise, occlusion, look-alikes and wrong classes (`cargo run --release -p hicp-tests
-/// --example confidence -- fit`). A probability is right on average over such cases. It tells
-/// nothing about two orientations that explain the image equally well.
+/// masks, noise, occlusion, look-alikes, walls and wrong classes
+/// (`cargo run --release -p hicp-tests --example confidence -- fit`). A probability is right on
+/// average over such cases. It tells nothing about two orientations that explain the image equally
+/// well.
 ///
 /// ```
 /// use hicp_score::Confidence;
