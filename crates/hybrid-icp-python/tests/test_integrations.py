@@ -49,15 +49,25 @@ def test_a_recording_has_every_iteration(scene, tmp_path):
     assert rows["/pairs"] == iterations + 1 and rows["/observed"] == 1
 
 
+class Column(dict):
+    """A column of a filtered table, whose rows keep their old numbers, as in pandas."""
+
+    def __init__(self, values):
+        super().__init__({10 + row: value for row, value in enumerate(values)})
+
+    def __iter__(self):
+        return iter(self.values())
+
+
 class Estimates:
     """Estimates in the shape of HappyPose's."""
 
     def __init__(self, labels, images, poses):
-        self.infos = {"label": labels, "batch_im_id": images}
+        self.infos = {"label": Column(labels), "batch_im_id": Column(images)}
         self.poses = poses
 
     def clone(self):
-        return Estimates(self.infos["label"], self.infos["batch_im_id"], self.poses.copy())
+        return Estimates(*self.infos.values(), self.poses.copy())
 
 
 def test_estimates_of_happypose_are_refined(scene):

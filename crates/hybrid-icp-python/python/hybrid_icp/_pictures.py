@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import InputError
+from ._native import Camera, render_depth
 
 if TYPE_CHECKING:
     from ._native import Model, Observation
@@ -62,8 +63,6 @@ def of_observation(observation: Observation) -> bytes:
 
 def of_model(model: Model) -> bytes:
     """Returns the shaded model, seen from the upper right, as a PNG file."""
-    from ._native import Camera, render_depth
-
     size = 240
     camera = Camera(size, size, (size - 1) / 2, (size - 1) / 2, size, size)
     right, down = np.array([0.8, -0.6, 0.0]), np.array([-0.3, -0.4, -0.87])
@@ -83,8 +82,6 @@ def pairs(
     observation: Observation, T_co: npt.ArrayLike, model: Model, count: int
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Returns observed and rendered points, meters, at up to `count` pixels that have both."""
-    from ._native import render_depth
-
     camera = observation.camera
     rendered, measured = render_depth(model, camera, T_co), observation.depth
     v, u = np.nonzero((rendered > 0) & (measured > 0) & observation.mask)
@@ -98,8 +95,6 @@ def residuals(
     observation: Observation, result: Result, model: Model | None
 ) -> npt.NDArray[np.float32]:
     """Returns the measured minus the rendered depth; NaN where one of them is missing."""
-    from ._native import render_depth
-
     rendered = render_depth(result._model(model), observation.camera, result.T_co)
     measured = observation.depth
     both = (rendered > 0) & (measured > 0)
@@ -110,8 +105,6 @@ def overlay(
     observation: Observation, T_co: npt.ArrayLike, model: Model, image: Any
 ) -> _Image:
     """Draws the contour of a model over an image, or over the picture of the depth."""
-    from ._native import render_depth
-
     camera = observation.camera
     if image is None:
         painted = gray(observation.depth)

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._native import Camera, Model, Observation, Pipeline, read_depth, read_mask, read_pose
+from ._native import (
+    Camera,
+    Model,
+    Observation,
+    Pipeline,
+    read_depth,
+    read_mask,
+    read_pose,
+    render_depth,
+)
 from ._results import Result
 
 __all__ = ["DepthRefiner", "FoundationPoseFolder"]
@@ -47,8 +56,8 @@ class DepthRefiner:
         K : array_like, shape (B, 3, 3)
             Calibrations, pixels.
         masks : array_like, shape (N, H, W), bool, optional
-            A mask per estimate. By default, the box of the silhouette at the estimate, widened by a tenth of
-            its size.
+            A mask per estimate. By default, the box of the silhouette at the estimate, widened by a
+            tenth of its size.
 
         Returns
         -------
@@ -59,10 +68,11 @@ class DepthRefiner:
         """
         depths, calibrations = np.asarray(depth), np.asarray(K)
         poses = np.array(predictions.poses, dtype=np.float64)
+        # Lists, because the rows of a filtered table keep their old numbers.
+        labels, images = (list(predictions.infos[name]) for name in ("label", "batch_im_id"))
         results: list[Result] = []
         for index, pose in enumerate(poses):
-            image = int(predictions.infos["batch_im_id"][index])
-            model = self.models[predictions.infos["label"][index]]
+            image, model = int(images[index]), self.models[labels[index]]
             height, width = depths[image].shape
             camera = Camera.from_K(calibrations[image], (width, height))
             mask = _around(model, camera, pose) if masks is None else np.asarray(masks[index])
@@ -78,8 +88,6 @@ class DepthRefiner:
 
 def _around(model: Model, camera: Camera, T_co: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """Returns the box around the silhouette, widened by a tenth of its size."""
-    from ._native import render_depth
-
     mask = render_depth(model, camera, T_co) > 0
     v, u = np.nonzero(mask)
     if len(v):
