@@ -74,7 +74,7 @@ struct Named {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.files.files.unit();
+    let unit = arguments.files.files.unit();
     let mut inputs = arguments.files.inputs();
     let mut outputs = Files::default().writes("--output", &arguments.output);
     for (option, path) in inputs.files() {
@@ -127,7 +127,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             _ => found.insert(0, (Fault::DepthScale { factor }, Some(diagnosis.score))),
         }
     }
-    let unit = arguments.files.files.unit();
     faults.extend(found.into_iter().map(|(fault, score)| Named {
         fault: json!(fault),
         problem: fault.to_string(),
