@@ -53,7 +53,8 @@ pub use object::diameter::diameter;
 pub use object::mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshError, TriMesh};
 pub use object::mesh_survey::MeshSurvey;
 pub use object::model::{Model, ModelConfig};
-pub use object::sampling::{MAX_SAMPLES, sample_surface};
+pub use object::sampling::{MAX_SAMPLES, sample_colored_surface, sample_surface};
+pub use object::surface_color::{SurfaceColor, TexturedTriangle};
 pub use object::symmetry::{
     CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError,
 };
@@ -68,7 +69,7 @@ pub use sensor::camera::{
     CameraError, MAX_FOCAL_LENGTH, MAX_IMAGE_SIDE, MIN_FOCAL_LENGTH, PinholeCamera, PixelCenters,
 };
 pub use sensor::image::{
-    DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask,
+    ColorImage, DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask,
 };
 pub use sensor::observation::Observation;
 pub use sensor::region::PixelRegion;

@@ -128,6 +128,44 @@ impl RenderedView {
     }
 }
 
+impl RenderedView {
+    /// Returns the color of the rendered surface at an image pixel: red, green and blue, 0 to 255.
+    ///
+    /// Returns `None` if nothing was rendered there, if the mesh has no color, or as for
+    /// [`Self::surfel_at`]. The color is that at the pixel's center, without filtering. Cost: one
+    /// intersection of a ray with a triangle.
+    #[must_use]
+    pub fn color_at(
+        &self,
+        u: u32,
+        v: u32,
+        mesh: &TriMesh,
+        camera: &PinholeCamera,
+        camera_from_object: &Isometry3<f64>,
+    ) -> Option<[f32; 3]> {
+        let index = self.region.index(u, v)?;
+        let triangle = self.triangles[index] as usize;
+        if triangle >= mesh.triangles().len() {
+            return None;
+        }
+        let depth = f64::from(self.depth[index]);
+        let point = camera.unproject(f64::from(u), f64::from(v), depth);
+        let point = camera_from_object.inverse_transform_point(&point);
+        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.cast::<f64>());
+        let (edge, other, to) = (b - a, c - a, point - a);
+        let normal = edge.cross(&other);
+        let area = normal.norm_squared();
+        if area <= 0.0 {
+            return None;
+        }
+        let second = (to.cross(&other).dot(&normal) / area).clamp(0.0, 1.0);
+        let third = (edge.cross(&to).dot(&normal) / area).clamp(0.0, 1.0 - second);
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+        let weights = [1.0 - second - third, second, third].map(|weight| weight as f32);
+        mesh.color_at(triangle, weights)
+    }
+}
+
 /// Renders the depth of a mesh at a pose.
 ///
 /// # Contract

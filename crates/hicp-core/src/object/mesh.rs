@@ -7,6 +7,8 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
+use crate::object::surface_color::SurfaceColor;
+
 /// Largest accepted absolute vertex coordinate, meters.
 ///
 /// Map grids reach this far: a UTM northing ends at 10 000 km. Far from the origin `f32` is coarse,
@@ -48,6 +50,7 @@ pub enum Facing {
 pub struct TriMesh {
     vertices: Vec<Point3<f32>>,
     triangles: Vec<[u32; 3]>,
+    color: Option<SurfaceColor>,
     facing: OnceLock<Facing>,
 }
 
@@ -97,6 +100,7 @@ impl TriMesh {
         let mesh = Self {
             vertices,
             triangles,
+            color: None,
             facing: OnceLock::new(),
         };
         if mesh.area() > 0.0 {
@@ -142,6 +146,64 @@ impl TriMesh {
         let double_area = self.double_area_vector(triangle);
         let norm = double_area.norm();
         (norm > 0.0).then(|| UnitVector3::new_unchecked((double_area / norm).cast::<f32>()))
+    }
+
+    /// Returns the mesh with the color of its surface. No geometric computation depends on it.
+    ///
+    /// # Errors
+    ///
+    /// [`MeshError::ColorCount`] if there is not one color per vertex, or one textured triangle per
+    /// triangle. [`MeshError::NoTexture`] if a triangle refers to an image that does not exist or
+    /// has no pixels.
+    pub fn with_color(mut self, color: SurfaceColor) -> Result<Self, MeshError> {
+        let (what, found, expected) = match &color {
+            SurfaceColor::Vertices(colors) => ("vertex colors", colors.len(), self.vertices.len()),
+            SurfaceColor::Textures { triangles, .. } => {
+                let what = "textured triangles";
+                (what, triangles.len(), self.triangles.len())
+            }
+        };
+        if found != expected {
+            return Err(MeshError::ColorCount {
+                what,
+                found,
+                expected,
+            });
+        }
+        if let SurfaceColor::Textures { images, triangles } = &color {
+            for (triangle, textured) in triangles.iter().enumerate() {
+                let image = images.get(textured.image as usize);
+                if image.is_none_or(|image| image.pixels().is_empty()) {
+                    return Err(MeshError::NoTexture {
+                        triangle,
+                        image: textured.image,
+                        images: images.len(),
+                    });
+                }
+            }
+        }
+        self.color = Some(color);
+        Ok(self)
+    }
+
+    /// The color of the surface, if it is known.
+    #[must_use]
+    pub fn color(&self) -> Option<&SurfaceColor> {
+        self.color.as_ref()
+    }
+
+    /// Returns the color at a place of a triangle: red, green and blue from 0 to 255.
+    ///
+    /// `weights` are the barycentric coordinates of the place: the shares of the three corners.
+    /// Returns `None` if the mesh has no color.
+    ///
+    /// # Panics
+    ///
+    /// If `triangle` is not below the number of triangles.
+    #[must_use]
+    pub fn color_at(&self, triangle: usize, weights: [f32; 3]) -> Option<[f32; 3]> {
+        let color = self.color.as_ref()?;
+        Some(color.at(triangle, self.triangles[triangle], weights))
     }
 
     /// Returns the surface area, m².
@@ -348,6 +410,28 @@ pub enum MeshError {
         z: f32,
         /// Largest accepted absolute coordinate, meters.
         limit: f32,
+    },
+    /// The number of colors does not match the mesh.
+    #[error("mesh has {found} {what}, expected {expected}")]
+    ColorCount {
+        /// `vertex colors` or `textured triangles`.
+        what: &'static str,
+        /// The number found.
+        found: usize,
+        /// The number of vertices or triangles.
+        expected: usize,
+    },
+    /// A triangle refers to a texture that does not exist or has no pixels.
+    #[error(
+        "triangle {triangle} uses texture {image}, expected one of {images} (counted from 0) with pixels"
+    )]
+    NoTexture {
+        /// Index of the triangle.
+        triangle: usize,
+        /// Index of the image.
+        image: u32,
+        /// Number of images.
+        images: usize,
     },
     /// Every triangle has zero area.
     #[error("all {triangles} triangles have zero area, expected at least one with an area")]

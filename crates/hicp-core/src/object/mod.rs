@@ -5,4 +5,5 @@ pub(crate) mod mesh;
 pub(crate) mod mesh_survey;
 pub(crate) mod model;
 pub(crate) mod sampling;
+pub(crate) mod surface_color;
 pub(crate) mod symmetry;

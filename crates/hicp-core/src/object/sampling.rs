@@ -20,6 +20,23 @@ pub const MAX_SAMPLES: usize = 10_000_000;
 /// Cost: O(triangles + count).
 #[must_use]
 pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
+    sample(mesh, count, |surfel, _, _| surfel)
+}
+
+/// Returns the surfels of [`sample_surface`] with their colors: red, green and blue, 0 to 255.
+///
+/// It is empty if the mesh has no color. Cost: O(triangles + count).
+#[must_use]
+pub fn sample_colored_surface(mesh: &TriMesh, count: usize) -> Vec<(Surfel, [f32; 3])> {
+    let count = if mesh.color().is_some() { count } else { 0 };
+    sample(mesh, count, |surfel, triangle, weights| {
+        let color = mesh.color_at(triangle, weights);
+        (surfel, color.unwrap_or_default())
+    })
+}
+
+/// Samples a surface. `take` receives the surfel, its triangle and its barycentric coordinates.
+fn sample<T>(mesh: &TriMesh, count: usize, take: impl Fn(Surfel, usize, [f32; 3]) -> T) -> Vec<T> {
     // R₂, the analogue of the golden-ratio sequence in two dimensions: 1/g and 1/g² with g³ = g +
     // 1.
     const STEP_1: f64 = 0.754_877_666_246_692_7;
@@ -43,10 +60,13 @@ pub fn sample_surface(mesh: &TriMesh, count: usize) -> Vec<Surfel> {
             if s + t > 1.0 {
                 (s, t) = (1.0 - s, 1.0 - t);
             }
-            samples.push(Surfel {
+            let surfel = Surfel {
                 point: (a + (b - a) * s + (c - a) * t).cast::<f32>(),
                 normal,
-            });
+            };
+            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+            let weights = [1.0 - s - t, s, t].map(|weight| weight as f32);
+            samples.push(take(surfel, triangle, weights));
         }
     }
     samples

@@ -8,7 +8,7 @@ use crate::derived::Derived;
 use crate::id::Id;
 use crate::internal;
 use crate::sensor::camera::PinholeCamera;
-use crate::sensor::image::{DepthImage, ImageError, Mask, check_size};
+use crate::sensor::image::{ColorImage, DepthImage, ImageError, Mask, check_size};
 use crate::sensor::normals::{DepthPatch, estimate_normals};
 use crate::sensor::region::PixelRegion;
 use crate::surfel::Surfel;
@@ -47,6 +47,7 @@ pub struct Observation {
     id: Id,
     camera: PinholeCamera,
     depth: Arc<DepthImage>,
+    color: Option<Arc<ColorImage>>,
     mask: Mask,
     region: PixelRegion,
     surfels: Vec<Surfel>,
@@ -141,6 +142,7 @@ impl Observation {
             id: Id::next(),
             camera,
             depth,
+            color: None,
             mask,
             region,
             surfels,
@@ -148,6 +150,26 @@ impl Observation {
             n_measured,
             derived: Derived::default(),
         })
+    }
+
+    /// Returns the observation with the color image of the same camera: pixel (u, v) of both shows
+    /// the same ray.
+    ///
+    /// `color` is a [`ColorImage`], or an `Arc` of one that other observations share. It is used
+    /// only where depth leaves a choice, and only with a model that has colors.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageError::SizeMismatch`] if the images differ in size.
+    pub fn with_color(mut self, color: impl Into<Arc<ColorImage>>) -> Result<Self, ImageError> {
+        let color = color.into();
+        let size = (self.depth.width(), self.depth.height());
+        let found = (color.width(), color.height());
+        check_size("color image", found, "depth image", size)?;
+        self.color = Some(color);
+        // Caches must not confuse it with the observation without color.
+        (self.id, self.derived) = (Id::next(), Derived::default());
+        Ok(self)
     }
 
     /// The identity of this observation, for caches.
@@ -184,6 +206,12 @@ impl Observation {
     #[must_use]
     pub fn shared_depth(&self) -> &Arc<DepthImage> {
         &self.depth
+    }
+
+    /// The color image, if there is one. It has the size of the depth image.
+    #[must_use]
+    pub fn color(&self) -> Option<&Arc<ColorImage>> {
+        self.color.as_ref()
     }
 
     /// The segmentation mask.
@@ -349,6 +377,8 @@ impl Observation {
             id: Id::next(),
             camera,
             depth: Arc::new(depth),
+            // Color is used at full resolution only.
+            color: None,
             mask,
             region,
             n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),
