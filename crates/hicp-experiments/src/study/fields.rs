@@ -103,7 +103,7 @@ impl<'a> Fields<'a> {
         found.iter().try_for_each(|element| {
             let name = element.as_str().or(element["name"].as_str());
             let name = name.unwrap_or_default();
-            let found = format_args!("{} twice", quoted(name));
+            let found = format!("{} twice", quoted(name));
             self.require(seen.insert(name), field, found, "different names")
         })
     }
