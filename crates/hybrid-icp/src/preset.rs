@@ -77,9 +77,9 @@ declare! {
     Local, "local", local,
         "local refinement that never raises the MVE: steps until it stalls, observed points to the model from afar";
     Search, "search", search,
-        "global: local, and above an MVE of 0.15 a search over 256 rotations; may end at an equivalent pose";
+        "global: local, and above an MVE of 0.1 a search over 1000 rotations; may end at an equivalent pose";
     Auto, "auto", auto,
-        "global where needed: local, and above an MVE of 0.2 a search over 128 rotations";
+        "global where needed: local, and above an MVE of 0.2 a search over 256 rotations";
 }
 
 impl Preset {
@@ -137,6 +137,18 @@ mod tests {
     fn every_name_reads_back() {
         for preset in Preset::ALL {
             assert_eq!(preset.name().parse(), Ok(preset));
+        }
+    }
+
+    #[test]
+    fn summaries_state_the_options_of_the_search() {
+        for (preset, built) in [
+            (Preset::Search, presets::search()),
+            (Preset::Auto, presets::auto()),
+        ] {
+            let (least, count) = (built.options.threshold, built.options.hypotheses);
+            let stated = format!("above an MVE of {least} a search over {count} rotations");
+            assert!(preset.summary().contains(&stated), "{preset}: {stated}");
         }
     }
 
