@@ -97,11 +97,7 @@ where
 {
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
-        Err(message) => {
-            // Help and version are messages, too. If the terminal is gone, nobody reads them.
-            let _ = message.print();
-            return u8::try_from(message.exit_code()).unwrap_or(2);
-        }
+        Err(message) => return show(&message),
     };
     cli.limits.choose();
     interrupt::listen();
@@ -122,6 +118,9 @@ where
         Ok(()) => 0,
         Err(error) => {
             interrupt::end_unless_saving();
+            if let Some(message) = error.downcast_ref() {
+                return show(message);
+            }
             terminal::complain(format_args!("{error:#}"));
             if interrupt::asked() {
                 interrupt::EXIT_CODE
@@ -130,4 +129,11 @@ where
             }
         }
     }
+}
+
+/// Prints a message about the command line, and returns its exit code.
+fn show(message: &clap::Error) -> u8 {
+    // Help and version are messages, too. If the terminal is gone, nobody reads them.
+    let _ = message.print();
+    u8::try_from(message.exit_code()).unwrap_or(2)
 }

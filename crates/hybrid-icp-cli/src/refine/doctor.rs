@@ -74,7 +74,7 @@ struct Named {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let unit = arguments.files.files.unit();
+    let unit = arguments.files.files.unit()?;
     let mut inputs = arguments.files.inputs();
     let mut outputs = Files::default().writes("--output", &arguments.output);
     for (option, path) in inputs.files() {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
+use clap::error::ErrorKind;
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{DepthImage, Mask, Model, Observation, PinholeCamera};
 use hybrid_icp::mask_in_box;
@@ -50,19 +51,20 @@ pub(crate) struct ImageFiles {
 }
 
 impl ImageFiles {
-    /// Returns the unit of the mesh. Ends the program if it is neither stated nor part of the
-    /// format.
-    pub(crate) fn unit(&self) -> LengthUnit {
+    /// Returns the unit of the mesh.
+    ///
+    /// Fails with a `clap::Error` if it is neither stated nor part of the format.
+    pub(crate) fn unit(&self) -> anyhow::Result<LengthUnit> {
         let is_gltf = ["glb", "gltf"].iter().any(|name| {
             (self.model.extension()).is_some_and(|found| found.eq_ignore_ascii_case(name))
         });
         match self.model_unit {
-            Some(unit) => unit,
-            None if is_gltf => LengthUnit::Meters,
+            Some(unit) => Ok(unit),
+            None if is_gltf => Ok(LengthUnit::Meters),
             None => {
                 let text =
                     "--model-unit <UNIT> is missing, expected the unit of the mesh: m, mm or cm\n";
-                clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, text).exit()
+                Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into())
             }
         }
     }
@@ -262,7 +264,7 @@ impl Inputs {
                 Some(path) => Some(limits.read_pose(path, self.init_unit)?),
                 None => None,
             },
-            model: Model::new(limits.read_mesh(&files.model, files.unit())?),
+            model: Model::new(limits.read_mesh(&files.model, files.unit()?)?),
             depth,
             camera,
             depth_scale,

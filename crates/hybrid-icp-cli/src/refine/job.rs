@@ -41,7 +41,7 @@ pub(crate) struct JobOptions {
 impl JobOptions {
     /// Refines the initial pose of the inputs, or estimates a pose if there is none.
     pub(super) fn run(&self, inputs: &Inputs) -> anyhow::Result<()> {
-        inputs.files.unit();
+        inputs.files.unit()?;
         let outputs = [&self.output, &self.alternatives, &self.overlay, &self.trace];
         if outputs.iter().all(|path| path.is_none()) {
             check_stdout()?;
@@ -83,7 +83,7 @@ impl JobOptions {
             Some(_) => report::summary(&refined, &reason),
             None => report::summary_of_estimate(&refined, &reason),
         };
-        let of_inputs = warnings::about_inputs(&model, &observation, &from, inputs, depth_scale);
+        let of_inputs = warnings::about_inputs(&model, &observation, &from, inputs, depth_scale)?;
         let mut warnings = of_files;
         warnings.extend(of_inputs);
         warnings.extend(warnings::about_result(&refined));

@@ -70,7 +70,7 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
         "pipeline": pipeline.name,
         "toml": pipeline.toml,
         "set": pipeline.overrides,
-        "model_unit": inputs.files.unit().to_string(),
+        "model_unit": inputs.files.unit()?.to_string(),
     });
     if let Some(unit) = inputs.init_unit {
         line["init_unit"] = json!(unit.to_string());

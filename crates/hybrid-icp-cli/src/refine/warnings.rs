@@ -49,14 +49,14 @@ pub(super) fn about_inputs(
     pose: &Isometry3<f64>,
     inputs: &Inputs,
     depth_scale: f64,
-) -> Vec<String> {
+) -> anyhow::Result<Vec<String>> {
     let warnings = hybrid_icp::warnings(object, observation, pose).into_iter();
     // If nothing was found, there is no pose to warn of.
     let warnings = warnings.filter(|warning| {
         inputs.init.is_some() || !matches!(warning, Warning::BehindCamera { .. })
     });
     let files = &inputs.files;
-    let (unit, model, depth) = (files.unit(), files.model.display(), files.depth.display());
+    let (unit, model, depth) = (files.unit()?, files.model.display(), files.depth.display());
     let mask = inputs.mask_name();
     let (init, pose_unit) = match &inputs.init {
         Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),
@@ -86,7 +86,7 @@ pub(super) fn about_inputs(
             _ => {}
         }
     }
-    warnings
+    Ok(warnings)
 }
 
 /// Returns warnings about a refined pose that should not be trusted.

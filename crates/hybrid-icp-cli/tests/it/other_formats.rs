@@ -1,5 +1,6 @@
 //! Masks of many values, other forms of poses, and names of files, in `hybrid-icp refine`.
 
+use std::ffi::OsStr;
 use std::process::Command;
 
 use crate::common::*;
@@ -70,6 +71,11 @@ fn a_mesh_needs_a_unit_unless_the_format_states_it() {
         .run()
         .exits(2)
         .complains(&["--model-unit", "m, mm or cm"]);
+    // A caller in the same process gets the code and goes on.
+    let given = scene.arguments.iter();
+    let words = given.flat_map(|(option, value)| [OsStr::new(*option), value]);
+    let program = ["hybrid-icp", "refine"].map(OsStr::new).into_iter();
+    assert_eq!(hybrid_icp_cli::run(program.chain(words)), 2);
 }
 
 #[test]
