@@ -51,7 +51,8 @@ cargo xtask COMMAND
             the tests that need these packages; needs Python 3, and network access on the first run
   wheel     builds the Python wheel, prints its size, and tries it in a new environment
 
-  package   packages all crates and tests each from its archive; prints what the metadata lacks
+  package   packages all crates, tests each from its archive, and builds it with the oldest supported Rust if that
+            is installed; prints what the metadata lacks
 
   bench [--save NAME | --against NAME] [FILTER]
             runs the benches whose id contains FILTER, saves them as a baseline, or compares them with one

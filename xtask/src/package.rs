@@ -2,18 +2,20 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 
-use crate::process::{cargo, command, execute, output, target};
+use crate::process::{cargo, command, execute, output, succeeds, target};
 
 /// Files that every archive contains.
 const FILES: [&str; 3] = ["LICENSE-APACHE", "LICENSE-MIT", "README.md"];
 /// Metadata that needs a public address, which is not decided.
 const ADDRESSES: [&str; 3] = ["repository", "homepage", "documentation"];
 
-/// Packages all published crates, unpacks the archives, and tests each of them.
+/// Packages all published crates, unpacks the archives, tests each of them, and builds them with
+/// the oldest supported compiler.
 ///
 /// The crates find each other by `[patch.crates-io]`, and everything else in the registry.
 pub(crate) fn check() -> Result<()> {
@@ -50,6 +52,8 @@ pub(crate) fn check() -> Result<()> {
     }
     fs::write(folder.join("Cargo.toml"), manifest)?;
     fs::copy("Cargo.lock", folder.join("Cargo.lock"))?;
+    let oldest = published.first().context("no published crate")?;
+    check_oldest(text(oldest, "rust_version")?, &folder)?;
     execute(cargo("test --workspace --quiet --no-fail-fast").current_dir(&folder))?;
 
     for key in ADDRESSES {
@@ -61,6 +65,17 @@ pub(crate) fn check() -> Result<()> {
     }
     println!("xtask package: {} crates pass", published.len());
     Ok(())
+}
+
+/// Checks the crates in a folder with a version of Rust, or prints a message without it.
+fn check_oldest(version: &str, folder: &Path) -> Result<()> {
+    let cargo = format!("rustup run {version} cargo");
+    if !succeeds(command(&format!("{cargo} --version"))) {
+        let install = format!("rustup toolchain install {version}");
+        println!("xtask package: SKIPPED Rust {version}: install it with `{install}`");
+        return Ok(());
+    }
+    execute(command(&format!("{cargo} check --workspace --quiet")).current_dir(folder))
 }
 
 fn text<'a>(package: &'a Value, key: &str) -> Result<&'a str> {
