@@ -70,6 +70,7 @@
 //! re-exported.
 
 mod align;
+mod batch;
 mod calibration;
 mod checks;
 mod diagnosis;
@@ -99,6 +100,7 @@ pub use align::{
     Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration,
     UnknownRegistration, align,
 };
+pub use batch::refine_batch;
 pub use calibration::Calibration;
 pub use checks::{
     ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warning_of_runner_up,

@@ -58,7 +58,7 @@ impl Refinement {
 }
 
 /// A pipeline with its scratch memory and renderer, for any number of refinements: create one per
-/// thread.
+/// thread, or call [`refine_batch`](crate::refine_batch).
 ///
 /// The pipeline is any stage, by default a boxed one. [`Refiner::stage_mut`] changes it in place,
 /// and [`Refiner::into_stage`] returns it.
@@ -67,7 +67,7 @@ impl Refinement {
 /// use hybrid_icp::core::{
 ///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
 /// };
-/// use hybrid_icp::{Preset, Refiner};
+/// use hybrid_icp::{Preset, Refiner, refine_batch};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let camera = PinholeCamera::new(100.0, 100.0, 31.5, 31.5, 64, 64)?;
 /// let plate = vec![
@@ -85,13 +85,10 @@ impl Refinement {
 /// assert!((refined.outcome.camera_from_object.translation.z - 0.5).abs() < 1e-4);
 /// assert!(refined.mve < refined.mve_initial);
 ///
-/// // Many poses on all cores, with a refiner per thread. The bits are those of one thread.
-/// use rayon::prelude::*;
-/// let poses = [init; 8];
-/// let refined: Vec<_> = poses.par_iter()
-///     .map_init(|| Refiner::preset(Preset::Auto), |refiner, init| refiner.refine(&model, &observation, init))
-///     .collect();
-/// # assert_eq!(refined.len(), 8);
+/// // Many poses on all cores, with the bits of one thread.
+/// let items = [(&model, &observation, init); 8];
+/// let all = refine_batch(&items, None, || Refiner::preset(Preset::Auto));
+/// assert_eq!(all, [refined; 8]);
 /// # Ok(()) }
 /// ```
 pub struct Refiner<S = BoxedStage> {

@@ -1,7 +1,7 @@
 //! Checks that types can be shared and sent between threads, and that threads do not change
 //! results.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::num::NonZeroUsize;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::render;
@@ -12,7 +12,7 @@ use hybrid_icp::fusion::{BoxedFuser, Fusion, PoseEstimate};
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::{BoxedStage, Preset, Refinement, Refiner, SequentialEstimator};
+use hybrid_icp::{BoxedStage, Preset, Refinement, Refiner, SequentialEstimator, refine_batch};
 
 /// Compiles only if the documented `Send` and `Sync` hold.
 ///
@@ -86,35 +86,32 @@ impl View {
 }
 
 /// Refines from every start on some threads that share the model and the observation.
-///
-/// Each thread takes the next start.
 fn refine_all(
     model: &Model,
     observation: &Observation,
     starts: &[Isometry3<f64>],
     threads: usize,
 ) -> Vec<Refinement> {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut refiner = Refiner::preset(Preset::Hybrid);
-        let mut done = Vec::new();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(start) = starts.get(index) else {
-                return done;
-            };
-            done.push((index, refiner.refine(model, observation, start)));
-        }
-    };
-    let mut done: Vec<(usize, Refinement)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        threads
-            .into_iter()
-            .flat_map(|t| t.join().unwrap())
-            .collect()
-    });
-    done.sort_by_key(|(index, _)| *index);
-    done.into_iter().map(|(_, refined)| refined).collect()
+    let items: Vec<_> = starts
+        .iter()
+        .map(|start| (model, observation, *start))
+        .collect();
+    let threads = NonZeroUsize::new(threads);
+    refine_batch(&items, threads, || Refiner::preset(Preset::Hybrid))
+}
+
+#[test]
+fn a_batch_has_the_results_of_single_calls_in_the_same_order() {
+    let view = View::new();
+    let (starts, observation) = (view.starts(20), view.observe());
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+    let single = starts
+        .iter()
+        .map(|start| refiner.refine(&view.model, &observation, start));
+    let single: Vec<_> = single.collect();
+    assert_eq!(refine_all(&view.model, &observation, &starts, 3), single);
+    assert_eq!(refine_all(&view.model, &observation, &starts, 0), single);
+    assert!(refine_all(&view.model, &observation, &[], 2).is_empty());
 }
 
 #[test]
