@@ -30,8 +30,8 @@ use hybrid_icp::{Preset, Refinement, Refiner};
 
 /// Returns a configuration that fails a bench that executes 3 % more than `instructions`.
 ///
-/// That is the count when the limit was set, with the compiler that `xtask/src/instructions.rs`
-/// names. A commit that changes a limit gives the reason.
+/// That is the count when the limit was set, with the compiler that
+/// `xtask/src/measure/instructions.rs` names. A commit that changes a limit gives the reason.
 fn limit(instructions: u64) -> LibraryBenchmarkConfig {
     let mut callgrind = Callgrind::default();
     callgrind.hard_limits([(EventKind::Ir, instructions * 103 / 100)]);

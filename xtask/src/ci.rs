@@ -7,9 +7,12 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 
-use crate::bench::BENCHES;
+use crate::checks::{licenses, tidy, valgrind};
+use crate::measure::bench::BENCHES;
+use crate::measure::{counts, instructions};
+use crate::pages::book;
 use crate::process::{cargo, execute};
-use crate::{book, counts, instructions, licenses, python, read, tidy, valgrind};
+use crate::{python, read};
 
 /// Runs every check and stops at the first that fails.
 pub(crate) fn run() -> Result<()> {

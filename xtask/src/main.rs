@@ -1,34 +1,22 @@
 //! Automation of the workspace: `cargo xtask help` lists the commands.
 
-mod bench;
-mod book;
+mod checks;
 mod ci;
-mod counts;
-mod cycles;
-mod deviations;
-mod fuzz;
-mod instructions;
-mod licenses;
-mod look;
-mod miri;
-mod mutants;
+mod measure;
 mod package;
-mod peers;
-mod pictures;
+mod pages;
 mod process;
-mod prose;
 mod python;
-mod repro;
-mod scale;
-mod scale_ray;
-mod tidy;
-mod valgrind;
 mod venv;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
+
+use checks::{deviations, fuzz, licenses, miri, mutants, tidy, valgrind};
+use measure::{bench, counts, instructions, peers, repro, scale};
+use pages::{book, look, pictures};
 
 const HELP: &str = "\
 cargo xtask COMMAND

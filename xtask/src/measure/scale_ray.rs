@@ -4,8 +4,8 @@ use std::process::Command;
 
 use anyhow::Result;
 
+use super::scale::Scale;
 use crate::process::execute;
-use crate::scale::Scale;
 use crate::{python, root};
 
 /// Runs the script that compares Ray with the `seconds` and the output of `bop refine` on as many

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
+use super::scale_ray;
 use crate::process::{cargo, execute, target};
-use crate::scale_ray;
 
 /// 20 scenes of 10 images, 6 objects per image and 20 starts per object give more than 20,000 rows.
 const GENERATE: &str =

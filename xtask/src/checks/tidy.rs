@@ -4,7 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 
-use crate::{cycles, deviations, prose, read, rust_files};
+use super::{cycles, deviations, prose};
+use crate::{read, rust_files};
 
 /// Every crate and its level. Dependencies within the workspace point to a lower level.
 const LAYERS: &[(&str, u32)] = &[
@@ -75,7 +76,7 @@ fn layers(name: &str, manifest: &str, findings: &mut Vec<String>) {
     };
     let Some(own) = level(name) else {
         findings.push(format!(
-            "crates/{name}: not in the layer table of xtask/src/tidy.rs"
+            "crates/{name}: not in the layer table of xtask/src/checks/tidy.rs"
         ));
         return;
     };

@@ -1,0 +1,5 @@
+//! The book and its pictures.
+
+pub(crate) mod book;
+pub(crate) mod look;
+pub(crate) mod pictures;
