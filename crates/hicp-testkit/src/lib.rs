@@ -53,11 +53,11 @@
 //! program must choose and not a library. In a separate test binary, install an allocator that
 //! counts per thread and forwards every call to `std::alloc::System`. Refine twice with one
 //! `Refiner`, and compare the count before and after the second run. To start, copy
-//! `tests/tests/it/allocations_custom.rs` from the repository.
+//! `tests/tests/it/custom/allocations.rs` from the repository.
 //!
 //! *Observers* have one law: observing changes nothing. The engine ensures it.
 //!
-//! `tests/tests/it/custom_*.rs` in the repository show a component for every extension point,
+//! `tests/tests/it/custom/*.rs` in the repository show a component for every extension point,
 //! checked and used in a whole pipeline.
 
 // A test kit reports by panicking, and its own scenes are valid by construction.

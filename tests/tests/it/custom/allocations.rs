@@ -2,8 +2,8 @@
 //!
 //! The conformance kit cannot test this.
 
-use crate::custom_association::SoftProjective;
-use crate::custom_metric::AlongRay;
+use super::association::SoftProjective;
+use super::metric::AlongRay;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::allocations;
 use hicp_tests::scene;

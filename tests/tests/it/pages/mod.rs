@@ -1,0 +1,5 @@
+//! Checks of the documentation.
+
+mod book;
+mod catalogue;
+mod pitfalls;

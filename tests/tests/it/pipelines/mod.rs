@@ -1,0 +1,5 @@
+//! Pipelines from files.
+
+mod cross;
+mod files;
+mod limits;

@@ -1,0 +1,10 @@
+//! The presets on simulated and real scenes.
+
+mod beyond;
+mod changed;
+mod estimate;
+mod metrics;
+mod ray_shift;
+mod resolution;
+mod starts;
+mod ycbv;
