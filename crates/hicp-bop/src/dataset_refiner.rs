@@ -37,6 +37,8 @@ impl DatasetRefiner {
     /// each row has a separate mask ([`crate::BoxMask`]). With [`MaskSource::OfRows`], the poses of
     /// the rows are ignored and estimated.
     ///
+    /// The color image is read if one of the models has colors.
+    ///
     /// Never fails: a row that cannot be refined has a [`RowStatus`] with the reason, and missing
     /// or damaged files are listed in the faults. Except for the time, the result depends only on
     /// the arguments.
@@ -49,7 +51,7 @@ impl DatasetRefiner {
         rows: &[ResultRow],
         indices: &[usize],
     ) -> FrameResult {
-        let image = match self.scenes.read(key) {
+        let mut image = match self.scenes.read(key) {
             Ok(image) => image,
             Err(fault) => {
                 let status = RowStatus::from(&fault);
@@ -61,10 +63,16 @@ impl DatasetRefiner {
                 };
             }
         };
+        let mut result = FrameResult::default();
+        let objects = indices.iter().map(|index| rows[*index].obj_id);
+        if objects.into_iter().any(|obj_id| self.is_colored(obj_id)) {
+            // Without its color image, the rows are refined by depth alone.
+            result.faults.extend(image.read_color().err());
+        }
         let mut work = Work {
             frame: self.masks.frame(key, image),
             refiner,
-            result: FrameResult::default(),
+            result,
         };
         let mut by_object: BTreeMap<u32, Vec<(usize, Isometry3<f64>)>> = BTreeMap::new();
         for index in indices {
@@ -99,8 +107,14 @@ impl DatasetRefiner {
         }
         let mut result = work.result;
         result.rows.sort_by_key(|row| row.index);
-        result.faults = work.frame.into_faults();
+        result.faults.extend(work.frame.into_faults());
         result
+    }
+
+    /// Returns whether the model of an object has colors.
+    fn is_colored(&self, obj_id: u32) -> bool {
+        let model = self.models.by_id.get(&obj_id);
+        model.is_some_and(|model| model.mesh().color().is_some())
     }
 }
 

@@ -13,8 +13,10 @@ use crate::fault::chain;
 #[derive(Clone, Debug)]
 pub struct ModelFolder {
     dir: PathBuf,
+    info_path: PathBuf,
     infos: BTreeMap<u32, ModelInfo>,
     limits: ReadLimits,
+    with_color: bool,
 }
 
 impl ModelFolder {
@@ -33,17 +35,58 @@ impl ModelFolder {
     ///
     /// As for [`ReadLimits::read_models_info`].
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
-        let dir = dir.as_ref().to_owned();
-        let info = dir.join("models_info.json");
-        let infos = if is_absent(&info) {
+        let dir = dir.as_ref();
+        Self::with_info(limits, dir, dir.join("models_info.json"))
+    }
+
+    /// Opens a folder as [`ModelFolder::open`] does, within `limits`, with the diameters and
+    /// symmetries of another file, if it exists ([`Dataset::models_info_path`]).
+    ///
+    /// # Errors
+    ///
+    /// As for [`ReadLimits::read_models_info`].
+    pub fn with_info(
+        limits: ReadLimits,
+        dir: impl AsRef<Path>,
+        info: impl AsRef<Path>,
+    ) -> Result<Self, IoError> {
+        let info_path = info.as_ref().to_owned();
+        let infos = if is_absent(&info_path) {
             BTreeMap::new()
         } else {
-            limits.read_models_info(info)?
+            limits.read_models_info(&info_path)?
         };
-        Ok(Self { dir, infos, limits })
+        Ok(Self {
+            dir: dir.as_ref().to_owned(),
+            info_path,
+            infos,
+            limits,
+            with_color: true,
+        })
+    }
+
+    /// Reads the models without their colors. Color images are then not read either.
+    #[must_use]
+    pub fn without_color(mut self) -> Self {
+        self.with_color = false;
+        self
+    }
+
+    /// Returns the folder.
+    #[must_use]
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Returns the path of the file of diameters and symmetries. The file may not exist.
+    #[must_use]
+    pub fn info_path(&self) -> &Path {
+        &self.info_path
     }
 
     /// Reads the model of an object in meters, or returns `None` if its file does not exist.
+    ///
+    /// Colors that cannot be used are left out.
     ///
     /// # Errors
     ///
@@ -59,7 +102,12 @@ impl ModelFolder {
             symmetries: info.map(|i| i.symmetries.clone()).unwrap_or_default(),
             ..ModelConfig::default()
         };
-        let mesh = self.limits.read_mesh(path, LengthUnit::Millimeters)?;
+        let mesh = match self.with_color {
+            true => self.limits.read_mesh(path, LengthUnit::Millimeters)?,
+            false => self
+                .limits
+                .read_mesh_geometry(path, LengthUnit::Millimeters)?,
+        };
         Ok(Some(Model::with_config(mesh, config)))
     }
 }

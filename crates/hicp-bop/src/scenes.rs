@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use hicp_io::bop::{Dataset, Scene};
-use hybrid_icp::core::{DepthImage, ImageError, Mask, Observation, PinholeCamera};
+use hybrid_icp::core::{ColorImage, DepthImage, ImageError, Mask, Observation, PinholeCamera};
 
 use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;
@@ -34,12 +34,42 @@ pub struct Image {
     pub camera: PinholeCamera,
     /// The depth image, meters. The observations with all masks share it.
     pub depth: Arc<DepthImage>,
+    /// The color image, if it was read ([`Image::read_color`]). All observations share it.
+    pub color: Option<Arc<ColorImage>>,
 }
 
 impl Image {
+    /// Reads the color image of the scene's folder `rgb`, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault`] if the color image is damaged or has another size than the depth image.
+    pub fn read_color(&mut self) -> Result<(), Fault> {
+        let color = self.scene.read_color(self.im_id);
+        self.color = color.map_err(|e| Fault::of(&e))?.map(Arc::new);
+        let expected = (self.depth.width(), self.depth.height());
+        let other = |color: &mut Arc<ColorImage>| expected != (color.width(), color.height());
+        match self.color.take_if(other) {
+            None => Ok(()),
+            Some(color) => Err(Fault::damaged(format!(
+                "{}, rgb of image {}: {}x{} pixels, expected {}x{} as the depth image",
+                self.scene.dir().display(),
+                self.im_id,
+                color.width(),
+                color.height(),
+                expected.0,
+                expected.1,
+            ))),
+        }
+    }
+
     /// Creates the observation of the image with a mask.
     pub(crate) fn observe(&self, mask: Mask) -> Result<Observation, ImageError> {
-        Observation::new(Arc::clone(&self.depth), mask, self.camera)
+        let observation = Observation::new(Arc::clone(&self.depth), mask, self.camera)?;
+        match &self.color {
+            Some(color) => observation.with_color(Arc::clone(color)),
+            None => Ok(observation),
+        }
     }
 }
 
@@ -88,7 +118,7 @@ impl Scenes {
         opened
     }
 
-    /// Reads the camera and the depth of an image.
+    /// Reads the camera and the depth of an image, without its color.
     ///
     /// # Errors
     ///
@@ -123,6 +153,7 @@ impl Scenes {
             im_id,
             camera,
             depth: Arc::new(depth),
+            color: None,
         })
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! **Should you use this crate?** Use it to read the files of robots, scanners and benchmarks into
 //! the types of `hicp-core`, and to write them. It is not a general mesh or image library: it keeps
-//! geometry and drops colors, materials and texture coordinates.
+//! geometry and the color of the surface, and drops all other properties of materials.
 //!
 //! - Units: files may be in millimeters; every returned value is in meters and seconds.
 //! - Errors: for any content, a reader returns a value or an [`IoError`]. The error names the file,
@@ -54,15 +54,15 @@ mod unit;
 pub use unit::{LengthUnit, UnknownUnit};
 
 mod mesh;
-pub use mesh::{read_mesh, write_obj, write_ply};
+pub use mesh::{MeshFile, read_mesh, write_obj, write_ply};
 
 mod cloud;
 pub use cloud::{PointCloud, read_cloud, read_point_cloud_ply, write_point_cloud_ply};
 
 mod image;
 pub use image::{
-    MaskFile, MaskRule, RawDepth, read_depth, read_depth_png, read_mask, read_mask_png,
-    read_png_size, read_rgb_png, write_depth_png, write_mask_png, write_rgb_png,
+    MaskFile, MaskRule, RawDepth, read_color, read_depth, read_depth_png, read_mask, read_mask_png,
+    read_png_size, write_depth_png, write_mask_png, write_rgb_png,
 };
 
 mod document;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod box_mask;
+mod color;
 mod judging;
 mod models;
 mod refining;

@@ -363,8 +363,9 @@ fn a_report_contains_figures_tables_and_cases_that_failed() {
     assert_eq!(summary.lines().count(), 1 + 13 * 9);
     let differences = std::fs::read_to_string(folder.path().join("differences.csv")).unwrap();
     assert_eq!(differences.lines().count(), 1 + 13 * 8);
-    let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("figure.png")).unwrap();
-    assert!(width > 1000 && height > 300 && rgb.iter().any(|b| *b != 255));
+    let image = hicp_io::read_color(folder.path().join("figure.png")).unwrap();
+    assert!(image.width() > 1000 && image.height() > 300);
+    assert!(image.pixels().iter().any(|pixel| *pixel != [255; 3]));
     assert!(!folder.path().join("alpha.svg").exists());
 }
 

@@ -33,6 +33,7 @@ use crate::unit::LengthUnit;
 pub struct Dataset {
     root: PathBuf,
     limits: ReadLimits,
+    models: Option<PathBuf>,
 }
 
 impl Dataset {
@@ -45,7 +46,11 @@ impl Dataset {
         let root = root.as_ref().to_owned();
         if root.is_dir() {
             let limits = ReadLimits::DEFAULT;
-            Ok(Self { root, limits })
+            Ok(Self {
+                root,
+                limits,
+                models: None,
+            })
         } else {
             Err(IoError::missing(root, "dataset folder"))
         }
@@ -59,19 +64,50 @@ impl Dataset {
         self
     }
 
+    /// Takes the meshes from another folder: one of the dataset, such as `models_color`, or a path.
+    ///
+    /// Diameters and symmetries still come from [`Dataset::models_info_path`].
+    ///
+    /// # Errors
+    ///
+    /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is no such folder.
+    pub fn with_models(mut self, folder: impl AsRef<Path>) -> Result<Self, IoError> {
+        let folder = folder.as_ref();
+        let places = [self.root.join(folder), folder.to_owned()];
+        let found = places.into_iter().find(|dir| dir.is_dir());
+        let missing = || IoError::missing(self.root.join(folder), "folder of models");
+        self.models = Some(found.ok_or_else(missing)?);
+        Ok(self)
+    }
+
     /// Returns the folder.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Returns the folder of the models: `models`, or `models_eval` if it is the only one.
+    /// Returns the folder of the models: that of [`Dataset::with_models`], or `models`, or
+    /// `models_eval` if it is the only one.
     ///
     /// # Errors
     ///
     /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if neither exists.
     pub fn models_dir(&self) -> Result<PathBuf, IoError> {
-        self.first_dir(["models", "models_eval"])
+        let other = self.models.clone().map(Ok);
+        other.unwrap_or_else(|| self.first_dir(["models", "models_eval"]))
+    }
+
+    /// Returns the path of the file of diameters and symmetries: `models_info.json` in `models`, or
+    /// in `models_eval` if it is the only folder. The file may not exist.
+    ///
+    /// If the dataset has neither folder, the file is that of [`Dataset::with_models`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`Dataset::models_dir`].
+    pub fn models_info_path(&self) -> Result<PathBuf, IoError> {
+        let dir = self.first_dir(["models", "models_eval"]);
+        Ok(dir.or_else(|_| self.models_dir())?.join("models_info.json"))
     }
 
     /// Returns the folder of the models over which BOP's errors are defined.
@@ -103,10 +139,19 @@ impl Dataset {
         Ok(Self::model_path_in(&self.models_dir()?, obj_id))
     }
 
-    /// Returns the path of an object's mesh in a folder of models. The file may not exist.
+    /// Returns the path of an object's mesh in a folder of models: `obj_000001.ply` for object 1,
+    /// or else `obj_000001.obj`, or one of them in the folder `obj_000001`.
+    ///
+    /// If there is none, returns the first path.
     #[must_use]
     pub fn model_path_in(models: &Path, obj_id: u32) -> PathBuf {
-        models.join(format!("obj_{obj_id:06}.ply"))
+        let name = format!("obj_{obj_id:06}");
+        let path = |stem: &Path, extension: &str| stem.with_extension(extension);
+        let (stem, inner) = (models.join(&name), models.join(&name).join(&name));
+        let first = path(&stem, "ply");
+        let others = [path(&stem, "obj"), path(&inner, "ply"), path(&inner, "obj")];
+        let found = others.into_iter().find(|other| !is_absent(other));
+        found.filter(|_| is_absent(&first)).unwrap_or(first)
     }
 
     /// Reads the mesh of an object, in meters.
@@ -125,8 +170,7 @@ impl Dataset {
     ///
     /// As for [`Dataset::models_dir`] and [`read_models_info`](super::read_models_info).
     pub fn read_models_info(&self) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
-        let path = self.models_dir()?.join("models_info.json");
-        self.limits.read_models_info(path)
+        self.limits.read_models_info(self.models_info_path()?)
     }
 
     /// Reads the targets of the benchmark from the dataset's `test_targets_bop19.json`.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use hicp_core::{DepthImage, Isometry3, Mask};
+use hicp_core::{ColorImage, DepthImage, Isometry3, Mask};
 
 use super::annotations::{GroundTruth, GroundTruthInfo, SceneCamera, by_image};
 use crate::error::{IoError, Place};
@@ -155,11 +155,24 @@ impl Scene {
     /// Returns the path of an image's color or gray image, or `None` if neither exists.
     #[must_use]
     pub fn color_path(&self, im_id: u32) -> Option<PathBuf> {
-        ["rgb", "gray"]
-            .iter()
-            .flat_map(|folder| ["png", "jpg"].map(|ext| format!("{folder}/{im_id:06}.{ext}")))
-            .map(|name| self.dir.join(name))
-            .find(|path| !is_absent(path))
+        let mut folders = ["rgb", "gray"].into_iter();
+        folders.find_map(|folder| self.picture_path(folder, im_id))
+    }
+
+    fn picture_path(&self, folder: &str, im_id: u32) -> Option<PathBuf> {
+        let names = ["png", "jpg"].map(|ext| format!("{folder}/{im_id:06}.{ext}"));
+        let mut paths = names.iter().map(|name| self.dir.join(name));
+        paths.find(|path| !is_absent(path))
+    }
+
+    /// Reads the color image of an image from `rgb/`, or returns `None` if there is none.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_color`](crate::read_color).
+    pub fn read_color(&self, im_id: u32) -> Result<Option<ColorImage>, IoError> {
+        let path = self.picture_path("rgb", im_id);
+        path.map(|path| self.limits.read_color(path)).transpose()
     }
 
     /// Returns the path of the mask of an instance's visible part. The file may not exist.

@@ -1,6 +1,6 @@
 //! Lens distortion, removed from images when they are read.
 
-use hicp_core::{DepthImage, Mask, PinholeCamera};
+use hicp_core::{ColorImage, DepthImage, Mask, PinholeCamera};
 
 /// A lens distortion: where the ray through a point of the ideal image plane really hits the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +58,17 @@ impl Distortion {
         let pixels = pixels.map(|source| source.and_then(|(u, v)| mask.get(u, v)));
         let pixels = pixels.map(Option::unwrap_or_default).collect();
         Mask::new(mask.width(), mask.height(), pixels).unwrap_or_else(|_| mask.clone())
+    }
+
+    /// Removes the distortion from a color image of `camera`, with the nearest pixel.
+    ///
+    /// A pixel that the real image does not show becomes black.
+    #[must_use]
+    pub fn undistort_color(&self, camera: &PinholeCamera, color: &ColorImage) -> ColorImage {
+        let pixels = self.sources(camera, color.width(), color.height());
+        let pixels = pixels.map(|source| source.and_then(|(u, v)| color.get(u, v)));
+        let pixels = pixels.map(Option::unwrap_or_default).collect();
+        ColorImage::new(color.width(), color.height(), pixels).unwrap_or_else(|_| color.clone())
     }
 
     /// Returns the pixel of the real image for each pixel of the ideal one, row by row.

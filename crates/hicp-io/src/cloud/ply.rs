@@ -26,7 +26,13 @@ pub fn read_point_cloud_ply(
 ) -> Result<PointCloud, IoError> {
     let path = path.as_ref();
     let limits = &ReadLimits::DEFAULT;
-    parse(Reading { path, unit, limits }, &limits.read_bytes(path)?)
+    let reading = Reading {
+        path,
+        unit,
+        limits,
+        with_color: false,
+    };
+    parse(reading, &limits.read_bytes(path)?)
 }
 
 /// Parses the vertices of a PLY file.

@@ -50,6 +50,7 @@ impl ReadLimits {
             path,
             unit,
             limits: self,
+            with_color: false,
         };
         match Format::of(&content) {
             Some(Format::Ply) => ply::parse(reading, &content),

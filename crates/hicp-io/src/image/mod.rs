@@ -1,10 +1,13 @@
-//! Reading and writing of images: depth, masks and pictures.
+//! Reading and writing of images: color, depth, masks and pictures.
 
 mod bmp;
+pub(crate) mod color;
 mod decode;
 mod depth;
 #[cfg(feature = "exr")]
 mod exr;
+#[cfg(feature = "jpeg")]
+mod jpeg;
 mod mask;
 mod mask_values;
 mod netpbm;
@@ -12,12 +15,11 @@ mod netpbm;
 mod npy;
 mod pixels;
 mod raster;
-mod rgb;
 #[cfg(feature = "tiff")]
 mod tiff;
 
+pub use color::{read_color, write_rgb_png};
 pub use depth::{RawDepth, read_depth, read_depth_png, write_depth_png};
 pub use mask::{read_mask_png, write_mask_png};
 pub use mask_values::{MaskFile, MaskRule, read_mask};
 pub use pixels::read_png_size;
-pub use rgb::{read_rgb_png, write_rgb_png};

@@ -53,7 +53,7 @@ impl From<Pixels> for Raster {
     }
 }
 
-/// Decodes a PNG file. If `only_depth` is set, refuses all pixel types except 16-bit gray.
+/// Reads a PNG file as [`decode`] does.
 pub(super) fn read(
     limits: &ReadLimits,
     path: &Path,
@@ -61,6 +61,17 @@ pub(super) fn read(
     only_depth: bool,
 ) -> Result<Pixels, IoError> {
     let content = limits.read_bytes(path)?;
+    decode(limits, path, &content, transformations, only_depth)
+}
+
+/// Decodes a PNG file. If `only_depth` is set, refuses all pixel types except 16-bit gray.
+pub(super) fn decode(
+    limits: &ReadLimits,
+    path: &Path,
+    content: &[u8],
+    transformations: Transformations,
+    only_depth: bool,
+) -> Result<Pixels, IoError> {
     let available = content.len() as u64;
     // The decoder's own limit covers only its working memory. The limit of this crate, below,
     // covers the image.

@@ -10,6 +10,7 @@ use crate::limits::ReadLimits;
 use crate::source::read_head;
 use crate::unit::LengthUnit;
 
+mod colors;
 mod gltf;
 mod lines;
 mod obj;
@@ -25,8 +26,8 @@ pub use write::{write_obj, write_ply};
 
 /// Reads a triangle mesh; the extension selects the format.
 ///
-/// The extension is `.glb`, `.gltf`, `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case. Only
-/// geometry is read: materials, colors, normals, texture coordinates, lines and points are skipped.
+/// The extension is `.glb`, `.gltf`, `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case.
+/// Normals, lines and points are skipped.
 /// All objects and groups of a file become one mesh. Polygons are triangulated, concave ones by ear
 /// clipping.
 ///
@@ -42,9 +43,15 @@ pub use write::{write_obj, write_ply};
 /// - OFF: text with or without normals and colors, with comments. The counts may be on the first or
 ///   the second line.
 /// - PLY: ASCII and binary of either byte order. Coordinates and faces may have any type of
-///   numbers. The list of a face is `vertex_indices` or `vertex_index`.
+///   numbers. The list of a face is `vertex_indices` or `vertex_index`. Vertices may have the color
+///   `red`, `green` and `blue` (also `diffuse_red` …) as bytes, as numbers up to 1, or as 16-bit
+///   numbers.
 /// - STL: ASCII with any number of solids, and binary, also if the header starts with `solid`.
 ///   Vertices at equal positions become one.
+///
+/// Colors never make a file unreadable: if they cannot be used, the mesh has none
+/// ([`ReadLimits::read_mesh_file`] returns the reason). [`ReadLimits::read_mesh_geometry`] skips
+/// them.
 ///
 /// Cost: the whole file and a small multiple of it are in memory while it is parsed, within
 /// [`ReadLimits::DEFAULT`].
@@ -66,6 +73,16 @@ pub fn read_mesh(path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, Io
     ReadLimits::DEFAULT.read_mesh(path, unit)
 }
 
+/// A mesh, and the reason if the colors in its file cannot be used.
+#[derive(Debug)]
+pub struct MeshFile {
+    /// The mesh, with its colors if they can be used.
+    pub mesh: TriMesh,
+    /// The reason why the colors of the file cannot be used. `None` if they are in the mesh, or if
+    /// the file states none.
+    pub color_fault: Option<IoError>,
+}
+
 impl ReadLimits {
     /// Reads a file as [`read_mesh`] does, within these limits.
     ///
@@ -73,7 +90,43 @@ impl ReadLimits {
     ///
     /// As for [`read_mesh`].
     pub fn read_mesh(&self, path: impl AsRef<Path>, unit: LengthUnit) -> Result<TriMesh, IoError> {
-        let path = path.as_ref();
+        self.read_mesh_file(path, unit).map(|file| file.mesh)
+    }
+
+    /// Reads a file as [`read_mesh`] does, and also returns why its colors cannot be used.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_mesh`].
+    pub fn read_mesh_file(
+        &self,
+        path: impl AsRef<Path>,
+        unit: LengthUnit,
+    ) -> Result<MeshFile, IoError> {
+        self.parse_mesh(path.as_ref(), unit, true)
+    }
+
+    /// Reads a file as [`read_mesh`] does, but without its colors: neither materials nor textures
+    /// are opened.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_mesh`].
+    pub fn read_mesh_geometry(
+        &self,
+        path: impl AsRef<Path>,
+        unit: LengthUnit,
+    ) -> Result<TriMesh, IoError> {
+        let file = self.parse_mesh(path.as_ref(), unit, false)?;
+        Ok(file.mesh)
+    }
+
+    fn parse_mesh(
+        &self,
+        path: &Path,
+        unit: LengthUnit,
+        with_color: bool,
+    ) -> Result<MeshFile, IoError> {
         let extension = path
             .extension()
             .unwrap_or_default()
@@ -94,12 +147,14 @@ impl ReadLimits {
             path,
             unit,
             limits: self,
+            with_color,
         };
         // Check counts from the first bytes, to refuse a large file before reading all of it.
         let (head, bytes) = read_head(path)?;
         check_format(path, &extension, &head)?;
         check_head(&reading, &head, bytes)?;
-        parse(reading, self.read_bytes(path)?)?.finish()
+        let (mesh, color_fault) = parse(reading, self.read_bytes(path)?)?.finish()?;
+        Ok(MeshFile { mesh, color_fault })
     }
 }
 
@@ -139,6 +194,7 @@ mod tests {
             path: Path::new(name),
             unit: LengthUnit::Meters,
             limits: &ReadLimits::DEFAULT,
+            with_color: true,
         }
     }
 

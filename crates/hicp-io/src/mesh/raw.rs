@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hicp_core::{MAX_COORDINATE_METERS, MeshError, Point3, TriMesh, Vector3};
 
+use super::colors::Colors;
 use super::polygon;
 use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
@@ -16,6 +17,8 @@ pub(crate) struct Reading<'a> {
     pub(crate) path: &'a Path,
     pub(crate) unit: LengthUnit,
     pub(crate) limits: &'a ReadLimits,
+    /// Whether colors are read, too.
+    pub(crate) with_color: bool,
 }
 
 impl Reading<'_> {
@@ -53,6 +56,7 @@ pub(crate) struct RawMesh<'a> {
     /// The normals of a point cloud.
     pub(crate) normals: Vec<Vector3<f64>>,
     pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) colors: Colors,
     /// The error if there are no triangles.
     pub(super) empty: IoError,
     /// The indices of welded vertices by position.
@@ -71,6 +75,7 @@ impl<'a> RawMesh<'a> {
             vertices: Vec::new(),
             normals: Vec::new(),
             triangles: Vec::new(),
+            colors: Colors::default(),
             empty,
             index_at: HashMap::new(),
             clipping_budget: polygon::CLIPPING_BUDGET,
@@ -141,18 +146,36 @@ impl<'a> RawMesh<'a> {
         Err(self.reading.refuse(place, found, expected))
     }
 
-    pub(super) fn finish(self) -> Result<TriMesh, IoError> {
+    /// Returns the mesh in meters, and the reason if its colors cannot be used.
+    pub(super) fn finish(self) -> Result<(TriMesh, Option<IoError>), IoError> {
+        let path = self.reading.path;
+        let colors = self.colors.finish(self.vertices.len());
         let scale = self.reading.unit.units_per_meter();
         let vertices = self.vertices.iter().map(|p| (p / scale).cast::<f32>());
         let mesh = TriMesh::new(vertices.collect(), self.triangles);
-        mesh.map_err(|error| {
+        let mesh = mesh.map_err(|error| {
             let expected = match error {
                 MeshError::NoTriangles { .. } => return self.empty,
                 MeshError::NoArea { .. } => "a triangle that has an area",
                 _ => "a usable one",
             };
-            IoError::new(self.reading.path, None, "no usable mesh", expected).with_source(error)
-        })
+            IoError::new(path, None, "no usable mesh", expected).with_source(error)
+        })?;
+        match colors {
+            Ok(None) => Ok((mesh, None)),
+            Ok(Some(color)) => {
+                // Its counts are those of the mesh.
+                let colored = mesh.with_color(color);
+                Ok((
+                    colored.map_err(|e| IoError::unusable(path, "color", e))?,
+                    None,
+                ))
+            }
+            Err(found) => {
+                let fault = IoError::new(path, None, found, "a color for each vertex");
+                Ok((mesh, Some(fault)))
+            }
+        }
     }
 }
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use hicp_io::bop::{read_detections, read_models_info, read_results, read_targets};
 use hicp_io::{
-    IoError, LengthUnit, read_camera_json, read_depth_png, read_mask_png, read_mesh,
-    read_point_cloud_ply, read_pose_json, read_rgb_png,
+    IoError, LengthUnit, read_camera_json, read_color, read_depth_png, read_mask_png, read_mesh,
+    read_point_cloud_ply, read_pose_json,
 };
 use proptest::prelude::*;
 
@@ -25,7 +25,7 @@ const READERS: [(&str, &[&str], Reader); 13] = [
     }),
     ("a.png", PNG, |p| read_depth_png(p, 1.0).map(drop)),
     ("b.png", PNG, |p| read_mask_png(p).map(drop)),
-    ("c.png", PNG, |p| read_rgb_png(p).map(drop)),
+    ("c.png", PNG, |p| read_color(p).map(drop)),
     ("a.json", JSON, |p| read_pose_json(p).map(drop)),
     ("b.json", JSON, |p| read_camera_json(p, (4, 3)).map(drop)),
     ("c.json", JSON, |p| read_targets(p).map(drop)),

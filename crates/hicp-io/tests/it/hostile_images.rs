@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use hicp_io::{
-    IoError, IoErrorKind, ReadLimits, read_depth_png, read_mask_png, read_rgb_png, write_depth_png,
+    IoError, IoErrorKind, ReadLimits, read_color, read_depth_png, read_mask_png, write_depth_png,
 };
 use png::{BitDepth, ColorType, Compression, Encoder};
 
@@ -167,7 +167,7 @@ fn errors_name_every_other_pixel_type() {
         }
         // A mask may be of any type.
         assert_eq!(read_mask_png(&path).unwrap().pixels(), [color == Indexed]);
-        assert_eq!(read_rgb_png(&path).unwrap().2.len(), 3);
+        assert_eq!(read_color(&path).unwrap().pixels().len(), 1);
     }
 }
 
@@ -202,7 +202,7 @@ fn decompression_bombs_are_refused_by_their_headers() {
         for error in [
             read_depth_png(&path, 1.0).unwrap_err(),
             read_mask_png(&path).unwrap_err(),
-            read_rgb_png(&path).unwrap_err(),
+            read_color(&path).unwrap_err(),
         ] {
             let text = message(&error);
             for part in parts {

@@ -11,6 +11,8 @@ mod any_bytes;
 mod awkward_files;
 #[cfg(feature = "all-formats")]
 mod camera_pose_formats;
+#[cfg(feature = "all-formats")]
+mod color_images;
 mod common;
 mod dataset_paths;
 mod hostile_files;
@@ -20,6 +22,7 @@ mod image_formats;
 mod json_limits;
 #[cfg(feature = "all-formats")]
 mod mesh_cloud_formats;
+mod mesh_colors;
 mod results;
 mod unwritable_numbers;
 mod ycbv;

@@ -2,7 +2,6 @@
 
 use hicp_core::se3;
 use hicp_io::bop::{Dataset, ResultFileName, Rle, read_results, write_results};
-use hicp_io::read_rgb_png;
 
 #[test]
 fn scenes_models_and_targets_agree() {
@@ -33,8 +32,8 @@ fn scenes_models_and_targets_agree() {
             let camera = scene.camera(image).unwrap();
             let camera = camera.pinhole(depth.width(), depth.height()).unwrap();
             assert_eq!((camera.width(), camera.height()), (640, 480));
-            let (width, height, rgb) = read_rgb_png(scene.color_path(image).unwrap()).unwrap();
-            assert_eq!((width, height, rgb.len()), (640, 480, 640 * 480 * 3));
+            let color = scene.read_color(image).unwrap().unwrap();
+            assert_eq!((color.width(), color.height()), (640, 480));
             let truths = scene.ground_truth(image).unwrap();
             let infos = scene.ground_truth_info(image).unwrap();
             assert_eq!(truths.len(), infos.len());

@@ -1,8 +1,9 @@
 //! The models of a dataset's objects.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use hicp_bop::{ModelFolder, Models};
 use hicp_io::IoError;
 use hicp_io::bop::Dataset;
@@ -11,21 +12,55 @@ use rayon::prelude::*;
 
 use crate::limits::limits;
 
-/// Reads the models of some objects from a folder, on all threads.
+/// The options for the models to register.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct ModelOptions {
+    /// Take the meshes from another folder: one of the dataset, such as models_color, or a path.
+    /// Diameters and symmetries are still those of models/models_info.json.
+    #[arg(long = "models", value_name = "DIR")]
+    folder: Option<PathBuf>,
+    /// Ignore the colors of the meshes and the images in rgb/. Otherwise, they are used if both
+    /// exist.
+    #[arg(long)]
+    pub(crate) no_color: bool,
+}
+
+impl ModelOptions {
+    /// Opens the folder of the meshes.
+    pub(crate) fn open(&self, dataset: &Dataset) -> Result<ModelFolder, IoError> {
+        let mut dataset = dataset.clone();
+        if let Some(folder) = &self.folder {
+            dataset = dataset.with_models(folder)?;
+        }
+        let (dir, info) = (dataset.models_dir()?, dataset.models_info_path()?);
+        let folder = ModelFolder::with_info(limits(), dir, info)?;
+        Ok(match self.no_color {
+            true => folder.without_color(),
+            false => folder,
+        })
+    }
+}
+
+/// Reads the models of some objects from a folder, without colors, on all threads.
 pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoError> {
     let folder = ModelFolder::open_within(limits(), dir)?;
+    Ok(read_from(&folder.without_color(), objects))
+}
+
+/// Reads the models of some objects, on all threads.
+pub(crate) fn read_from(folder: &ModelFolder, objects: &BTreeSet<u32>) -> Models {
     let read = objects.par_iter().map(|id| (*id, folder.read(*id)));
-    Ok(read.collect::<Vec<_>>().into_iter().collect())
+    read.collect::<Vec<_>>().into_iter().collect()
 }
 
 /// Returns a message for each object whose diameter in `models_info.json` differs from its mesh.
 ///
-/// Masks, pairs, the MVE and recalls depend on the diameter, and none of them fails if it is wrong.
+/// `info` is the path of that file. Masks, pairs, the MVE and recalls depend on the diameter, and
+/// none of them fails if it is wrong.
 /// Works on all threads.
-pub(crate) fn wrong_diameters(models: &Models, dir: &Path) -> BTreeMap<u32, String> {
-    let info = dir.join("models_info.json");
+pub(crate) fn wrong_diameters(models: &Models, info: &Path) -> BTreeMap<u32, String> {
     // Without the file, the diameter is that of the mesh.
-    if hicp_io::is_absent(&info) {
+    if hicp_io::is_absent(info) {
         return BTreeMap::new();
     }
     let wrong = models.by_id.par_iter().filter_map(|(obj_id, model)| {

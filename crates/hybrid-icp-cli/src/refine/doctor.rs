@@ -99,6 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         model,
         depth,
         mask,
+        color,
         camera,
         init,
         warnings,
@@ -106,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = read;
     let init = init.unwrap_or_else(|| unreachable!("--init is required"));
     let init = init.camera_from_object;
-    let mut observation = inputs.observe(depth, mask, camera)?;
+    let mut observation = inputs.observe(depth, mask, color, camera)?;
     let mut faults = Vec::new();
     if !warnings.is_empty()
         && let Some((named, selected)) = many_values(&inputs, &model, &observation, &init)?

@@ -53,7 +53,7 @@ Examples:
       --camera camera.json --output estimated.json --overlay overlay.png
   hybrid-icp estimate --model mug.ply --model-unit mm \\
       --depth depth.png --depth-scale 0.1 --bbox 116,57,133,112 \\
-      --camera camera.json
+      --rgb rgb.png --camera camera.json
 
 `hybrid-icp help refine` shows the form of camera.json.";
 

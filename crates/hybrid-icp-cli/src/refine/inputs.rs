@@ -6,9 +6,10 @@ use anyhow::{Context as _, bail};
 use clap::Args;
 use clap::error::ErrorKind;
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
-use hybrid_icp::core::{DepthImage, Mask, Model, Observation, PinholeCamera};
+use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
 use hybrid_icp::mask_in_box;
 
+use super::colors;
 use crate::limits::limits;
 use crate::options::{finite, positive};
 
@@ -30,9 +31,13 @@ pub(crate) struct ImageFiles {
     /// depth_scale for integers, meters for floating point.
     #[arg(long, value_name = "MM_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) depth_scale: Option<f64>,
+    /// The color image of --camera, of the mask's size: PNG or JPEG. It decides where depth alone
+    /// is ambiguous, and needs a mesh with colors or textures.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rgb: Option<PathBuf>,
     /// The camera, as JSON, YAML, XML, text or NPY: cam_K (nine numbers, row-major), fx, fy, cx and
     /// cy, a 3x3 matrix, or a file of ROS, OpenCV, RealSense or Open3D. Pixel centers are at
-    /// integers. If it has lens distortion, the depth image and the mask are undistorted.
+    /// integers. If it has lens distortion, the images are undistorted.
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: PathBuf,
     /// The camera of the depth image, if it is another one than that of the mask. The depth is then
@@ -187,6 +192,7 @@ pub(crate) struct Read {
     pub(crate) model: Model,
     pub(crate) depth: DepthImage,
     pub(crate) mask: Mask,
+    pub(crate) color: Option<ColorImage>,
     pub(crate) camera: PinholeCamera,
     pub(crate) init: Option<PoseFile>,
     /// Millimeters per unit of the depth image.
@@ -258,13 +264,18 @@ impl Inputs {
             (Some(mask), None) => mask,
             (None, _) => mask_in_box(&depth, &camera, bbox),
         };
+        let rgb = files.rgb.as_deref();
+        let (model, warning) = colors::read_model(&files.model, files.unit()?, rgb)?;
+        warnings.extend(warning);
+        let color = rgb.map(|path| colors::read_image(path, &of_mask, &files.camera));
         Ok(Read {
             mask,
+            color: color.transpose()?,
             init: match &self.init {
                 Some(path) => Some(limits.read_pose(path, self.init_unit)?),
                 None => None,
             },
-            model: Model::new(limits.read_mesh(&files.model, files.unit()?)?),
+            model,
             depth,
             camera,
             depth_scale,
@@ -277,11 +288,16 @@ impl Inputs {
         &self,
         depth: DepthImage,
         mask: Mask,
+        color: Option<ColorImage>,
         camera: PinholeCamera,
     ) -> anyhow::Result<Observation> {
         let (depth_file, mask_name) = (self.files.depth.display(), self.mask_name());
-        Observation::new(depth, mask, camera)
-            .with_context(|| format!("{depth_file} and {mask_name} do not fit together"))
+        let observation = Observation::new(depth, mask, camera)
+            .with_context(|| format!("{depth_file} and {mask_name} do not fit together"))?;
+        Ok(match color {
+            Some(color) => observation.with_color(color)?,
+            None => observation,
+        })
     }
 
     /// Returns the path of the mask, or the option of the box.
@@ -303,6 +319,7 @@ impl Inputs {
             ("--model", Some(&files.model)),
             ("--depth", Some(&files.depth)),
             ("--mask", mask),
+            ("--rgb", files.rgb.as_ref()),
             ("--camera", Some(&files.camera)),
             ("--depth-camera", files.depth_camera.as_ref()),
             ("--camera-from-depth", files.camera_from_depth.as_ref()),

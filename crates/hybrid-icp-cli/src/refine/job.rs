@@ -56,6 +56,7 @@ impl JobOptions {
             model,
             depth,
             mask,
+            color,
             camera,
             init: init_file,
             depth_scale,
@@ -69,7 +70,7 @@ impl JobOptions {
         }
         let mut trace = TraceLines::new(header);
         let start = Instant::now();
-        let observation = inputs.observe(depth, mask, camera)?;
+        let observation = inputs.observe(depth, mask, color, camera)?;
         let refined = match &init {
             Some(init) => refiner.refine_observed(&model, &observation, init, &mut trace),
             None => refiner.estimate_observed(&model, &observation, &mut trace),

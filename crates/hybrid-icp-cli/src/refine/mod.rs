@@ -1,5 +1,6 @@
 //! `hybrid-icp refine`, and the parts that it shares with `hybrid-icp estimate`.
 
+mod colors;
 pub(crate) mod doctor;
 pub(crate) mod estimate;
 mod inputs;
@@ -37,11 +38,14 @@ hybrid-icp refine --model <FILE> --model-unit <UNIT>
            --camera <FILE> --init <FILE> [OPTIONS]";
 
 const EXAMPLE: &str = "\
-Example:
+Examples:
   hybrid-icp refine --model mug.ply --model-unit mm \\
       --depth depth.png --depth-scale 0.1 --mask mask.png \\
       --camera camera.json --init pose.json \\
       --output refined.json --overlay overlay.png
+  hybrid-icp refine --model mug.ply --model-unit mm \\
+      --depth depth.png --depth-scale 0.1 --rgb rgb.png \\
+      --mask mask.png --camera camera.json --init pose.json
 
 camera.json: {\"cam_K\": [572.4, 0, 325.3, 0, 573.6, 242.0, 0, 0, 1]}
          or: {\"fx\": 572.4, \"fy\": 573.6, \"cx\": 325.3, \"cy\": 242.0,

@@ -89,6 +89,7 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
             model_unit: header.unit("model_unit")?,
             depth: header.text("depth")?.into(),
             depth_scale: Some(header.get("depth_scale", "a number")?),
+            rgb: header.get("rgb", "a string")?,
             camera: header.text("camera")?.into(),
             depth_camera: header.get("depth-camera", "a string")?,
             camera_from_depth: header.get("camera-from-depth", "a string")?,
@@ -109,7 +110,7 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
         init_unit: header.unit("init_unit")?,
     };
     let read = inputs.read()?;
-    let observation = inputs.observe(read.depth, read.mask, read.camera)?;
+    let observation = inputs.observe(read.depth, read.mask, read.color, read.camera)?;
     let mut trace = TraceLines::new(Some(header.line.clone()));
     let mut refiner = pipeline.refiner();
     match &read.init {

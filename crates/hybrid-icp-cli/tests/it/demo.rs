@@ -46,17 +46,19 @@ fn it_needs_nothing_and_shows_everything() {
     assert_eq!(shown.err, "");
     assert_eq!(names(folder.path()), ["demo.png"]);
 
-    let (width, height, rgb) = hicp_io::read_rgb_png(folder.path().join("demo.png")).unwrap();
+    let image = hicp_io::read_color(folder.path().join("demo.png")).unwrap();
+    let (width, height) = (image.width(), image.height());
     // The picture shows the object, twice as large, and two rows of a legend.
     assert!(width == 640 && (400..700).contains(&height), "{height}");
-    let legend = &rgb[rgb.len() - 3 * 640 * 50..];
-    assert_eq!(legend[..3], [255; 3]);
-    assert!(legend.chunks_exact(3).any(|p| p == [230, 159, 0]));
-    assert!(legend.chunks_exact(3).any(|p| p == [86, 180, 233]));
+    let legend = image.pixels().rchunks(640 * 50).next().unwrap();
+    assert_eq!(legend[0], [255; 3]);
+    assert!(legend.contains(&[230, 159, 0]));
+    assert!(legend.contains(&[86, 180, 233]));
     // The picture has both outlines and the measured depth.
-    let count = |wanted: &dyn Fn(&[u8]) -> bool| rgb.chunks_exact(3).filter(|p| wanted(p)).count();
-    assert!(count(&|p| p == [230, 159, 0]) > 100);
-    assert!(count(&|p| p == [86, 180, 233]) > 100);
+    let pixels = || image.pixels().iter();
+    let count = |wanted: &dyn Fn(&[u8; 3]) -> bool| pixels().filter(|p| wanted(p)).count();
+    assert!(count(&|p| *p == [230, 159, 0]) > 100);
+    assert!(count(&|p| *p == [86, 180, 233]) > 100);
     assert!(count(&|p| p[0] == p[1] && p[1] == p[2] && p[0] > 0) > 1000);
 }
 

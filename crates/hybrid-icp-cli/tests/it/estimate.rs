@@ -40,9 +40,9 @@ fn an_object_is_found_in_its_mask_or_box() {
         assert!(result["mve"].as_f64().unwrap() < 0.05);
         assert!(result.get("mve_initial").is_none());
         assert!(!result["trace"].as_array().unwrap().is_empty());
-        let (width, _, rgb) = hicp_io::read_rgb_png(scene.path("overlay.png")).unwrap();
-        let has = |color: [u8; 3]| rgb.chunks_exact(3).any(|pixel| pixel == color);
-        assert!(width == 640 && has([86, 180, 233]) && !has([230, 159, 0]));
+        let overlay = hicp_io::read_color(scene.path("overlay.png")).unwrap();
+        let has = |color: [u8; 3]| overlay.pixels().contains(&color);
+        assert!(overlay.width() == 640 && has([86, 180, 233]) && !has([230, 159, 0]));
         let told = run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
         assert!(told.out.contains("all equal"), "{}", told.out);
     }

@@ -69,6 +69,7 @@ fn the_examples_of_all_help_texts_run() {
         let scene = Scene::new();
         hicp_io::write_ply(scene.path("mug.ply"), &car(), LengthUnit::Millimeters).unwrap();
         std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
+        hicp_io::write_rgb_png(scene.path("rgb.png"), 320, 240, &[90; 3 * 320 * 240]).unwrap();
         write_clouds(scene.folder.path(), &truth());
         for name in ["bop", "detections.json"] {
             symlink(shared.path().join(name), scene.path(name)).unwrap();

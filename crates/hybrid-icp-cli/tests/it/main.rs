@@ -23,6 +23,7 @@ mod bop_sequence;
 mod bop_show;
 mod bop_track;
 mod bop_warnings;
+mod color;
 mod command_line;
 mod common;
 mod demo;

@@ -32,12 +32,12 @@ fn it_writes_every_object_a_sheet_and_a_table() {
         );
     }
     // Every cell has a drawing.
-    let (width, height, rgb) = hicp_io::read_rgb_png(written.join("contact_sheet.png")).unwrap();
-    assert_eq!((width, height), (1200, 960));
+    let sheet = hicp_io::read_color(written.join("contact_sheet.png")).unwrap();
+    assert_eq!((sheet.width(), sheet.height()), (1200, 960));
     for (row, column) in (0..4).flat_map(|row| (0..5).map(move |column| (row, column))) {
         let drawn = (0..240 * 240).filter(|i| {
             let (u, v) = (column * 240 + i % 240, row * 240 + i / 240);
-            rgb[3 * (v * 1200 + u)..][..3] != [255, 255, 255]
+            sheet.get(u, v) != Some([255, 255, 255])
         });
         let count = drawn.count();
         assert!(

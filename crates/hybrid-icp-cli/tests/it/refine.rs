@@ -81,11 +81,12 @@ fn the_result_has_every_key_in_its_type() {
         .sum();
     assert_eq!(result["iterations"].as_u64(), Some(sum));
 
-    let (width, height, rgb) = hicp_io::read_rgb_png(scene.path("overlay.png")).unwrap();
+    let overlay = hicp_io::read_color(scene.path("overlay.png")).unwrap();
+    let (width, height) = (overlay.width(), overlay.height());
     // Twice as large, without rows far above and below the object, and with a legend.
     assert!(width == 640 && (370..530).contains(&height), "{height}");
     for color in [[230, 159, 0], [86, 180, 233]] {
-        assert!(rgb.chunks_exact(3).any(|pixel| pixel == color));
+        assert!(overlay.pixels().contains(&color));
     }
 }
 
@@ -298,7 +299,7 @@ fn a_pose_that_cannot_be_refined_keeps_the_numbers_of_the_file() {
     )
     .unwrap();
     assert_kept(&scene, "the mask is empty");
-    assert!(hicp_io::read_rgb_png(scene.path("overlay.png")).is_ok());
+    assert!(hicp_io::read_color(scene.path("overlay.png")).is_ok());
 
     let scene = Scene::new();
     scene.write("init.json", ROUNDED);

@@ -1,5 +1,6 @@
 //! Parses PLY headers and checks element counts against the file size before allocating.
 
+use std::ops::Range;
 use std::path::Path;
 
 use crate::error::{END_OF_FILE, IoError, Place, quote};
@@ -11,8 +12,18 @@ use crate::source::text_bytes;
 /// sufficient bound.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// The properties of a vertex that are read: its position and its normal.
+/// The properties of a vertex that points need: its position and its normal.
 pub(super) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+
+/// The names of the other properties of a vertex that are read: its color.
+const COLOR_NAMES: [&[&str]; 3] = [
+    &["red", "diffuse_red", "r"],
+    &["green", "diffuse_green", "g"],
+    &["blue", "diffuse_blue", "b"],
+];
+
+/// The slots of a vertex's color.
+pub(super) const COLOR_SLOTS: Range<usize> = 6..9;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -71,10 +82,22 @@ pub(super) struct Property {
     pub(super) scalar: &'static Scalar,
     /// The position at which a reader stores the values.
     ///
-    /// It is 0 to 5 for [`VERTEX_NAMES`], 0 for the corners of a face, and `None` if the property
-    /// is skipped.
+    /// It is 0 to 5 for [`VERTEX_NAMES`], the next numbers are for [`COLOR_NAMES`]. It is 0 for the
+    /// corners of a face, and `None` if the property is skipped.
     pub(super) slot: Option<usize>,
     line: usize,
+}
+
+impl Property {
+    /// Returns whether the values are stored at one of these slots.
+    pub(super) fn is_in(&self, slots: &[Range<usize>]) -> bool {
+        let holds = |slot| slots.iter().any(|slots| slots.contains(&slot));
+        self.slot.is_some_and(holds)
+    }
+
+    pub(super) fn is_color(&self) -> bool {
+        self.is_in(&[COLOR_SLOTS])
+    }
 }
 
 /// A kind of elements, such as vertices.
@@ -224,12 +247,20 @@ fn declare(
     let count = count.map(Scalar::parse).transpose()?;
     let element = elements.last_mut().ok_or_else(grammar)?;
     let slot = match (&*element.name, name, count) {
-        ("vertex", _, None) => VERTEX_NAMES.iter().position(|known| *known == name),
+        ("vertex", _, None) => {
+            let required = VERTEX_NAMES.iter().position(|known| *known == name);
+            let color = || COLOR_NAMES.iter().position(|names| names.contains(&name));
+            required.or_else(|| color().map(|index| COLOR_SLOTS.start + index))
+        }
         ("face", "vertex_indices" | "vertex_index", Some(_)) => Some(0),
         _ => None,
     };
     let mut others = element.properties.iter();
-    if let Some(first) = others.find(|other| slot.is_some() && other.slot == slot) {
+    let first = others.find(|other| slot.is_some() && other.slot == slot);
+    // A second color is skipped; a second position or normal would be ambiguous.
+    let is_color = slot.is_some_and(|slot| COLOR_SLOTS.contains(&slot));
+    let slot = slot.filter(|_| first.is_none());
+    if let Some(first) = first.filter(|_| !is_color) {
         let (element, line) = (&element.name, first.line);
         return Err(format!(
             "no second `{name}` of a {element}: line {line} declares one"

@@ -2,7 +2,7 @@
 
 use hicp_core::Vector3;
 
-use super::header::{Element, Encoding, Header};
+use super::header::{COLOR_SLOTS, Element, Encoding, Header, Property};
 use super::rows::Rows;
 use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
@@ -92,7 +92,7 @@ fn parse<'a>(
                 if name == "face" && with_faces {
                     early = Some((rows.clone(), element));
                 }
-                rows.read(&reading, element, 0, |_, _| Ok(()))?;
+                rows.read(&reading, element, &[], |_, _| Ok(()))?;
             }
         }
     }
@@ -108,19 +108,29 @@ fn read_vertices(
     with_faces: bool,
     mesh: &mut RawMesh<'_>,
 ) -> Result<(), IoError> {
-    let slots = if with_faces { 3 } else { 6 };
-    let properties = element.properties.iter();
-    let order = properties.filter_map(|p| p.slot.filter(|slot| *slot < slots));
-    let order: Vec<usize> = order.collect();
     let reading = mesh.reading;
-    rows.read(&reading, element, slots, |place, numbers| {
-        let mut vertex = [f64::NAN; 6];
+    let colored =
+        { COLOR_SLOTS }.all(|slot| element.properties.iter().any(|p| p.slot == Some(slot)));
+    let slots = match (with_faces, reading.with_color && colored) {
+        (false, _) => vec![0..6],
+        (true, false) => vec![0..3],
+        (true, true) => vec![0..3, COLOR_SLOTS],
+    };
+    let properties = element.properties.iter().filter(|p| p.is_in(&slots));
+    let order: Vec<usize> = properties.filter_map(|p| p.slot).collect();
+    let is_byte = |p: &Property| p.is_color() && p.scalar.bytes == 1;
+    let bytes = element.properties.iter().any(is_byte);
+    rows.read(&reading, element, &slots, |place, numbers| {
+        let mut vertex = [f64::NAN; 9];
         for (slot, number) in order.iter().zip(numbers) {
             vertex[*slot] = *number;
         }
-        let [x, y, z, nx, ny, nz] = vertex;
+        let [x, y, z, nx, ny, nz, color @ ..] = vertex;
         if !with_faces {
             mesh.normals.push(Vector3::new(nx, ny, nz));
+        }
+        if slots.contains(&COLOR_SLOTS) {
+            mesh.colors.add(color, bytes);
         }
         mesh.add_vertex(place, [x, y, z])
     })
@@ -135,7 +145,7 @@ fn read_faces(
     let needed = "a list property `vertex_indices` or `vertex_index`";
     element.require(reading.path, 1, needed)?;
     let mut faces = 0;
-    rows.read(&reading, element, 1, |place, corners| {
+    rows.read(&reading, element, &[0..1], |place, corners| {
         faces += 1;
         mesh.add_corners(place, faces - 1, corners)
     })

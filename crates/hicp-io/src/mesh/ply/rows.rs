@@ -1,5 +1,6 @@
 //! The rows of a PLY file, which follow its header.
 
+use std::ops::Range;
 use std::str::SplitAsciiWhitespace;
 
 use super::header::{Element, Encoding, Header, Property, Scalar};
@@ -42,16 +43,16 @@ impl<'a> Rows<'a> {
 
     /// Reads all elements of a kind.
     ///
-    /// Calls `take` for each element with its place and the numbers of the properties in the first
-    /// `slots` slots.
+    /// Calls `take` for each element with its place and the numbers of the properties whose slots
+    /// are in `slots`. A color in a text that is not a number is NaN.
     pub(super) fn read(
         &mut self,
         reading: &Reading<'_>,
         element: &Element,
-        slots: usize,
+        slots: &[Range<usize>],
         mut take: impl FnMut(Place, &[f64]) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
-        let is_kept = |p: &Property| p.slot.is_some_and(|slot| slot < slots);
+        let is_kept = |p: &Property| p.is_in(slots);
         let properties: Vec<_> = element.properties.iter().map(|p| (p, is_kept(p))).collect();
         let mut numbers = Vec::new();
         for row in 0..element.count {
@@ -96,11 +97,13 @@ impl<'a> Rows<'a> {
     /// Reads a property of the current element; returns `None` if it is invalid.
     fn property(&mut self, property: &Property, kept: bool, numbers: &mut Vec<f64>) -> Option<()> {
         let mut left = match property.count {
-            Some(count) => self.number(count, true).filter(|count| *count >= 0.0)?,
+            Some(count) => self
+                .number(count, true, false)
+                .filter(|count| *count >= 0.0)?,
             None => 1.0,
         };
         while left >= 1.0 {
-            let number = self.number(property.scalar, kept)?;
+            let number = self.number(property.scalar, kept, property.is_color())?;
             if kept {
                 numbers.push(number);
             }
@@ -109,13 +112,16 @@ impl<'a> Rows<'a> {
         Some(())
     }
 
-    fn number(&mut self, scalar: &Scalar, kept: bool) -> Option<f64> {
+    fn number(&mut self, scalar: &Scalar, kept: bool, optional: bool) -> Option<f64> {
         match self {
             Self::Ascii { words, .. } => {
                 let word = words.next()?;
                 // A skipped number may be any word: exporters write values that do not fit the
                 // type.
-                if kept { word.parse().ok() } else { Some(0.0) }
+                if !kept {
+                    return Some(0.0);
+                }
+                word.parse().ok().or(optional.then_some(f64::NAN))
             }
             Self::Binary {
                 rest, big_endian, ..

@@ -13,6 +13,7 @@ use hicp_bop::{MaskSource, Rescore};
 
 use self::report::Comparison;
 use super::eval::{self, DELTA_MM, EvalJob};
+use super::models::ModelOptions;
 use super::options::{DatasetOptions, ThreadOptions};
 use super::refine::{RefineJob, RowOptions};
 use crate::choice::{Pipeline, Source};
@@ -85,6 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             dataset: &arguments.dataset,
             results: &arguments.init,
             choice: RowOptions::default(),
+            models: ModelOptions::default(),
             masks: MaskSource::Visible,
             pipeline,
             output: &output,

@@ -67,7 +67,8 @@ impl EvalJob<'_> {
         let scenes = Scenes::new(&dataset, split, pool.current_num_threads() + 1);
         let models_dir = dataset.eval_models_dir()?;
         let models = pool.install(|| models::read(&models_dir, &objects))?;
-        let diameters = pool.install(|| models::wrong_diameters(&models, &models_dir));
+        let diameters =
+            pool.install(|| models::wrong_diameters(&models, &models_dir.join("models_info.json")));
         let objects = EvaluatedObject::of_models(&models, self.symmetric);
         let judge = Judge::new(objects, &scenes, &rows, 1e-3 * self.delta_mm);
         let progress = progress_bar(wanted.len(), "images");

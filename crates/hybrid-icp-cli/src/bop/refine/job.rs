@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use hicp_bop::{MaskSource, Rescore};
 
 use super::row_options::RowOptions;
+use crate::bop::models::ModelOptions;
 use crate::bop::options::{DatasetOptions, ThreadOptions};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::outputs::{Files, journal_of};
@@ -19,6 +20,8 @@ pub(crate) struct JobOptions {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) pipeline: PipelineArguments,
+    #[command(flatten)]
+    models: ModelOptions,
     #[command(flatten)]
     threads: ThreadOptions,
     /// Write -1 to the time column, so that the same input gives the same bytes.
@@ -84,6 +87,7 @@ impl JobOptions {
             dataset,
             results,
             choice: self.choice.clone(),
+            models: self.models.clone(),
             masks,
             pipeline,
             output: &self.output,
@@ -119,6 +123,7 @@ pub(crate) struct RefineJob<'a> {
     pub(crate) results: &'a Path,
     /// The options that chose the rows from the file.
     pub(crate) choice: RowOptions,
+    pub(crate) models: ModelOptions,
     pub(crate) masks: MaskSource,
     pub(crate) pipeline: Pipeline,
     /// The path of the refined result file.

@@ -26,12 +26,12 @@ impl RefineJob<'_> {
         let frames = frames_of(&rows);
         let pool = self.threads.pool(frames.len())?;
         let start = Instant::now();
-        let models_dir = dataset.models_dir()?;
+        let folder = self.models.open(&dataset)?;
         // Read the settings first: if a file changes later, `--resume` must detect the change.
-        let settings = settings::of(self, &rows, &models_dir);
+        let settings = settings::of(self, &rows, &folder);
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
-        let models = pool.install(|| models::read(&models_dir, &objects))?;
-        pool.install(|| warnings::about_models(&models, &models_dir));
+        let models = pool.install(|| models::read_from(&folder, &objects));
+        pool.install(|| warnings::about_models(&models, &folder));
         let shared = DatasetRefiner {
             models,
             scenes: Scenes::new(
@@ -107,7 +107,7 @@ impl RefineJob<'_> {
         if self.distrusts {
             distrust.warn(self);
         }
-        report_faults(self, (&shared.models, &models_dir), &results)?;
+        report_faults(self, (&shared.models, folder.dir()), &results)?;
         said?;
         Ok(mean_seconds(&results))
     }

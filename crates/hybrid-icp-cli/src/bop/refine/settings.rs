@@ -7,6 +7,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
+use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, ResultRow};
 
 use super::job::RefineJob;
@@ -17,7 +18,7 @@ const FORM: u32 = 5;
 /// Returns the settings of a job as a line of text: its options and the state of its files.
 ///
 /// A run continues only a run with equal settings. Images are left out because there are too many.
-pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> String {
+pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], folder: &ModelFolder) -> String {
     let root = &job.dataset.root;
     let dataset = root.canonicalize().unwrap_or_else(|_| root.clone());
     let pipeline = &job.pipeline;
@@ -37,7 +38,8 @@ pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> 
     settings.push(format!("digest-of-masks={}", digest(&job.masks)));
     let parts = (&pipeline.toml, &pipeline.overrides);
     settings.push(format!("digest-of-pipeline={}", digest(&parts)));
-    settings.extend(files(job, rows, models_dir));
+    settings.push(format!("--no-color={}", job.models.no_color));
+    settings.extend(files(job, rows, folder));
     settings.join(", ").replace('\n', " ")
 }
 
@@ -45,12 +47,12 @@ pub(super) fn of(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> 
 ///
 /// Files with equal size and modification time count as equal, because reading all of them would
 /// take as long as some runs.
-fn files(job: &RefineJob<'_>, rows: &[ResultRow], models_dir: &Path) -> Vec<String> {
+fn files(job: &RefineJob<'_>, rows: &[ResultRow], folder: &ModelFolder) -> Vec<String> {
     let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
     let scenes: BTreeSet<u32> = rows.iter().map(|row| row.scene_id).collect();
-    let mut paths = vec![models_dir.join("models_info.json")];
+    let mut paths = vec![folder.info_path().to_owned()];
     let models = objects.iter();
-    paths.extend(models.map(|id| Dataset::model_path_in(models_dir, *id)));
+    paths.extend(models.map(|id| Dataset::model_path_in(folder.dir(), *id)));
     let split = job.dataset.root.join(&job.dataset.split);
     for scene in scenes {
         let names = ["scene_camera.json", "scene_gt.json", "scene_gt_info.json"];

@@ -1,9 +1,8 @@
 //! Warnings about the models and the images of a dataset, once per object.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-use hicp_bop::{FrameResult, Models};
+use hicp_bop::{FrameResult, ModelFolder, Models};
 use hicp_io::bop::ResultRow;
 use hybrid_icp::{Warning, warnings_of_model};
 
@@ -15,8 +14,8 @@ use crate::terminal::warn;
 const SCENES_SHOWN: usize = 5;
 
 /// Warns of models that seem to have another unit and of diameters that differ from the meshes.
-pub(super) fn about_models(models: &Models, models_dir: &Path) {
-    let diameters = models::wrong_diameters(models, models_dir);
+pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
+    let diameters = models::wrong_diameters(models, folder.info_path());
     for (obj_id, model) in &models.by_id {
         let diameter = diameters.get(obj_id);
         diameter.into_iter().for_each(warn);
@@ -25,7 +24,7 @@ pub(super) fn about_models(models: &Models, models_dir: &Path) {
             if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
                 warn(format_args!(
                     "object {obj_id}: {warning}: check that {} is in mm",
-                    models_dir.display()
+                    folder.dir().display()
                 ));
             }
         }

@@ -128,7 +128,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     ))?;
-    let diameter = models::wrong_diameters(&models, &models_dir).remove(&object);
+    let diameter = models::wrong_diameters(&models, &dataset.models_info_path()?).remove(&object);
     diameter.iter().for_each(warn);
     let (im_id, warnings) = tracker.warnings.unwrap_or_default();
     for warning in warnings {

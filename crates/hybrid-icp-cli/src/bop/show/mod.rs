@@ -217,20 +217,14 @@ impl Arguments {
         Ok(MaskSource::detections(detections))
     }
 
-    /// Returns the picture to draw on: the color or gray image if it is a PNG file, else the depth.
+    /// Returns the picture to draw on: the color or gray image if there is one, else the depth.
     fn background(&self, image: &Image) -> anyhow::Result<Picture> {
         let path = image.scene.color_path(image.im_id);
-        let mut path = path.filter(|_| !self.depth);
-        if let Some(other) = path.take_if(|path| path.extension().is_none_or(|end| end != "png")) {
-            warn(format_args!(
-                "{} is no PNG file, expected one: the picture is of the depth",
-                other.display()
-            ));
-        }
-        let Some(path) = path else {
+        let Some(path) = path.filter(|_| !self.depth) else {
             return Ok(Picture::shaded(&image.depth, &image.camera)?);
         };
-        let (width, height, rgb) = hicp_io::read_rgb_png(&path)?;
+        let color = limits().read_color(&path)?;
+        let (width, height) = (color.width(), color.height());
         let expected = (image.depth.width(), image.depth.height());
         if (width, height) != expected {
             bail!(
@@ -240,6 +234,10 @@ impl Arguments {
                 expected.1
             );
         }
-        Ok(Picture { width, height, rgb })
+        Ok(Picture {
+            width,
+            height,
+            rgb: color.pixels().as_flattened().to_vec(),
+        })
     }
 }

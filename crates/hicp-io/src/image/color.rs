@@ -1,31 +1,70 @@
-//! Color images in PNG files, for pictures of results. No computation uses them.
+//! Color images: PNG and JPEG files.
 
 use std::path::Path;
 
+use hicp_core::ColorImage;
 use png::{BitDepth, ColorType, Transformations};
 
 use super::pixels;
 use crate::error::IoError;
+use crate::format::{self, Format};
 use crate::limits::ReadLimits;
 
-/// Reads a PNG file of any pixel type as 8-bit RGB.
+/// Reads a color image from a PNG file of any pixel type, or from a JPEG file.
 ///
-/// Returns the width, the height, and 3 · width · height bytes, row-major. Gray values are
-/// repeated, 16-bit samples lose their low byte, and transparency is dropped.
+/// The first bytes select the format. Gray values are repeated, 16-bit samples lose their low byte,
+/// and transparency is dropped. JPEG needs the feature `jpeg`.
 ///
 /// # Errors
 ///
 /// As for [`read_depth_png`](crate::read_depth_png), except for the errors about scale and pixel
-/// type.
-pub fn read_rgb_png(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>), IoError> {
+/// type. Also if the file has another format.
+pub fn read_color(path: impl AsRef<Path>) -> Result<ColorImage, IoError> {
+    ReadLimits::DEFAULT.read_color(path)
+}
+
+impl ReadLimits {
+    /// Reads a file as [`read_color`] does, within these limits.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read_color`].
+    pub fn read_color(&self, path: impl AsRef<Path>) -> Result<ColorImage, IoError> {
+        let path = path.as_ref();
+        decode(self, path, &self.read_bytes(path)?)
+    }
+}
+
+/// Decodes the content of a color image. `path` is its file, or the file that contains it.
+pub(crate) fn decode(
+    limits: &ReadLimits,
+    path: &Path,
+    content: &[u8],
+) -> Result<ColorImage, IoError> {
+    match Format::of(content) {
+        Some(Format::Png) => decode_png(limits, path, content),
+        #[cfg(feature = "jpeg")]
+        Some(Format::Jpeg) => super::jpeg::decode(limits, path, content),
+        #[cfg(not(feature = "jpeg"))]
+        Some(Format::Jpeg) => Err(format::without_feature(path, Format::Jpeg, "jpeg")),
+        _ => Err(format::refuse(
+            path,
+            content,
+            "a color image as PNG or JPEG",
+        )),
+    }
+}
+
+fn decode_png(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<ColorImage, IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
-    let image = pixels::read(&ReadLimits::DEFAULT, path.as_ref(), transformations, false)?;
+    let image = pixels::decode(limits, path, content, transformations, false)?;
     let pixels = image.bytes.chunks_exact(image.color.samples());
-    let bytes = match image.color {
-        ColorType::Rgb | ColorType::Rgba => pixels.flat_map(|p| [p[0], p[1], p[2]]).collect(),
-        _ => pixels.flat_map(|pixel| [pixel[0]; 3]).collect(),
+    let pixels = match image.color {
+        ColorType::Rgb | ColorType::Rgba => pixels.map(|p| [p[0], p[1], p[2]]).collect(),
+        _ => pixels.map(|pixel| [pixel[0]; 3]).collect(),
     };
-    Ok((image.width, image.height, bytes))
+    let image = ColorImage::new(image.width, image.height, pixels);
+    image.map_err(|error| IoError::unusable(path, "color image", error))
 }
 
 /// Writes 8-bit RGB pixels (3 · `width` · `height` bytes, row-major) as a PNG file.
@@ -63,7 +102,8 @@ mod tests {
         let path = dir.path().join("a.png");
         let rgb: Vec<u8> = (0..36).collect();
         write_rgb_png(&path, 4, 3, &rgb).unwrap();
-        assert_eq!(read_rgb_png(&path).unwrap(), (4, 3, rgb.clone()));
+        let expected = ColorImage::from_rgb(4, 3, &rgb).unwrap();
+        assert_eq!(read_color(&path).unwrap(), expected);
         assert!(matches!(
             write_rgb_png(&path, 4, 4, &rgb),
             Err(IoError { found, expected, .. })
@@ -94,7 +134,7 @@ mod tests {
             ),
         ] {
             pixels::write(&path, (1, 1), kind, &bytes).unwrap();
-            assert_eq!(read_rgb_png(&path).unwrap().2, expected, "{kind:?}");
+            assert_eq!(read_color(&path).unwrap().pixels(), [expected], "{kind:?}");
         }
     }
 }

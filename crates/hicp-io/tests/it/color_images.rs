@@ -1,0 +1,43 @@
+//! Color images of other programs (`tests/fixtures/make.py`).
+
+use hicp_io::{IoErrorKind, ReadLimits, read_color};
+
+use crate::common::fixture;
+
+#[test]
+fn jpeg_images_have_nearly_the_colors_of_the_png_image() {
+    let png = read_color(fixture("picture.png")).unwrap();
+    assert_eq!((png.width(), png.height()), (32, 24));
+    assert_eq!(png.get(3, 2), Some([24, 20, 40]));
+    for name in ["picture.jpg", "picture_progressive.jpg"] {
+        let jpeg = read_color(fixture(name)).unwrap();
+        assert_eq!((jpeg.width(), jpeg.height()), (32, 24), "{name}");
+        let pairs = jpeg.pixels().as_flattened().iter();
+        let pairs = pairs.zip(png.pixels().as_flattened());
+        let most = pairs.map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(most.is_some_and(|most| most <= 12), "{name}: {most:?}");
+    }
+    let gray = read_color(fixture("photo.jpg")).unwrap();
+    assert_eq!((gray.width(), gray.height()), (5, 4));
+    assert!(gray.pixels().iter().all(|[r, g, b]| r == g && g == b));
+}
+
+#[test]
+fn damaged_jpeg_images_and_images_beyond_the_limit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.jpg");
+    let content = std::fs::read(fixture("picture.jpg")).unwrap();
+    for length in [4, 100, 300, content.len() - 40] {
+        std::fs::write(&path, &content[..length]).unwrap();
+        let error = read_color(&path).unwrap_err();
+        assert!(error.found.contains("JPEG"), "{length}: {error}");
+    }
+    let limits = ReadLimits {
+        max_pixels: 32 * 24 - 1,
+        ..ReadLimits::DEFAULT
+    };
+    let error = limits.read_color(fixture("picture.jpg")).unwrap_err();
+    assert_eq!(error.kind, IoErrorKind::Limit);
+    let error = read_color(fixture("mask_red.bmp")).unwrap_err();
+    assert!(error.expected.contains("PNG or JPEG"), "{error}");
+}

@@ -1,0 +1,125 @@
+//! Color images and colored meshes.
+
+use hybrid_icp::core::TriMesh;
+
+use crate::common::*;
+use crate::world::World;
+
+/// Returns the text of a PLY file, red at one end and green at the other.
+fn colored(mesh: &TriMesh, units_per_meter: f32) -> String {
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n",
+        mesh.vertices().len()
+    );
+    let names = [
+        "float x",
+        "float y",
+        "float z",
+        "uchar red",
+        "uchar green",
+        "uchar blue",
+    ];
+    for name in names {
+        text += &format!("property {name}\n");
+    }
+    let faces = mesh.triangles().len();
+    text += &format!("element face {faces}\nproperty list uchar int vertex_index\nend_header\n");
+    for p in mesh.vertices() {
+        let color = if p.x > 0.0 { "250 0 0" } else { "0 250 0" };
+        let p = p * units_per_meter;
+        text += &format!("{} {} {} {color}\n", p.x, p.y, p.z);
+    }
+    for [a, b, c] in mesh.triangles() {
+        text += &format!("3 {a} {b} {c}\n");
+    }
+    text
+}
+
+fn write_gray(path: std::path::PathBuf, width: u32, height: u32) {
+    let bytes = vec![90; 3 * width as usize * height as usize];
+    hicp_io::write_rgb_png(path, width, height, &bytes).unwrap();
+}
+
+#[test]
+fn a_color_image_is_used_with_a_colored_mesh_and_a_trace_repeats_it() {
+    let scene = Scene::new()
+        .with("--rgb", "rgb.png")
+        .with("--model", "colored.ply")
+        .with("--trace", "trace.jsonl");
+    scene.write("colored.ply", colored(&car(), 1.0));
+    write_gray(scene.path("rgb.png"), 320, 240);
+    let result = scene.result();
+    assert_improved(&pose_of(&result), &truth());
+    assert_eq!(result["warnings"], serde_json::json!([]));
+    let trace = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    let header = trace.lines().next().unwrap();
+    assert!(header.contains(r#""rgb":"rgb.png""#), "{header}");
+    run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
+}
+
+#[test]
+fn a_warning_says_why_a_color_image_is_ignored() {
+    let scene = Scene::new().with("--rgb", "rgb.png");
+    write_gray(scene.path("rgb.png"), 320, 240);
+    let parts = [
+        "warning: mesh.ply has no colors",
+        "--rgb rgb.png is ignored",
+    ];
+    scene.run().exits(0).complains(&parts);
+    let text = colored(&car(), 1.0).replacen("250 0 0", "250 none 0", 1);
+    scene.write("colored.ply", text);
+    let scene = scene.with("--model", "colored.ply");
+    scene
+        .run()
+        .exits(0)
+        .complains(&["a color that is not a number"]);
+}
+
+#[test]
+fn a_color_image_of_another_size_is_refused() {
+    let scene = Scene::new().with("--rgb", "rgb.png");
+    write_gray(scene.path("rgb.png"), 640, 480);
+    let parts = ["rgb.png is 640x480", "320x240", "--depth-camera"];
+    scene.run().exits(1).complains(&parts);
+    scene.write("rgb.png", "not an image");
+    scene.run().exits(1).complains(&["rgb.png", "PNG or JPEG"]);
+}
+
+#[test]
+fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
+    let world = World::new();
+    let rows = world.rows();
+    let (_, depth_only) = world.refine(&rows, &[]);
+    std::fs::create_dir(world.path("models_color")).unwrap();
+    for id in [1, 2] {
+        let name = format!("obj_{id:06}.ply");
+        let mesh = hicp_io::read_mesh(
+            world.path("models").join(&name),
+            hicp_io::LengthUnit::Millimeters,
+        );
+        let text = colored(&mesh.unwrap(), 1000.0);
+        std::fs::write(world.path("models_color").join(name), text).unwrap();
+    }
+    let info = r#"{"1": {"diameter": 0.5}, "2": {"diameter": 100}}"#;
+    std::fs::write(world.path("models/models_info.json"), info).unwrap();
+    let (warned, _) = world.refine(&rows, &["--models", "models_color"]);
+    warned
+        .exits(0)
+        .complains(&["models/models_info.json: object 1"]);
+    std::fs::remove_file(world.path("models/models_info.json")).unwrap();
+
+    let rgb = world.scene(3).join("rgb");
+    std::fs::create_dir(&rgb).unwrap();
+    std::fs::write(rgb.join("000040.png"), "damaged").unwrap();
+    let (damaged, _) = world.refine(&rows, &["--models", "models_color"]);
+    damaged
+        .exits(1)
+        .complains(&["rgb/000040.png", "PNG or JPEG"]);
+    let (_, refined) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
+    for (color, depth) in refined.iter().zip(&depth_only) {
+        let (a, b) = (color.camera_from_object(), depth.camera_from_object());
+        assert!((a.translation.vector - b.translation.vector).norm() < 1e-4);
+    }
+    let (missing, _) = (world.run(&["--models", "nothing"]), ());
+    missing.exits(1).complains(&["folder of models", "nothing"]);
+}
