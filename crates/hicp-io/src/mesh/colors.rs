@@ -1,8 +1,13 @@
 //! The colors of a mesh during parsing.
 
-use hicp_core::SurfaceColor;
+use std::path::Path;
 
-/// The colors of a mesh as its file states them.
+use hicp_core::{ColorImage, SurfaceColor, TexturedTriangle};
+
+use crate::error::IoError;
+use crate::limits::{Limit, ReadLimits};
+
+/// The colors of a mesh as its file states them: textures, or else those of the vertices.
 #[derive(Debug, Default)]
 pub(crate) struct Colors {
     /// The numbers of each vertex.
@@ -10,6 +15,12 @@ pub(crate) struct Colors {
     /// Whether the numbers are bytes. Otherwise, the largest one shows their scale.
     bytes: bool,
     largest: f32,
+    images: Vec<ColorImage>,
+    /// The number of pixels of all images.
+    pixels: u64,
+    triangles: Vec<TexturedTriangle>,
+    /// The first reason why colors of the file cannot be used.
+    fault: Option<IoError>,
 }
 
 impl Colors {
@@ -22,24 +33,86 @@ impl Colors {
         self.vertices.push(color);
     }
 
-    /// Returns the colors of a mesh with `vertices` vertices, or the reason why there are none.
+    /// Adds a texture that `read` returns, and returns its index. Reads nothing after a fault.
+    ///
+    /// All textures together may have as many pixels as an image.
+    pub(super) fn add_image(
+        &mut self,
+        limits: &ReadLimits,
+        path: &Path,
+        read: impl FnOnce() -> Result<ColorImage, IoError>,
+    ) -> u32 {
+        let index = u32::try_from(self.images.len()).unwrap_or(u32::MAX);
+        if self.fault.is_some() {
+            return index;
+        }
+        let image = read().and_then(|image| {
+            self.pixels += image.pixels().len() as u64;
+            let within = limits.check(Limit::PIXELS, path, None, self.pixels);
+            within.map(|()| image)
+        });
+        match image {
+            Ok(image) => self.images.push(image),
+            Err(error) => self.refuse(error),
+        }
+        index
+    }
+
+    /// Covers the next triangle with a part of an image.
+    pub(super) fn cover(&mut self, image: u32, corners: [[f32; 2]; 3]) {
+        self.triangles.push(TexturedTriangle { image, corners });
+    }
+
+    /// Sets the reason why colors cannot be used, unless there is one.
+    pub(super) fn refuse(&mut self, fault: IoError) {
+        self.fault.get_or_insert(fault);
+    }
+
+    /// Returns the color of a mesh, and the reason if colors of its file cannot be used.
+    pub(super) fn finish(
+        mut self,
+        path: &Path,
+        vertices: usize,
+        triangles: usize,
+    ) -> (Option<SurfaceColor>, Option<IoError>) {
+        let images = self.images.len();
+        let exists = |triangle: &TexturedTriangle| (triangle.image as usize) < images;
+        if images > 0
+            && self.triangles.len() == triangles
+            && self.fault.is_none()
+            && self.triangles.iter().all(exists)
+        {
+            let color = SurfaceColor::Textures {
+                images: self.images,
+                triangles: self.triangles,
+            };
+            return (Some(color), None);
+        }
+        if !self.triangles.is_empty() || images > 0 {
+            let found = "triangles without a texture or texture coordinates";
+            self.refuse(IoError::new(path, None, found, "both for each triangle"));
+        }
+        if self.vertices.is_empty() {
+            return (None, self.fault);
+        }
+        let is_number = |color: &[f32; 3]| color.iter().all(|number| number.is_finite());
+        let found = match self.vertices.iter().position(|color| !is_number(color)) {
+            Some(vertex) => format!("vertex {vertex} with a color that is not a number"),
+            None if self.vertices.len() == vertices => {
+                return (Some(self.vertex_colors()), self.fault);
+            }
+            None => format!("{} colors of {vertices} vertices", self.vertices.len()),
+        };
+        self.refuse(IoError::new(path, None, found, "a color for each vertex"));
+        (None, self.fault)
+    }
+
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "the conversion saturates"
     )]
-    pub(super) fn finish(self, vertices: usize) -> Result<Option<SurfaceColor>, String> {
-        if self.vertices.is_empty() {
-            return Ok(None);
-        }
-        let is_number = |color: &[f32; 3]| color.iter().all(|number| number.is_finite());
-        if let Some(vertex) = self.vertices.iter().position(|color| !is_number(color)) {
-            return Err(format!("vertex {vertex} with a color that is not a number"));
-        }
-        if self.vertices.len() != vertices {
-            let found = self.vertices.len();
-            return Err(format!("{found} colors of {vertices} vertices"));
-        }
+    fn vertex_colors(&self) -> SurfaceColor {
         let scale = match self.largest {
             _ if self.bytes => 1.0,
             ..=1.0 => 255.0,
@@ -47,8 +120,7 @@ impl Colors {
             _ => 255.0 / 65535.0,
         };
         let byte = |number: f32| (number * scale).round() as u8;
-        let colors = self.vertices.into_iter();
-        let colors = colors.map(|color| color.map(byte)).collect();
-        Ok(Some(SurfaceColor::Vertices(colors)))
+        let colors = self.vertices.iter().map(|color| color.map(byte));
+        SurfaceColor::Vertices(colors.collect())
     }
 }

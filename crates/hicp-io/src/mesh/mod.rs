@@ -13,12 +13,14 @@ use crate::unit::LengthUnit;
 mod colors;
 mod gltf;
 mod lines;
+mod materials;
 mod obj;
 mod off;
 pub(crate) mod ply;
 mod polygon;
 pub(crate) mod raw;
 mod stl;
+mod texture;
 mod write;
 
 use raw::{RawMesh, Reading};
@@ -36,20 +38,24 @@ pub use write::{write_obj, write_ply};
 ///
 /// - GLB and glTF: triangles, strips and fans of the default scene, with the transforms of its
 ///   nodes; also quantized and sparse. The unit of the format is the meter, and y is up; the axes
-///   stay. Draco and meshopt compression is refused. Buffers are read from files next to it.
+///   stay. Draco and meshopt compression is refused. Buffers are read from files next to it. The
+///   color is the base color of the materials, times their textures or `COLOR_0`.
 /// - OBJ: relative indices, continued lines, comments after a record and any line ending are
-///   accepted. Only the first three numbers of a vertex are read. Vertices that no face uses are
-///   dropped.
+///   accepted. Vertices that no face uses are dropped. The color is `map_Kd` or `Kd` of the
+///   materials; without materials, that of the vertices (`v x y z red green blue`).
 /// - OFF: text with or without normals and colors, with comments. The counts may be on the first or
 ///   the second line.
 /// - PLY: ASCII and binary of either byte order. Coordinates and faces may have any type of
 ///   numbers. The list of a face is `vertex_indices` or `vertex_index`. Vertices may have the color
 ///   `red`, `green` and `blue` (also `diffuse_red` …) as bytes, as numbers up to 1, or as 16-bit
-///   numbers.
+///   numbers. Textures are those of comments `TextureFile`, with the coordinates `texture_u` and
+///   `texture_v` of vertices (also `s` and `t`, `u` and `v`) or `texcoord` of faces.
 /// - STL: ASCII with any number of solids, and binary, also if the header starts with `solid`.
 ///   Vertices at equal positions become one.
 ///
-/// Colors never make a file unreadable: if they cannot be used, the mesh has none
+/// Textures and material files are read from the folder of the mesh or below it. Textures are PNG
+/// or JPEG images, and all together have at most [`ReadLimits::max_pixels`] pixels. Colors never
+/// make a file unreadable: if they cannot be used, the mesh has none
 /// ([`ReadLimits::read_mesh_file`] returns the reason). [`ReadLimits::read_mesh_geometry`] skips
 /// them.
 ///

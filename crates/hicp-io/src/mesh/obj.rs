@@ -4,7 +4,7 @@
 //! original line, because `tobj` has four limitations:
 //!
 //! - It refuses files with colors on only some vertices.
-//! - It refuses files that refer to missing normals.
+//! - It refuses files that refer to missing normals or texture coordinates.
 //! - It divides positions by a fourth number.
 //! - It splits vertices that groups share.
 
@@ -12,6 +12,7 @@ use hicp_core::Point3;
 use tobj::{LoadError, LoadOptions};
 
 use super::lines::{Lines, without_comment};
+use super::materials::Materials;
 use super::raw::{FACE, RawMesh, Reading, position};
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
@@ -34,6 +35,8 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
 
     let end = Place::Line(records.text.lines().count().max(1));
     let mut mesh = RawMesh::new(reading, reading.refuse(end.clone(), END_OF_FILE, FACE));
+    let materials = &records.materials;
+    let mut coverage = materials.load(&reading, records.vertices, &mut mesh.colors);
     // Without groups, there is one model, and it has the faces in the order of the file.
     for tobj::Model { mesh: part, .. } in models {
         let positions = part.positions.chunks_exact(3);
@@ -44,9 +47,11 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             let arity = part.face_arities.get(index).copied().unwrap_or(3);
             let (corners, others) = rest.split_at(arity as usize);
             mesh.add_face(Place::Line(*line), corners)?;
+            coverage.cover(corners, &mut mesh);
             rest = others;
         }
     }
+    coverage.finish(&mut mesh.colors);
     let fits = |p: &Point3<f64>| {
         reading
             .check_position(end.clone(), p.coords.as_slice())
@@ -67,6 +72,7 @@ struct Records {
     triangles: usize,
     /// The line of each face.
     faces: Vec<usize>,
+    materials: Materials,
 }
 
 impl Records {
@@ -98,9 +104,12 @@ impl Records {
                 reading.check(Limit::VERTICES, place, self.vertices)?;
                 self.text.push('v');
                 // More numbers may follow: colors, the weight of a curve, or a confidence.
-                for word in words.take(3) {
+                for word in words.clone().take(3) {
                     self.text.push(' ');
                     self.text.push_str(word);
+                }
+                if reading.with_color {
+                    self.materials.add_vertex(words.skip(3));
                 }
             }
             // Records with fewer corners are not faces. They are dropped because the limit does not
@@ -110,12 +119,16 @@ impl Records {
                 reading.check(Limit::TRIANGLES, place, self.triangles)?;
                 self.faces.push(number);
                 self.text.push('f');
+                if reading.with_color {
+                    self.materials.add_face(words.clone(), self.vertices);
+                }
                 for word in words {
                     let position = word.split('/').next().filter(|index| !index.is_empty());
                     self.text.push(' ');
                     self.text.push_str(position.unwrap_or(word));
                 }
             }
+            Some(other) if reading.with_color => self.materials.add(other, line),
             _ => {}
         }
         Ok(())

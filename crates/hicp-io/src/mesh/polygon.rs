@@ -8,7 +8,8 @@ use hicp_core::{Point2, Point3, Vector3};
 /// for hours.
 pub(super) const CLIPPING_BUDGET: u64 = 1 << 28;
 
-/// Appends the n − 2 triangles of a polygon of n corners, with its winding.
+/// Appends the n − 2 triangles of a polygon of n corners, with its winding. They are places in
+/// `corners`.
 ///
 /// Appends nothing for fewer than three corners. A convex polygon becomes a fan. A concave polygon
 /// is clipped ear by ear in its mean plane. The rest of a polygon that crosses itself becomes a
@@ -19,25 +20,25 @@ pub(super) const CLIPPING_BUDGET: u64 = 1 << 28;
 pub(super) fn triangulate(
     vertices: &[Point3<f64>],
     corners: &[u32],
-    triangles: &mut Vec<[u32; 3]>,
+    triangles: &mut Vec<[usize; 3]>,
     budget: &mut u64,
 ) -> bool {
-    if corners.len() <= 3 {
-        fan(corners, triangles);
+    let n = corners.len();
+    if n <= 3 {
+        fan(0..n, triangles);
         return true;
     }
     let points = flatten(vertices, corners);
-    let n = corners.len();
     if (0..n).all(|i| turn(&points[(i + n - 1) % n], &points[i], &points[(i + 1) % n]) >= 0.0) {
-        fan(corners, triangles);
+        fan(0..n, triangles);
         return true;
     }
-    clip_ears(&points, corners, triangles, budget)
+    clip_ears(&points, triangles, budget)
 }
 
-fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
-    if let [first, rest @ ..] = corners {
-        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+fn fan(mut corners: impl Iterator<Item = usize>, triangles: &mut Vec<[usize; 3]>) {
+    if let (Some(first), Some(mut last)) = (corners.next(), corners.next()) {
+        triangles.extend(corners.map(|next| [first, std::mem::replace(&mut last, next), next]));
     }
 }
 
@@ -65,12 +66,7 @@ fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
     (b - a).perp(&(c - a))
 }
 
-fn clip_ears(
-    points: &[Point2<f64>],
-    corners: &[u32],
-    triangles: &mut Vec<[u32; 3]>,
-    budget: &mut u64,
-) -> bool {
+fn clip_ears(points: &[Point2<f64>], triangles: &mut Vec<[usize; 3]>, budget: &mut u64) -> bool {
     let mut left: Vec<usize> = (0..points.len()).collect();
     let (mut at, mut misses) = (0, 0);
     while left.len() > 3 && misses < left.len() {
@@ -81,7 +77,7 @@ fn clip_ears(
         at %= n;
         let ear = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]];
         if is_ear(points, &left, ear, budget) {
-            triangles.push(ear.map(|i| corners[i]));
+            triangles.push(ear);
             left.remove(at);
             misses = 0;
         } else {
@@ -89,8 +85,7 @@ fn clip_ears(
             at += 1;
         }
     }
-    let rest: Vec<u32> = left.iter().map(|i| corners[*i]).collect();
-    fan(&rest, triangles);
+    fan(left.into_iter(), triangles);
     true
 }
 
@@ -122,10 +117,10 @@ mod tests {
     use hicp_core::Isometry3;
     use proptest::prelude::*;
 
-    fn area(vertices: &[Point3<f64>], triangles: &[[u32; 3]], up: &Vector3<f64>) -> (f64, f64) {
+    fn area(vertices: &[Point3<f64>], triangles: &[[usize; 3]], up: &Vector3<f64>) -> (f64, f64) {
         let (mut signed, mut absolute) = (0.0, 0.0);
         for t in triangles {
-            let [a, b, c] = t.map(|i| vertices[i as usize]);
+            let [a, b, c] = t.map(|i| vertices[i]);
             let area = 0.5 * (b - a).cross(&(c - a)).dot(up);
             signed += area;
             absolute += area.abs();
@@ -133,7 +128,7 @@ mod tests {
         (signed, absolute)
     }
 
-    fn cut(vertices: &[Point3<f64>]) -> Vec<[u32; 3]> {
+    fn cut(vertices: &[Point3<f64>]) -> Vec<[usize; 3]> {
         let corners: Vec<u32> = (0..).take(vertices.len()).collect();
         let mut triangles = Vec::new();
         let mut budget = CLIPPING_BUDGET;

@@ -57,6 +57,8 @@ pub(crate) struct RawMesh<'a> {
     pub(crate) normals: Vec<Vector3<f64>>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) colors: Colors,
+    /// The triangles of the last face, as places among its corners.
+    pub(super) places: Vec<[usize; 3]>,
     /// The error if there are no triangles.
     pub(super) empty: IoError,
     /// The indices of welded vertices by position.
@@ -76,6 +78,7 @@ impl<'a> RawMesh<'a> {
             normals: Vec::new(),
             triangles: Vec::new(),
             colors: Colors::default(),
+            places: Vec::new(),
             empty,
             index_at: HashMap::new(),
             clipping_budget: polygon::CLIPPING_BUDGET,
@@ -130,12 +133,24 @@ impl<'a> RawMesh<'a> {
         self.add_face(place, &corners)
     }
 
+    /// Covers the last face with an image, by the texture coordinates of its corners.
+    pub(super) fn texture_face(&mut self, image: u32, coordinates: &[[f32; 2]]) {
+        let corner = |place: usize| coordinates.get(place).copied().unwrap_or_default();
+        for places in &self.places {
+            self.colors.cover(image, places.map(corner));
+        }
+    }
+
     /// Adds a face. Its corners must be indices of existing vertices.
     pub(super) fn add_face(&mut self, place: Place, corners: &[u32]) -> Result<(), IoError> {
         let count = self.triangles.len() + corners.len().saturating_sub(2);
         self.reading.check(Limit::TRIANGLES, place.clone(), count)?;
         let budget = &mut self.clipping_budget;
-        if polygon::triangulate(&self.vertices, corners, &mut self.triangles, budget) {
+        self.places.clear();
+        if polygon::triangulate(&self.vertices, corners, &mut self.places, budget) {
+            let triangles = self.places.iter();
+            self.triangles
+                .extend(triangles.map(|places| places.map(|place| corners[place])));
             return Ok(());
         }
         let found = format!("a concave polygon of {} corners", corners.len());
@@ -149,7 +164,9 @@ impl<'a> RawMesh<'a> {
     /// Returns the mesh in meters, and the reason if its colors cannot be used.
     pub(super) fn finish(self) -> Result<(TriMesh, Option<IoError>), IoError> {
         let path = self.reading.path;
-        let colors = self.colors.finish(self.vertices.len());
+        let (color, fault) = self
+            .colors
+            .finish(path, self.vertices.len(), self.triangles.len());
         let scale = self.reading.unit.units_per_meter();
         let vertices = self.vertices.iter().map(|p| (p / scale).cast::<f32>());
         let mesh = TriMesh::new(vertices.collect(), self.triangles);
@@ -161,21 +178,14 @@ impl<'a> RawMesh<'a> {
             };
             IoError::new(path, None, "no usable mesh", expected).with_source(error)
         })?;
-        match colors {
-            Ok(None) => Ok((mesh, None)),
-            Ok(Some(color)) => {
-                // Its counts are those of the mesh.
-                let colored = mesh.with_color(color);
-                Ok((
-                    colored.map_err(|e| IoError::unusable(path, "color", e))?,
-                    None,
-                ))
-            }
-            Err(found) => {
-                let fault = IoError::new(path, None, found, "a color for each vertex");
-                Ok((mesh, Some(fault)))
-            }
-        }
+        let Some(color) = color else {
+            return Ok((mesh, fault));
+        };
+        // Its counts are those of the mesh.
+        let mesh = mesh
+            .with_color(color)
+            .map_err(|error| IoError::unusable(path, "color", error));
+        Ok((mesh?, fault))
     }
 }
 

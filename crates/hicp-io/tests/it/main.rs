@@ -23,6 +23,7 @@ mod json_limits;
 #[cfg(feature = "all-formats")]
 mod mesh_cloud_formats;
 mod mesh_colors;
+mod mesh_textures;
 mod results;
 mod unwritable_numbers;
 mod ycbv;

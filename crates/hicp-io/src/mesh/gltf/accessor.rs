@@ -25,7 +25,7 @@ struct Layout {
 }
 
 impl Accessors<'_, '_> {
-    /// Reads the elements of an accessor, each of so many components, one after another.
+    /// Reads the elements of an accessor, each of one to four components, one after another.
     ///
     /// `limit` applies to the number of elements; indices are three per triangle.
     pub(super) fn read(
@@ -41,7 +41,7 @@ impl Accessors<'_, '_> {
                 .reading
                 .refuse(place, "an accessor that does not exist", expected));
         };
-        let shape = if components == 1 { "SCALAR" } else { "VEC3" };
+        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
         if accessor.shape != shape {
             return Err(self.reading.refuse(place, quote(&accessor.shape), shape));
         }
@@ -95,6 +95,14 @@ impl Accessors<'_, '_> {
             }
         }
         Ok(numbers)
+    }
+
+    /// Returns the bytes of a buffer view, if it is inside of its buffer.
+    pub(super) fn view(&self, index: usize) -> Option<Cow<'_, [u8]>> {
+        let view = self.root.buffer_views.get(index)?;
+        let end = view.byte_offset.checked_add(view.byte_length)?;
+        let bytes = self.buffers.get(view.buffer)?;
+        Some(Cow::Borrowed(bytes.get(view.byte_offset..end)?))
     }
 
     fn elements(&self, place: &Place, view: usize, layout: Layout) -> Result<Vec<f64>, IoError> {

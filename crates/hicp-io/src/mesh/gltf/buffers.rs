@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use super::schema::Root;
 use crate::error::{IoError, Place, quote};
 use crate::mesh::raw::Reading;
+use crate::mesh::texture;
 use crate::source::text_bytes;
 
 /// Splits a file into its JSON text and the binary chunk of a GLB file.
@@ -60,20 +61,12 @@ pub(super) fn load<'a>(
                 ));
             };
             if let Some(data) = uri.strip_prefix("data:") {
-                let bytes = data
-                    .split_once(";base64,")
-                    .map(|(_, text)| STANDARD.decode(text));
-                return match bytes {
-                    Some(Ok(bytes)) => Ok(Cow::Owned(bytes)),
-                    _ => Err(reading.refuse(place(), quote(uri), "data in base64")),
-                };
+                let data = decode(data).map(Cow::Owned);
+                return data.ok_or_else(|| reading.refuse(place(), quote(uri), "data in base64"));
             }
             let name = uri.replace("%20", " ");
             let folder = reading.path.parent().unwrap_or(Path::new(""));
-            // A file from elsewhere must not read the files of its user.
-            let inside =
-                !name.contains("..") && !name.contains(':') && Path::new(&name).is_relative();
-            if !inside {
+            if !texture::is_inside(&name) {
                 return Err(reading.refuse(place(), quote(uri), "a file next to this one"));
             }
             let bytes = reading.limits.read_bytes(folder.join(name));
@@ -85,4 +78,10 @@ pub(super) fn load<'a>(
             })
         })
         .collect()
+}
+
+/// Decodes the data of a URI, after `data:`.
+pub(super) fn decode(data: &str) -> Option<Vec<u8>> {
+    let (_, text) = data.split_once(";base64,")?;
+    STANDARD.decode(text).ok()
 }

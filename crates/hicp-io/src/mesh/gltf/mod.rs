@@ -5,12 +5,15 @@
 
 mod accessor;
 mod buffers;
+mod paint;
 mod schema;
 
 use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
 
 use self::accessor::Accessors;
+use self::paint::Paint;
 use self::schema::{Node, Primitive, Root};
+use super::colors::Colors;
 use super::raw::{FACE, RawMesh, Reading};
 use crate::error::{IoError, Place};
 use crate::json;
@@ -21,6 +24,14 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     let (text, binary) = buffers::split(&reading, &content)?;
     let root: Root = json::parse(reading.path, text)?;
     let buffers = buffers::load(&reading, &root, binary)?;
+    let mut mesh_colors = Colors::default();
+    let paint = match reading.with_color {
+        true => Paint::parse(&reading, text).unwrap_or_else(|error| {
+            mesh_colors.refuse(error);
+            None
+        }),
+        false => None,
+    };
     let place = Place::Field("$.meshes".to_owned());
     let found = format!("{} meshes", root.meshes.len());
     let mut scene = Scene {
@@ -30,8 +41,10 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             buffers: &buffers,
         },
         visited: vec![false; root.nodes.len()],
+        paint,
         mesh: RawMesh::new(reading, reading.refuse(place, found, FACE)),
     };
+    scene.mesh.colors = mesh_colors;
     let chosen = root.scenes.get(root.scene.unwrap_or(0));
     let mut open: Vec<(usize, Matrix4<f64>)> = match chosen {
         Some(scene) => scene
@@ -82,6 +95,8 @@ fn local(node: &Node) -> Matrix4<f64> {
 struct Scene<'a, 'r> {
     accessors: Accessors<'a, 'r>,
     visited: Vec<bool>,
+    /// The colors of the file, if there are any.
+    paint: Option<Paint>,
     mesh: RawMesh<'r>,
 }
 
@@ -121,7 +136,7 @@ impl<'a> Scene<'a, '_> {
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = Place::Field(format!("$.meshes[{index}].primitives[{number}]"));
-            self.add_primitive(primitive, &place, world)?;
+            self.add_primitive(primitive, (index, number), &place, world)?;
         }
         Ok(())
     }
@@ -129,6 +144,7 @@ impl<'a> Scene<'a, '_> {
     fn add_primitive(
         &mut self,
         primitive: &Primitive,
+        numbers: (usize, usize),
         place: &Place,
         world: &Matrix4<f64>,
     ) -> Result<(), IoError> {
@@ -154,6 +170,10 @@ impl<'a> Scene<'a, '_> {
                 .add_vertex(place.clone(), [point.x, point.y, point.z])?;
         }
         let count = self.mesh.vertices.len() - first;
+        let accessors = self.accessors;
+        let paint = self.paint.as_mut();
+        let texture = paint
+            .and_then(|paint| paint.primitive(&accessors, numbers, count, &mut self.mesh.colors));
         let corners = match primitive.indices {
             Some(indices) => self.accessors.read(indices, 1, Limit::TRIANGLES)?,
             None => (0..count).map(|index| index as f64).collect(),
@@ -179,8 +199,17 @@ impl<'a> Scene<'a, '_> {
                 _ => [0, face + 1, face + 2],
             };
             let order = if mirrored { [a, c, b] } else { [a, b, c] };
-            let corners = order.map(|corner| corners[corner] + first as f64);
-            self.mesh.add_corners(place.clone(), face, &corners)?;
+            let vertices = order.map(|corner| corners[corner] + first as f64);
+            self.mesh.add_corners(place.clone(), face, &vertices)?;
+            if let Some((image, coordinates)) = &texture {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "the corners are below the number of vertices"
+                )]
+                let coordinates = order.map(|corner| coordinates[corners[corner] as usize]);
+                self.mesh.texture_face(*image, &coordinates);
+            }
         }
         Ok(())
     }

@@ -15,15 +15,24 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 /// The properties of a vertex that points need: its position and its normal.
 pub(super) const VERTEX_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
-/// The names of the other properties of a vertex that are read: its color.
-const COLOR_NAMES: [&[&str]; 3] = [
+/// The names of the other properties of a vertex that are read: its color and its place in the
+/// texture.
+const OPTIONAL_NAMES: [&[&str]; 5] = [
     &["red", "diffuse_red", "r"],
     &["green", "diffuse_green", "g"],
     &["blue", "diffuse_blue", "b"],
+    &["texture_u", "u", "s"],
+    &["texture_v", "v", "t"],
 ];
 
 /// The slots of a vertex's color.
 pub(super) const COLOR_SLOTS: Range<usize> = 6..9;
+/// The slots of a vertex's texture coordinates.
+pub(super) const TEXTURE_SLOTS: Range<usize> = 9..11;
+/// The slot of the texture coordinates of a face: two numbers per corner.
+pub(super) const FACE_TEXTURE: usize = 1;
+/// The slot of the number of a face's texture.
+pub(super) const FACE_IMAGE: usize = 2;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -82,9 +91,11 @@ pub(super) struct Property {
     pub(super) scalar: &'static Scalar,
     /// The position at which a reader stores the values.
     ///
-    /// It is 0 to 5 for [`VERTEX_NAMES`], the next numbers are for [`COLOR_NAMES`]. It is 0 for the
-    /// corners of a face, and `None` if the property is skipped.
+    /// It is 0 to 5 for [`VERTEX_NAMES`], the next numbers are for [`OPTIONAL_NAMES`]. It is 0 for
+    /// the corners of a face, and `None` if the property is skipped.
     pub(super) slot: Option<usize>,
+    /// Whether a value in a text may be any word.
+    pub(super) is_optional: bool,
     line: usize,
 }
 
@@ -93,10 +104,6 @@ impl Property {
     pub(super) fn is_in(&self, slots: &[Range<usize>]) -> bool {
         let holds = |slot| slots.iter().any(|slots| slots.contains(&slot));
         self.slot.is_some_and(holds)
-    }
-
-    pub(super) fn is_color(&self) -> bool {
-        self.is_in(&[COLOR_SLOTS])
     }
 }
 
@@ -138,6 +145,8 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// The names of the texture files, from comments `TextureFile`.
+    pub(super) textures: Vec<String>,
     pub(super) bytes: usize,
     pub(super) lines: usize,
 }
@@ -151,7 +160,7 @@ impl Header {
             [b'p', b'l', b'y', b'\r', next, ..] if *next != b'\n' => b'\r',
             _ => b'\n',
         };
-        let (mut encoding, mut elements) = (None, Vec::new());
+        let (mut encoding, mut elements, mut textures) = (None, Vec::new(), Vec::new());
         let (mut bytes, mut lines) = (content.len() - text.len(), 0);
         for line in text.split_inclusive(|byte| *byte == end) {
             (bytes, lines) = (bytes + line.len(), lines + 1);
@@ -167,6 +176,10 @@ impl Header {
             }
             let line = String::from_utf8_lossy(line);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            if let ["comment", "TextureFile", _, ..] = words[..] {
+                let name = line.split_once("TextureFile").map_or("", |(_, name)| name);
+                textures.push(name.trim().to_owned());
+            }
             declare(&words, lines, &mut encoding, &mut elements).map_err(refuse)?;
             if words == ["end_header"] {
                 let expected = "a line `format ascii 1.0`, or another PLY format, before it";
@@ -174,6 +187,7 @@ impl Header {
                 let header = Self {
                     encoding,
                     elements,
+                    textures,
                     bytes,
                     lines,
                 };
@@ -249,18 +263,29 @@ fn declare(
     let slot = match (&*element.name, name, count) {
         ("vertex", _, None) => {
             let required = VERTEX_NAMES.iter().position(|known| *known == name);
-            let color = || COLOR_NAMES.iter().position(|names| names.contains(&name));
-            required.or_else(|| color().map(|index| COLOR_SLOTS.start + index))
+            let optional = || {
+                OPTIONAL_NAMES
+                    .iter()
+                    .position(|names| names.contains(&name))
+            };
+            required.or_else(|| optional().map(|index| COLOR_SLOTS.start + index))
         }
         ("face", "vertex_indices" | "vertex_index", Some(_)) => Some(0),
+        ("face", "texcoord", Some(_)) => Some(FACE_TEXTURE),
+        ("face", "texnumber", None) => Some(FACE_IMAGE),
         _ => None,
     };
     let mut others = element.properties.iter();
     let first = others.find(|other| slot.is_some() && other.slot == slot);
+    let required = if element.name == "face" {
+        0..1
+    } else {
+        0..COLOR_SLOTS.start
+    };
+    let is_optional = slot.is_some_and(|slot| !required.contains(&slot));
     // A second color is skipped; a second position or normal would be ambiguous.
-    let is_color = slot.is_some_and(|slot| COLOR_SLOTS.contains(&slot));
     let slot = slot.filter(|_| first.is_none());
-    if let Some(first) = first.filter(|_| !is_color) {
+    if let Some(first) = first.filter(|_| !is_optional) {
         let (element, line) = (&element.name, first.line);
         return Err(format!(
             "no second `{name}` of a {element}: line {line} declares one"
@@ -271,6 +296,7 @@ fn declare(
         count,
         scalar: Scalar::parse(scalar)?,
         slot,
+        is_optional,
         line,
     });
     Ok(())

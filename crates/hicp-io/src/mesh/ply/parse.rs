@@ -2,11 +2,14 @@
 
 use hicp_core::Vector3;
 
-use super::header::{COLOR_SLOTS, Element, Encoding, Header, Property};
+use super::header::{
+    COLOR_SLOTS, Element, Encoding, FACE_IMAGE, FACE_TEXTURE, Header, Property, TEXTURE_SLOTS,
+};
 use super::rows::Rows;
 use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::{FACE, RawMesh, Reading};
+use crate::mesh::texture;
 
 /// Returns an error if the header alone shows that the file has too many elements.
 ///
@@ -80,24 +83,36 @@ fn parse<'a>(
         _ => "".into(),
     };
     let mut rows = Rows::new(content, &text, &header);
+    let textured = with_faces && reading.with_color && !header.textures.is_empty();
+    let mut coordinates = Vec::new();
     // Faces may precede the vertices that they refer to.
     let mut early = None;
     for element in &header.elements {
         match &*element.name {
-            "vertex" => read_vertices(&mut rows, element, with_faces, &mut mesh)?,
+            "vertex" => {
+                let coordinates = textured.then_some(&mut coordinates);
+                read_vertices(&mut rows, element, with_faces, coordinates, &mut mesh)?;
+            }
             "face" if with_faces && element.line > vertex.line => {
-                read_faces(&mut rows, element, &mut mesh)?;
+                let coordinates = textured.then_some(&*coordinates);
+                read_faces(&mut rows, element, coordinates, &mut mesh)?;
             }
             name => {
                 if name == "face" && with_faces {
                     early = Some((rows.clone(), element));
                 }
-                rows.read(&reading, element, &[], |_, _| Ok(()))?;
+                rows.read(&reading, element, &[], |_, _, _| Ok(()))?;
             }
         }
     }
     if let Some((mut rows, element)) = early {
-        read_faces(&mut rows, element, &mut mesh)?;
+        let coordinates = textured.then_some(&*coordinates);
+        read_faces(&mut rows, element, coordinates, &mut mesh)?;
+    }
+    for name in header.textures.iter().filter(|_| textured) {
+        mesh.colors.add_image(reading.limits, reading.path, || {
+            texture::read(&reading, name)
+        });
     }
     Ok(mesh)
 }
@@ -106,48 +121,95 @@ fn read_vertices(
     rows: &mut Rows<'_>,
     element: &Element,
     with_faces: bool,
+    mut coordinates: Option<&mut Vec<[f32; 2]>>,
     mesh: &mut RawMesh<'_>,
 ) -> Result<(), IoError> {
     let reading = mesh.reading;
-    let colored =
-        { COLOR_SLOTS }.all(|slot| element.properties.iter().any(|p| p.slot == Some(slot)));
-    let slots = match (with_faces, reading.with_color && colored) {
-        (false, _) => vec![0..6],
-        (true, false) => vec![0..3],
-        (true, true) => vec![0..3, COLOR_SLOTS],
-    };
+    let has = |slot| element.properties.iter().any(|p| p.slot == Some(slot));
+    let mut slots = vec![if with_faces { 0..3 } else { 0..6 }];
+    let colored = with_faces && reading.with_color && { COLOR_SLOTS }.all(has);
+    coordinates.take_if(|_| !{ TEXTURE_SLOTS }.all(has));
+    slots.extend(colored.then_some(COLOR_SLOTS));
+    slots.extend(coordinates.is_some().then_some(TEXTURE_SLOTS));
     let properties = element.properties.iter().filter(|p| p.is_in(&slots));
     let order: Vec<usize> = properties.filter_map(|p| p.slot).collect();
-    let is_byte = |p: &Property| p.is_color() && p.scalar.bytes == 1;
+    let is_byte = |p: &Property| p.is_in(&[COLOR_SLOTS]) && p.scalar.bytes == 1;
     let bytes = element.properties.iter().any(is_byte);
-    rows.read(&reading, element, &slots, |place, numbers| {
-        let mut vertex = [f64::NAN; 9];
+    rows.read(&reading, element, &slots, |place, numbers, _| {
+        let mut vertex = [f64::NAN; 11];
         for (slot, number) in order.iter().zip(numbers) {
             vertex[*slot] = *number;
         }
-        let [x, y, z, nx, ny, nz, color @ ..] = vertex;
+        let [x, y, z, nx, ny, nz, red, green, blue, s, t] = vertex;
         if !with_faces {
             mesh.normals.push(Vector3::new(nx, ny, nz));
         }
-        if slots.contains(&COLOR_SLOTS) {
-            mesh.colors.add(color, bytes);
+        if colored {
+            mesh.colors.add([red, green, blue], bytes);
+        }
+        if let Some(coordinates) = &mut coordinates {
+            coordinates.push(downward(s, t));
         }
         mesh.add_vertex(place, [x, y, z])
     })
 }
 
+/// Converts texture coordinates whose origin is the lower left corner.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "f32 is the precision of buffers"
+)]
+fn downward(s: f64, t: f64) -> [f32; 2] {
+    [s as f32, (1.0 - t) as f32]
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "corners are valid indices, and the numbers of textures are checked later"
+)]
 fn read_faces(
     rows: &mut Rows<'_>,
     element: &Element,
+    coordinates: Option<&[[f32; 2]]>,
     mesh: &mut RawMesh<'_>,
 ) -> Result<(), IoError> {
     let reading = mesh.reading;
     let needed = "a list property `vertex_indices` or `vertex_index`";
     element.require(reading.path, 1, needed)?;
-    let mut faces = 0;
-    rows.read(&reading, element, &[0..1], |place, corners| {
+    let last = if coordinates.is_some() { FACE_IMAGE } else { 0 };
+    let slots = 0..last + 1;
+    let slots = std::slice::from_ref(&slots);
+    let properties = element.properties.iter().filter(|p| p.is_in(slots));
+    let order: Vec<Option<usize>> = properties.map(|p| p.slot).collect();
+    let place_of = |slot| order.iter().position(|kept| *kept == Some(slot));
+    let (mut faces, mut of_face) = (0, Vec::new());
+    rows.read(&reading, element, slots, |place, numbers, ends| {
+        let part = |slot| {
+            let index = place_of(slot)?;
+            let start = index.checked_sub(1).map_or(0, |before| ends[before]);
+            Some(&numbers[start..ends[index]])
+        };
+        let corners = part(0).unwrap_or_default();
         faces += 1;
-        mesh.add_corners(place, faces - 1, corners)
+        mesh.add_corners(place, faces - 1, corners)?;
+        let Some(of_vertices) = coordinates else {
+            return Ok(());
+        };
+        of_face.clear();
+        match part(FACE_TEXTURE) {
+            Some(pairs) if pairs.len() == 2 * corners.len() => {
+                of_face.extend(pairs.chunks_exact(2).map(|pair| downward(pair[0], pair[1])));
+            }
+            // The corners are valid indices, because the face was added.
+            _ if !of_vertices.is_empty() => {
+                of_face.extend(corners.iter().map(|corner| of_vertices[*corner as usize]));
+            }
+            _ => return Ok(()),
+        }
+        let image = part(FACE_IMAGE).and_then(|image| image.first());
+        mesh.texture_face(image.map_or(0, |image| *image as u32), &of_face);
+        Ok(())
     })
 }
 

@@ -43,23 +43,28 @@ impl<'a> Rows<'a> {
 
     /// Reads all elements of a kind.
     ///
-    /// Calls `take` for each element with its place and the numbers of the properties whose slots
-    /// are in `slots`. A color in a text that is not a number is NaN.
+    /// Calls `take` for each element with its place, the numbers of the properties whose slots are
+    /// in `slots`, and the end of each property among them. A color or a texture coordinate in a
+    /// text that is not a number is NaN.
     pub(super) fn read(
         &mut self,
         reading: &Reading<'_>,
         element: &Element,
         slots: &[Range<usize>],
-        mut take: impl FnMut(Place, &[f64]) -> Result<(), IoError>,
+        mut take: impl FnMut(Place, &[f64], &[usize]) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
         let is_kept = |p: &Property| p.is_in(slots);
         let properties: Vec<_> = element.properties.iter().map(|p| (p, is_kept(p))).collect();
-        let mut numbers = Vec::new();
+        let (mut numbers, mut ends) = (Vec::new(), Vec::new());
         for row in 0..element.count {
             numbers.clear();
+            ends.clear();
             let place = self.start();
             for (property, kept) in &properties {
                 if self.property(property, *kept, &mut numbers).is_some() {
+                    if *kept {
+                        ends.push(numbers.len());
+                    }
                     continue;
                 }
                 let (count, name) = (element.count, &element.name);
@@ -74,7 +79,7 @@ impl<'a> Rows<'a> {
                 };
                 return Err(reading.refuse(place, found, expected));
             }
-            take(place, &numbers)?;
+            take(place, &numbers, &ends)?;
         }
         Ok(())
     }
@@ -103,7 +108,7 @@ impl<'a> Rows<'a> {
             None => 1.0,
         };
         while left >= 1.0 {
-            let number = self.number(property.scalar, kept, property.is_color())?;
+            let number = self.number(property.scalar, kept, property.is_optional)?;
             if kept {
                 numbers.push(number);
             }
