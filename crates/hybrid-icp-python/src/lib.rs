@@ -20,6 +20,7 @@ mod array;
 mod batch;
 mod bop;
 mod camera;
+mod color;
 mod depth;
 mod errors;
 mod fusion;

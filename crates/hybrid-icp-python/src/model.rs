@@ -18,6 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
+use crate::color;
 use crate::errors::{self, InputError};
 
 /// The model of an object: its mesh, surface samples, size and symmetries.
@@ -44,6 +45,10 @@ use crate::errors::{self, InputError};
 /// symmetry_axes : sequence of (axis, offset), optional
 ///     Continuous symmetries: any rotation around the line through `offset` along `axis`. Both
 ///     have three numbers.
+/// colors : array_like of uint8, shape (V, 3), optional
+///     Red, green and blue of each vertex, or textures as a tuple (images, indices, corners): a
+///     list of (H, W, 3) arrays of uint8, the image of each face, and its corners in the image,
+///     shape (F, 3, 2), from (0, 0) at the upper left to (1, 1) at the lower right.
 ///
 /// Examples
 /// --------
@@ -75,7 +80,7 @@ struct Options<'a, 'py> {
 #[pymethods]
 impl PyModel {
     #[new]
-    #[pyo3(signature = (vertices, faces, *, unit = "m", samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new()))]
+    #[pyo3(signature = (vertices, faces, *, unit = "m", samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new(), colors = None))]
     #[allow(clippy::too_many_arguments)] // Keywords in Python.
     fn new(
         py: Python<'_>,
@@ -86,13 +91,21 @@ impl PyModel {
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
         symmetry_axes: Vec<([f64; 3], [f64; 3])>,
+        colors: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
-        let mesh = mesh(vertices, faces, options.unit)?;
+        let mut mesh = mesh(vertices, faces, options.unit)?;
+        if let Some(colors) = colors {
+            mesh = mesh
+                .with_color(color::surface(colors)?)
+                .map_err(errors::input)?;
+        }
         options.model(py, mesh)
     }
 
-    /// Reads a mesh from an OBJ, OFF, PLY or STL file.
+    /// Reads a mesh and its colors from a GLB, glTF, OBJ, OFF, PLY or STL file.
+    ///
+    /// Colors that cannot be used are left out (`has_color`).
     ///
     /// Parameters
     /// ----------
@@ -166,6 +179,8 @@ impl PyModel {
 
     /// Creates a model from a mesh of trimesh, or from anything with `vertices` and `faces`.
     ///
+    /// The colors of its vertices or its texture are kept.
+    ///
     /// Parameters
     /// ----------
     /// mesh : trimesh.Trimesh
@@ -190,6 +205,9 @@ impl PyModel {
     ) -> PyResult<Self> {
         let (vertices, faces) = (mesh.getattr("vertices")?, mesh.getattr("faces")?);
         let (vertices, faces) = (&vertices, &faces);
+        let module = py.import("hybrid_icp._colors")?;
+        let colors = module.call_method1("of_trimesh", (mesh,))?;
+        let colors = (!colors.is_none()).then_some(colors);
         Self::new(
             py,
             vertices,
@@ -199,6 +217,7 @@ impl PyModel {
             diameter,
             symmetries,
             symmetry_axes,
+            colors.as_ref(),
         )
     }
 
@@ -243,6 +262,9 @@ impl PyModel {
         let axes = axes.map(|axis| (*axis.direction().as_ref(), axis.offset().coords));
         let axes: Vec<([f64; 3], [f64; 3])> = axes.map(|(a, o)| (a.into(), o.into())).collect();
         options.set_item("symmetry_axes", axes)?;
+        if let Some(color) = self.model.mesh().color() {
+            options.set_item("colors", color::of_surface(py, color)?)?;
+        }
         Ok(((self.vertices(), self.faces()), options))
     }
 
@@ -263,6 +285,12 @@ impl PyModel {
     #[getter]
     fn faces(&self) -> Matrix<u32> {
         Matrix::new(3, self.model.mesh().triangles().concat())
+    }
+
+    /// Whether the mesh has colors, of its vertices or as textures.
+    #[getter]
+    fn has_color(&self) -> bool {
+        self.model.mesh().color().is_some()
     }
 
     /// Largest distance between two vertices, or the prescribed diameter, meters.

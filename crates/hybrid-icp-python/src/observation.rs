@@ -2,14 +2,20 @@
 
 use std::sync::Arc;
 
-use hybrid_icp::core::{DepthImage, Mask, Observation, PinholeCamera};
+use hybrid_icp::core::{ColorImage, DepthImage, Mask, Observation, PinholeCamera};
+use numpy::PyArray3;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
 use crate::camera::PyCamera;
+use crate::color;
 use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
 use crate::model::PyModel;
+
+/// The positional and the named arguments that create an observation again.
+type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict>);
 
 /// A segmented depth image, for refining poses.
 ///
@@ -28,6 +34,9 @@ use crate::model::PyModel;
 ///     A camera for images of this size.
 /// scale : float, optional
 ///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+/// color : numpy.ndarray of uint8, shape (H, W, 3), optional
+///     Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
+///     model that has colors (`Model.has_color`).
 ///
 /// Raises
 /// ------
@@ -58,13 +67,14 @@ pub(crate) struct PyObservation {
 #[pymethods]
 impl PyObservation {
     #[new]
-    #[pyo3(signature = (depth, mask, camera, *, scale = None))]
+    #[pyo3(signature = (depth, mask, camera, *, scale = None, color = None))]
     fn new(
         py: Python<'_>,
         depth: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
         camera: PyCamera,
         scale: Option<f64>,
+        color: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let image = depth::shared(depth, scale)?;
         let mask = depth::mask(mask, &image)?;
@@ -82,7 +92,10 @@ impl PyObservation {
                 camera.width()
             )));
         }
-        py.detach(|| Self::make(image, mask, camera))
+        let size = (image.width(), image.height());
+        let color = color.map(|value| color::image(value, "color", Some(size)));
+        let color = color.transpose()?;
+        py.detach(|| Self::make(image, mask, camera, color))
     }
 
     /// The camera.
@@ -111,6 +124,13 @@ impl PyObservation {
     fn mask(&self) -> Matrix<bool> {
         let mask = self.observation.mask();
         depth::image(mask.width(), mask.pixels())
+    }
+
+    /// A copy of the colors of the pixels, shape (H, W, 3), uint8, or None if there are none.
+    #[getter]
+    fn color<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<u8>>>> {
+        let image = self.observation.color();
+        image.map(|image| color::to_numpy(py, image)).transpose()
     }
 
     /// Number of masked pixels with a depth.
@@ -175,20 +195,25 @@ impl PyObservation {
     ///     Nonzero on the object. By default, every pixel.
     /// scale : float, optional
     ///     Meters per unit of integers.
+    /// color : open3d.geometry.Image or array_like, shape (H, W, 3), uint8, optional
+    ///     The color image of the same pixels, such as `RGBDImage.color`.
     ///
     /// Returns
     /// -------
     /// Observation
     #[staticmethod]
-    #[pyo3(signature = (depth, intrinsic, mask = None, *, scale = 0.001))]
+    #[pyo3(signature = (depth, intrinsic, mask = None, *, scale = 0.001, color = None))]
     fn from_open3d(
         py: Python<'_>,
         depth: &Bound<'_, PyAny>,
         intrinsic: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
         scale: f64,
+        color: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let depth = py.import("numpy")?.call_method1("asarray", (depth,))?;
+        let numpy = py.import("numpy")?;
+        let color = color.map(|color| numpy.call_method1("asarray", (color,)));
+        let depth = numpy.call_method1("asarray", (depth,))?;
         let kind: String = depth.getattr("dtype")?.getattr("kind")?.extract()?;
         let size = (intrinsic.getattr("width")?, intrinsic.getattr("height")?);
         let calibration = intrinsic.getattr("intrinsic_matrix")?;
@@ -196,11 +221,14 @@ impl PyObservation {
             .get_type::<PyCamera>()
             .call_method1("from_K", (calibration, size))?;
         let scale = (kind != "f").then_some(scale);
-        Self::new(py, &depth, mask, camera.extract()?, scale)
+        let color = color.transpose()?;
+        Self::new(py, &depth, mask, camera.extract()?, scale, color.as_ref())
     }
 
-    fn __getnewargs__(&self) -> (PyDepthImage, Matrix<bool>, PyCamera) {
-        (self.image(), self.mask(), self.camera())
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Arguments<'py>> {
+        let options = PyDict::new(py);
+        options.set_item("color", self.color(py)?)?;
+        Ok(((self.image(), self.mask(), self.camera()), options))
     }
 
     fn _repr_png_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -221,8 +249,16 @@ impl PyObservation {
 }
 
 impl PyObservation {
-    fn make(depth: Arc<DepthImage>, mask: Mask, camera: PinholeCamera) -> PyResult<Self> {
-        let observation = Observation::new(depth, mask, camera).map_err(errors::input)?;
+    fn make(
+        depth: Arc<DepthImage>,
+        mask: Mask,
+        camera: PinholeCamera,
+        color: Option<ColorImage>,
+    ) -> PyResult<Self> {
+        let mut observation = Observation::new(depth, mask, camera).map_err(errors::input)?;
+        if let Some(color) = color {
+            observation = observation.with_color(color).map_err(errors::input)?;
+        }
         let region = observation.region();
         let (down, right) = depth::strides(region.height(), region.width());
         let median_depth = masked_median(&observation, down, right)

@@ -70,7 +70,19 @@ fn write_other_formats(scene: &Scene, depth: &DepthImage) {
         "color_pose.json",
         pose_json(&(color_from_depth * init)).to_string(),
     );
+    let gray = vec![90; 3 * width as usize * height as usize];
+    hicp_io::write_rgb_png(scene.path("rgb.png"), width, height, &gray).unwrap();
     let mesh = car();
+    let mut painted = String::new();
+    for p in mesh.vertices() {
+        let (p, red) = (p * 1000.0, if p.x > 0.0 { 1 } else { 0 });
+        painted += &format!("v {} {} {} {red} 0.5 0\n", p.x, p.y, p.z);
+    }
+    for triangle in mesh.triangles() {
+        let [a, b, c] = triangle.map(|index| index + 1);
+        painted += &format!("f {a} {b} {c}\n");
+    }
+    scene.write("painted.obj", painted);
     let vertices: Vec<u8> = mesh
         .vertices()
         .iter()

@@ -155,6 +155,8 @@ class _HasMesh(Protocol):
         ...
 _Depth = Union[npt.NDArray[np.float32], npt.NDArray[np.float64], npt.NDArray[np.uint16], _HasArray]
 _Mask = Union[npt.NDArray[np.bool_], npt.NDArray[np.uint8], _HasArray]
+_Color = Union[npt.NDArray[np.uint8], _HasArray]
+_Textures = tuple[Sequence[npt.NDArray[np.uint8]], npt.ArrayLike, npt.ArrayLike]
 
 @final
 class DepthImage:
@@ -285,6 +287,10 @@ class Model:
     symmetry_axes : sequence of (axis, offset), optional
         Continuous symmetries: any rotation around the line through `offset` along `axis`. Both
         have three numbers.
+    colors : array_like of uint8, shape (V, 3), optional
+        Red, green and blue of each vertex, or textures as a tuple (images, indices, corners): a
+        list of (H, W, 3) arrays of uint8, the image of each face, and its corners in the image,
+        shape (F, 3, 2), from (0, 0) at the upper left to (1, 1) at the lower right.
 
     Examples
     --------
@@ -295,12 +301,14 @@ class Model:
     Model(4 vertices, 2 faces, diameter 0.2828 m)
     """
 
-    def __new__(cls, vertices: npt.ArrayLike, faces: npt.ArrayLike, *, unit: _Unit='m', samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=...) -> Model:
+    def __new__(cls, vertices: npt.ArrayLike, faces: npt.ArrayLike, *, unit: _Unit='m', samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=..., colors: npt.ArrayLike | _Textures | None=None) -> Model:
         ...
 
     @staticmethod
     def from_file(path: _Path, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=...) -> Model:
-        """Reads a mesh from an OBJ, OFF, PLY or STL file.
+        """Reads a mesh and its colors from a GLB, glTF, OBJ, OFF, PLY or STL file.
+
+        Colors that cannot be used are left out (`has_color`).
 
         Parameters
         ----------
@@ -346,6 +354,8 @@ class Model:
     def from_trimesh(mesh: _HasMesh, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=...) -> Model:
         """Creates a model from a mesh of trimesh, or from anything with `vertices` and `faces`.
 
+        The colors of its vertices or its texture are kept.
+
         Parameters
         ----------
         mesh : trimesh.Trimesh
@@ -384,6 +394,10 @@ class Model:
         """The triangles as indices into `vertices`, shape (F, 3), uint32."""
 
     @property
+    def has_color(self) -> bool:
+        """Whether the mesh has colors, of its vertices or as textures."""
+
+    @property
     def diameter(self) -> float:
         """Largest distance between two vertices, or the prescribed diameter, meters."""
 
@@ -420,6 +434,9 @@ class Observation:
         A camera for images of this size.
     scale : float, optional
         Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+    color : numpy.ndarray of uint8, shape (H, W, 3), optional
+        Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
+        model that has colors (`Model.has_color`).
 
     Raises
     ------
@@ -441,7 +458,7 @@ class Observation:
     1000, or pass uint16 with scale=0.001)
     """
 
-    def __new__(cls, depth: DepthImage | _Depth, mask: _Mask | None, camera: Camera, *, scale: float | None=None) -> Observation:
+    def __new__(cls, depth: DepthImage | _Depth, mask: _Mask | None, camera: Camera, *, scale: float | None=None, color: _Color | None=None) -> Observation:
         ...
 
     @property
@@ -466,6 +483,10 @@ class Observation:
         """A copy of the mask, shape (H, W), bool."""
 
     @property
+    def color(self) -> npt.NDArray[np.uint8] | None:
+        """A copy of the colors of the pixels, shape (H, W, 3), uint8, or None if there are none."""
+
+    @property
     def n_measured(self) -> int:
         """Number of masked pixels with a depth."""
 
@@ -485,7 +506,7 @@ class Observation:
         """
 
     @staticmethod
-    def from_open3d(depth: Any, intrinsic: Any, mask: _Mask | None=None, *, scale: float=0.001) -> Observation:
+    def from_open3d(depth: Any, intrinsic: Any, mask: _Mask | None=None, *, scale: float=0.001, color: _Color | None=None) -> Observation:
         """Creates an observation from a depth image and an intrinsic calibration of Open3D.
 
         Parameters
@@ -497,6 +518,8 @@ class Observation:
             Nonzero on the object. By default, every pixel.
         scale : float, optional
             Meters per unit of integers.
+        color : open3d.geometry.Image or array_like, shape (H, W, 3), uint8, optional
+            The color image of the same pixels, such as `RGBDImage.color`.
 
         Returns
         -------
@@ -518,7 +541,7 @@ class Observation:
             Meters; NaN where nothing was measured or rendered.
         """
 
-    def __getnewargs__(self) -> tuple[DepthImage, npt.NDArray[np.bool_], Camera]:
+    def __getnewargs_ex__(self) -> tuple[tuple[DepthImage, npt.NDArray[np.bool_], Camera], dict[str, Any]]:
         ...
 
     def _repr_png_(self) -> bytes:
