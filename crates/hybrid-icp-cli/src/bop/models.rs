@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use hicp_bop::{ModelFolder, Models};
-use hicp_io::IoError;
+use hicp_bop::{ModelFolder, Models, chain};
 use hicp_io::bop::Dataset;
+use hicp_io::{IoError, LengthUnit};
+use hybrid_icp::core::Model;
 use hybrid_icp::warning_of_diameter;
 use rayon::prelude::*;
 
@@ -39,6 +40,26 @@ impl ModelOptions {
             false => folder,
         })
     }
+}
+
+/// Returns the reasons why the colors of the meshes in `--models` cannot be used.
+///
+/// Reads the meshes without color again.
+pub(crate) fn color_faults(
+    options: &ModelOptions,
+    models: &Models,
+    folder: &ModelFolder,
+) -> Vec<String> {
+    if options.folder.is_none() || options.no_color {
+        return Vec::new();
+    }
+    let fault = |(obj_id, model): (&u32, &Model)| {
+        let path = Dataset::model_path_in(folder.dir(), *obj_id);
+        let plain = model.mesh().color().is_none();
+        let file = plain.then(|| limits().read_mesh_file(path, LengthUnit::Millimeters));
+        file?.ok()?.color_fault.map(|fault| chain(&fault))
+    };
+    models.by_id.iter().filter_map(fault).collect()
 }
 
 /// Reads the models of some objects from a folder, without colors, on all threads.

@@ -120,6 +120,18 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
         let (a, b) = (color.camera_from_object(), depth.camera_from_object());
         assert!((a.translation.vector - b.translation.vector).norm() < 1e-4);
     }
-    let (missing, _) = (world.run(&["--models", "nothing"]), ());
-    missing.exits(1).complains(&["folder of models", "nothing"]);
+    let path = world.path("models_color/obj_000001.ply");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replacen("250 0 0", "250 none 0", 1)).unwrap();
+    let (warned, _) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
+    assert!(!warned.exits(0).err.contains("a color"));
+    std::fs::remove_dir_all(&rgb).unwrap();
+    let (warned, _) = world.refine(&rows, &["--models", "models_color"]);
+    warned
+        .exits(0)
+        .complains(&["obj_000001.ply", "a color that is not a number"]);
+    world
+        .run(&["--models", "nothing"])
+        .exits(1)
+        .complains(&["folder of models", "nothing"]);
 }

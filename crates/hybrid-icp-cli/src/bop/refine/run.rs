@@ -32,6 +32,8 @@ impl RefineJob<'_> {
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
         let models = pool.install(|| models::read_from(&folder, &objects));
         pool.install(|| warnings::about_models(&models, &folder));
+        let uncolored = models::color_faults(&self.models, &models, &folder);
+        uncolored.iter().for_each(warn);
         let shared = DatasetRefiner {
             models,
             scenes: Scenes::new(
