@@ -4,6 +4,8 @@
 //!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
 //! - [`Evidence`]: what agrees with a pose, what contradicts it, and how well the mask fits.
 //! - [`Confidence`]: the probability that a pose is right, from the evidence and its [`Misfit`].
+//! - [`ColorAgreement`]: compares colors, and says whether they are evidence. [`SampledColor`]
+//!   ranks many poses.
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
 //!   benchmark.
@@ -28,12 +30,14 @@
 // Counts are converted to floating point; all are far below 2⁵³.
 #![allow(clippy::cast_precision_loss)]
 
+mod color;
 mod errors;
 mod judgment;
 mod mve;
 mod score;
 mod tolerances;
 
+pub use color::{ColorAgreement, ColorEvidence, SampledColor, Shading, WithColor};
 pub use errors::{
     MSSD_MM, ModelPoints, N_THRESHOLDS, PoseErrors, Recalls, ScoreError, TargetErrors, Vsd, add,
     adi, bop_vsd, match_instances, most_visible, mspd, mssd, spheres_overlap, top_estimates,
