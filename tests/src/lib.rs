@@ -3,6 +3,7 @@
 pub mod allocations;
 pub mod fuzz;
 pub mod nees;
+pub mod painted;
 pub mod room;
 pub mod starts;
 pub mod tabletop;

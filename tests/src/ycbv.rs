@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use hicp_io::bop::Dataset;
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera,
+    ColorImage, DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
 
 /// Returns the dataset's folder, if it exists and contains result files.
@@ -36,6 +36,7 @@ pub struct Instance {
     /// The true pose, camera from object.
     pub truth: Isometry3<f64>,
     depth: Arc<DepthImage>,
+    color: Option<Arc<ColorImage>>,
     mask: Mask,
     camera: PinholeCamera,
 }
@@ -45,6 +46,17 @@ impl Instance {
     pub fn observe(&self) -> Observation {
         let depth = Arc::clone(&self.depth);
         Observation::new(depth, self.mask.clone(), self.camera).expect("sizes agree")
+    }
+
+    /// Creates a new observation with the color image, if there is one.
+    pub fn observe_color(&self) -> Observation {
+        match &self.color {
+            Some(color) => self
+                .observe()
+                .with_color(color.clone())
+                .expect("sizes agree"),
+            None => self.observe(),
+        }
     }
 }
 
@@ -57,6 +69,8 @@ pub fn instances(dataset: &Dataset) -> Vec<Instance> {
         let scene = dataset.scene("test", scene_id).expect("the scene opens");
         for im_id in scene.image_ids() {
             let depth = Arc::new(scene.read_depth(im_id).expect("the depth image reads"));
+            let color = scene.read_color(im_id).expect("the color image reads");
+            let color = color.map(Arc::new);
             let camera = scene
                 .camera(im_id)
                 .expect("the image has a camera")
@@ -81,6 +95,7 @@ pub fn instances(dataset: &Dataset) -> Vec<Instance> {
                     model: Arc::clone(model),
                     truth: truth.camera_from_object,
                     depth: Arc::clone(&depth),
+                    color: color.clone(),
                     mask: scene
                         .read_visible_mask(im_id, index)
                         .expect("the mask reads"),

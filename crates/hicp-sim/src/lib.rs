@@ -31,6 +31,8 @@ mod mask;
 mod meshing;
 mod moving;
 mod noise;
+mod paint;
+mod photo;
 mod profile;
 mod reconstruction;
 mod sampling;
@@ -51,6 +53,8 @@ pub use mask::MaskDefects;
 pub use meshing::ScalarGrid;
 pub use moving::{Hand, MovingConfig, MovingScene};
 pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
+pub use paint::Texture;
+pub use photo::Lighting;
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,

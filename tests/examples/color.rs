@@ -1,0 +1,156 @@
+//! Compares pipelines with and without color on simulated scenes of textured objects.
+//!
+//! Run `cargo run --release -p hicp-tests --example color [CASES] [SET] [EVIDENCE] [plain]`.
+//!
+//! `SET` is `tuning` or `test`. With `plain`, the objects have no texture.
+//! `EVIDENCE` is `right`, or a fault of the color image: `other` (of another scene), `swapped` (red
+//! and blue), `shadow`, `shifted` (by 5 pixels) or `overexposed`. A pose fails if its MSSD is above
+//! a tenth of the diameter; no symmetry is declared. Half of the objects are symmetric in depth.
+
+use std::time::Instant;
+
+use hicp_sim::{Household, Lighting, Texture, stream};
+use hicp_tests::median;
+use hicp_tests::painted::Painted;
+use hicp_tests::tabletop::MaskKind;
+use hybrid_icp::core::{ColorImage, Isometry3, Observation};
+use hybrid_icp::score::ModelPoints;
+use hybrid_icp::{Preset, Refinement, Refiner, presets};
+
+const FAULTS: [&str; 6] = [
+    "right",
+    "other",
+    "swapped",
+    "shadow",
+    "shifted",
+    "overexposed",
+];
+
+/// The failures of a pipeline.
+#[derive(Default)]
+struct Row {
+    failed: usize,
+    in_depth: usize,
+    turned: usize,
+    ambiguous: usize,
+    warned_wrongly: usize,
+    times: Vec<f64>,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let cases: usize = arguments.next().map_or(Ok(200), |text| text.parse())?;
+    let objects = match arguments.next().as_deref() {
+        None | Some("tuning") => Household::TUNING,
+        Some("test") => Household::TEST,
+        Some(other) => return Err(format!("{other}: expected tuning or test").into()),
+    };
+    let fault = arguments.next().unwrap_or_else(|| FAULTS[0].to_owned());
+    if !FAULTS.contains(&fault.as_str()) {
+        return Err(format!("{fault}: expected one of {FAULTS:?}").into());
+    }
+    let textures: Vec<Texture> = match arguments.next().as_deref() {
+        Some("plain") => vec![Texture::None],
+        _ => vec![Texture::Logos, Texture::Text],
+    };
+    let painted = Painted::new(&objects, &textures)?;
+    let scenes = &painted.scenes;
+    let points: Vec<ModelPoints> = scenes
+        .objects
+        .iter()
+        .map(|o| ModelPoints::new(&o.1))
+        .collect();
+    let mut searching = Refiner::boxed(presets::color());
+    let mut estimating = Refiner::preset(Preset::Local);
+    let mut auto = Refiner::preset(Preset::Auto);
+    let mut local = Refiner::preset(Preset::Local);
+    let names = ["auto", "color", "estimate", "estimate, then color"];
+    let mut rows: [[Row; 4]; 2] = Default::default();
+    let mut n = [0; 2];
+    'scenes: for seed in 1000.. {
+        for seen in scenes.scene(seed)? {
+            let mut random = stream(seed, &["light"], n.iter().sum::<usize>() as u64);
+            let mut lighting = Lighting::draw(&mut random);
+            match fault.as_str() {
+                "shadow" => lighting.shadow = 0.3,
+                "overexposed" => lighting.exposure = 5.0,
+                _ => {}
+            }
+            let model = &scenes.objects[seen.model].1;
+            let right = painted.observe(&seen, MaskKind::Exact, &lighting, seed)?;
+            let color = spoil(right.color().ok_or("no color")?, &fault);
+            let create = || Observation::new(seen.depth.clone(), seen.visible.clone(), seen.camera);
+            let (depth, colored) = (create()?, create()?.with_color(color)?);
+            let init = seen.near(&mut random, 1.0);
+            let symmetric = usize::from(painted.motions[seen.model].len() > 1);
+            n[symmetric] += 1;
+            let wrong = |pose: &Isometry3<f64>| {
+                points[seen.model].mssd(pose, &seen.truth) > 0.1 * points[seen.model].diameter()
+            };
+            for (index, row) in rows[symmetric].iter_mut().enumerate() {
+                let start = Instant::now();
+                let refined: Refinement = match index {
+                    0 => auto.refine(model, &depth, &init),
+                    1 => searching.refine(model, &colored, &init),
+                    2 => local.estimate(model, &depth),
+                    _ => estimating.estimate(model, &colored),
+                };
+                row.times.push(start.elapsed().as_secs_f64() * 1e3);
+                let failed = wrong(&refined.outcome.camera_from_object);
+                let ambiguous = refined.runner_up.is_some_and(|other| other.is_ambiguous());
+                row.failed += usize::from(failed);
+                row.ambiguous += usize::from(ambiguous);
+                row.warned_wrongly += usize::from(ambiguous && !failed);
+                let pose = refined.outcome.camera_from_object;
+                let motions = painted.motions[seen.model].iter();
+                let in_depth = motions
+                    .map(|motion| points[seen.model].mssd(&(seen.truth * motion), &pose))
+                    .fold(f64::INFINITY, f64::min);
+                let fits = in_depth < 0.1 * points[seen.model].diameter();
+                row.in_depth += usize::from(fits);
+                row.turned += usize::from(fits && failed);
+            }
+            if n.iter().sum::<usize>() == cases {
+                break 'scenes;
+            }
+        }
+    }
+    println!(
+        "| objects | pipeline | failed | right in depth, but turned | ambiguous | ambiguous and right | ms, median | mean |\n|---|---|---|---|---|---|---|---|"
+    );
+    for (kind, (rows, n)) in ["others", "symmetric in depth"]
+        .iter()
+        .zip(rows.iter_mut().zip(n))
+    {
+        for (name, row) in names.iter().zip(rows) {
+            let percent = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
+            let mean = row.times.iter().sum::<f64>() / n.max(1) as f64;
+            println!(
+                "| {kind}: {n} | {name} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} | {mean:.1} |",
+                percent(row.failed),
+                100.0 * row.turned as f64 / row.in_depth.max(1) as f64,
+                percent(row.ambiguous),
+                percent(row.warned_wrongly),
+                median(&mut row.times)
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Returns the color image with a fault.
+fn spoil(color: &ColorImage, fault: &str) -> ColorImage {
+    let (width, height) = (color.width(), color.height());
+    let at = |u: u32, v: u32| color.get(u % width, v % height).unwrap_or_default();
+    let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+    let pixels = pixels.map(|(u, v)| match fault {
+        "other" => at(width - 1 - u, height - 1 - v),
+        "swapped" => {
+            let [r, g, b] = at(u, v);
+            [b, g, r]
+        }
+        "shifted" => at(u + 4, v + 3),
+        _ => at(u, v),
+    });
+    ColorImage::new(width, height, pixels.collect()).expect("the same size")
+}
