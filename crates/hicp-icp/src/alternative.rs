@@ -18,6 +18,10 @@ pub struct Alternative {
     ///
     /// It is negative if the pose is better, but by less than the gain that a search requires.
     pub gap: f64,
+    /// The agreement of the colors at the returned pose minus that at this one, as correlations.
+    ///
+    /// `None` if there are no colors, or none that tell poses apart.
+    pub color_gap: Option<f64>,
     /// MSSD from the returned pose, meters.
     pub mssd_meters: f64,
     /// Smallest angle to the rotation of the returned pose, degrees.
@@ -27,10 +31,12 @@ pub struct Alternative {
 impl Alternative {
     /// The gap in score within which two poses explain the image equally well.
     pub const AMBIGUOUS_GAP: f64 = 0.01;
+    /// The gap in the agreement of colors from which on colors tell two poses apart.
+    pub const COLOR_GAP: f64 = 0.15;
 
-    /// Returns whether the pose explains the image as well as the returned one.
+    /// Returns whether the pose explains the image as well as the returned one, in depth and color.
     #[must_use]
     pub fn is_ambiguous(&self) -> bool {
-        self.gap < Self::AMBIGUOUS_GAP
+        self.gap < Self::AMBIGUOUS_GAP && self.color_gap.is_none_or(|gap| gap < Self::COLOR_GAP)
     }
 }

@@ -80,6 +80,8 @@ declare! {
         "global: local, and above an MVE of 0.1 a search over 1000 rotations; may end at an equivalent pose";
     Auto, "auto", auto,
         "global where needed: local, and above an MVE of 0.2 a search over 256 rotations";
+    Color, "color", color,
+        "global where needed: auto, and color decides among poses that depth cannot tell apart";
 }
 
 impl Preset {

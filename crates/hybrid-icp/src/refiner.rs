@@ -214,7 +214,7 @@ impl<S: Stage> Refiner<S> {
         observer: &mut dyn Observer,
     ) -> Refinement {
         let problem = Problem::new(model, observation);
-        let mut search = presets::estimate_with(&mut self.stage);
+        let mut search = presets::by_color(presets::estimate_with(&mut self.stage));
         self.workspace.alternatives_mut().clear();
         let outcome = search.run(
             &problem,

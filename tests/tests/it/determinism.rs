@@ -120,7 +120,7 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
 #[test]
 fn preset_functions_build_the_presets_of_their_names() {
     let cases = cases();
-    let functions: [(Preset, Refiner); 13] = [
+    let functions: [(Preset, Refiner); 14] = [
         (Preset::Hybrid, Refiner::boxed(presets::hybrid())),
         (
             Preset::ProjectivePointToPoint,
@@ -161,14 +161,15 @@ fn preset_functions_build_the_presets_of_their_names() {
         (Preset::Local, Refiner::boxed(presets::local())),
         (Preset::Search, Refiner::boxed(presets::search())),
         (Preset::Auto, Refiner::boxed(presets::auto())),
+        (Preset::Color, Refiner::boxed(presets::color())),
     ];
     assert_eq!(functions.each_ref().map(|(preset, _)| *preset), Preset::ALL);
     let mut results = Vec::new();
     for (preset, mut refiner) in functions {
         let found = run(&mut refiner, &cases);
         assert_eq!(found, run(&mut Refiner::preset(preset), &cases), "{preset}");
-        // `auto` equals `local` if the local pose is good.
-        let own = preset != Preset::Auto;
+        // `auto` equals `local` if the local pose is good, and `color` equals it without colors.
+        let own = !matches!(preset, Preset::Auto | Preset::Color);
         assert!(
             !own || !results.contains(&found),
             "{preset} gives the results of another preset"

@@ -8,6 +8,7 @@
 
 mod allocations;
 mod clouds;
+mod color;
 mod concurrency;
 mod custom;
 mod degeneracy_scenes;

@@ -1,6 +1,7 @@
 //! Stages: generic ICP, and stages composed of stages.
 
 pub(crate) mod anderson;
+pub(crate) mod color_choice;
 pub(crate) mod compose;
 pub(crate) mod descent;
 pub(crate) mod guard;
@@ -11,6 +12,7 @@ pub(crate) mod search;
 pub(crate) mod stage_trait;
 
 pub use anderson::Anderson;
+pub use color_choice::ColorChoice;
 pub use compose::{Cascade, Repeat};
 pub use descent::Descent;
 pub use guard::{Guard, KeepBest};

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use hicp_icp::{
-    Anderson, AtResolution, Bound, BoxedStage, Cascade, Descent, Guard, HypothesisSearch, Icp,
-    KeepBest, MAX_ITERATIONS, RayShift, Repeat, Rotations, SearchOptions, Start,
+    Anderson, AtResolution, Bound, BoxedStage, Cascade, ColorChoice, Descent, Guard,
+    HypothesisSearch, Icp, KeepBest, MAX_ITERATIONS, RayShift, Repeat, Rotations, SearchOptions,
+    Start,
 };
 use hicp_switch::{Switch, SwitchAmong, SwitchUntilStall, Threshold, Thresholds};
 
@@ -127,6 +128,26 @@ pub(super) fn add(catalog: &mut Catalog) {
         let total = total.saturating_add(aligned);
         p.takes("refined", total.saturating_add(explored))?;
         Ok(search)
+    });
+    catalog.add_stage("color-choice", |p| {
+        p.about = "Lets color decide between the pose of a stage and others that explain the depth \
+            as well; without colors, it is that stage. Cost: the stage; where depth leaves a \
+            choice, three times the polish and some milliseconds.";
+        let stage = p.part::<BoxedStage>("stage", None, "finds a pose")?;
+        let polish = p.part::<BoxedStage>("polish", None, "moves other poses to the depth")?;
+        let score = p.part::<BoxedScore>("score", "mve", "judges the depth")?;
+        let mut choice = ColorChoice::new(stage, polish, score);
+        let rise = "rise of that score, plus a fifth of it, up to which a pose is a choice";
+        choice.tolerance = p.number("tolerance", FACTOR, choice.tolerance, rise)?;
+        let least = "correlation of colors at which they agree";
+        let correlation = choice.least_correlation;
+        choice.least_correlation = p.number("least_correlation", FACTOR, correlation, least)?;
+        let gain = "gain in correlation that leaves the pose of the stage";
+        choice.min_gain = p.number("min_gain", FACTOR, choice.min_gain, gain)?;
+        let stage = p.iterations_of("stage").fold(0, u64::max);
+        let polish = p.iterations_of("polish").fold(0, u64::max);
+        p.takes("polish", stage.saturating_add(polish.saturating_mul(3)))?;
+        Ok(choice)
     });
     catalog.add_stage("ray-shift", |p| {
         p.about = "Moves the model along the ray to its center by the median difference of \

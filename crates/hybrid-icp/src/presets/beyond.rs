@@ -10,10 +10,10 @@ use hicp_association::{
     Stride, UniformCount, VisibleSurface,
 };
 use hicp_icp::{
-    Cascade, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp, IterationLimit,
-    Repeat, SearchOptions, Start,
+    Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
+    IterationLimit, Repeat, SearchOptions, Start,
 };
-use hicp_metric::{PointToPlane, PointToPoint, Symmetric};
+use hicp_metric::{Conditioned, PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
@@ -45,6 +45,8 @@ pub type Local = Cascade<(
 pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
 /// The stage that refines hypotheses.
 pub type Explore = Descent<SampledMve>;
+/// The type of [`by_color`].
+pub type ByColor<S> = ColorChoice<S, GatedIcp<Conditioned<PointToPlane>>, MeanVsd>;
 /// The type of [`search`], [`auto`] and [`search_with`].
 pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd>;
 
@@ -262,6 +264,26 @@ pub fn search_with(options: SearchOptions) -> Search {
 #[must_use]
 pub fn search() -> Search {
     search_with(SearchOptions::default())
+}
+
+/// Lets color decide among the poses of a stage that depth cannot tell apart.
+#[must_use]
+pub fn by_color<S>(stage: S) -> ByColor<S> {
+    // A rotation that the depth does not determine is the choice of the colors.
+    let metric = Conditioned {
+        threshold: 5e-3,
+        ..Conditioned::default()
+    };
+    let polish = projective(metric, 1000, 10);
+    ColorChoice::new(stage, polish, MeanVsd::imperfect_mask())
+}
+
+/// `color`: [`auto`], with the choice by color among the poses that depth cannot tell apart.
+///
+/// Without a color image or a colored model it is `auto`.
+#[must_use]
+pub fn color() -> ByColor<Search> {
+    by_color(auto())
 }
 
 /// `auto`: [`local`], followed by a search if its score stays above 0.2.

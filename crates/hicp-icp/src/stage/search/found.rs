@@ -74,6 +74,7 @@ impl FoundPoses {
                     camera_from_object: other,
                     score: found.score,
                     gap: found.score - score,
+                    color_gap: None,
                     mssd_meters: distinct.mssd(&other, returned),
                     rotation_degrees: distinct.degrees(&other, returned),
                 });

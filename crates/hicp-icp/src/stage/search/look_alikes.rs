@@ -46,11 +46,11 @@ impl LookAlikes {
         let limit = run.score(ranking, base) + gap;
         let spacing = options.spacing_degrees;
         let refined = options.refined.div_ceil(3);
-        for motion in near.undecided(observation, base, model.diameter()) {
+        for index in near.undecided(observation, base, model.diameter()) {
             if run.is_over() {
                 return &self.listed;
             }
-            let pose = base * motion;
+            let pose = base * near.motion(index);
             if run.allows(&pose) {
                 let score = run.score(ranking, &pose);
                 if score < limit {

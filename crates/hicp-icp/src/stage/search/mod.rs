@@ -9,3 +9,4 @@ pub(crate) mod near_symmetries;
 pub(crate) mod options;
 pub(crate) mod run;
 pub(crate) mod shortlist;
+pub(crate) mod turns;

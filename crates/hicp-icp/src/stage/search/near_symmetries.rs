@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use hicp_core::{Isometry3, Matrix3, Model, Observation, Point3, Surfel, UnitQuaternion, Vector3};
+use hicp_core::{
+    Isometry3, Matrix3, Model, Observation, Point3, Surfel, UnitQuaternion, UnitVector3, Vector3,
+};
 
 use crate::stage::search::distinct::Distinct;
 
@@ -38,6 +40,8 @@ pub(crate) struct NearSymmetries {
     oriented: bool,
     /// The motions, with the samples that are far from the moved surface.
     motions: Vec<(Isometry3<f64>, Set)>,
+    /// The axes around which every rotation is one of them.
+    spins: Vec<UnitVector3<f64>>,
 }
 
 impl NearSymmetries {
@@ -51,7 +55,8 @@ impl NearSymmetries {
         self.motions.is_empty()
     }
 
-    /// Iterates over the motions for which the image may show the object at `pose · S` instead.
+    /// Iterates over the indices of the motions S for which the image may show the object at
+    /// `pose · S` instead.
     ///
     /// Motions are left out if enough of what the image shows of the object at `pose` is not on
     /// the surface at `pose · S`. Cost: one projection per sample.
@@ -60,13 +65,27 @@ impl NearSymmetries {
         observation: &Observation,
         pose: &Isometry3<f64>,
         diameter: f64,
-    ) -> impl Iterator<Item = &Isometry3<f64>> {
+    ) -> impl Iterator<Item = usize> + '_ {
         let seen = self.seen(observation, pose, 2.0 * TOLERANCE * diameter);
         let enough = (f64::from(count(&seen, &[u64::MAX; SAMPLES / 64])) * TELLING).max(1.0);
-        self.motions
-            .iter()
-            .filter(move |(_, bare)| f64::from(count(&seen, bare)) < enough)
-            .map(|(motion, _)| motion)
+        let decided = move |bare: &Set| f64::from(count(&seen, bare)) >= enough;
+        let motions = self.motions.iter().enumerate();
+        motions.filter_map(move |(index, (_, bare))| (!decided(bare)).then_some(index))
+    }
+
+    /// Returns the axes around which every rotation is a near symmetry, object frame.
+    pub(crate) fn spins(&self) -> &[UnitVector3<f64>] {
+        &self.spins
+    }
+
+    /// Returns a motion by its index.
+    pub(crate) fn motion(&self, index: usize) -> &Isometry3<f64> {
+        &self.motions[index].0
+    }
+
+    /// Iterates over all motions.
+    pub(crate) fn motions(&self) -> impl Iterator<Item = &Isometry3<f64>> {
+        self.motions.iter().map(|(motion, _)| motion)
     }
 
     /// Returns the samples whose depth was measured.
@@ -99,10 +118,22 @@ impl NearSymmetries {
         let distinct = Distinct::of(model);
         let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();
         let identity = Isometry3::identity();
-        for rotation in rotations(&samples) {
-            let Some(motion) = align(&samples, &rotation, tolerance) else {
+        let (axes, rotations) = rotations(&samples);
+        let (mut spins, mut aligned) = (Vec::new(), 0);
+        for (index, rotation) in rotations.iter().enumerate() {
+            let step = index % STEPS;
+            if step == 0 {
+                aligned = 0;
+            }
+            let Some(motion) = align(&samples, rotation, tolerance) else {
                 continue;
             };
+            aligned += 1;
+            // The rotations without a flip come before those with one.
+            if step + 1 == STEPS && aligned == STEPS && (index / STEPS).is_multiple_of(2) {
+                let axis = axes.column(index / (2 * STEPS)).into_owned();
+                spins.push(UnitVector3::new_normalize(axis));
+            }
             let mut known = motions.iter().map(|(motion, _)| motion);
             if !distinct.apart(&motion, &identity) || known.any(|m| !distinct.apart(&motion, m)) {
                 continue;
@@ -122,6 +153,7 @@ impl NearSymmetries {
             samples,
             oriented: model.mesh().is_closed(),
             motions,
+            spins,
         }
     }
 }
@@ -131,8 +163,8 @@ fn count(a: &Set, b: &Set) -> u32 {
     a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
 }
 
-/// Returns rotations around the principal axes of the samples, with and without a flip.
-fn rotations(samples: &[Surfel]) -> Vec<UnitQuaternion<f64>> {
+/// Returns the principal axes of the samples, and rotations around them, without and with a flip.
+fn rotations(samples: &[Surfel]) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
     let mean = mean(samples);
     let covariance: Matrix3<f64> = samples
         .iter()
@@ -150,7 +182,7 @@ fn rotations(samples: &[Surfel]) -> Vec<UnitQuaternion<f64>> {
             }));
         }
     }
-    rotations
+    (axes, rotations)
 }
 
 /// Shifts the rotated samples such that most of them lie on the samples.

@@ -1,0 +1,321 @@
+//! The choice by color among poses that depth cannot tell apart.
+
+use hicp_core::{Isometry3, Model, Observation, Problem, se3};
+use hicp_score::{ColorAgreement, ColorEvidence, SampledColor, SampledMve, Score, WithColor};
+
+use crate::alternative::Alternative;
+use crate::outcome::{Outcome, Termination};
+use crate::session::Session;
+use crate::stage::descent::Descent;
+use crate::stage::search::distinct::Distinct;
+use crate::stage::search::turns::Turns;
+use crate::stage::stage_trait::Stage;
+
+/// Runs a stage, and lets color decide between its pose and others that explain the depth as well.
+///
+/// 1. The others are the alternatives that the stage found, and poses at which the model nearly
+///    covers itself: a box turned end over end, a can turned around its axis. If the image shows
+///    what tells them apart in depth, such as the handle of a mug, they are left out.
+/// 2. They are ranked by depth and color together. The best few are polished, which keeps rotations
+///    that the depth does not determine, and then rotated around an axis of the object as long as
+///    the colors agree better.
+/// 3. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
+///    depth is nearly as good, and its colors agree clearly better.
+///
+/// [`Alternative::color_gap`] then has the margin of each alternative that is as good in depth.
+/// Without colors, or without a contrast, the result is that of the stage, bit for bit.
+///
+/// Cost: nothing without colors. Otherwise some 20 µs if depth leaves no choice, and some
+/// milliseconds if it does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColorChoice<S, P, C> {
+    /// Finds a pose.
+    pub stage: S,
+    /// Moves other poses to the measured depth.
+    pub polish: P,
+    /// Scores the depth; lower is better.
+    pub score: C,
+    /// The rise of that score up to which another pose is a choice, plus a fifth of the score.
+    pub tolerance: f64,
+    /// The smallest correlation of colors at which they agree.
+    pub least_correlation: f64,
+    /// The gain in correlation by which another pose must beat that of the stage.
+    pub min_gain: f64,
+    ranking: WithColor<SampledMve>,
+    color: SampledColor,
+    descent: Descent<WithColor<SampledMve>>,
+    agreement: ColorAgreement,
+    motions: Vec<Isometry3<f64>>,
+    ranked: Vec<(f64, Isometry3<f64>)>,
+}
+
+/// Number of alternatives that take part.
+const ALTERNATIVES: usize = 4;
+/// Fine steps around an axis of near symmetry, degrees.
+const FINE: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
+/// Correlation at which no other pose is tried.
+const SURE: f64 = 0.8;
+/// Correlation that a single cell might have by chance; it falls with the root of their number.
+const CHANCE: f64 = 3.5;
+/// Number of poses that are polished.
+const POLISHED: usize = 3;
+
+/// A pose, its colors, and its score of the depth.
+#[derive(Clone, Copy, Debug)]
+struct Chosen {
+    color: ColorEvidence,
+    score: f64,
+    outcome: Outcome,
+}
+
+impl<S, P, C> ColorChoice<S, P, C> {
+    /// Creates the stage with the default conditions.
+    #[must_use]
+    pub fn new(stage: S, polish: P, score: C) -> Self {
+        let mut depth = SampledMve::imperfect_mask();
+        (depth.samples, depth.pixels) = (800, 150);
+        Self {
+            stage,
+            polish,
+            score,
+            tolerance: 0.02,
+            least_correlation: 0.3,
+            min_gain: 0.12,
+            ranking: WithColor {
+                depth,
+                color: SampledColor::new(600),
+                weight: 1.0,
+            },
+            color: SampledColor::default(),
+            descent: Descent {
+                score: WithColor {
+                    depth: SampledMve::imperfect_mask(),
+                    color: SampledColor::new(1000),
+                    weight: 0.2,
+                },
+                good_enough: 0.0,
+                first_step: 0.02,
+                last_step: 0.005,
+                min_gain: 0.0,
+                evaluations: 40,
+            },
+            agreement: ColorAgreement::default(),
+            motions: Vec::new(),
+            ranked: Vec::new(),
+        }
+    }
+
+    /// Lists the poses that may look the same in depth as `pose`, the best first.
+    ///
+    /// The list is empty if there is no other.
+    fn rank(&mut self, problem: &Problem<'_>, pose: &Isometry3<f64>, session: &mut Session<'_>) {
+        self.ranked.clear();
+        let Some((model, observation)) = problem.sides() else {
+            return;
+        };
+        let (turns, distinct) = (Turns::of(model), Distinct::of(model));
+        let found = session.workspace.alternatives.iter();
+        let found = found.filter(|other| other.gap < self.tolerance);
+        let found = found
+            .take(ALTERNATIVES)
+            .map(|other| other.camera_from_object);
+        let bases: Vec<_> = std::iter::once(*pose).chain(found).collect();
+        for base in &bases {
+            turns.undecided(model, observation, base, &mut self.motions);
+            if self.motions.len() == 1 && bases.len() == 1 {
+                return;
+            }
+            for motion in &self.motions {
+                let pose = base * motion;
+                let mut context = session.workspace.context(problem);
+                let score = self.ranking.score(&mut context, &pose);
+                insert(&mut self.ranked, (score, pose), &distinct);
+            }
+        }
+    }
+
+    /// Rotates a pose around the axes that depth leaves free, as long as the colors agree better.
+    fn spin(&mut self, problem: &Problem<'_>, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let Some(model) = problem.model() else {
+            return *pose;
+        };
+        let turns = Turns::of(model);
+        let mut color = |pose: &Isometry3<f64>| self.color.measure(problem, pose).correlation;
+        let mut best = (color(pose), *pose);
+        for (spin, step) in turns.spins().flat_map(|spin| FINE.map(|step| (spin, step))) {
+            let start = best.1;
+            for degrees in [-step, step] {
+                let turned = start * spin.turn(degrees);
+                let found = color(&turned);
+                if found > best.0 {
+                    best = (found, turned);
+                }
+            }
+        }
+        best.1
+    }
+}
+
+impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
+    /// Measures the colors and the depth at the pose of an outcome.
+    fn measure(
+        &mut self,
+        problem: &Problem<'_>,
+        outcome: Outcome,
+        session: &mut Session<'_>,
+    ) -> Chosen {
+        let mut context = session.workspace.context(problem);
+        let pose = &outcome.camera_from_object;
+        Chosen {
+            color: self.agreement.measure(&mut context, pose),
+            score: self.score.score(&mut context, pose),
+            outcome,
+        }
+    }
+
+    /// Returns whether colors are evidence for a pose.
+    fn agrees(&self, color: &ColorEvidence) -> bool {
+        // By chance, correlations of few cells are large.
+        let by_chance = CHANCE / (color.cells.max(1) as f64).sqrt();
+        color.is_telling() && color.correlation >= self.least_correlation.max(by_chance)
+    }
+
+    /// Lets color choose between the pose of an outcome and others that explain the depth as well.
+    fn choose(
+        &mut self,
+        problem: &Problem<'_>,
+        distinct: &Distinct,
+        outcome: Outcome,
+        session: &mut Session<'_>,
+    ) -> Chosen {
+        let first = self.measure(problem, outcome, session);
+        let pose = outcome.camera_from_object;
+        self.rank(problem, &pose, session);
+        let ranked = std::mem::take(&mut self.ranked);
+        let (mut chosen, mut tried) = (first, vec![first]);
+        for (_, start) in &ranked {
+            let polished = if *start == pose {
+                pose
+            } else {
+                self.polish.run(problem, start, session).camera_from_object
+            };
+            let turned = self.spin(problem, &polished);
+            let most = 1.2 * first.score + self.tolerance;
+            let turned = Outcome::refined(turned, Termination::Converged);
+            let mut found = self.measure(problem, turned, session);
+            if found.score > most || !found.color.is_telling() {
+                continue;
+            }
+            // Small steps bring the colors together as far as the depth allows.
+            let start = &turned.camera_from_object;
+            let moved = self.descent.run(problem, start, session);
+            let moved = self.measure(problem, moved, session);
+            if moved.score <= found.score && moved.color.correlation > found.color.correlation {
+                found = moved;
+            }
+            let pose_found = &found.outcome.camera_from_object;
+            tried.push(found);
+            let other = distinct.apart(pose_found, &pose);
+            let by_chance = CHANCE / (found.color.cells.max(1) as f64).sqrt();
+            let gain = self.min_gain.max(0.7 * by_chance) * if other { 1.0 } else { 0.1 };
+            if self.agrees(&found.color)
+                && found.color.correlation > first.color.correlation + gain
+                && found.color.correlation > chosen.color.correlation
+            {
+                chosen = found;
+            }
+            if chosen.color.correlation > SURE {
+                break;
+            }
+        }
+        self.ranked = ranked;
+        if !tried.iter().any(|tried| tried.color.is_telling()) {
+            return first;
+        }
+        chosen.outcome.iterations = outcome.iterations;
+        self.list(problem, distinct, (&chosen, &tried), session);
+        chosen
+    }
+
+    /// Lists the alternatives to the chosen pose, those that color does not tell apart first.
+    fn list(
+        &mut self,
+        problem: &Problem<'_>,
+        distinct: &Distinct,
+        (chosen, tried): (&Chosen, &[Chosen]),
+        session: &mut Session<'_>,
+    ) {
+        let pose = &chosen.outcome.camera_from_object;
+        let mut list = std::mem::take(&mut session.workspace.alternatives);
+        for other in tried {
+            let (other, score) = (other.outcome.camera_from_object, other.score);
+            let same = |old: &Alternative| !distinct.apart(&old.camera_from_object, &other);
+            if !list.iter().any(same) {
+                list.push(Alternative {
+                    camera_from_object: other,
+                    score,
+                    gap: 0.0,
+                    color_gap: None,
+                    mssd_meters: 0.0,
+                    rotation_degrees: 0.0,
+                });
+            }
+        }
+        list.retain(|other| distinct.apart(&other.camera_from_object, pose));
+        for alternative in &mut list {
+            let other = &alternative.camera_from_object;
+            alternative.gap = alternative.score - chosen.score;
+            alternative.mssd_meters = distinct.mssd(other, pose);
+            alternative.rotation_degrees = distinct.degrees(other, pose);
+            if alternative.is_ambiguous() && self.agrees(&chosen.color) {
+                let mut context = session.workspace.context(problem);
+                let color = self.agreement.measure(&mut context, other);
+                alternative.color_gap = Some(chosen.color.correlation - color.correlation);
+            }
+        }
+        list.sort_by(|a, b| {
+            let ambiguous = b.is_ambiguous().cmp(&a.is_ambiguous());
+            ambiguous.then(a.score.total_cmp(&b.score))
+        });
+        session.workspace.alternatives = list;
+    }
+}
+
+/// Adds a pose to a short list, best first. Of two that are not distinct, the better stays.
+fn insert(list: &mut Vec<(f64, Isometry3<f64>)>, new: (f64, Isometry3<f64>), distinct: &Distinct) {
+    let place = list.partition_point(|(score, _)| *score <= new.0);
+    let same = |other: &(f64, Isometry3<f64>)| !distinct.apart(&other.1, &new.1);
+    if place >= POLISHED || list[..place].iter().any(same) {
+        return;
+    }
+    list.retain(|other| other.0 <= new.0 || !same(other));
+    list.insert(place, new);
+    list.truncate(POLISHED);
+}
+
+impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        let outcome = self.stage.run(problem, init, session);
+        let colored = |(model, observation): &(&Model, &Observation)| {
+            model.mesh().color().is_some() && observation.color().is_some()
+        };
+        let seen = |(_, observation): &(&Model, &Observation)| observation.n_surfels() > 0;
+        let Some((model, _)) = problem.sides().filter(colored).filter(seen) else {
+            return outcome;
+        };
+        if outcome.termination == Termination::Stopped || !se3::is_finite(init) {
+            return outcome;
+        }
+        let distinct = Distinct::of(model);
+        self.choose(problem, &distinct, outcome, session).outcome
+    }
+
+    fn name(&self) -> &'static str {
+        "color-choice"
+    }
+}
