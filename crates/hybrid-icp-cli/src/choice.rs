@@ -14,12 +14,13 @@ use crate::limits::pipeline_limits;
 pub(crate) struct PipelineArguments {
     /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
     ///
-    /// `auto` refines locally, and searches if the MVE stays above 0.2. After a search, the result
-    /// may be far from the initial pose. `--set max_rotation_degrees=30` and
-    /// `--set max_translation_meters=0.05` limit the distance. `local` never searches. `hybrid` is
-    /// the paper's method.
-    #[arg(long, value_name = "NAME|FILE.toml", default_value = "auto")]
-    pipeline: Source,
+    /// `auto`, the default, refines locally, and searches if the MVE stays above 0.2. After a
+    /// search, the result may be far from the initial pose. `--set max_rotation_degrees=30` and
+    /// `--set max_translation_meters=0.05` limit the distance. `color`, the default if color images
+    /// are used and nothing is set, also lets color decide where depth cannot. `local` never
+    /// searches. `hybrid` is the paper's method.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    pipeline: Option<Source>,
     /// Override a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be
     /// given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
@@ -29,12 +30,22 @@ pub(crate) struct PipelineArguments {
 impl PipelineArguments {
     /// Returns the pipeline file, which no output may replace.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
-        self.pipeline.file()
+        self.pipeline.as_ref().and_then(Source::file)
     }
 
     /// Reads the file, applies the overrides, and checks that the pipeline builds.
-    pub(crate) fn choose(&self) -> anyhow::Result<Pipeline> {
-        self.pipeline.choose(&self.overrides)
+    ///
+    /// `color` states whether color images are used.
+    pub(crate) fn choose(&self, color: bool) -> anyhow::Result<Pipeline> {
+        let usual = match color && self.overrides.is_empty() {
+            true => Preset::Color,
+            false => Preset::Auto,
+        };
+        let usual = Source::Preset(usual);
+        self.pipeline
+            .as_ref()
+            .unwrap_or(&usual)
+            .choose(&self.overrides)
     }
 }
 

@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let files = Files::default().writes("--picture", [&arguments.picture]);
     files.check()?;
     check_png("--picture", [&arguments.picture])?;
-    let pipeline = arguments.pipeline.choose()?;
+    let pipeline = arguments.pipeline.choose(false)?;
     let mut rng = rng(arguments.seed);
     let model = arguments.object.model()?;
     let camera = PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480)?;

@@ -28,6 +28,13 @@ impl DatasetOptions {
         Ok(dataset)
     }
 
+    /// Returns whether a scene of the split has a folder of color images.
+    pub(crate) fn has_color(&self) -> bool {
+        let scenes = std::fs::read_dir(self.root.join(&self.split));
+        let mut scenes = scenes.into_iter().flatten().flatten();
+        scenes.any(|scene| scene.path().join("rgb").is_dir())
+    }
+
     /// Returns the name of the dataset's folder.
     pub(crate) fn name(&self) -> String {
         let root = self.root.canonicalize();

@@ -47,7 +47,7 @@ impl JobOptions {
             check_stdout()?;
         }
         self.check_files(inputs)?;
-        let pipeline = self.pipeline.choose()?;
+        let pipeline = self.pipeline.choose(inputs.files.rgb.is_some())?;
         let trace_path = self.trace.as_ref();
         let mut header = trace_path
             .map(|_| trace::header(inputs, &pipeline))

@@ -20,7 +20,7 @@ fn help_texts_have_80_columns_and_the_important_words() {
         (
             "refine --help",
             &[
-                "Example:",
+                "Examples:",
                 "cam_R_m2c",
                 "MM_PER_UNIT",
                 "kept_initial",

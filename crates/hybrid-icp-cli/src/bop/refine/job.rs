@@ -21,7 +21,7 @@ pub(crate) struct JobOptions {
     #[command(flatten)]
     pub(crate) pipeline: PipelineArguments,
     #[command(flatten)]
-    models: ModelOptions,
+    pub(crate) models: ModelOptions,
     #[command(flatten)]
     threads: ThreadOptions,
     /// Write -1 to the time column, so that the same input gives the same bytes.

@@ -94,7 +94,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .reads("--results", [results])
         .reads("--detections", &arguments.detections);
     arguments.job.check_files(files, "--results", dataset)?;
-    let pipeline = arguments.job.pipeline.choose()?;
+    let color = !arguments.job.models.no_color && dataset.has_color();
+    let pipeline = arguments.job.pipeline.choose(color)?;
     let rows = arguments.read_rows()?;
     let masks = match (&arguments.detections, arguments.mask) {
         (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),

@@ -87,7 +87,7 @@ Example:
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let follow = &arguments.follow;
     follow.check_files(arguments.pipeline.file())?;
-    let pipeline = arguments.pipeline.choose()?;
+    let pipeline = arguments.pipeline.choose(false)?;
     let dataset = follow.dataset.open()?;
     let scenes = Scenes::new(&dataset, &follow.dataset.split, 1);
     let (scene_id, object) = (follow.scene, follow.object);
