@@ -25,8 +25,8 @@ use crate::stage::stage_trait::Stage;
 /// [`Alternative::color_gap`] then has the margin of each alternative that is as good in depth.
 /// Without colors, or without a contrast, the result is that of the stage, bit for bit.
 ///
-/// Cost: nothing without colors. Otherwise some 20 µs if depth leaves no choice, and some
-/// milliseconds if it does.
+/// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
+/// no choice, and some milliseconds if it does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorChoice<S, P, C> {
     /// Finds a pose.
@@ -302,10 +302,10 @@ impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
     ) -> Outcome {
         let outcome = self.stage.run(problem, init, session);
         let colored = |(model, observation): &(&Model, &Observation)| {
-            model.mesh().color().is_some() && observation.color().is_some()
+            let seen = observation.n_surfels() > 0 && observation.color().is_some();
+            seen && self.color.can_tell(model)
         };
-        let seen = |(_, observation): &(&Model, &Observation)| observation.n_surfels() > 0;
-        let Some((model, _)) = problem.sides().filter(colored).filter(seen) else {
+        let Some((model, _)) = problem.sides().filter(colored) else {
             return outcome;
         };
         if outcome.termination == Termination::Stopped || !se3::is_finite(init) {

@@ -16,7 +16,7 @@ const AROUND: usize = 2;
 /// Smallest number of cells that are evidence.
 const LEAST_CELLS: usize = 12;
 /// Smallest contrast of the model's colors that is evidence, gray levels.
-const LEAST_CONTRAST: f64 = 6.0;
+pub(crate) const LEAST_CONTRAST: f64 = 6.0;
 
 /// The effects of light that are removed from the colors of model and image before they are
 /// compared.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use hicp_core::{Context, Isometry3, Model, Point3, Problem, Surfel, sample_colored_surface};
 
-use crate::color::cells::{Cells, ColorEvidence, Shading, faces_camera};
+use crate::color::cells::{Cells, ColorEvidence, LEAST_CONTRAST, Shading, faces_camera};
 use crate::score::Score;
 
 /// An estimate of [`ColorAgreement`](crate::ColorAgreement) without a render, for ranking many
@@ -33,17 +33,34 @@ impl Default for SampledColor {
 /// The colored samples of a model.
 struct Samples {
     points: Vec<(Surfel, [f32; 3])>,
+    /// Standard deviation of the colors, gray levels.
+    contrast: f64,
     /// `true` if normals are certain to point out of the object.
     oriented: bool,
 }
 
 impl Samples {
     fn of(model: &Model, count: usize) -> Arc<Self> {
-        model.derived().get_or_build(count as u64, || Self {
-            points: sample_colored_surface(model.mesh(), count),
-            oriented: model.mesh().is_closed(),
+        model.derived().get_or_build(count as u64, || {
+            let points = sample_colored_surface(model.mesh(), count);
+            Self {
+                contrast: contrast(&points),
+                oriented: model.mesh().is_closed(),
+                points,
+            }
         })
     }
+}
+
+/// Returns the standard deviation of colors over all channels.
+fn contrast(points: &[(Surfel, [f32; 3])]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let mean = |channel: usize, value: fn(f64) -> f64| {
+        let colors = points.iter().map(|(_, color)| f64::from(color[channel]));
+        colors.map(value).sum::<f64>() / n
+    };
+    let variance = |channel| mean(channel, |x| x * x) - mean(channel, |x| x).powi(2);
+    ((0..3).map(variance).sum::<f64>() / 3.0).max(0.0).sqrt()
 }
 
 impl SampledColor {
@@ -55,6 +72,13 @@ impl SampledColor {
             shading: Shading::default(),
             cells: Cells::default(),
         }
+    }
+
+    /// Returns whether the model has colors, and enough contrast to be evidence from some side.
+    #[must_use]
+    pub fn can_tell(&self, model: &Model) -> bool {
+        model.mesh().color().is_some()
+            && Samples::of(model, self.samples).contrast >= LEAST_CONTRAST
     }
 
     /// Returns the agreement at a pose `camera_from_object`, and whether it is evidence.
