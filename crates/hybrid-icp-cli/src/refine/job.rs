@@ -25,7 +25,7 @@ pub(crate) struct JobOptions {
     output: Option<PathBuf>,
     /// A JSON file for the distinct other poses that a search found, best first. Each has its pose
     /// and score, the gap (its score minus that of the result), and rotation_degrees and mssd_mm
-    /// from the result.
+    /// from the result. If colors tell it apart, color_gap is the margin of their correlation.
     #[arg(long, value_name = "FILE")]
     alternatives: Option<PathBuf>,
     /// A PNG file for a picture: the depth around the object, with the model's outline at the

@@ -139,6 +139,9 @@ pub(crate) fn alternative(other: &Alternative) -> Value {
         "rotation_degrees": other.rotation_degrees,
         "mssd_mm": other.mssd_meters * 1e3,
     });
+    if let Some(gap) = other.color_gap {
+        object["color_gap"] = gap.into();
+    }
     add_pose(&mut object, &other.camera_from_object);
     object
 }
