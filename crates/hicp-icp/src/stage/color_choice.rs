@@ -23,7 +23,8 @@ use crate::stage::stage_trait::Stage;
 ///    depth is nearly as good, and its colors agree clearly better.
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is as good in depth.
-/// Without colors, or without a contrast, the result is that of the stage, bit for bit.
+/// Without colors, or without a contrast, the result is that of the stage, bit for bit. A bound of
+/// the stage does not limit the choice.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
 /// no choice, and some milliseconds if it does.
@@ -57,6 +58,12 @@ const FINE: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 const SURE: f64 = 0.8;
 /// Correlation that a single cell might have by chance; it falls with the root of their number.
 const CHANCE: f64 = 3.5;
+/// Share of that correlation by which another pose must beat that of the stage.
+const GAIN: f64 = 0.7;
+/// Share of the gain that suffices for a pose that is nearly the same.
+const SMALL_MOVE: f64 = 0.1;
+/// Share of the depth's score that another pose may add to it.
+const TOLERANCE: f64 = 0.2;
 /// Number of poses that are polished.
 const POLISHED: usize = 3;
 
@@ -175,9 +182,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
 
     /// Returns whether colors are evidence for a pose.
     fn agrees(&self, color: &ColorEvidence) -> bool {
-        // By chance, correlations of few cells are large.
-        let by_chance = CHANCE / (color.cells.max(1) as f64).sqrt();
-        color.is_telling() && color.correlation >= self.least_correlation.max(by_chance)
+        color.is_telling() && color.correlation >= self.least_correlation.max(by_chance(color))
     }
 
     /// Lets color choose between the pose of an outcome and others that explain the depth as well.
@@ -187,10 +192,14 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         distinct: &Distinct,
         outcome: Outcome,
         session: &mut Session<'_>,
-    ) -> Chosen {
-        let first = self.measure(problem, outcome, session);
+    ) -> Outcome {
         let pose = outcome.camera_from_object;
         self.rank(problem, &pose, session);
+        if self.ranked.is_empty() {
+            return outcome;
+        }
+        let first = self.measure(problem, outcome, session);
+        let most = (1.0 + TOLERANCE) * first.score + self.tolerance;
         let ranked = std::mem::take(&mut self.ranked);
         let (mut chosen, mut tried) = (first, vec![first]);
         for (_, start) in &ranked {
@@ -200,7 +209,6 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
                 self.polish.run(problem, start, session).camera_from_object
             };
             let turned = self.spin(problem, &polished);
-            let most = 1.2 * first.score + self.tolerance;
             let turned = Outcome::refined(turned, Termination::Converged);
             let mut found = self.measure(problem, turned, session);
             if found.score > most || !found.color.is_telling() {
@@ -213,11 +221,10 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             if moved.score <= found.score && moved.color.correlation > found.color.correlation {
                 found = moved;
             }
-            let pose_found = &found.outcome.camera_from_object;
             tried.push(found);
-            let other = distinct.apart(pose_found, &pose);
-            let by_chance = CHANCE / (found.color.cells.max(1) as f64).sqrt();
-            let gain = self.min_gain.max(0.7 * by_chance) * if other { 1.0 } else { 0.1 };
+            let other = distinct.apart(&found.outcome.camera_from_object, &pose);
+            let gain = self.min_gain.max(GAIN * by_chance(&found.color));
+            let gain = if other { gain } else { SMALL_MOVE * gain };
             if self.agrees(&found.color)
                 && found.color.correlation > first.color.correlation + gain
                 && found.color.correlation > chosen.color.correlation
@@ -230,11 +237,11 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         }
         self.ranked = ranked;
         if !tried.iter().any(|tried| tried.color.is_telling()) {
-            return first;
+            return outcome;
         }
         chosen.outcome.iterations = outcome.iterations;
         self.list(problem, distinct, (&chosen, &tried), session);
-        chosen
+        chosen.outcome
     }
 
     /// Lists the alternatives to the chosen pose, those that color does not tell apart first.
@@ -281,6 +288,11 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
     }
 }
 
+/// Returns the correlation that colors may have by chance: it is large for few cells.
+fn by_chance(color: &ColorEvidence) -> f64 {
+    CHANCE / (color.cells.max(1) as f64).sqrt()
+}
+
 /// Adds a pose to a short list, best first. Of two that are not distinct, the better stays.
 fn insert(list: &mut Vec<(f64, Isometry3<f64>)>, new: (f64, Isometry3<f64>), distinct: &Distinct) {
     let place = list.partition_point(|(score, _)| *score <= new.0);
@@ -312,7 +324,7 @@ impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
             return outcome;
         }
         let distinct = Distinct::of(model);
-        self.choose(problem, &distinct, outcome, session).outcome
+        self.choose(problem, &distinct, outcome, session)
     }
 
     fn name(&self) -> &'static str {
