@@ -287,7 +287,7 @@ impl PyModel {
         Matrix::new(3, self.model.mesh().triangles().concat())
     }
 
-    /// Whether the mesh has colors, of its vertices or as textures.
+    /// True if the mesh has colors, of its vertices or as textures.
     #[getter]
     fn has_color(&self) -> bool {
         self.model.mesh().color().is_some()

@@ -12,7 +12,7 @@ use crate::limits::{Limit, ReadLimits};
 pub(crate) struct Colors {
     /// The numbers of each vertex.
     vertices: Vec<[f32; 3]>,
-    /// Whether the numbers are bytes. Otherwise, the largest one shows their scale.
+    /// `true` if the numbers are bytes. Otherwise, the largest one shows their scale.
     bytes: bool,
     largest: f32,
     images: Vec<ColorImage>,

@@ -17,7 +17,7 @@ pub(crate) struct Reading<'a> {
     pub(crate) path: &'a Path,
     pub(crate) unit: LengthUnit,
     pub(crate) limits: &'a ReadLimits,
-    /// Whether colors are read, too.
+    /// `true` if colors are read, too.
     pub(crate) with_color: bool,
 }
 

@@ -395,7 +395,7 @@ class Model:
 
     @property
     def has_color(self) -> bool:
-        """Whether the mesh has colors, of its vertices or as textures."""
+        """True if the mesh has colors, of its vertices or as textures."""
 
     @property
     def diameter(self) -> float:

@@ -94,7 +94,7 @@ pub(super) struct Property {
     /// It is 0 to 5 for [`VERTEX_NAMES`], the next numbers are for [`OPTIONAL_NAMES`]. It is 0 for
     /// the corners of a face, and `None` if the property is skipped.
     pub(super) slot: Option<usize>,
-    /// Whether a value in a text may be any word.
+    /// `true` if a value in a text may be any word.
     pub(super) is_optional: bool,
     line: usize,
 }
