@@ -71,6 +71,7 @@ pub use sensor::camera::{
 pub use sensor::image::{
     ColorImage, DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, MIN_DEPTH_METERS, Mask,
 };
+pub use sensor::normals::NormalWindow;
 pub use sensor::observation::Observation;
 pub use sensor::region::PixelRegion;
 pub use surfel::Surfel;

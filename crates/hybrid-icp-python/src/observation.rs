@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hybrid_icp::core::{ColorImage, DepthImage, Mask, Observation, PinholeCamera};
+use hybrid_icp::core::{ColorImage, DepthImage, Mask, NormalWindow, Observation, PinholeCamera};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -37,6 +37,9 @@ type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict
 /// color : numpy.ndarray of uint8, shape (H, W, 3), optional
 ///     Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
 ///     model that has colors (`Model.has_color`).
+/// normal_window : int, optional
+///     Half side of the window that normals are fitted over, from 1 (3 × 3 pixels) to 10. By
+///     default, it follows the noise of the image.
 ///
 /// Raises
 /// ------
@@ -67,7 +70,7 @@ pub(crate) struct PyObservation {
 #[pymethods]
 impl PyObservation {
     #[new]
-    #[pyo3(signature = (depth, mask, camera, *, scale = None, color = None))]
+    #[pyo3(signature = (depth, mask, camera, *, scale = None, color = None, normal_window = None))]
     fn new(
         py: Python<'_>,
         depth: &Bound<'_, PyAny>,
@@ -75,6 +78,7 @@ impl PyObservation {
         camera: PyCamera,
         scale: Option<f64>,
         color: Option<&Bound<'_, PyAny>>,
+        normal_window: Option<u8>,
     ) -> PyResult<Self> {
         let image = depth::shared(depth, scale)?;
         let mask = depth::mask(mask, &image)?;
@@ -95,7 +99,8 @@ impl PyObservation {
         let size = (image.width(), image.height());
         let color = color.map(|value| color::image(value, "color", Some(size)));
         let color = color.transpose()?;
-        py.detach(|| Self::make(image, mask, camera, color))
+        let window = normal_window.map_or(NormalWindow::Automatic, NormalWindow::HalfSide);
+        py.detach(|| Self::make(image, mask, camera, color, window))
     }
 
     /// The camera.
@@ -222,12 +227,16 @@ impl PyObservation {
             .call_method1("from_K", (calibration, size))?;
         let scale = (kind != "f").then_some(scale);
         let color = color.transpose()?;
-        Self::new(py, &depth, mask, camera.extract()?, scale, color.as_ref())
+        let (camera, color) = (camera.extract()?, color.as_ref());
+        Self::new(py, &depth, mask, camera, scale, color, None)
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Arguments<'py>> {
         let options = PyDict::new(py);
         options.set_item("color", self.color(py)?)?;
+        if let NormalWindow::HalfSide(pixels) = self.observation.normal_window() {
+            options.set_item("normal_window", pixels)?;
+        }
         Ok(((self.image(), self.mask(), self.camera()), options))
     }
 
@@ -254,8 +263,10 @@ impl PyObservation {
         mask: Mask,
         camera: PinholeCamera,
         color: Option<ColorImage>,
+        window: NormalWindow,
     ) -> PyResult<Self> {
-        let mut observation = Observation::new(depth, mask, camera).map_err(errors::input)?;
+        let observation = Observation::with_normal_window(depth, mask, camera, window);
+        let mut observation = observation.map_err(errors::input)?;
         if let Some(color) = color {
             observation = observation.with_color(color).map_err(errors::input)?;
         }

@@ -1,6 +1,7 @@
 """Tests the checks of arguments and their messages."""
 
 import os
+import pickle
 
 import numpy as np
 import pytest
@@ -34,6 +35,17 @@ WALL = np.full((48, 64), 0.8, np.float32)
 def test_observation_errors_name_the_value(arguments, scale, message):
     with pytest.raises(hi.InputError, match=message):
         hi.Observation(*arguments, scale=scale)
+
+
+def test_the_window_of_normals_is_a_setting_that_survives_a_pickle():
+    # Two columns of five pixels: the 3 x 3 windows of the four outer pixels have fewer than six.
+    strip = np.zeros((48, 64), bool)
+    strip[10:15, 20:22] = True
+    assert hi.Observation(WALL, strip, CAMERA).n_surfels == 10
+    small = hi.Observation(WALL, strip, CAMERA, normal_window=1)
+    assert small.n_surfels == 6 and pickle.loads(pickle.dumps(small)).n_surfels == 6
+    with pytest.raises(hi.InputError, match="half side of 11 pixels, expected 1 to 10"):
+        hi.Observation(WALL, strip, CAMERA, normal_window=11)
 
 
 def test_units_are_checked_even_if_few_pixels_were_measured():

@@ -112,7 +112,7 @@ pub use mask_in_box::mask_in_box;
 pub use preset::{Preset, UnknownPreset};
 pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
-pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
+pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
 pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::Warning;

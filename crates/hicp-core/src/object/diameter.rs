@@ -17,6 +17,7 @@ const LEAF_SIZE: usize = 16;
 ///
 /// Cost: about O(n log n) for surfaces.
 #[must_use]
+// Open: the object's diameter: §IV-A.2. The largest distance between two vertices, as in BOP.
 pub fn diameter(points: &[Point3<f32>]) -> f64 {
     let finite = |p: &&Point3<f32>| p.iter().all(|x| x.is_finite());
     let mut points: Vec<Point3<f64>> = points.iter().filter(finite).map(|p| p.cast()).collect();

@@ -29,6 +29,9 @@ pub struct ModelConfig {
 impl Default for ModelConfig {
     fn default() -> Self {
         Self {
+            // Open: number of points of O for nearest neighbors: §III-A. They are uniform over the
+            // whole surface, as §IV-B.1 says of common practice. Between 300 and 3,000 points, the
+            // accuracy hardly changes.
             samples: 1000,
             diameter: None,
             symmetries: Symmetries::default(),

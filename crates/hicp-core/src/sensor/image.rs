@@ -434,4 +434,10 @@ pub enum ImageError {
         /// Height of the second.
         second_height: u32,
     },
+    /// The window of normals is too small or too large.
+    #[error("window of normals has a half side of {found} pixels, expected 1 to 10")]
+    NormalWindow {
+        /// The half side given.
+        found: u8,
+    },
 }

@@ -9,7 +9,7 @@ use crate::id::Id;
 use crate::internal;
 use crate::sensor::camera::PinholeCamera;
 use crate::sensor::image::{ColorImage, DepthImage, ImageError, Mask, check_size};
-use crate::sensor::normals::{DepthPatch, estimate_normals};
+use crate::sensor::normals::{DepthPatch, NormalWindow, estimate_normals};
 use crate::sensor::region::PixelRegion;
 use crate::surfel::Surfel;
 
@@ -50,6 +50,7 @@ pub struct Observation {
     color: Option<Arc<ColorImage>>,
     mask: Mask,
     region: PixelRegion,
+    normal_window: NormalWindow,
     surfels: Vec<Surfel>,
     n_surfels: usize,
     n_measured: usize,
@@ -70,14 +71,43 @@ impl Observation {
         mask: Mask,
         camera: PinholeCamera,
     ) -> Result<Self, ImageError> {
-        Self::of_shared(depth.into(), mask, camera)
+        Self::of_shared(depth.into(), mask, camera, NormalWindow::Automatic)
+    }
+
+    /// Creates an observation as [`Observation::new`] does, with another window for its normals.
+    ///
+    /// ```
+    /// use hicp_core::{DepthImage, Mask, NormalWindow, Observation, PinholeCamera};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let camera = PinholeCamera::new(50.0, 50.0, 15.5, 15.5, 32, 32)?;
+    /// # let wall = DepthImage::from_meters(32, 32, vec![0.8; 32 * 32])?;
+    /// let small = NormalWindow::HalfSide(1); // 3 × 3 pixels, whatever the noise.
+    /// let observation =
+    ///     Observation::with_normal_window(wall, Mask::full(32, 32), camera, small)?;
+    /// assert_eq!(observation.normal_window(), small);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Observation::new`], and [`ImageError::NormalWindow`] if the half side is not from
+    /// 1 to 10 pixels.
+    pub fn with_normal_window(
+        depth: impl Into<Arc<DepthImage>>,
+        mask: Mask,
+        camera: PinholeCamera,
+        window: NormalWindow,
+    ) -> Result<Self, ImageError> {
+        Self::of_shared(depth.into(), mask, camera, window)
     }
 
     fn of_shared(
         depth: Arc<DepthImage>,
         mask: Mask,
         camera: PinholeCamera,
+        normal_window: NormalWindow,
     ) -> Result<Self, ImageError> {
+        normal_window.check()?;
         let size = (depth.width(), depth.height());
         check_size("mask", (mask.width(), mask.height()), "depth image", size)?;
         check_size(
@@ -119,7 +149,10 @@ impl Observation {
             camera: &camera,
             depth: &patch,
         };
-        estimate_normals(&depth_patch, |row, first, normals| {
+        // Deviation: pixels without normals leave C: §III-A gives every point of C a normal. Here a
+        // pixel whose neighbors do not determine a plane (a flying pixel, a line) has no surfel. It
+        // is not paired by any metric, and still counts toward the MVE.
+        estimate_normals(&depth_patch, normal_window, |row, first, normals| {
             let start = row * width;
             surfels.resize(start + first, nothing);
             let (depth, xs) = (&patch[start + first..], &xs[first..]);
@@ -145,6 +178,7 @@ impl Observation {
             color: None,
             mask,
             region,
+            normal_window,
             surfels,
             n_surfels,
             n_measured,
@@ -224,6 +258,12 @@ impl Observation {
     #[must_use]
     pub fn region(&self) -> PixelRegion {
         self.region
+    }
+
+    /// The window that the normals were fitted over.
+    #[must_use]
+    pub fn normal_window(&self) -> NormalWindow {
+        self.normal_window
     }
 
     /// Number of pixels that have a surfel.
@@ -381,6 +421,7 @@ impl Observation {
             color: None,
             mask,
             region,
+            normal_window: self.normal_window,
             n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),
             surfels,
             n_measured,

@@ -1,7 +1,7 @@
 //! Tests of normals against their definition, pixel by pixel, without sliding sums.
 
 use crate::support::Numbers;
-use hicp_core::{DepthImage, Mask, Matrix3, Observation, PinholeCamera, Vector3};
+use hicp_core::{DepthImage, Mask, Matrix3, NormalWindow, Observation, PinholeCamera, Vector3};
 
 /// The depths and edges that [`Observation`] fits to, by definition. Pixels are relative to the
 /// corner of the region.
@@ -12,8 +12,9 @@ struct Definition<'a> {
     height: usize,
     /// In meters; 0 if the pixel is not masked.
     depth: Vec<f64>,
-    /// Half side of the windows away from edges, pixels.
+    /// Half sides of the windows away from edges and near them, pixels.
     radius: usize,
+    edge_radius: usize,
     /// A step between neighbors beyond this share of the nearer depth is an edge.
     edge_step: f64,
     /// Pixels on either side of an edge.
@@ -42,6 +43,7 @@ impl<'a> Definition<'a> {
             height: region.height(),
             depth,
             radius: 0,
+            edge_radius: 3,
             edge_step: 0.0,
             beside: Vec::new(),
         };
@@ -53,6 +55,10 @@ impl<'a> Definition<'a> {
             focal * noise / squares.sqrt() <= 0.1
         };
         definition.radius = (2..=10).find(suffices).unwrap_or(10);
+        if let NormalWindow::HalfSide(radius) = observation.normal_window() {
+            definition.radius = radius.into();
+            definition.edge_radius = definition.radius.min(3);
+        }
         let surface = 85_f64.to_radians().tan() / focal;
         definition.edge_step = surface.max(5.0 * 2_f64.sqrt() * noise);
         definition.beside = definition
@@ -128,14 +134,14 @@ impl<'a> Definition<'a> {
 
     /// The pixels that a plane is fitted to.
     ///
-    /// Away from edges they are the window's. Near an edge they are those of a 7 × 7 window that
-    /// are connected inside it by steps that are not edges. Their depth must differ by at most half
-    /// a step plus half a step per pixel.
+    /// Away from edges they are the window's. Near an edge they are those of a window of at most
+    /// 7 × 7 pixels that are connected inside it by steps that are not edges. Their depth must
+    /// differ by at most half a step plus half a step per pixel.
     fn support(&self, pixel: (usize, usize)) -> Vec<(usize, usize)> {
         if !self.is_near_an_edge(pixel) {
             return self.window(pixel, self.radius);
         }
-        let window = self.window(pixel, 3);
+        let window = self.window(pixel, self.edge_radius);
         let mut joined = vec![pixel];
         let mut next = 0;
         while let Some(&here) = joined.get(next) {
@@ -227,6 +233,7 @@ struct Recipe {
     /// Shares of pixels that are not masked, and that have no depth.
     unmasked: f64,
     holes: f64,
+    window: NormalWindow,
 }
 
 const PLAIN: Recipe = Recipe {
@@ -239,6 +246,7 @@ const PLAIN: Recipe = Recipe {
     right_half: false,
     unmasked: 0.0,
     holes: 0.0,
+    window: NormalWindow::Automatic,
 };
 
 /// Creates patches of surface with different slopes and offsets; a border of the image is not
@@ -276,7 +284,8 @@ fn scene(recipe: &Recipe, seed: u64) -> Observation {
     }
     let (width, height) = (camera.width(), camera.height());
     let depth = DepthImage::from_meters(width, height, depth).unwrap();
-    Observation::new(depth, Mask::new(width, height, mask).unwrap(), camera).unwrap()
+    let mask = Mask::new(width, height, mask).unwrap();
+    Observation::with_normal_window(depth, mask, camera, recipe.window).unwrap()
 }
 
 /// Cases that the images must contain, so that the comparison means something.
@@ -400,4 +409,24 @@ fn noise_is_measured_within_rows_and_not_across_holes() {
         compare(&recipe, 300, &mut seen);
     }
     assert!(seen.normals > 4000, "{}", seen.normals);
+}
+
+#[test]
+fn fixed_windows_equal_the_definition_whatever_the_noise() {
+    for half_side in [1, 2, 4, 10] {
+        let mut seen = Seen::default();
+        for (seed, noise) in [(400, 0.0), (401, 0.01)] {
+            let recipe = Recipe {
+                noise,
+                jump: 2.0,
+                patch: 15,
+                holes: 0.05,
+                window: NormalWindow::HalfSide(half_side),
+                ..PLAIN
+            };
+            compare(&recipe, seed, &mut seen);
+        }
+        assert_eq!(seen.radii, [usize::from(half_side); 2]);
+        assert!(seen.normals > 3000 && seen.beside_edges > 300);
+    }
 }

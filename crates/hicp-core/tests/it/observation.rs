@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::support::Numbers;
 use hicp_core::{
-    DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, Mask, Observation, PinholeCamera,
-    PixelRegion,
+    DepthImage, DistanceImage, ImageError, MAX_DEPTH_METERS, Mask, NormalWindow, Observation,
+    PinholeCamera, PixelRegion,
 };
 use proptest::prelude::*;
 
@@ -31,6 +31,22 @@ fn ragged(width: u32, height: u32, seed: u64) -> Observation {
         camera(width, height),
     )
     .unwrap()
+}
+
+#[test]
+fn a_window_of_normals_that_is_too_small_or_too_large_is_an_error() {
+    for (half_side, valid) in [(0, false), (1, true), (10, true), (11, false)] {
+        let depth = DepthImage::from_meters(4, 3, vec![1.0; 12]).unwrap();
+        let window = NormalWindow::HalfSide(half_side);
+        let made = Observation::with_normal_window(depth, Mask::full(4, 3), camera(4, 3), window);
+        assert_eq!(made.is_ok(), valid, "{half_side}");
+        if let Err(error) = made {
+            let expected = format!(
+                "window of normals has a half side of {half_side} pixels, expected 1 to 10"
+            );
+            assert_eq!(error.to_string(), expected);
+        }
+    }
 }
 
 #[test]

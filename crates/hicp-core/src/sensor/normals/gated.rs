@@ -2,12 +2,11 @@
 
 use super::edges::Edges;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
+use super::size::EDGE_RADIUS;
 use super::window::{Rays, WindowSums};
 use crate::internal::VectorLoop;
 
-/// Half side of the gated window, pixels. Its rows must fit [`Joined`].
-const EDGE_RADIUS: usize = 3;
-/// Columns that are summed in parallel: those of the window, and one that stays empty.
+/// Columns that are summed in parallel: those of the largest window, and one that stays empty.
 const LANES: usize = 2 * EDGE_RADIUS + 2;
 
 /// A set of pixels of the gated window, one byte per row: bit `8 y + x`.
@@ -19,6 +18,8 @@ pub(super) struct FitGated<'a> {
     pub(super) edges: &'a Edges,
     pub(super) rays: &'a Rays,
     pub(super) edge_step: f32,
+    /// Half side of the window, at most [`EDGE_RADIUS`] pixels.
+    pub(super) radius: usize,
     pub(super) v: usize,
     /// The normals of the row from column `first` on. Those of other pixels are not changed.
     pub(super) first: usize,
@@ -33,7 +34,7 @@ impl VectorLoop for FitGated<'_> {
         let width = self.patch.region.width();
         for u in self.edges.near.columns(self.v, width) {
             if self.patch.depth[self.v * width + u] >= MIN_DEPTH_METERS {
-                let window = Window::around(self.patch, u, self.v);
+                let window = Window::around(self.patch, u, self.v, self.radius);
                 let sums = self.sums(&window, window.joined(self.edges));
                 let at = (u - window.left, self.v - window.top);
                 self.normals[u - self.first] = sums.normal(self.rays, (u, self.v), at);
@@ -108,16 +109,16 @@ struct Window {
 
 impl Window {
     #[inline(always)]
-    fn around(patch: &DepthPatch<'_>, u: usize, v: usize) -> Self {
+    fn around(patch: &DepthPatch<'_>, u: usize, v: usize, radius: usize) -> Self {
         let (width, height) = (patch.region.width(), patch.region.height());
-        let (left, top) = (u.saturating_sub(EDGE_RADIUS), v.saturating_sub(EDGE_RADIUS));
+        let (left, top) = (u.saturating_sub(radius), v.saturating_sub(radius));
         Self {
             u,
             v,
             left,
             top,
-            columns: (u + EDGE_RADIUS + 1).min(width) - left,
-            rows: (v + EDGE_RADIUS + 1).min(height) - top,
+            columns: (u + radius + 1).min(width) - left,
+            rows: (v + radius + 1).min(height) - top,
         }
     }
 

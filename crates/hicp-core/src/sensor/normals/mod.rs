@@ -3,7 +3,7 @@
 //! For a plane seen by a pinhole camera, the inverse depth is *affine* in the pixel coordinates. A
 //! normal is therefore a linear least-squares fit of 1/z over a window of pixels, exact for planes
 //! at any tilt. The sums of the window are updated along columns and rows, so the cost per pixel
-//! does not depend on its size. The size follows the noise of the image.
+//! does not depend on its size. By default, the size follows the noise of the image.
 //!
 //! Windows never mix two sides of a depth edge. Near an edge, a small window uses only the
 //! neighbors that are connected to the pixel by steps that are not edges.
@@ -12,6 +12,7 @@ mod edges;
 mod gated;
 mod lanes;
 mod patch;
+mod size;
 mod window;
 
 use std::ops::Range;
@@ -19,15 +20,14 @@ use std::ops::Range;
 use edges::Edges;
 use gated::FitGated;
 pub(crate) use patch::DepthPatch;
+pub use size::NormalWindow;
 use window::{ColumnSums, Rays, RowFits};
 
 use crate::internal::vectorized;
 
-/// Largest standard error of the slope (tangent of the tilt) that the choice of the window accepts.
-const SLOPE_ERROR: f64 = 0.1;
-/// Smallest and largest half side of the window, pixels.
-const RADIUS: std::ops::RangeInclusive<usize> = 2..=10;
 /// A step is a depth edge if it is steeper than a surface at this angle, degrees off frontal …
+// Open: depth edges in the normals of C: §III-A. No window mixes two sides of an edge. An edge is
+// steeper than this tilt, in degrees, and larger than five standard deviations of the noise.
 const EDGE_TILT_DEGREES: f64 = 85.0;
 /// … and larger than this many of its standard deviations, which are √2 times those of a depth.
 const EDGE_SIGMAS: f64 = 5.0;
@@ -44,6 +44,7 @@ const NOISE_SAMPLES: usize = 4096;
 /// side of the depth edges (flying pixels, single-pixel lines).
 pub(crate) fn estimate_normals(
     patch: &DepthPatch<'_>,
+    window: NormalWindow,
     mut found: impl FnMut(usize, usize, &[[f32; 3]]),
 ) {
     if patch.region.is_empty() {
@@ -53,7 +54,7 @@ pub(crate) fn estimate_normals(
     let spans: Vec<_> = (0..height).map(|v| used(patch.row(v))).collect();
     let noise = relative_noise(patch);
     let focal = patch.camera.fx().min(patch.camera.fy());
-    let radius = window_radius(focal * noise);
+    let (radius, edge_radius) = window.radii(focal * noise);
     #[allow(clippy::cast_possible_truncation)] // A relative step; f32 is the precision of depth.
     let edge_step = (EDGE_TILT_DEGREES.to_radians().tan() / focal)
         .max(EDGE_SIGMAS * std::f64::consts::SQRT_2 * noise) as f32;
@@ -77,6 +78,7 @@ pub(crate) fn estimate_normals(
                 edges,
                 rays: &rays,
                 edge_step,
+                radius: edge_radius,
                 v,
                 first: span.start,
                 normals: &mut fits.normals,
@@ -122,41 +124,4 @@ fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
     let middle = differences.len() / 2;
     let (_, median, _) = differences.select_nth_unstable_by(middle, f32::total_cmp);
     f64::from(*median) / (0.6745 * 6.0_f64.sqrt())
-}
-
-/// Returns the smallest radius at which the slope's standard error, noise/√Σu², is within
-/// [`SLOPE_ERROR`].
-fn window_radius(slope_noise_per_pixel: f64) -> usize {
-    let needed = (slope_noise_per_pixel / SLOPE_ERROR).powi(2);
-    RADIUS
-        .clone()
-        .find(|r| {
-            let (side, r) = ((2 * r + 1) as f64, *r as f64);
-            // Σu² over a full (2r+1)² window.
-            side * side * r * (r + 1.0) / 3.0 >= needed
-        })
-        .unwrap_or(*RADIUS.end())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_window_is_the_smallest_with_an_accurate_slope() {
-        // Σu² over a full window, pixel by pixel.
-        let squares = |r: i32| -> f64 {
-            let row: i32 = (-r..=r).map(|u| u * u).sum();
-            f64::from((2 * r + 1) * row)
-        };
-        assert_eq!(window_radius(0.0), 2);
-        assert_eq!(window_radius(f64::INFINITY), 10);
-        for r in 2..=10_u8 {
-            // The noise at which the standard error equals the limit.
-            let noise = SLOPE_ERROR * squares(r.into()).sqrt();
-            let r = usize::from(r);
-            assert_eq!(window_radius(noise * (1.0 - 1e-9)), r);
-            assert_eq!(window_radius(noise * (1.0 + 1e-9)), (r + 1).min(10));
-        }
-    }
 }

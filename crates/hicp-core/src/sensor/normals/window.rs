@@ -10,6 +10,8 @@ use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use crate::internal::{VectorLoop, vectorized};
 
 /// Smallest number of pixels that determine a plane.
+// Open: fewest pixels of a normal of C: §III-A. Twice the unknowns of a plane; a pixel with fewer
+// leaves C.
 const MIN_SUPPORT: f64 = 6.0;
 /// Number of pixels fitted at once.
 const LANES: usize = 8;
