@@ -1,19 +1,19 @@
 //! Compares pipelines with and without color on simulated scenes of textured objects.
 //!
-//! Run `cargo run --release -p hicp-tests --example color [CASES] [SET] [EVIDENCE] [plain]`.
+//! Run `cargo run --release -p hicp-tests --example color [CASES] [SET] [EVIDENCE] [WORDS]`.
 //!
-//! `SET` is `tuning` or `test`. With `plain`, the objects have no texture.
+//! `SET` is `tuning` or `test`. With the word `plain`, the objects have no texture. With `refine`,
+//! poses are not estimated from the mask alone. Times are those of the processor.
 //! `EVIDENCE` is `right`, or a fault of the color image: `other` (of another scene), `swapped` (red
 //! and blue), `shadow`, `shifted` (by 5 pixels) or `overexposed`. A pose fails if its MSSD is above
 //! a tenth of the diameter; no symmetry is declared. Half of the objects are symmetric in depth.
-
-use std::time::Instant;
 
 use hicp_sim::{Household, Lighting, Texture, stream};
 use hicp_tests::median;
 use hicp_tests::painted::Painted;
 use hicp_tests::tabletop::MaskKind;
 use hybrid_icp::core::{ColorImage, Isometry3, Observation};
+use hybrid_icp::icp::Alternative;
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
 
@@ -34,7 +34,9 @@ struct Row {
     turned: usize,
     ambiguous: usize,
     warned_wrongly: usize,
-    times: Vec<f64>,
+    /// Errors of the right poses, as shares of the diameter.
+    errors: Vec<f64>,
+    milliseconds: Vec<f64>,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -49,9 +51,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if !FAULTS.contains(&fault.as_str()) {
         return Err(format!("{fault}: expected one of {FAULTS:?}").into());
     }
-    let textures: Vec<Texture> = match arguments.next().as_deref() {
-        Some("plain") => vec![Texture::None],
-        _ => vec![Texture::Logos, Texture::Text],
+    let words: Vec<String> = arguments.collect();
+    let has = |word: &str| words.iter().any(|given| given == word);
+    let only_refine = has("refine");
+    let textures = if has("plain") {
+        vec![Texture::None]
+    } else {
+        vec![Texture::Logos, Texture::Text]
     };
     let painted = Painted::new(&objects, &textures)?;
     let scenes = &painted.scenes;
@@ -67,6 +73,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let names = ["auto", "color", "estimate", "estimate, then color"];
     let mut rows: [[Row; 4]; 2] = Default::default();
     let mut n = [0; 2];
+    let mut by_depth = (0.0, Isometry3::identity());
+    // Of `auto` and `color`, where color changes nothing and where it has a choice.
+    let mut costs: [Vec<[f64; 2]>; 2] = Default::default();
     'scenes: for seed in 1000.. {
         for seen in scenes.scene(seed)? {
             let mut random = stream(seed, &["light"], n.iter().sum::<usize>() as u64);
@@ -84,19 +93,35 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let init = seen.near(&mut random, 1.0);
             let symmetric = usize::from(painted.motions[seen.model].len() > 1);
             n[symmetric] += 1;
-            let wrong = |pose: &Isometry3<f64>| {
-                points[seen.model].mssd(pose, &seen.truth) > 0.1 * points[seen.model].diameter()
-            };
             for (index, row) in rows[symmetric].iter_mut().enumerate() {
-                let start = Instant::now();
+                if only_refine && index > 1 {
+                    continue;
+                }
+                let start = processor_time();
                 let refined: Refinement = match index {
                     0 => auto.refine(model, &depth, &init),
                     1 => searching.refine(model, &colored, &init),
                     2 => local.estimate(model, &depth),
                     _ => estimating.estimate(model, &colored),
                 };
-                row.times.push(start.elapsed().as_secs_f64() * 1e3);
-                let failed = wrong(&refined.outcome.camera_from_object);
+                let milliseconds = processor_time() - start;
+                row.milliseconds.push(milliseconds);
+                if index == 0 {
+                    by_depth = (milliseconds, refined.outcome.camera_from_object);
+                }
+                if index == 1 {
+                    let ambiguous = |other: &Alternative| other.gap < Alternative::AMBIGUOUS_GAP;
+                    let choice = searching.alternatives().iter().any(ambiguous);
+                    let moved = refined.outcome.camera_from_object != by_depth.1;
+                    costs[usize::from(choice || moved)].push([by_depth.0, milliseconds]);
+                }
+                let error =
+                    points[seen.model].mssd(&refined.outcome.camera_from_object, &seen.truth);
+                let error = error / points[seen.model].diameter();
+                let failed = error > 0.1;
+                if !failed {
+                    row.errors.push(error);
+                }
                 let ambiguous = refined.runner_up.is_some_and(|other| other.is_ambiguous());
                 row.failed += usize::from(failed);
                 row.ambiguous += usize::from(ambiguous);
@@ -116,26 +141,62 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     println!(
-        "| objects | pipeline | failed | right in depth, but turned | ambiguous | ambiguous and right | ms, median | mean |\n|---|---|---|---|---|---|---|---|"
+        "| objects | pipeline | failed | right in depth, but turned | ambiguous | ambiguous and right | error of the right, median | 90 % | ms, median | mean |\n|---|---|---|---|---|---|---|---|---|---|"
     );
     for (kind, (rows, n)) in ["others", "symmetric in depth"]
         .iter()
         .zip(rows.iter_mut().zip(n))
     {
-        for (name, row) in names.iter().zip(rows) {
+        let pipelines = if only_refine { 2 } else { 4 };
+        for (name, row) in names.iter().zip(rows).take(pipelines) {
             let percent = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
-            let mean = row.times.iter().sum::<f64>() / n.max(1) as f64;
+            let mean = row.milliseconds.iter().sum::<f64>() / n.max(1) as f64;
+            row.errors.sort_by(f64::total_cmp);
+            let error = |share: f64| {
+                let index = share * row.errors.len().saturating_sub(1) as f64;
+                100.0 * row.errors.get(index as usize).copied().unwrap_or(f64::NAN)
+            };
             println!(
-                "| {kind}: {n} | {name} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} | {mean:.1} |",
+                "| {kind}: {n} | {name} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} % | {:.2} % | {:.1} | {mean:.1} |",
                 percent(row.failed),
                 100.0 * row.turned as f64 / row.in_depth.max(1) as f64,
                 percent(row.ambiguous),
                 percent(row.warned_wrongly),
-                median(&mut row.times)
+                error(0.5),
+                error(0.9),
+                median(&mut row.milliseconds)
             );
         }
     }
+    println!(
+        "\n| color | cases | auto, ms | ratio | ms more, median | mean |\n|---|---|---|---|---|---|"
+    );
+    for (kind, costs) in ["changes nothing", "has a choice"].iter().zip(&costs) {
+        let mut auto: Vec<f64> = costs.iter().map(|[auto, _]| *auto).collect();
+        let mut ratios: Vec<f64> = costs.iter().map(|[auto, color]| color / auto).collect();
+        let mut more: Vec<f64> = costs.iter().map(|[auto, color]| color - auto).collect();
+        let mean = more.iter().sum::<f64>() / more.len().max(1) as f64;
+        let (auto, ratio, more) = (median(&mut auto), median(&mut ratios), median(&mut more));
+        println!(
+            "| {kind} | {} | {auto:.1} | {ratio:.2} | {more:.1} | {mean:.1} |",
+            costs.len()
+        );
+    }
     Ok(())
+}
+
+/// Returns the processor time of this thread, milliseconds.
+#[cfg(unix)]
+fn processor_time() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
+}
+
+/// Returns the time, milliseconds. Only Unix has a portable clock of a thread.
+#[cfg(not(unix))]
+fn processor_time() -> f64 {
+    let epoch = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
+    epoch.as_secs_f64() * 1e3
 }
 
 /// Returns the color image with a fault.

@@ -29,6 +29,7 @@
 //!
 //! - [`Robust`]: a [`Kernel`] against outliers.
 //! - [`PosePrior`]: a Gaussian prior of the pose.
+//! - [`Photometric`]: the colors of the image.
 //! - [`Conditioned`]: a policy for [`Degeneracy`].
 //! - [`Frozen`]: fixed degrees of freedom.
 //! - [`GaussNewton`] and [`LevenbergMarquardt`]: iterations over fixed pairs.

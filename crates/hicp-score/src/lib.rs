@@ -37,7 +37,7 @@ mod mve;
 mod score;
 mod tolerances;
 
-pub use color::{ColorAgreement, ColorEvidence, SampledColor, Shading, WithColor};
+pub use color::{ColorAgreement, ColorEvidence, SampledColor, Shading};
 pub use errors::{
     MSSD_MM, ModelPoints, N_THRESHOLDS, PoseErrors, Recalls, ScoreError, TargetErrors, Vsd, add,
     adi, bop_vsd, match_instances, most_visible, mspd, mssd, spheres_overlap, top_estimates,

@@ -108,6 +108,7 @@ fn alternative<'py>(py: Python<'py>, other: &Alternative) -> PyResult<Bound<'py,
     dict.set_item("T_co", Matrix::from(&other.camera_from_object))?;
     dict.set_item("score", other.score)?;
     dict.set_item("gap", other.gap)?;
+    dict.set_item("color_gap", other.color_gap)?;
     dict.set_item("mssd", other.mssd_meters)?;
     dict.set_item("rotation_degrees", other.rotation_degrees)?;
     Ok(dict)

@@ -130,3 +130,48 @@ def test_color_images_of_open3d_are_read():
     color = Array(PICTURE)
     observation = hi.Observation.from_open3d(Array(WALL), Intrinsic, color=color)
     assert np.array_equal(observation.color, PICTURE)
+
+
+def painted_box():
+    """Returns a box of 16 × 16 × 4 cm and the picture on its square sides, of 8 × 8 patches."""
+    signs = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)])
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    faces = np.array([corners for a, b, c, d in quads for corners in ([a, b, c], [a, c, d])])
+    patches = np.random.default_rng(3).integers(40, 200, (8, 8, 3), dtype=np.uint8)
+    picture = patches.repeat(8, axis=0).repeat(8, axis=1)
+    places = (signs[faces][:, :, :2] + 1) / 2
+    colors = ([picture], np.zeros(12, int), places)
+    return hi.Model(signs * [0.08, 0.08, 0.02], faces, colors=colors), picture
+
+
+def test_colors_tell_the_sides_of_a_square_apart_and_return_their_margin():
+    model, picture = painted_box()
+    camera = hi.Camera(200, 200, 79.5, 59.5, 160, 120)
+    # Seen from the front at 0.5 m, the near square covers the pixels whose rays meet it.
+    v, u = np.mgrid[:120, :160]
+    place = np.stack((v - 59.5, u - 79.5)) * 0.48 / 200
+    seen = (abs(place) < 0.08).all(axis=0)
+    depth = np.where(seen, 0.48, 0).astype(np.float32)
+    row, column = np.clip((place / 0.16 + 0.5) * 64, 0, 63).astype(int)
+    rough = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]], float)
+    pipeline = hi.Pipeline.preset("color")
+
+    colored = hi.Observation(depth, seen, camera, color=picture[row, column])
+    result = pipeline.refine(model, colored, rough)
+    assert np.allclose(result.T_co[:3, :3], np.eye(3), atol=0.02)
+    [margin] = [a["color_gap"] for a in result.alternatives if np.allclose(a["T_co"], rough)]
+    assert 0.15 < margin <= 2 and not any("ambiguous" in text for text in result.warnings)
+    assert result.to_dict()["alternatives"][0]["color_gap"] == result.alternatives[0]["color_gap"]
+
+    # The far square, seen from behind, shows the mirrored picture.
+    mirrored = hi.Observation(depth, seen, camera, color=picture[63 - row, column])
+    result = pipeline.refine(model, mirrored, rough)
+    assert np.allclose(result.T_co[:3, :3], np.diag([1, -1, -1]), atol=0.02)
+
+    # Neither another picture nor an image without colors tells the sides apart.
+    other = np.random.default_rng(4).integers(40, 200, (8, 8, 3), dtype=np.uint8)
+    other = hi.Observation(depth, seen, camera, color=other[row // 8, column // 8])
+    for observation in (other, hi.Observation(depth, seen, camera)):
+        result = pipeline.refine(model, observation, rough)
+        assert np.array_equal(result.T_co, rough) and result.alternatives
+        assert all(other["color_gap"] is None for other in result.alternatives)

@@ -58,8 +58,9 @@ use hicp_switch::{PAPER_ALPHA, Switch, Threshold};
 /// The stop rules of the paper's variants (§IV-B).
 pub type PaperStop = (Divergence, Convergence, IterationLimit);
 
-// Deviation: §IV-B states the divergence rules for Cascading ICP; here they end the single-metric
-// baselines too, so that all variants differ in association and metric alone.
+// Deviation: divergence rules of the baselines: §IV-B.2 states them for Cascading ICP. Here they
+// end the single-metric baselines too, so that all variants differ in association and metric alone.
+// It favors the baselines.
 /// Returns the paper's rules: divergence as written, convergence of the loss, 50 iterations.
 #[must_use]
 pub fn paper_stop() -> PaperStop {
@@ -93,6 +94,8 @@ fn projective<M>(metric: M) -> ProjectiveIcp<M> {
     Icp {
         selection: VisibleSurface::default(),
         association: Projective,
+        // Open: τ_max and θ_max: §III-A.1 mentions such limits and does not say whether the
+        // variants use them. They are off, so that no limit has to be chosen.
         filter: (),
         metric,
         stop: paper_stop(),
@@ -159,9 +162,10 @@ pub fn nn_cascade_plane_point() -> NearestCascade<PointToPlane, PointToPoint> {
 
 /// `hybrid`: Hybrid ICP (§IV-C). Twice: score the estimate by the MVE; below α = 0.4 run the
 /// projective cascade, else nearest-neighbor point-to-point.
-// Deviation: occluded pixels do not count toward the MVE; if nothing stands in front of the object,
-// it is exactly the paper's MVE.
 #[must_use]
+// Deviation: occluded pixels in the MVE: §IV-A.2 counts every pixel of both masks. Here a rendered
+// pixel behind a measured surface outside the mask does not count. If nothing stands in front of
+// the object, it is exactly the paper's MVE.
 pub fn hybrid() -> Hybrid {
     Repeat {
         times: 2,

@@ -9,12 +9,13 @@ use hybrid_icp::core::{
     ColorImage, Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3,
     Problem, RenderCache, RenderedView, Renderer, SurfaceColor, TexturedTriangle, TriMesh, Vector3,
 };
+use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{ColorAgreement, ColorEvidence, ModelPoints, SampledColor, Score, Shading};
 use hybrid_icp::{Preset, Refinement, Refiner};
 
 /// A board of 0.2 m with a texture of 8 × 8 patches.
-fn board(patch: impl Fn(u32) -> [u8; 3]) -> Model {
+pub(crate) fn board(patch: impl Fn(u32) -> [u8; 3]) -> Model {
     let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
     let vertices = corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec();
     let places = corners.map(|(x, y)| [5.0 * x + 0.5, 5.0 * y + 0.5]);
@@ -34,17 +35,17 @@ fn board(patch: impl Fn(u32) -> [u8; 3]) -> Model {
     Model::new(mesh.with_color(color).unwrap())
 }
 
-fn colorful(patch: u32) -> [u8; 3] {
+pub(crate) fn colorful(patch: u32) -> [u8; 3] {
     let value = |factor: u32| 40 + u8::try_from((patch * factor + patch / 8 * 3) % 7).unwrap() * 20;
     [value(3), value(5), value(11)]
 }
 
-fn pose() -> Isometry3<f64> {
+pub(crate) fn pose() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.01, 0.0, 0.6), Vector3::new(0.3, 0.2, 0.4))
 }
 
 /// An image of the board, with a change of its colors.
-fn photograph(model: &Model, change: impl Fn([f32; 3]) -> [f32; 3]) -> Observation {
+pub(crate) fn photograph(model: &Model, change: impl Fn([f32; 3]) -> [f32; 3]) -> Observation {
     let camera = PinholeCamera::new(300.0, 300.0, 79.5, 59.5, 160, 120).unwrap();
     let mut view = RenderedView::default();
     let mesh = model.mesh();
@@ -167,7 +168,7 @@ fn a_lamp_and_its_shadow_matter_least_if_the_surroundings_are_removed() {
 }
 
 /// A scene of the simulation that shows one object of a texture, and its index.
-fn scene(object: Household, texture: Texture) -> (Painted, Seen) {
+pub(crate) fn scene(object: Household, texture: Texture) -> (Painted, Seen) {
     let painted = Painted::new(&[object], &[texture]).unwrap();
     let scenes = (0..).flat_map(|seed| painted.scenes.scene(seed).unwrap());
     let good = |seen: &Seen| seen.visible_share > 0.9 && seen.noise_percent < 1.0;
@@ -176,12 +177,12 @@ fn scene(object: Household, texture: Texture) -> (Painted, Seen) {
 }
 
 /// Ordinary light.
-fn lighting() -> Lighting {
+pub(crate) fn lighting() -> Lighting {
     Lighting::draw(&mut stream(3, &["light"], 0))
 }
 
 /// A start that is turned around the object's axis of symmetry.
-fn turned(painted: &Painted, seen: &Seen) -> Isometry3<f64> {
+pub(crate) fn turned(painted: &Painted, seen: &Seen) -> Isometry3<f64> {
     let motions = &painted.motions[seen.model];
     seen.truth * motions[motions.len() / 3]
 }
@@ -202,6 +203,9 @@ fn color_turns_a_can_around_its_axis() {
     assert!(error(&by_depth) > 0.2, "{}", error(&by_depth));
     let by_color = Refiner::preset(Preset::Color).refine(model, &observation, &start);
     assert!(error(&by_color) < 0.05, "{}", error(&by_color));
+    let file = PipelineFile::parse(Preset::Color.toml(), "color").unwrap();
+    let mut built = Refiner::boxed(file.build().unwrap());
+    assert_eq!(built.refine(model, &observation, &start), by_color);
     let ambiguous = |refined: &Refinement| refined.runner_up.is_some_and(|r| r.is_ambiguous());
     assert!(!ambiguous(&by_color), "{:?}", by_color.runner_up);
     // An estimate uses color with every pipeline.

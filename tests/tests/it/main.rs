@@ -19,6 +19,7 @@ mod hostile;
 mod moving;
 mod numbers;
 mod pages;
+mod photometric;
 mod pipelines;
 mod pitfalls;
 mod presets;

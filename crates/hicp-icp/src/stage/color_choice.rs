@@ -1,12 +1,11 @@
 //! The choice by color among poses that depth cannot tell apart.
 
 use hicp_core::{Isometry3, Model, Observation, Problem, se3};
-use hicp_score::{ColorAgreement, ColorEvidence, SampledColor, SampledMve, Score, WithColor};
+use hicp_score::{ColorAgreement, ColorEvidence, SampledColor, Score};
 
 use crate::alternative::Alternative;
-use crate::outcome::{Outcome, Termination};
+use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
-use crate::stage::descent::Descent;
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::turns::Turns;
 use crate::stage::stage_trait::Stage;
@@ -16,9 +15,9 @@ use crate::stage::stage_trait::Stage;
 /// 1. The others are the alternatives that the stage found, and poses at which the model nearly
 ///    covers itself: a box turned end over end, a can turned around its axis. If the image shows
 ///    what tells them apart in depth, such as the handle of a mug, they are left out.
-/// 2. They are ranked by depth and color together. The best few are polished, which keeps rotations
-///    that the depth does not determine, and then rotated around an axis of the object as long as
-///    the colors agree better.
+/// 2. They are ranked by the colors of samples, and the best few are polished. A polish with a
+///    [`Photometric`](hicp_metric::Photometric) metric also finds the rotation that the depth does
+///    not determine.
 /// 3. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
 ///    depth is nearly as good, and its colors agree clearly better.
 ///
@@ -27,12 +26,12 @@ use crate::stage::stage_trait::Stage;
 /// the stage does not limit the choice.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
-/// no choice, and some milliseconds if it does.
+/// no choice, and 2 to 5 ms if it does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorChoice<S, P, C> {
     /// Finds a pose.
     pub stage: S,
-    /// Moves other poses to the measured depth.
+    /// Moves poses to the measured depth and colors.
     pub polish: P,
     /// Scores the depth; lower is better.
     pub score: C,
@@ -42,9 +41,7 @@ pub struct ColorChoice<S, P, C> {
     pub least_correlation: f64,
     /// The gain in correlation by which another pose must beat that of the stage.
     pub min_gain: f64,
-    ranking: WithColor<SampledMve>,
     color: SampledColor,
-    descent: Descent<WithColor<SampledMve>>,
     agreement: ColorAgreement,
     motions: Vec<Isometry3<f64>>,
     ranked: Vec<(f64, Isometry3<f64>)>,
@@ -52,8 +49,6 @@ pub struct ColorChoice<S, P, C> {
 
 /// Number of alternatives that take part.
 const ALTERNATIVES: usize = 4;
-/// Fine steps around an axis of near symmetry, degrees.
-const FINE: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Correlation at which no other pose is tried.
 const SURE: f64 = 0.8;
 /// Correlation that a single cell might have by chance; it falls with the root of their number.
@@ -79,8 +74,6 @@ impl<S, P, C> ColorChoice<S, P, C> {
     /// Creates the stage with the default conditions.
     #[must_use]
     pub fn new(stage: S, polish: P, score: C) -> Self {
-        let mut depth = SampledMve::imperfect_mask();
-        (depth.samples, depth.pixels) = (800, 150);
         Self {
             stage,
             polish,
@@ -88,24 +81,7 @@ impl<S, P, C> ColorChoice<S, P, C> {
             tolerance: 0.02,
             least_correlation: 0.3,
             min_gain: 0.12,
-            ranking: WithColor {
-                depth,
-                color: SampledColor::new(600),
-                weight: 1.0,
-            },
-            color: SampledColor::default(),
-            descent: Descent {
-                score: WithColor {
-                    depth: SampledMve::imperfect_mask(),
-                    color: SampledColor::new(1000),
-                    weight: 0.2,
-                },
-                good_enough: 0.0,
-                first_step: 0.02,
-                last_step: 0.005,
-                min_gain: 0.0,
-                evaluations: 40,
-            },
+            color: SampledColor::new(600),
             agreement: ColorAgreement::default(),
             motions: Vec::new(),
             ranked: Vec::new(),
@@ -132,34 +108,13 @@ impl<S, P, C> ColorChoice<S, P, C> {
             if self.motions.len() == 1 && bases.len() == 1 {
                 return;
             }
+            let mut context = session.workspace.context(problem);
             for motion in &self.motions {
                 let pose = base * motion;
-                let mut context = session.workspace.context(problem);
-                let score = self.ranking.score(&mut context, &pose);
+                let score = self.color.score(&mut context, &pose);
                 insert(&mut self.ranked, (score, pose), &distinct);
             }
         }
-    }
-
-    /// Rotates a pose around the axes that depth leaves free, as long as the colors agree better.
-    fn spin(&mut self, problem: &Problem<'_>, pose: &Isometry3<f64>) -> Isometry3<f64> {
-        let Some(model) = problem.model() else {
-            return *pose;
-        };
-        let turns = Turns::of(model);
-        let mut color = |pose: &Isometry3<f64>| self.color.measure(problem, pose).correlation;
-        let mut best = (color(pose), *pose);
-        for (spin, step) in turns.spins().flat_map(|spin| FINE.map(|step| (spin, step))) {
-            let start = best.1;
-            for degrees in [-step, step] {
-                let turned = start * spin.turn(degrees);
-                let found = color(&turned);
-                if found > best.0 {
-                    best = (found, turned);
-                }
-            }
-        }
-        best.1
     }
 }
 
@@ -202,24 +157,14 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         let most = (1.0 + TOLERANCE) * first.score + self.tolerance;
         let ranked = std::mem::take(&mut self.ranked);
         let (mut chosen, mut tried) = (first, vec![first]);
+        let mut iterations = outcome.iterations;
         for (_, start) in &ranked {
-            let polished = if *start == pose {
-                pose
-            } else {
-                self.polish.run(problem, start, session).camera_from_object
-            };
-            let turned = self.spin(problem, &polished);
-            let turned = Outcome::refined(turned, Termination::Converged);
-            let mut found = self.measure(problem, turned, session);
+            let mut polished = self.polish.run(problem, start, session);
+            polished.verdict = Verdict::Refined;
+            iterations += polished.iterations;
+            let found = self.measure(problem, polished, session);
             if found.score > most || !found.color.is_telling() {
                 continue;
-            }
-            // Small steps bring the colors together as far as the depth allows.
-            let start = &turned.camera_from_object;
-            let moved = self.descent.run(problem, start, session);
-            let moved = self.measure(problem, moved, session);
-            if moved.score <= found.score && moved.color.correlation > found.color.correlation {
-                found = moved;
             }
             tried.push(found);
             let other = distinct.apart(&found.outcome.camera_from_object, &pose);
@@ -239,7 +184,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         if !tried.iter().any(|tried| tried.color.is_telling()) {
             return outcome;
         }
-        chosen.outcome.iterations = outcome.iterations;
+        chosen.outcome.iterations = iterations;
         self.list(problem, distinct, (&chosen, &tried), session);
         chosen.outcome
     }
@@ -275,8 +220,16 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             alternative.mssd_meters = distinct.mssd(other, pose);
             alternative.rotation_degrees = distinct.degrees(other, pose);
             if alternative.is_ambiguous() && self.agrees(&chosen.color) {
-                let mut context = session.workspace.context(problem);
-                let color = self.agreement.measure(&mut context, other);
+                let known = tried
+                    .iter()
+                    .find(|tried| tried.outcome.camera_from_object == *other);
+                let color = match known {
+                    Some(known) => known.color,
+                    None => {
+                        let mut context = session.workspace.context(problem);
+                        self.agreement.measure(&mut context, other)
+                    }
+                };
                 alternative.color_gap = Some(chosen.color.correlation - color.correlation);
             }
         }

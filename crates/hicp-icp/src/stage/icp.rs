@@ -106,6 +106,9 @@ where
                 break Termination::NoPairs;
             }
             let Some(step) = self.metric.minimize(&iteration, pairs) else {
+                // Deviation: pairs that determine no step: §IV-B.2 ends a stage without pairs. Here
+                // fewer than 3 pairs (point-to-point) or 6 (point-to-plane) end it too, and the
+                // last accepted pose is returned.
                 break Termination::Degenerate;
             };
             let current = Evaluation {
@@ -127,6 +130,9 @@ where
                 increment: &step.increment,
             };
             let judgment = self.stop.check(&iteration, &progress);
+            // Deviation: last increment: §III-A, Algorithm 1, applies the increment of its last
+            // iteration without another evaluation. Here a pose is returned only after its pairs
+            // and its loss were computed, because the rules of §IV-B judge these.
             if let Judgment::Reject(termination) = judgment {
                 break termination;
             }

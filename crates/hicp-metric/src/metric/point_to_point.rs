@@ -12,6 +12,7 @@ use crate::system::pair_block::{BLOCK, LANES, PairBlock, add, add_products, prod
 use crate::system::point_blocks::system_of_points;
 
 /// Smallest number of pairs that determines a rotation.
+// Open: fewest pairs of point-to-point: §III-A.2. Fewer leave a rotation undetermined.
 const MIN_PAIRS: usize = 3;
 
 /// E = ‖T o − c‖² (§III-A.2; Besl & McKay 1992), minimized in closed form.

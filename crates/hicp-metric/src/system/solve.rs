@@ -8,6 +8,8 @@ use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
 
 /// Damping relative to the mean diagonal of the scaled system. Undetermined directions do not move.
+// Open: damping of point-to-plane: §III-A.2. Surfaces may slide in directions without normals. This
+// share of the mean diagonal keeps such directions in place, and changes no others.
 const DAMPING: f64 = 1e-6;
 /// Smallest diagonal entry for Marquardt's damping, as a share of the mean.
 const DIAGONAL_FLOOR: f64 = 1e-6;

@@ -17,6 +17,7 @@ mod frozen;
 mod generalized;
 mod own_metric;
 mod pairs;
+mod photometric;
 mod point_to_plane;
 mod point_to_plane_limits;
 mod point_to_point;

@@ -2,14 +2,15 @@
 
 use hicp_metric::{
     Conditioned, Degeneracy, Frame, Frozen, GaussNewton, Generalized, Kernel, LevenbergMarquardt,
-    MetricSchedule, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior, Robust, Scale,
-    Symmetric, WeightedSum,
+    MetricSchedule, Photometric, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
+    Robust, Scale, Symmetric, WeightedSum,
 };
 
 use crate::build::Parameters;
 use crate::catalog::{BoxedMetric, Catalog};
 use crate::error::PipelineError;
 use crate::range::{FACTOR, METERS, Range};
+use crate::work::Limited::Samples;
 
 pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_metric("point-to-point", |p| {
@@ -80,6 +81,17 @@ pub(super) fn add(catalog: &mut Catalog) {
         let sigma = "standard deviation of a residual, times √(pixels per independent one)";
         let sigma = p.number("sigma_meters", METERS, 1e-3, sigma)?;
         Ok(PosePrior::new(metric, prior, sigma))
+    });
+    catalog.add_metric("photometric", |p| {
+        p.about = "Adds the colors of the image to a metric; without colors, it is the metric. \
+            Source: Park, Zhou & Koltun 2017, on images. Cost: the metric, by Gauss–Newton, and \
+            two passes over the samples.";
+        let mut photometric = Photometric::new(inner(p)?);
+        let weight = "the RMS residual that counts as much as colors that do not agree";
+        let diameters = Range::new(0.0, 1.0, "diameters");
+        photometric.weight_diameters = p.number("weight_diameters", diameters, 0.01, weight)?;
+        photometric.samples = p.limited(Samples, "samples", 1, 2000, "points on the model")?;
+        Ok(photometric)
     });
     catalog.add_metric("metric-schedule", |p| {
         p.about = "Minimizes one metric per iteration, the last from then on. Source: Blake & \

@@ -134,7 +134,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             as well; without colors, it is that stage. Cost: the stage; where depth leaves a \
             choice, three times the polish and some milliseconds.";
         let stage = p.part::<BoxedStage>("stage", None, "finds a pose")?;
-        let polish = p.part::<BoxedStage>("polish", None, "moves other poses to the depth")?;
+        let polish = p.part::<BoxedStage>("polish", None, "moves poses to depth and colors")?;
         let score = p.part::<BoxedScore>("score", "mve", "judges the depth")?;
         let mut choice = ColorChoice::new(stage, polish, score);
         let rise = "rise of that score, plus a fifth of it, up to which a pose is a choice";

@@ -1,13 +1,13 @@
 //! The agreement of a render with a color image.
 
-use hicp_core::internal::index;
+use hicp_core::internal::{faces_camera, index, seen_color};
 use hicp_core::{Context, Isometry3, Problem};
 
-use crate::color::cells::{Cells, ColorEvidence, Shading, faces_camera};
+use crate::color::cells::{Cells, ColorEvidence, Shading};
 use crate::score::Score;
 
 /// Largest number of compared pixels, about.
-const MOST_PIXELS: usize = 4000;
+const MOST_PIXELS: usize = 2000;
 
 /// Scores how well the colors of a model agree with the color image: 0 perfectly, 0.5 not at all.
 ///
@@ -20,7 +20,7 @@ const MOST_PIXELS: usize = 4000;
 /// An object of one color, an overexposed image, and a problem without colors are no evidence, and
 /// score 0.5 at every pose: see [`ColorAgreement::measure`].
 ///
-/// Cost: one render (shared with other components that use this pose), and at most some 4000 pixels
+/// Cost: one render (shared with other components that use this pose), and at most some 2000 pixels
 /// of it, about 100 ns each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColorAgreement {
@@ -43,7 +43,9 @@ impl ColorAgreement {
         if model.mesh().color().is_none() || observation.color().is_none() {
             return nothing;
         }
-        let placed = self.cells.place(model, observation, camera_from_object);
+        let placed = self
+            .cells
+            .place(model, observation.camera(), camera_from_object);
         let (Some(()), Some(view)) = (placed, context.view(camera_from_object)) else {
             return nothing;
         };
@@ -62,9 +64,12 @@ impl ColorAgreement {
                 if !faces_camera(&point, &normal) {
                     continue;
                 }
+                let Some(seen) = seen_color(model, observation, (u, v), point.z) else {
+                    continue;
+                };
                 if let Some(color) = view.color_at(u, v, mesh, camera, camera_from_object) {
-                    let seen = (&normal, color);
-                    self.cells.add(observation, (u, v), point.z, seen);
+                    self.cells
+                        .add((u, v), &normal, [color, seen.map(f32::from)]);
                 }
             }
         }

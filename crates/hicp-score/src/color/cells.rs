@@ -1,14 +1,10 @@
 //! Colors of the model and of the image, averaged over cells, and their correlation.
 
 use hicp_core::nalgebra::{Matrix4, SMatrix, Vector4};
-use hicp_core::{Isometry3, Model, Observation, Point3, Vector3};
+use hicp_core::{Isometry3, Model, PinholeCamera, Vector3};
 
 /// Number of cells along each side of the object's bounding square.
 const SIDE: usize = 24;
-/// Share of the diameter by which measured and modeled depth may differ.
-const AGREES: f64 = 0.05;
-/// The channel value from which on a pixel is overexposed.
-const OVEREXPOSED: u8 = 250;
 /// Cells with fewer pixels or samples than this share of the average do not count.
 const LEAST_FILLED: f32 = 0.25;
 /// Number of cells on each side whose mean color is removed.
@@ -75,23 +71,13 @@ struct Cell {
 }
 
 /// The cells of an image region around an object.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// It allocates when they are placed for the first time.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Cells {
     cells: Vec<Cell>,
     origin: [f64; 2],
     per_pixel: [f64; 2],
-    tolerance: f64,
-}
-
-impl Default for Cells {
-    fn default() -> Self {
-        Self {
-            cells: vec![Cell::default(); SIDE * SIDE],
-            origin: [0.0; 2],
-            per_pixel: [0.0; 2],
-            tolerance: 0.0,
-        }
-    }
 }
 
 impl Cells {
@@ -101,44 +87,28 @@ impl Cells {
     pub(crate) fn place(
         &mut self,
         model: &Model,
-        observation: &Observation,
+        camera: &PinholeCamera,
         pose: &Isometry3<f64>,
     ) -> Option<()> {
-        let camera = observation.camera();
         let center = pose * model.center();
         let pixel = camera.project(&center)?;
         let reach = model.radius() / center.z;
         let half = [camera.fx() * reach, camera.fy() * reach];
         self.origin = [pixel.x - half[0], pixel.y - half[1]];
         self.per_pixel = half.map(|half| SIDE as f64 / (2.0 * half));
-        self.tolerance = AGREES * model.diameter();
-        self.cells.fill(Cell::default());
+        self.cells.clear();
+        self.cells.resize(SIDE * SIDE, Cell::default());
         Some(())
     }
 
-    /// Adds a place of the model that is seen at pixel (u, v) in a depth of `z` meters.
-    ///
-    /// It does not count if another surface was measured there, if the pixel is not masked or
-    /// overexposed, or if the surface is seen from the side.
+    /// Adds the colors of the model and of the image at pixel (u, v).
     #[inline]
     pub(crate) fn add(
         &mut self,
-        observation: &Observation,
         (u, v): (u32, u32),
-        z: f64,
-        (normal, color): (&Vector3<f64>, [f32; 3]),
+        normal: &Vector3<f64>,
+        [model, image]: [[f32; 3]; 2],
     ) {
-        let Some(image) = observation.color() else {
-            return;
-        };
-        let index = v as usize * image.width() as usize + u as usize;
-        let measured = f64::from(observation.depth().pixels()[index]);
-        let seen = observation.mask().pixels()[index]
-            && (measured <= 0.0 || (measured - z).abs() < self.tolerance);
-        let pixel = image.pixels()[index];
-        if !seen || pixel.iter().any(|value| *value >= OVEREXPOSED) {
-            return;
-        }
         let place = |axis: usize, at: u32| {
             let cell = (f64::from(at) - self.origin[axis]) * self.per_pixel[axis];
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates.
@@ -148,8 +118,8 @@ impl Cells {
         let cell = &mut self.cells[place(1, v) * SIDE + place(0, u)];
         cell.weight += 1.0;
         for channel in 0..3 {
-            cell.model[channel] += color[channel];
-            cell.image[channel] += f32::from(pixel[channel]);
+            cell.model[channel] += model[channel];
+            cell.image[channel] += image[channel];
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
             let along = normal[channel] as f32;
             cell.normal[channel] += along;
@@ -303,11 +273,4 @@ impl Cell {
             }
         }
     }
-}
-
-/// Returns whether a surface is seen well: not from behind and not from the side.
-#[inline]
-pub(crate) fn faces_camera(point: &Point3<f64>, normal: &Vector3<f64>) -> bool {
-    let along = normal.dot(&point.coords);
-    along < 0.0 && along * along > 0.09 * point.coords.norm_squared()
 }

@@ -6,4 +6,4 @@ mod sampled;
 
 pub use agreement::ColorAgreement;
 pub use cells::{ColorEvidence, Shading};
-pub use sampled::{SampledColor, WithColor};
+pub use sampled::SampledColor;

@@ -437,6 +437,9 @@ class Observation:
     color : numpy.ndarray of uint8, shape (H, W, 3), optional
         Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
         model that has colors (`Model.has_color`).
+    normal_window : int, optional
+        Half side of the window that normals are fitted over, from 1 (3 × 3 pixels) to 10. By
+        default, it follows the noise of the image.
 
     Raises
     ------
@@ -458,7 +461,7 @@ class Observation:
     1000, or pass uint16 with scale=0.001)
     """
 
-    def __new__(cls, depth: DepthImage | _Depth, mask: _Mask | None, camera: Camera, *, scale: float | None=None, color: _Color | None=None) -> Observation:
+    def __new__(cls, depth: DepthImage | _Depth, mask: _Mask | None, camera: Camera, *, scale: float | None=None, color: _Color | None=None, normal_window: int | None=None) -> Observation:
         ...
 
     @property

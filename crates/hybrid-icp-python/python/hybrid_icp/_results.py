@@ -22,6 +22,8 @@ class Alternative(TypedDict):
     - `T_co`: the pose, camera from object, shape (4, 4), float64, meters.
     - `score`: the score of the search; lower is better.
     - `gap`: the score minus that of the returned pose.
+    - `color_gap`: the agreement of the colors at the returned pose minus that at this one, as
+      correlations; None if there are no colors, or none that tell poses apart.
     - `mssd`: distance from the returned pose, meters.
     - `rotation_degrees`: angle to the returned pose.
     """
@@ -29,6 +31,7 @@ class Alternative(TypedDict):
     T_co: _Array
     score: float
     gap: float
+    color_gap: float | None
     mssd: float
     rotation_degrees: float
 

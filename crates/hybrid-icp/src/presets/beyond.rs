@@ -13,7 +13,7 @@ use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
     IterationLimit, Repeat, SearchOptions, Start,
 };
-use hicp_metric::{Conditioned, PointToPlane, PointToPoint, Symmetric};
+use hicp_metric::{Conditioned, Photometric, PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
@@ -46,7 +46,7 @@ pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetri
 /// The stage that refines hypotheses.
 pub type Explore = Descent<SampledMve>;
 /// The type of [`by_color`].
-pub type ByColor<S> = ColorChoice<S, GatedIcp<Conditioned<PointToPlane>>, MeanVsd>;
+pub type ByColor<S> = ColorChoice<S, GatedIcp<Conditioned<Photometric<PointToPlane>>>, MeanVsd>;
 /// The type of [`search`], [`auto`] and [`search_with`].
 pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd>;
 
@@ -271,10 +271,17 @@ pub fn search() -> Search {
 pub fn by_color<S>(stage: S) -> ByColor<S> {
     // A rotation that the depth does not determine is the choice of the colors.
     let metric = Conditioned {
+        metric: Photometric {
+            weight_diameters: 0.02,
+            samples: 1000,
+            ..Photometric::default()
+        },
         threshold: 5e-3,
         ..Conditioned::default()
     };
-    let polish = projective(metric, 1000, 10);
+    let mut polish = projective(metric, 1000, 10);
+    // Places that come into view may raise the loss of the colors.
+    polish.stop.0.rise_tolerance = 0.5;
     ColorChoice::new(stage, polish, MeanVsd::imperfect_mask())
 }
 

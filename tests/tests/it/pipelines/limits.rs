@@ -281,6 +281,7 @@ fn the_largest_counts_are_refused_or_end() {
             ("normal-compatible", "k"),
             ("normal-shooting", "k"),
             ("observation-to-model", "samples"),
+            ("photometric", "samples"),
             ("repeat", "times"),
             ("sampled-mve", "samples"),
         ]

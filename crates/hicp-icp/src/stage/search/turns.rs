@@ -106,11 +106,6 @@ impl Turns {
         }
     }
 
-    /// Iterates over the axes.
-    pub(crate) fn spins(&self) -> impl Iterator<Item = &Spin> {
-        self.spins.iter()
-    }
-
     /// Lists the motions S for which the image may show the object at `pose · S` instead.
     ///
     /// The identity is the first. Around an axis they are close to each other.
