@@ -4,50 +4,98 @@ use hybrid_icp::Preset;
 
 use crate::analysis::{Analysis, Interval, Metric};
 
-/// The verdict on a claim in a study.
+/// Largest difference between mean VSDs that counts as none.
+pub const EQUIVALENT_VSD: f64 = 0.01;
+
+/// The verdict on a claim in a study, by 95 % intervals of paired differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClaimVerdict {
     /// The claim holds, and the intervals exclude the opposite.
     Holds,
     /// The claim does not hold, and the intervals exclude that it does.
     DoesNotHold,
+    /// There is no difference of more than [`EQUIVALENT_VSD`], and the intervals exclude one.
+    Equivalent,
     /// The study cannot decide.
-    NotSignificant,
+    Undecided {
+        /// About the number of cases that would decide it, if objects increase alike; `None` if no
+        /// number can be stated.
+        cases: Option<usize>,
+    },
 }
 
-use ClaimVerdict::{DoesNotHold, Holds, NotSignificant};
+use ClaimVerdict::{DoesNotHold, Equivalent, Holds, Undecided};
 
 impl ClaimVerdict {
     /// Returns the verdict in words.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub fn words(self) -> String {
         match self {
-            Holds => "holds",
-            DoesNotHold => "does not hold",
-            NotSignificant => "not significant",
+            Holds => "holds".to_owned(),
+            DoesNotHold => "does not hold".to_owned(),
+            Equivalent => format!("equivalent within ±{EQUIVALENT_VSD}"),
+            Undecided { cases: None } => "undecided".to_owned(),
+            Undecided { cases: Some(cases) } => format!("undecided, about {cases} cases needed"),
         }
     }
 
-    /// Returns "does not hold" if `fails`, and "holds" if `holds`.
-    pub(crate) fn of(holds: bool, fails: bool) -> Self {
-        match (fails, holds) {
-            (true, _) => DoesNotHold,
-            (false, true) => Holds,
-            (false, false) => NotSignificant,
-        }
-    }
-
-    /// Decides whether all contrasts are negative.
+    /// Decides whether all differences of mean VSDs are negative.
     pub(crate) fn negative(contrasts: &[Interval]) -> Self {
-        let holds = contrasts.iter().all(|i| i.high < 0.0);
-        Self::of(holds, contrasts.iter().any(|i| i.low > 0.0))
+        Self::below_zero(contrasts, |i| i.high < 0.0, EQUIVALENT_VSD)
     }
 
-    /// Decides whether no contrast is positive.
+    /// Decides whether no difference of mean VSDs is positive.
     pub(crate) fn not_positive(contrasts: &[Interval]) -> Self {
-        let holds = contrasts.iter().all(|i| i.high <= 0.0);
-        Self::of(holds, contrasts.iter().any(|i| i.low > 0.0))
+        Self::below_zero(contrasts, |i| i.high <= 0.0, EQUIVALENT_VSD)
     }
+
+    /// Decides whether all contrasts are negative. They are not differences of mean VSDs, so that
+    /// none is too small to count.
+    pub(crate) fn strictly_negative(contrasts: &[Interval]) -> Self {
+        Self::below_zero(contrasts, |i| i.high < 0.0, 0.0)
+    }
+
+    fn below_zero(contrasts: &[Interval], is_below: fn(&Interval) -> bool, tolerance: f64) -> Self {
+        if contrasts.iter().any(|i| i.low > 0.0) {
+            return DoesNotHold;
+        }
+        let mut open = contrasts.iter().filter(|i| !is_below(i)).peekable();
+        if open.peek().is_none() {
+            return Holds;
+        }
+        let is_wide = |i: &&Interval| !(-tolerance < i.low && i.high < tolerance);
+        let needed = open.filter(is_wide).map(|i| cases_needed(*i, tolerance));
+        let needed: Vec<Option<usize>> = needed.collect();
+        match needed.is_empty() {
+            true => Equivalent,
+            false => Undecided {
+                cases: needed
+                    .into_iter()
+                    .collect::<Option<Vec<_>>>()
+                    .and_then(|n| n.into_iter().max()),
+            },
+        }
+    }
+}
+
+/// Returns about the number of cases with which an interval around the same estimate excludes zero,
+/// or a difference above `tolerance`, in two digits.
+///
+/// Widths shrink with the root of the number of cases, if the number of objects grows alike.
+fn cases_needed(interval: Interval, tolerance: f64) -> Option<usize> {
+    let half = 0.5 * (interval.high - interval.low);
+    let distance = interval
+        .estimate
+        .abs()
+        .max(tolerance - interval.estimate.abs());
+    let needed = interval.cases as f64 * (half / distance).powi(2);
+    if !(1.0..1e9).contains(&needed) {
+        return None;
+    }
+    let unit = 10.0_f64.powf(needed.log10().floor() - 1.0).max(1.0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Within the range above.
+    let rounded = ((needed / unit).ceil() * unit) as usize;
+    Some(rounded)
 }
 
 /// A claim with its verdict.
@@ -177,28 +225,50 @@ pub(crate) fn listed(figures: impl IntoIterator<Item = String>) -> String {
 mod tests {
     use super::*;
 
+    fn around(half: f64) -> impl Fn(&f64) -> Interval {
+        move |estimate: &f64| Interval {
+            estimate: *estimate,
+            low: estimate - half,
+            high: estimate + half,
+            cases: 100,
+        }
+    }
+
     #[test]
     fn verdicts_follow_the_intervals() {
-        let around = |half: f64| {
-            move |estimate: &f64| Interval {
-                estimate: *estimate,
-                low: estimate - half,
-                high: estimate + half,
-            }
-        };
         let all =
             |estimates: &[f64]| -> Vec<Interval> { estimates.iter().map(around(0.1)).collect() };
         assert_eq!(ClaimVerdict::negative(&all(&[-0.2, -0.3])), Holds);
-        assert_eq!(ClaimVerdict::negative(&all(&[-0.2, 0.05])), NotSignificant);
         assert_eq!(ClaimVerdict::negative(&all(&[-0.2, 0.2])), DoesNotHold);
         assert_eq!(ClaimVerdict::not_positive(&all(&[-0.2])), Holds);
+        assert_eq!(ClaimVerdict::not_positive(&all(&[-0.2, 0.2])), DoesNotHold);
+        let undecided = |cases| Undecided { cases: Some(cases) };
+        // Half of the width excludes zero, so four times the cases do.
+        assert_eq!(ClaimVerdict::negative(&all(&[-0.2, 0.05])), undecided(400));
+        assert_eq!(
+            ClaimVerdict::negative(&all(&[-0.05, 0.02])),
+            undecided(2500)
+        );
+        // Without a difference, a tenth of the width shows that there is none.
         assert_eq!(
             ClaimVerdict::not_positive(&all(&[-0.2, 0.0])),
-            NotSignificant
+            undecided(10_000)
         );
-        assert_eq!(ClaimVerdict::not_positive(&all(&[0.2, -0.2])), DoesNotHold);
+        assert_eq!(
+            ClaimVerdict::strictly_negative(&all(&[0.0])),
+            Undecided { cases: None }
+        );
         let zero = [around(0.0)(&0.0)];
         assert_eq!(ClaimVerdict::not_positive(&zero), Holds);
-        assert_eq!(ClaimVerdict::negative(&zero), NotSignificant);
+        assert_eq!(ClaimVerdict::negative(&zero), Equivalent);
+        let small = [-0.2, 0.004].map(|x| around(0.005)(&x));
+        assert_eq!(ClaimVerdict::negative(&small), Equivalent);
+    }
+
+    #[test]
+    fn verdicts_have_words() {
+        assert_eq!(Equivalent.words(), "equivalent within ±0.01");
+        let undecided = Undecided { cases: Some(3200) };
+        assert_eq!(undecided.words(), "undecided, about 3200 cases needed");
     }
 }

@@ -49,14 +49,14 @@ mod variant;
 pub use analysis::{
     ADD_SHARE, Analysis, Cell, FAILURE_VSD, Interval, Metric, REPLICATES, WORSE_VSD, never_seen,
 };
-pub use claims::{Claim, ClaimVerdict};
+pub use claims::{Claim, ClaimVerdict, EQUIVALENT_VSD};
 pub use error::ExperimentError;
 pub use report::{
     Curve, Document, Entry, Figure, Panel, ReportOf, Reported, Table, html_escaped, html_page,
 };
 pub use sequential::{
-    FusionRule, TrajectoryClock, TrajectoryConfig, TrajectoryStep, UnderlyingRecord,
-    watch_trajectories,
+    FusionRule, PathDirection, PlainCovariance, TrajectoryClock, TrajectoryConfig, TrajectoryStep,
+    UnderlyingRecord, watch_trajectories,
 };
 pub use single::{Condition, Config, Experiment, TABLE_I, claims};
 pub use study::{

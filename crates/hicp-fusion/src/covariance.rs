@@ -7,6 +7,7 @@ use crate::unit::UnitCovariance;
 /// The default floor of e_MVE, which keeps an exact match (e_MVE = 0) invertible.
 ///
 /// The paper does not state a floor.
+// Open: value of the floor of e_MVE: §V. It limits the weight of an exact match.
 pub const MVE_FLOOR: f64 = 1e-3;
 
 /// The covariance e_MVE times a unit covariance: the paper's proxy (§V).
@@ -21,8 +22,8 @@ pub const MVE_FLOOR: f64 = 1e-3;
 /// assert_eq!(paper.covariance(&pose, Some(0.25)), Matrix6::identity() * 0.25);
 /// assert_eq!(paper.covariance(&pose, Some(0.0)), Matrix6::identity() * 1e-3);
 /// ```
-// Deviation: §V weighs by e_MVE as it is; an exact match would weigh infinitely, so e_MVE is
-// floored at 1e-3.
+// Deviation: floor of e_MVE: §V weighs by e_MVE as it is. Here e_MVE is at least 1e-3, because an
+// exact match would weigh infinitely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MveCovariance {
@@ -66,6 +67,9 @@ impl MveCovariance {
 /// With `UnitCovariance::AboutObject`, a standard deviation of one unit is a radius and 1 rad.
 /// **The defaults are not calibrated**: fit the factors to data with ground truth, until ξᵀΣ⁻¹ξ of
 /// the errors is distributed like χ²₆.
+// Deviation: covariance of the calibrated estimator: §V uses e_MVE·I₆.
+// `SequentialEstimator::calibrated` inflates the covariance of the registration by the MVE, so that
+// the stated covariance agrees with the errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InflatedCovariance {

@@ -134,6 +134,9 @@ impl Fusion {
                 break;
             }
             // Invariant: `at` belongs to `pose`, and its cost never rises by more than rounding.
+            // Deviation: steps of the fusion: §V fuses by Barfoot & Furgale, who take full
+            // Gauss–Newton steps. Here a step that raises the cost is halved, because poses that
+            // scatter over half turns would otherwise not converge.
             let highest = at.cost * (1.0 + 1e-12);
             let (candidate, linearization, falls) = loop {
                 let candidate = moved(&pose, &step);

@@ -9,6 +9,9 @@ use crate::solution::Solution;
 pub const CHI_SQUARED_6_999: f64 = 22.458;
 
 /// The conditions under which estimates pass.
+// Deviation: gate: §V fuses every estimate. `SequentialEstimator::for_object` and `calibrated` skip
+// estimates with an MVE above α, because a failed one would stay in the average.
+// `SequentialEstimator::paper` has no gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gate {

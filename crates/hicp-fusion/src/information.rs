@@ -5,6 +5,8 @@ use nalgebra::{Cholesky, SymmetricEigen, U6};
 
 /// Standard deviation, in meters and radians, for directions in which a singular covariance has
 /// none.
+// Open: smallest deviation of an estimate: §V. Meters and radians. It keeps singular covariances
+// invertible.
 pub const MIN_STANDARD_DEVIATION: f64 = 1e-6;
 
 /// Share of its diagonal entry below which a pivot of the Cholesky decomposition is rounding.

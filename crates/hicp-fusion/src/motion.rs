@@ -135,7 +135,8 @@ impl CameraMotion {
 }
 
 /// The effect of a camera motion A on the covariance of an estimate.
-// Deviation: §V moves poses and does not mention covariances; by default they move along.
+// Deviation: transport of covariances: §V moves poses with the camera and does not mention
+// covariances. By default they move along, so that the fused pose does not depend on the frame.
 // `Transport::Kept` is the plain reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -77,6 +77,8 @@ impl Fuser for RecursiveFuser {
             weight,
         };
         let Some(held) = self.state else {
+            // Open: start of filtering: §V-A. The first estimate and its covariance are the first
+            // state.
             self.state = Some(new);
             return Update::Accepted(Solution::NONE);
         };

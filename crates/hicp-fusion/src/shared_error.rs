@@ -25,6 +25,9 @@ use crate::unit::UnitCovariance;
 /// assert!((variance - (1e-4 / 1000.0 + 1e-6)).abs() < 1e-12);
 /// # Ok(()) }
 /// ```
+// Deviation: error that all estimates share: §V treats estimates as independent.
+// `SequentialEstimator::calibrated` adds the error of the model and of the calibration, which no
+// number of estimates averages out, to the resulting covariance.
 #[derive(Clone, Debug)]
 pub struct SharedError<F> {
     inner: F,

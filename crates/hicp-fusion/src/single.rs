@@ -48,6 +48,8 @@ impl Fuser for LastEstimate {
 }
 
 /// Largest difference of ln det Σ that counts as rounding.
+// Open: equals of most-confident: §V-A. Differences of ln det Σ up to this value are rounding, and
+// the newest estimate is returned.
 const TIE: f64 = 1e-9;
 
 /// Returns the estimate with the lowest uncertainty so far (§V-A): `most-confident`.

@@ -18,7 +18,10 @@ impl Default for FusionLimits {
     /// Estimates that spread over 0.1 rad need about 6 evaluations, and over 0.4 rad about 9.
     fn default() -> Self {
         Self {
+            // Open: evaluations of a fusion: §V. Estimates that spread over 0.4 rad need about 9.
             max_iterations: 50,
+            // Open: last step of a fusion: §V. Meters and radians together, far below any pose
+            // error.
             tolerance: 1e-10,
         }
     }

@@ -45,6 +45,9 @@ const PARALLEL: f64 = 0.03;
 /// assert!(fused.camera_from_object().rotation.angle() < 1e-9); // Not 90°.
 /// # Ok(()) }
 /// ```
+// Deviation: symmetric objects in fusing: §V fuses poses as they are.
+// `SequentialEstimator::for_object` and `calibrated` first replace an estimate by the equivalent
+// pose nearest to the held one. Otherwise, the average of 0° and 180° would be 90°.
 #[derive(Clone, Debug)]
 pub struct SymmetryAware<F> {
     inner: F,

@@ -20,6 +20,10 @@ pub enum UnitCovariance {
     ///
     /// A rotation by 1 rad counts as a translation by the object's radius. It is isotropic there,
     /// so Ad(A) does not change it for any motion A.
+    // Deviation: U instead of I₆: §V multiplies e_MVE by I₆, in which a meter counts like a radian
+    // around the camera. `SequentialEstimator::for_object` uses U = diag(r², r², r², 1, 1, 1)
+    // around the object's center, so the fused pose does not depend on the camera's place.
+    // `SequentialEstimator::paper` uses I₆.
     AboutObject {
         /// The center of the object's rotations, object frame, meters.
         center: Point3<f64>,

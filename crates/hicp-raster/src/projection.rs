@@ -11,6 +11,8 @@ use crate::fixed::{FixedPoint, GUARD_PIXELS};
 const MAX_TRANSLATION_METERS: f64 = 1.0e30;
 
 /// Default depth of the near plane, meters.
+// Open: near plane of the renders: §III-B. Meters. Initial poses of the studies may reach through
+// the camera.
 pub const DEFAULT_NEAR_METERS: f64 = 0.01;
 
 /// Smallest depth of the near plane, meters: 1/z must stay finite.

@@ -68,6 +68,8 @@ impl AgreementCounts {
 pub(crate) fn errors(correct: [u64; N_TOLERANCES], union: u64) -> [f64; N_TOLERANCES] {
     correct.map(|correct| {
         if union == 0 {
+            // Open: VSD and MVE of an empty union: §III-B. The worst value, since nothing is
+            // visible where something should be.
             1.0
         } else {
             (union - correct) as f64 / union as f64

@@ -64,7 +64,11 @@ impl Default for VsdBins {
         Self {
             count: 10,
             max_translation_meters: 0.15,
+            // Open: rejection sampling: §VI-B.1. Initial poses tried around one object pose.
+            // Drawing both for every try would favor object poses for which the bin is easy to hit.
             tries_per_pose: 500,
+            // Open: end of rejection sampling: §VI-B.1. Object poses tried before a bin counts as
+            // impossible to fill.
             max_poses: 40,
         }
     }
@@ -94,6 +98,8 @@ impl CaseConfig {
         Self {
             camera,
             max_distance_meters: 0.6,
+            // Open: point in the proximity of the object's center: §VI-A.3. Uniform in a disc of
+            // this radius, meters, in which the optical axis passes.
             axis_offset_meters: 0.02,
             init,
         }
@@ -366,5 +372,7 @@ impl VsdBins {
 /// The ratio is 1.92° per millimeter.
 #[must_use]
 pub fn rotation_of(translation_meters: f64) -> f64 {
+    // Open: rotations above 180°: §VI-B.1. A translation error of 0.15 m comes with 288°, which
+    // acts like −72°. The text states no limit, so there is none.
     (translation_meters * 1e3 * DEGREES_PER_MILLIMETER).to_radians()
 }

@@ -55,7 +55,7 @@ pub use moving::{Hand, MovingConfig, MovingScene};
 pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
 pub use paint::Texture;
 pub use photo::Lighting;
-pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise};
+pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise, WrongPose};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,

@@ -53,6 +53,9 @@ impl AxialPolynomial {
     /// paper was not consulted. Only the axial term is used, which holds for nearly frontal
     /// surfaces. One paper that cites it reports up to 4 cm at 2 m, twice this polynomial.
     #[must_use]
+    // Deviation: axial-only D435 noise: §VI-C.2 uses the noise model of Ahn et al. for the D435.
+    // Here it is only the axial term for frontal surfaces, independent per pixel, because the other
+    // terms were not available.
     pub fn d435_ahn2019_axial() -> Self {
         Self {
             c0: 0.001_063,

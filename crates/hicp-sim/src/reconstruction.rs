@@ -1,26 +1,46 @@
 //! Noisy models: objects reconstructed from noisy images (§VI-B.3).
 
-use hicp_core::{Model, ModelConfig, PinholeCamera, Vector3};
+use hicp_core::{Isometry3, Model, ModelConfig, PinholeCamera, Vector3};
 use hicp_raster::render_depth_image;
+
+use rand::Rng;
 
 use crate::components::{components, join};
 use crate::error::{SimError, check_range};
-use crate::noise::RelativeGaussian;
+use crate::noise::{DepthNoise, RelativeGaussian};
 use crate::sampling::{object_pose, perturb};
 use crate::stream::stream;
 use crate::tsdf::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen};
 
 /// The errors of the images from which a model is reconstructed.
+// Deviation: object instead of camera poses: §VI-C.2 reconstructs with wrong camera poses. By
+// default, the object's poses are wrong here, as in §VI-B.3. A camera turned by 1.1° moves a
+// surface by 1 cm, in which thin walls are lost.
+// Deviation: noise-free model images: §VI-C.2 reconstructs from images with D435 noise. By default,
+// these images have no noise here, so that the wrong poses are the only error of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReconstructionNoise {
     /// Error added to all four camera parameters, pixels.
     pub intrinsics_pixels: f64,
-    /// Standard deviation of the depth noise, in percent of the depth.
-    pub depth_percent: f64,
+    /// Noise of the depth images.
+    pub depth: DepthNoise,
     /// Translation error of every pose, meters.
     pub translation_meters: f64,
     /// Rotation error of every pose, degrees.
     pub rotation_degrees: f64,
+    /// The pose that has these errors.
+    pub wrong_pose: WrongPose,
+}
+
+/// The pose that is wrong in each image of a reconstruction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum WrongPose {
+    /// The object's pose: the errors of rotation turn the object about its origin (§VI-B.3).
+    #[default]
+    Object,
+    /// The camera's pose: the errors of rotation turn the camera about its center, and move the
+    /// surface more the farther it is away (§VI-C.2).
+    Camera,
 }
 
 impl ReconstructionNoise {
@@ -38,10 +58,27 @@ impl ReconstructionNoise {
         let steps = f64::from(level - 1);
         Ok(Self {
             intrinsics_pixels: 0.5 * steps,
-            depth_percent: steps,
+            depth: DepthNoise::Relative(RelativeGaussian { percent: steps }),
             translation_meters: 1e-3 * steps,
             rotation_degrees: steps,
+            wrong_pose: WrongPose::Object,
         })
+    }
+
+    /// Returns a wrong pose (`camera_from_object`).
+    fn disturbed<R: Rng + ?Sized>(&self, rng: &mut R, truth: &Isometry3<f64>) -> Isometry3<f64> {
+        let mut perturb = |pose| {
+            perturb(
+                rng,
+                &pose,
+                self.translation_meters,
+                self.rotation_degrees.to_radians(),
+            )
+        };
+        match self.wrong_pose {
+            WrongPose::Object => perturb(*truth),
+            WrongPose::Camera => perturb(truth.inverse()).inverse(),
+        }
     }
 }
 
@@ -60,12 +97,16 @@ pub struct Reconstruction {
     pub axis_offset_meters: f64,
     /// Distance between voxels, meters.
     pub voxel_meters: f64,
+    /// Truncation of the volume, meters; `None` for [`Reconstruction::truncation_meters`].
+    pub truncation_meters: Option<f64>,
     /// The errors of the images.
     pub noise: ReconstructionNoise,
 }
 
 /// Smallest area of a component to keep, as a share of the largest component's area. Noise leaves
 /// smaller specks in the air.
+// Open: parts of reconstructions that are kept: §VI-B.3. Share of the largest part's area; noise
+// leaves specks in the air.
 pub const MIN_COMPONENT_SHARE: f64 = 0.05;
 
 impl Reconstruction {
@@ -78,19 +119,43 @@ impl Reconstruction {
         Self {
             camera,
             images: 100,
+            // Open: images of reconstructions: §VI-B.3. Their object poses are drawn like those of
+            // §VI-A.3, up to this distance in meters.
             max_distance_meters: 0.6,
             axis_offset_meters: 0.02,
+            // Open: voxels of reconstructions: §VI-B.3. Meters. Smaller ones cost time with the
+            // third power; walls of the objects have 2 mm and more.
             voxel_meters: 0.0025,
+            truncation_meters: None,
             noise,
         }
+    }
+
+    /// Returns the default truncation for a model, meters: three voxels plus two and a half
+    /// standard deviations of a measured surface along a ray.
+    ///
+    /// The noise of the depth and the errors of the poses move a surface. The paper does not state
+    /// a truncation.
+    #[must_use]
+    pub fn truncation_meters(&self, model: &Model) -> f64 {
+        let distance = f64::midpoint(model.diameter(), self.max_distance_meters);
+        let lever = match self.noise.wrong_pose {
+            WrongPose::Object => model.radius(),
+            WrongPose::Camera => distance,
+        };
+        let turned = self.noise.rotation_degrees.to_radians() * lever;
+        // Both errors have random directions; a third of their squares is along the ray.
+        let moved = self.noise.translation_meters.hypot(turned) / 3.0_f64.sqrt();
+        // Open: truncation of reconstructions: §VI-B.3. Meters. It must cover what noise and wrong
+        // poses move.
+        3.0 * self.voxel_meters + 2.5 * self.noise.depth.sigma_meters(distance).hypot(moved)
     }
 
     /// Returns the reconstructed model: closed, facing outward, with the original's diameter and
     /// symmetries.
     ///
-    /// The truncation is three voxels plus two and a half times the depth noise. Cavities and
-    /// specks are dropped. Parts that noise cut off may be dropped, too: a knife's blade of 2 mm
-    /// does not survive noise of 2 % of the depth.
+    /// Cavities and specks are dropped. Parts that noise cut off may be dropped, too: a knife's
+    /// blade of 2 mm does not survive noise of 2 % of the depth.
     ///
     /// The result depends only on the configuration, the model, its name and the seed. All noise
     /// levels use the same poses and the same deviates.
@@ -104,7 +169,6 @@ impl Reconstruction {
     pub fn reconstruct(&self, model: &Model, object: &str, seed: u64) -> Result<Model, SimError> {
         let noise = &self.noise;
         check_range("number of images", f64::from(self.images), 1.0..=1e6)?;
-        check_range("depth noise in percent", noise.depth_percent, 0.0..=50.0)?;
         let (nearest, farthest) = (model.diameter(), self.max_distance_meters);
         if nearest >= farthest {
             return Err(SimError::TooLarge {
@@ -113,8 +177,8 @@ impl Reconstruction {
                 max_distance: farthest,
             });
         }
-        let sigma = noise.depth_percent / 100.0 * f64::midpoint(nearest, farthest);
-        let truncation_meters = 3.0 * self.voxel_meters + 2.5 * sigma;
+        let automatic = || self.truncation_meters(model);
+        let truncation_meters = self.truncation_meters.unwrap_or_else(automatic);
         let margin = Vector3::repeat(truncation_meters + 2.0 * self.voxel_meters);
         let half = half_extent(model);
         let mut volume = TsdfVolume::new(TsdfConfig {
@@ -133,12 +197,8 @@ impl Reconstruction {
                 self.axis_offset_meters,
             );
             let depth = render_depth_image(model.mesh(), &self.camera, &truth);
-            let gaussian = RelativeGaussian {
-                percent: noise.depth_percent,
-            };
-            let depth = gaussian.apply(&mut of("noise"), &depth);
-            let angle = noise.rotation_degrees.to_radians();
-            let pose = perturb(&mut of("error"), &truth, noise.translation_meters, angle);
+            let depth = noise.depth.apply(&mut of("noise"), &depth);
+            let pose = noise.disturbed(&mut of("error"), &truth);
             volume.integrate(&depth, &believed, &pose, EmptyPixels::Free)?;
         }
         let parts = components(&volume.surface(Unseen::Solid)?)?;
@@ -154,6 +214,8 @@ impl Reconstruction {
             .map(|part| &part.mesh);
         let config = ModelConfig {
             symmetries: model.symmetries().clone(),
+            // Open: diameter of reconstructions: §VI-B.3. That of the original, so that the
+            // tolerances of the MVE are equal at all levels.
             diameter: Some(model.diameter()),
             ..ModelConfig::default()
         };

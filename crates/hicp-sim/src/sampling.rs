@@ -46,6 +46,8 @@ pub fn object_pose<R: Rng + ?Sized>(
     let angle = std::f64::consts::TAU * rng.random::<f64>();
     let radius = offset * rng.random::<f64>().sqrt();
     let aside = Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
+    // Open: distance between object and camera: §VI-A.3. It is that of the object's center along
+    // the optical axis.
     let seen_at = Vector3::new(0.0, 0.0, distance) + aside;
     Isometry3::from_parts(
         Translation3::from(seen_at - rotation * center.coords),

@@ -32,6 +32,8 @@ pub enum EmptyPixels {
     /// The sensor did not measure: nothing is known along the ray.
     Unknown,
     /// The ray hits nothing, as in the render of a single object.
+    // Open: pixels without depth in a reconstruction: §VI-B.3. The renders of a single object are
+    // empty around it, so these rays carve.
     Free,
 }
 
@@ -39,6 +41,8 @@ pub enum EmptyPixels {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unseen {
     /// The inside of the object. The surface is then closed, also along the border of the volume.
+    // Open: voxels that no image reached: §VI-B.3. They count as inside, so that reconstructions
+    // are closed.
     Solid,
     /// Unknown. The surface ends there.
     Open,
@@ -185,6 +189,8 @@ impl TsdfVolume {
                         merge(voxel, truncation, 1.0);
                     } else if along_axis > -truncation {
                         let distance = along_axis * p.norm() / p.z;
+                        // Open: weight of voxels behind a surface: §VI-B.3. It falls from half the
+                        // truncation on, so that a thin wall keeps both sides.
                         let weight = (2.0 + 2.0 * distance / truncation).min(1.0);
                         if weight > 0.0 {
                             merge(voxel, distance.min(truncation), weight);

@@ -9,10 +9,10 @@ use crate::preset::Preset;
 /// They are the factors of [`InflatedCovariance`] in units of the object (its radius and 1 rad),
 /// the error that all estimates along a trajectory share, and the tails of the errors.
 ///
-/// The constants are fitted along trajectories toward the tuning objects, reconstructed with errors
-/// of 5 mm and 1.1° and seen with the noise of a D435 (`cargo run --release -p hicp-experiments
-/// --example calibration`). They hold for such models: with an exact model the shared error is much
-/// smaller.
+/// The constants are fitted along trajectories toward the tuning objects, seen with the noise of a
+/// D435, and reconstructed from such images with camera poses that are off by 5 mm and 1.1°
+/// (`cargo run --release -p hicp-experiments --example calibration`). They hold for such models:
+/// with an exact model the shared error is much smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Calibration {
@@ -40,7 +40,7 @@ impl Calibration {
     pub const HYBRID: Self = Self {
         scale: 1.0,
         floor: 0.003,
-        mve_gain: 140.0,
+        mve_gain: 36.0,
         mve_power: 5.0,
         undetermined: 0.3,
         shared: 0.021,
@@ -54,7 +54,7 @@ impl Calibration {
 
     /// Fitted to `projective-cascade-point-plane`.
     pub const PROJECTIVE_CASCADE_POINT_PLANE: Self = Self {
-        mve_gain: 40.0,
+        mve_gain: 18.0,
         mve_power: 4.4,
         ..Self::HYBRID
     };

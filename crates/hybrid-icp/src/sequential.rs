@@ -10,13 +10,13 @@ use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
 use crate::calibration::Calibration;
-use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep};
+use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
 
 /// Estimates the pose of a static object from images along the path of a moving camera (§V).
 ///
 /// Each image is registered from the pose fused so far, moved with the camera. The fuser receives
 /// the result, and its estimate is the answer and the next initial pose (§V-A). If ICP finds no
-/// pairs, nothing is fused. The estimator has no clock and starts no thread.
+/// pairs, nothing is fused ([`WithoutPairs`]). The estimator has no clock and starts no thread.
 ///
 /// Cost of a step: the pipeline, and one render and one score if the MVE is computed.
 ///
@@ -150,8 +150,9 @@ impl SequentialEstimator {
 
     /// Creates the estimator of §V to the letter.
     ///
-    /// Covariances are e_MVE·I₆ and do not change when the camera moves. There is no gate. The MVE
-    /// is computed only for the methods that need it.
+    /// Covariances are e_MVE·I₆ and do not change when the camera moves. There is no gate. If ICP
+    /// finds no pairs, its initial pose is fused. The MVE is computed only for the methods that
+    /// need it.
     ///
     /// # Errors
     ///
@@ -164,6 +165,7 @@ impl SequentialEstimator {
         let config = SequentialConfig {
             covariance: CovarianceModel::default(),
             score: method.uses_covariances().then(MeanVsd::paper),
+            without_pairs: WithoutPairs::Initial,
         };
         Self::new(stage, method.build(FuserConfig::paper()), config, init)
     }
@@ -250,7 +252,7 @@ impl SequentialEstimator {
 
     /// Scores the outcome of ICP and passes it to the fuser.
     fn take(&mut self, problem: &Problem<'_>, outcome: &Outcome) -> (Option<f64>, SequentialEvent) {
-        if outcome.evaluation.is_none() {
+        if outcome.evaluation.is_none() && self.config.without_pairs == WithoutPairs::Nothing {
             return (None, SequentialEvent::NoEstimate(outcome.termination));
         }
         let pose = &outcome.camera_from_object;

@@ -16,6 +16,23 @@ pub struct SequentialConfig {
     ///
     /// If neither the fuser nor the covariance needs an MVE, `None` saves a render.
     pub score: Option<MeanVsd>,
+    /// The pose that is fused if ICP finds no pairs.
+    pub without_pairs: WithoutPairs,
+}
+
+/// The pose that is fused for an image in which ICP finds no pairs.
+// Deviation: no pairs: §IV-B.2 returns the initial pose, which §V then fuses as an estimate.
+// Here nothing is fused, because the image added nothing. `SequentialEstimator::paper` fuses the
+// initial pose (`WithoutPairs::Initial`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum WithoutPairs {
+    /// Nothing: the fused pose stays.
+    #[default]
+    Nothing,
+    /// The initial pose of ICP, as if it were an estimate (§IV-B).
+    Initial,
 }
 
 impl Default for SequentialConfig {
@@ -24,6 +41,7 @@ impl Default for SequentialConfig {
         Self {
             covariance: CovarianceModel::default(),
             score: Some(MeanVsd::default()),
+            without_pairs: WithoutPairs::Nothing,
         }
     }
 }

@@ -85,7 +85,8 @@ impl NearestNeighbor {
 
 impl Default for NearestNeighbor {
     /// About 4,000 observed points in a box tree.
-    // Deviation: §III-A.1 searches all of C; a strided C is faster to search at hardly any loss of
+    // Deviation: stride of C for nearest neighbors: §III-A.1 searches all of C. Here the tree has
+    // about 4,000 points of it, because a small tree is faster to search at hardly any loss of
     // accuracy. `Stride::Pixels(1)` searches all.
     fn default() -> Self {
         Self::new(Stride::AboutPoints(4000), SearchIndex::default())

@@ -20,6 +20,9 @@ pub struct VisibleSurface {
 
 impl Default for VisibleSurface {
     /// About 2,000 points.
+    // Deviation: stride of V_O: §III-A.1 pairs every rendered pixel. Here V_O is a grid of about
+    // 2,000 of them, because the accuracy is the same in a fifth of the time. `Stride::Pixels(1)`
+    // keeps every pixel.
     fn default() -> Self {
         Self {
             stride: Stride::AboutPoints(2000),
@@ -35,6 +38,10 @@ impl PointSelection for VisibleSurface {
         source: &mut Vec<Surfel>,
     ) {
         let problem = context.problem;
+        // Deviation: V_O per stage: §III-A.1 renders V_O once, at the initial pose of ICP. Here
+        // every stage renders it at its own initial pose, so the second stage of a cascade pairs
+        // the surface that is visible by then. The first stage after a switch shares the render of
+        // the MVE.
         let (Some((model, observation)), Some(view)) =
             (problem.sides(), context.view(camera_from_object))
         else {

@@ -155,14 +155,16 @@ impl Analysis {
         let mut drawn: Vec<f64> = samples.iter().map(value).collect();
         drawn.retain(|x| x.is_finite());
         drawn.sort_by(f64::total_cmp);
+        let cases = terms.iter().map(|(g, v, _)| self.cases(*g, *v)).min();
+        let cases = cases.unwrap_or(0);
         let mut interval = Interval {
+            cases,
             estimate,
             low: quantile(&drawn, 0.025).unwrap_or(estimate),
             high: quantile(&drawn, 0.975).unwrap_or(estimate),
         };
         if metric.is_share() && interval.low >= interval.high {
-            let cases = terms.iter().map(|(g, v, _)| self.cases(*g, *v)).min();
-            let unseen = never_seen(cases.unwrap_or(0));
+            let unseen = never_seen(cases);
             // No share is below 0 or above 1.
             let bound =
                 |sign: f64| -> f64 { terms.iter().map(|t| t.2).filter(|f| f * sign > 0.0).sum() };
@@ -182,6 +184,17 @@ impl Analysis {
             figures.map(|measured| (self.diameters_mm[unit.object], measured))
         });
         Cell::of(&rows.collect::<Vec<_>>())
+    }
+
+    /// Returns the figures of a variant for all units and levels of a group.
+    pub(crate) fn all_figures(
+        &self,
+        group: usize,
+        variant: usize,
+    ) -> impl Iterator<Item = &Measured> {
+        let group = &self.groups[group];
+        let units = self.units.iter();
+        units.flat_map(move |unit| self.figures(unit, group, variant))
     }
 
     /// Returns the number of cases for which a variant has rows in a group.

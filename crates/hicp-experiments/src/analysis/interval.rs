@@ -15,6 +15,8 @@ pub struct Interval {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+    /// Number of cases behind the estimate.
+    pub cases: usize,
 }
 
 impl Interval {
@@ -36,6 +38,7 @@ impl Interval {
             estimate,
             low,
             high,
+            cases: self.cases,
         }
     }
 
@@ -46,6 +49,7 @@ impl Interval {
             estimate,
             low,
             high,
+            cases: self.cases,
         }
     }
 }

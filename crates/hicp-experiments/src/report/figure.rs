@@ -169,6 +169,7 @@ mod tests {
     fn figure() -> Figure {
         let at = |estimate| Interval {
             estimate,
+            cases: 1,
             low: estimate - 0.05,
             high: estimate + 0.05,
         };

@@ -108,7 +108,8 @@ impl<D: Reported> ReportOf<D> {
 
     /// Writes `report.html`, which contains everything, and separate files.
     ///
-    /// These are the tables as CSV files, and the figures as SVG and PNG files.
+    /// These are the tables as CSV files, the figures as SVG and PNG files, and the configurations
+    /// of several studies as JSON files.
     ///
     /// # Errors
     ///
@@ -132,6 +133,11 @@ impl<D: Reported> ReportOf<D> {
         write("differences.csv", &document.differences.csv())?;
         for (name, table) in &document.tables {
             write(name, &table.csv())?;
+        }
+        // The configuration of a single study is usually in the same folder.
+        for entry in self.entries.iter().filter(|_| self.entries.len() > 1) {
+            let config = serde_json::to_string_pretty(&entry.study.config).unwrap_or_default();
+            write(&format!("{}.json", entry.name), &(config + "\n"))?;
         }
         let section = |heading: &str, html: &str| format!("<h2>{heading}</h2>\n{html}");
         let unmade = Some(self.unmade()).filter(|table| !table.rows.is_empty());
@@ -171,8 +177,8 @@ impl<D: Reported> ReportOf<D> {
     fn claims_table(&self) -> Table {
         let mut table = Table::new(&["study", "where", "claim", "verdict", "figures"]);
         table.rows.extend(self.claims().map(|(study, claim)| {
-            let (section, verdict) = (claim.section, claim.verdict.name());
-            texts(&[study, section, &claim.text, verdict, &claim.figures])
+            let (section, verdict) = (claim.section, claim.verdict.words());
+            texts(&[study, section, &claim.text, &verdict, &claim.figures])
         }));
         table
     }

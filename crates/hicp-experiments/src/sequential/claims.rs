@@ -2,7 +2,7 @@
 
 use super::config::TrajectoryConfig;
 use crate::analysis::{Analysis, Interval, Metric};
-use crate::claims::{Claim, ClaimVerdict, Evidence, Judge, listed};
+use crate::claims::{Claim, ClaimVerdict, EQUIVALENT_VSD, Evidence, Judge, listed};
 use crate::study::{ALL, HIGH, LOW};
 
 /// The methods of the paper that use uncertainty, each with its counterpart that does not.
@@ -79,12 +79,16 @@ impl Pipeline<'_> {
         let against = against.filter_map(|(_, m)| Some((m, self.difference(best, m)?)));
         let against: Vec<_> = against.collect();
         against.first()?;
-        let is_clear = against.iter().all(|(_, i)| i.high < 0.0);
+        let all: Vec<Interval> = against.iter().map(|(_, i)| *i).collect();
+        let is_as_good = all.iter().any(|i| i.low > -EQUIVALENT_VSD);
+        let verdict = match ClaimVerdict::negative(&all) {
+            _ if is_as_good => ClaimVerdict::Holds,
+            ClaimVerdict::Holds => ClaimVerdict::DoesNotHold,
+            undecided => undecided,
+        };
         let mut figures = vec![format!("lowest: {best}, {mean:.4}")];
         figures.extend(against.iter().map(|(m, i)| format!("− {m}: {i:+.4}")));
-        let text =
-            "no method is clearly best (better than each other one, its interval excluding zero)";
-        let verdict = ClaimVerdict::of(!is_clear, is_clear);
+        let text = "no method is clearly best (lower than each other one, and equivalent to none)";
         self.judge.claim(self.text(text), verdict, listed(figures))
     }
 

@@ -1,8 +1,9 @@
 //! The [`Design`] of sequential studies.
 
 use hicp_io::IoError;
+use hicp_sim::DepthNoise;
 
-use super::config::{SEQUENTIAL, TrajectoryConfig};
+use super::config::{PathDirection, SEQUENTIAL, TrajectoryConfig};
 use super::rule::FusionRule;
 use super::runner::TrajectoryRunner;
 use crate::error::ExperimentError;
@@ -40,7 +41,6 @@ impl Design for TrajectoryConfig {
             "max_translation_m",
             "path_m",
             "axis_offset_m",
-            "target_offset_m",
             "reconstruction_translation_m",
             "reconstruction_rotation_deg",
         ])?;
@@ -50,10 +50,31 @@ impl Design for TrajectoryConfig {
             "reconstruction_voxel_m",
             "reconstruction_max_distance_m",
         ])?;
+        if let PathDirection::Target { offset_m } = self.path {
+            let (is_valid, expected) = (offset_m >= 0.0, "a number of at least 0");
+            fields.require(is_valid, "path.target.offset_m", offset_m, expected)?;
+        }
+        if let Some(truncation) = self.reconstruction_truncation_m {
+            fields.between("reconstruction_truncation_m", truncation, f64::INFINITY)?;
+        }
+        for (field, text) in [
+            ("depth_noise", &self.depth_noise),
+            (
+                "reconstruction_depth_noise",
+                &self.reconstruction_depth_noise,
+            ),
+        ] {
+            let is_valid = text.parse::<DepthNoise>().is_ok();
+            let expected = "a noise, such as none, relative:2 or d435-ahn2019-axial";
+            fields.require(is_valid, field, quoted(text), expected)?;
+        }
         fields.names("underlying", MAX_UNDERLYING)?;
         for (index, underlying) in self.underlying.iter().enumerate() {
             let field = format_args!("underlying[{index}].seconds_per_estimate");
             fields.between(field, underlying.seconds_per_estimate, f64::INFINITY)?;
+            let seconds = underlying.seconds_per_mve;
+            let field = format_args!("underlying[{index}].seconds_per_mve");
+            fields.require(seconds >= 0.0, field, seconds, "a number of at least 0")?;
         }
         fields.names("methods", MAX_METHODS)?;
         for (index, method) in self.methods.iter().enumerate() {

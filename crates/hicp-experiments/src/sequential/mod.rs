@@ -10,7 +10,7 @@ mod runner;
 mod step;
 mod trajectory;
 
-pub use config::{TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
-pub use rule::FusionRule;
+pub use config::{PathDirection, TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
+pub use rule::{FusionRule, PlainCovariance};
 pub use runner::watch_trajectories;
 pub use step::TrajectoryStep;

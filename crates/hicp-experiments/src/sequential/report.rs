@@ -2,7 +2,11 @@
 
 use super::calibration;
 use super::claims::claims;
-use super::config::{TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
+use super::config::{PathDirection, TrajectoryClock, TrajectoryConfig, UnderlyingRecord};
+use hicp_sim::WrongPose;
+use hybrid_icp::WithoutPairs;
+
+use super::rule::PlainCovariance;
 use crate::analysis::{Analysis, FAILURE_VSD, Metric};
 use crate::claims::{Claim, listed};
 use crate::report::{
@@ -24,26 +28,51 @@ impl Reported for TrajectoryConfig {
 
     fn described(&self) -> Vec<(&'static str, String)> {
         let cost = |(index, u): (usize, &UnderlyingRecord)| {
-            let (name, seconds) = (&u.name, u.seconds_per_estimate);
-            let (step, images) = (self.step_m(index), self.n_images(index));
+            let (name, seconds, mve) = (&u.name, u.seconds_per_estimate, u.seconds_per_mve);
+            let images = [false, true].map(|with_mve| self.n_images(index, with_mve));
             match self.clock {
-                TrajectoryClock::Cost => {
-                    format!("{name}: {seconds} s per estimate, {step:.4} m, {images} images")
-                }
+                TrajectoryClock::Cost => format!(
+                    "{name}: {seconds} s per estimate, {} images; with an MVE {mve:.4} s more, {} images",
+                    images[0], images[1]
+                ),
                 TrajectoryClock::Real => format!("{name}: the measured time"),
             }
         };
         let costs = self.underlying.iter().enumerate().map(cost);
         let (from, over, speed) = (self.start_distance_m, self.path_m, self.speed_m_s);
-        let path = format!("from {from} m over {over} m at {speed} m/s");
+        let direction = match self.path {
+            PathDirection::OpticalAxis => "along the optical axis".to_owned(),
+            PathDirection::Target { offset_m } => {
+                format!("toward a point within {offset_m} m of the center")
+            }
+        };
+        let path = format!("from {from} m over {over} m at {speed} m/s {direction}");
         let (images, voxel) = (self.reconstruction_images, self.reconstruction_voxel_m);
         let (meters, degrees) = (
             self.reconstruction_translation_m,
             self.reconstruction_rotation_deg,
         );
-        let reconstruction =
-            format!("{images} images, {meters} m, {degrees}°, voxels of {voxel} m");
-        let [c0, c1, c2] = self.depth_noise_m;
+        let noise = &self.reconstruction_depth_noise;
+        let wrong = match self.reconstruction_wrong_pose {
+            WrongPose::Camera => "camera",
+            WrongPose::Object => "object",
+        };
+        let truncation = match self.reconstruction_truncation_m {
+            Some(meters) => format!("{meters} m"),
+            None => "by the noise and the errors".to_owned(),
+        };
+        let reconstruction = format!(
+            "{images} images with noise {noise}, {wrong} poses off by {meters} m and {degrees}°, \
+             voxels of {voxel} m, truncation {truncation}"
+        );
+        let covariance = match self.covariance {
+            PlainCovariance::Identity => "e_MVE·I₆, not moved",
+            PlainCovariance::AboutObject => "e_MVE·U about the object, moved by the adjoint",
+        };
+        let without_pairs = match self.without_pairs {
+            WithoutPairs::Initial => "the initial pose",
+            WithoutPairs::Nothing => "nothing",
+        };
         vec![
             ("version", self.version.clone()),
             (
@@ -53,7 +82,9 @@ impl Reported for TrajectoryConfig {
             ("pipelines", listed(costs)),
             ("path", path),
             ("reconstruction", reconstruction),
-            ("depth noise", format!("σ = {c0} + {c1} z + {c2} z² m")),
+            ("depth noise", self.depth_noise.clone()),
+            ("covariance of the paper's methods", covariance.to_owned()),
+            ("fused if ICP finds no pairs", without_pairs.to_owned()),
         ]
     }
 
@@ -93,16 +124,15 @@ impl Reported for TrajectoryConfig {
 fn note(is_real: bool) -> String {
     let clock = match is_real {
         false => {
-            "The clock is a stored cost, the mean of Table I of the paper. All methods of a pipeline see the same images."
+            "The clock is a stored cost, the mean of Table I of the paper, and for methods that need it the share of an MVE."
         }
         true => {
             "The clock was the measured processor time. Every method saw different images, and no run repeats this one."
         }
     };
     format!(
-        "{clock} All pipelines get the same paths, starts and models. Covariances are e_MVE·U, where U \
-         is the unit covariance around the object, and are transported by the adjoint. <i>gated</i> \
-         methods leave out estimates with an MVE above 0.4, and use the symmetries of the object. <i>calibrated</i> methods also use the covariance of the \
+        "{clock} All pipelines get the same paths, starts and models. <i>gated</i> \
+         methods leave out estimates with an MVE above 0.4, use the symmetries of the object, and fuse e_MVE·U, where U is the unit covariance about the object. <i>calibrated</i> methods also use the covariance of the \
          registration, fitted on other objects, and a stricter gate. {}",
         note_on_intervals()
     )

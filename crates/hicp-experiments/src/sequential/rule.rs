@@ -6,7 +6,20 @@ use hybrid_icp::fusion::{
     probability_within,
 };
 use hybrid_icp::score::MeanVsd;
-use hybrid_icp::{BoxedStage, Calibration, Preset, SequentialConfig, SequentialEstimator};
+use hybrid_icp::{
+    BoxedStage, Calibration, Preset, SequentialConfig, SequentialEstimator, WithoutPairs,
+};
+use serde::{Deserialize, Serialize};
+
+/// The covariances that the paper's methods fuse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlainCovariance {
+    /// e_MVE·I₆, which stays as it is when the camera moves (§V).
+    Identity,
+    /// e_MVE·U with the unit covariance U about the object, moved by the adjoint.
+    AboutObject,
+}
 
 /// A fusion method of §V-A as the study runs it, with or without a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -14,8 +27,7 @@ use hybrid_icp::{BoxedStage, Calibration, Preset, SequentialConfig, SequentialEs
 pub enum FusionRule {
     /// The paper's method, without a gate and without symmetries.
     ///
-    /// Covariances are e_MVE·U, where U is the unit covariance around the object: rotations count
-    /// by its radius. They are transported by the adjoint.
+    /// The configuration of a study chooses its covariances and what it fuses without pairs.
     Plain(FusionMethod),
     /// The same with a gate and with symmetries: [`SequentialEstimator::for_object`].
     ///
@@ -86,13 +98,23 @@ impl FusionRule {
         }
     }
 
+    /// Returns whether every estimate needs an MVE.
+    #[must_use]
+    pub fn uses_mve(self) -> bool {
+        match self {
+            Self::Plain(method) => method.uses_covariances(),
+            Self::Gated(_) | Self::Calibrated(_) => true,
+        }
+    }
+
     /// Creates an estimator that starts from `init` in the first camera frame.
     ///
-    /// `pipeline` is the name of the underlying pipeline.
+    /// Methods of the paper fuse `covariance`, and `without_pairs` if ICP finds none. `stage` is
+    /// that of an underlying pipeline.
     pub(crate) fn estimator(
         self,
-        stage: BoxedStage,
-        pipeline: &str,
+        (covariance, without_pairs): (PlainCovariance, WithoutPairs),
+        (pipeline, stage): (&str, BoxedStage),
         model: &Model,
         init: &Isometry3<f64>,
     ) -> Result<SequentialEstimator, FusionError> {
@@ -106,19 +128,29 @@ impl FusionRule {
             }
             Self::Plain(method) => method,
         };
-        let unit = UnitCovariance::about_object(model.center(), model.radius())?;
-        let fuser = method.build(FuserConfig {
-            unit,
-            ..FuserConfig::default()
-        });
-        let config = SequentialConfig {
+
+        let (fuser, score) = match covariance {
+            PlainCovariance::Identity => (FuserConfig::paper(), MeanVsd::paper()),
+            PlainCovariance::AboutObject => {
+                let unit = UnitCovariance::about_object(model.center(), model.radius())?;
+                (
+                    FuserConfig {
+                        unit,
+                        ..FuserConfig::default()
+                    },
+                    MeanVsd::default(),
+                )
+            }
+        };
+        let sequential = SequentialConfig {
             covariance: CovarianceModel::Mve(MveCovariance {
-                unit,
+                unit: fuser.unit,
                 ..MveCovariance::default()
             }),
-            score: method.uses_covariances().then(MeanVsd::default),
+            score: method.uses_covariances().then_some(score),
+            without_pairs,
         };
-        SequentialEstimator::new(stage, fuser, config, init)
+        SequentialEstimator::new(stage, method.build(fuser), sequential, init)
     }
 }
 

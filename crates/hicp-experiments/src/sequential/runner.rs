@@ -46,6 +46,8 @@ struct Journey<'a> {
 struct Traveler {
     estimator: SequentialEstimator,
     n_estimates: usize,
+    /// `true` if each of its estimates takes the time of an MVE, too.
+    with_mve: bool,
 }
 
 /// Runs trajectories of every object, and calls `watch` with each step of every method.
@@ -102,7 +104,8 @@ impl<'a> TrajectoryRunner<'a> {
     /// Evaluates a trajectory. The outcomes are ordered by underlying pipeline, then by method.
     ///
     /// All get the same path, the same start and the same model. With the clock of costs, all
-    /// methods of a pipeline get the same images. `watch` is called with every step.
+    /// methods of a pipeline whose estimates take as long get the same images. `watch` is called
+    /// with every step.
     pub(super) fn outcomes(&mut self, object: usize, index: u64, watch: Watch<'_>) -> Vec<Outcome> {
         let drawn = self.draw(object, index);
         let mut outcomes = Vec::new();
@@ -140,28 +143,37 @@ impl<'a> TrajectoryRunner<'a> {
 
     /// Runs a trajectory with one underlying pipeline. Returns the figures of each method.
     fn travel(&mut self, journey: &Journey<'_>, watch: Watch<'_>) -> Result<Vec<Measured>, Failed> {
-        let variant = &self.underlying[journey.underlying];
+        let (config, variant) = (self.config, &self.underlying[journey.underlying]);
+        let plain = (config.covariance, config.without_pairs);
+        let has_costly_mve = config.underlying[journey.underlying].seconds_per_mve > 0.0;
         let mut travelers = Vec::new();
         for rule in &self.rules {
-            let (stage, init) = (variant.build(None)?, &journey.trajectory.init);
+            let underlying = (&*variant.name, variant.build(None)?);
+            let init = &journey.trajectory.init;
             travelers.push(Traveler {
-                estimator: rule.estimator(stage, &variant.name, journey.believed, init)?,
+                estimator: rule.estimator(plain, underlying, journey.believed, init)?,
                 n_estimates: 0,
+                with_mve: has_costly_mve && rule.uses_mve(),
             });
         }
-        // With the real clock, every method takes its images from different places.
-        let together = match self.config.clock {
-            TrajectoryClock::Cost => travelers.len(),
-            TrajectoryClock::Real => 1,
-        };
-        let mut all = Vec::new();
-        for group in travelers.chunks_mut(together.max(1)) {
-            let truth = self.go(journey, group, watch)?;
-            for one in group {
-                all.push(self.judge(journey, one, &truth)?);
+        let mut groups: Vec<Vec<&mut Traveler>> = Vec::new();
+        for one in &mut travelers {
+            // With the real clock, every method takes its images from different places.
+            let is_shared = config.clock == TrajectoryClock::Cost;
+            let group = groups
+                .iter_mut()
+                .find(|group| group[0].with_mve == one.with_mve);
+            match group.filter(|_| is_shared) {
+                Some(group) => group.push(one),
+                None => groups.push(vec![one]),
             }
         }
-        Ok(all)
+        let mut truth = journey.trajectory.camera_from_object;
+        for group in &mut groups {
+            truth = self.go(journey, group, watch)?;
+        }
+        let judged = travelers.iter().map(|one| self.judge(journey, one, &truth));
+        judged.collect()
     }
 
     /// Moves some estimators along the path over the same images.
@@ -170,11 +182,13 @@ impl<'a> TrajectoryRunner<'a> {
     fn go(
         &self,
         journey: &Journey<'_>,
-        group: &mut [Traveler],
+        group: &mut [&mut Traveler],
         watch: Watch<'_>,
     ) -> Result<Isometry3<f64>, Failed> {
         let (config, trajectory) = (self.config, journey.trajectory);
-        let last = config.n_images(journey.underlying) - 1;
+        let with_mve = group.first().is_some_and(|one| one.with_mve);
+        let last = config.n_images(journey.underlying, with_mve) - 1;
+        let seconds = config.seconds(journey.underlying, with_mve);
         let mut truth = trajectory.camera_from_object;
         let mut motion = CameraMotion::none();
         let mut traveled = 0.0;
@@ -198,7 +212,7 @@ impl<'a> TrajectoryRunner<'a> {
             }
             let meters = match config.clock {
                 TrajectoryClock::Cost if image == last as u64 => f64::INFINITY,
-                TrajectoryClock::Cost => config.step_m(journey.underlying),
+                TrajectoryClock::Cost => config.speed_m_s * seconds,
                 TrajectoryClock::Real => config.speed_m_s * end.saturating_sub(start).as_secs_f64(),
             };
             if traveled + meters > config.path_m + 1e-9 {
@@ -229,7 +243,8 @@ impl<'a> TrajectoryRunner<'a> {
         let underlying = &self.underlying[journey.underlying].name;
         let labels = [&subject.name, underlying, "trajectory sensor"];
         let mut rng = stream(self.config.seed, &labels, (journey.index << 20) + image);
-        Ok((self.config.depth_noise().apply(&mut rng, &depth), mask))
+        let noise = TrajectoryConfig::noise(&self.config.depth_noise);
+        Ok((noise.apply(&mut rng, &depth), mask))
     }
 
     fn judge(

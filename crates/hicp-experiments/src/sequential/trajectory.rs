@@ -4,9 +4,9 @@ use hicp_core::{Isometry3, Model, Translation3, Vector3};
 use hicp_sim::{CaseMaker, VsdBins, object_pose, perturb, rotation_of, stream, unit_vector};
 use rand::RngExt;
 
-use super::config::TrajectoryConfig;
+use super::config::{PathDirection, TrajectoryConfig};
 
-/// A straight path toward a point near the object, and an initial pose in a bin of the initial VSD.
+/// A straight path toward the object, and an initial pose in a bin of the initial VSD.
 ///
 /// The camera does not rotate.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +50,13 @@ impl Trajectory {
                 distance..distance,
                 config.axis_offset_m,
             );
-            let aside = unit_vector(&mut paths) * (config.target_offset_m * paths.random::<f64>());
-            let direction = ((truth * model.center()).coords + aside).normalize();
+            let direction = match config.path {
+                PathDirection::OpticalAxis => Vector3::z(),
+                PathDirection::Target { offset_m } => {
+                    let aside = unit_vector(&mut paths) * (offset_m * paths.random::<f64>());
+                    ((truth * model.center()).coords + aside).normalize()
+                }
+            };
             for _ in 0..bins.tries_per_pose {
                 let translation = bins.max_translation_meters * inits.random::<f64>();
                 let init = perturb(&mut inits, &truth, translation, rotation_of(translation));

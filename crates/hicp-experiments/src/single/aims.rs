@@ -67,7 +67,7 @@ fn test(
             let ratio = ours.estimate / hybrids.estimate;
             judge.claim(
                 format!("{name} has at most {share} × hybrid's: {figure}, {images}"),
-                ClaimVerdict::negative(&[excess]),
+                ClaimVerdict::strictly_negative(&[excess]),
                 format!("{ratio:.2} ×: {ours} against {hybrids}"),
             )
         }
@@ -76,7 +76,7 @@ fn test(
             let hybrids = hybrids.unwrap_or_default();
             judge.claim(
                 format!("{name} below {}: {figure}, {images}", percent(share)),
-                ClaimVerdict::negative(&[ours.minus(share)]),
+                ClaimVerdict::strictly_negative(&[ours.minus(share)]),
                 format!("{}{hybrids}", ours.percent()),
             )
         }

@@ -1,5 +1,6 @@
 //! The configuration of a study of single images, stored next to its rows.
 
+use hicp_core::NormalWindow;
 use hicp_sim::{
     CaseConfig, InitialPose, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, VsdBins,
 };
@@ -37,6 +38,10 @@ pub struct Config {
     pub max_distance_m: f64,
     /// Largest distance of the optical axis from the object's center, meters.
     pub axis_offset_m: f64,
+    /// Half side of the window of the normals, pixels; `null` to choose it by the noise of the
+    /// image.
+    #[serde(default)]
+    pub normal_window: Option<u8>,
     /// The camera.
     pub camera: CameraRecord,
     /// The levels.
@@ -75,6 +80,7 @@ impl Config {
             rotation_deg: MEAN_ROTATION_ERROR_DEGREES,
             max_distance_m: 0.6,
             axis_offset_m: 0.02,
+            normal_window: None,
             camera: CameraRecord::default(),
             levels: experiment.levels(),
             variants: variants.to_vec(),
@@ -84,6 +90,12 @@ impl Config {
         let alpha = experiment.condition(0, 0).alpha;
         variants.iter().try_for_each(|v| v.build(alpha).map(drop))?;
         Ok(config)
+    }
+
+    /// Returns the window of the normals.
+    pub(super) fn normals(&self) -> NormalWindow {
+        self.normal_window
+            .map_or(NormalWindow::Automatic, NormalWindow::HalfSide)
     }
 
     /// Returns the configuration of the cases, with binned or with fixed initial poses.

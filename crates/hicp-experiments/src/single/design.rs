@@ -27,6 +27,7 @@ impl Design for Config {
         ("iterations", Column::Steps),
         ("termination", Column::Termination),
         ("cpu_ms", Column::CpuMs),
+        ("regimes", Column::Regimes),
         ("note", Column::Note),
     ];
 
@@ -39,6 +40,10 @@ impl Design for Config {
             "axis_offset_m",
         ])?;
         fields.above_0(&["max_distance_m"])?;
+        if let Some(half_side) = self.normal_window {
+            let is_valid = (1..=10).contains(&half_side);
+            fields.require(is_valid, "normal_window", half_side, "null, or 1 to 10")?;
+        }
         let known = self.experiment.levels();
         fields.names("levels", known.len())?;
         // The index of a level decides its meaning. A study may have only the first levels.

@@ -1,5 +1,7 @@
 //! The report of studies of single images, with figures like the paper's Figure 6.
 
+use std::collections::BTreeMap;
+
 use super::claims::claims;
 use super::config::Config;
 use super::experiment::Experiment;
@@ -17,6 +19,9 @@ const SUMMARY: &str = "study|experiment|group|variant|rows|vsd_initial|vsd_final
     vsd_final_high|failure_share|failure_low|failure_high|worse_share|worse_low|worse_high|\
     add_median_mm|add_below_tenth_diameter|iterations|cpu_ms|cpu_ms_deviation|\
     cpu_ratio_to_nn_point_to_point";
+/// The columns of `switches.csv`: the regimes of the outer iterations by their first letters, `a`
+/// for aligned and `m` for misaligned, and the share of the cases that had them.
+const SWITCHES: &str = "study|group|variant|regimes|cases|share|vsd_initial|vsd_final";
 /// The columns of `differences.csv`.
 const DIFFERENCES: &str = "study|group|variant|against|vsd_difference|low|high|\
     failure_difference|failure_low|failure_high";
@@ -59,7 +64,10 @@ impl Reported for Config {
             ],
             results: entries.iter().map(Entry::results).collect(),
             differences: table(DIFFERENCES, Entry::differences),
-            tables: vec![("summary.csv", table(SUMMARY, Entry::summary))],
+            tables: vec![
+                ("summary.csv", table(SUMMARY, Entry::summary)),
+                ("switches.csv", table(SWITCHES, Entry::switches)),
+            ],
         }
     }
 }
@@ -195,6 +203,28 @@ impl Entry<Config> {
             Some([&labels[..], &figures, &others].concat())
         };
         analysis.grid().filter_map(row).collect()
+    }
+
+    /// Returns the rows of `switches.csv`: how often each variant switched which way, per group.
+    fn switches(&self) -> Vec<Vec<String>> {
+        let mut rows = Vec::new();
+        for (group, label, variant, name) in self.analysis.grid() {
+            // Number, sum of the initial VSDs and sum of the final ones, by the regimes.
+            let mut found: BTreeMap<&str, [f64; 3]> = BTreeMap::new();
+            let figures = self.analysis.all_figures(group, variant);
+            for measured in figures.filter(|m| !m.regimes.is_empty()) {
+                let sums = found.entry(&measured.regimes).or_default();
+                let figures = [1.0, measured.vsd_initial, measured.vsd_final];
+                *sums = std::array::from_fn(|i| sums[i] + figures[i]);
+            }
+            let total: f64 = found.values().map(|sums| sums[0]).sum();
+            rows.extend(found.into_iter().map(|(regimes, [count, initial, last])| {
+                let labels = texts(&[&self.name, label, name, regimes, &format!("{count:.0}")]);
+                let means = [count / total, initial / count, last / count];
+                [labels, means.map(|x| fixed(Some(x), 4)).to_vec()].concat()
+            }));
+        }
+        rows
     }
 
     /// Returns the paired differences between the reference and each other variant, per group.

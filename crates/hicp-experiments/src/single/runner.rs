@@ -5,7 +5,7 @@ use std::sync::Arc;
 use hicp_core::{DepthImage, Isometry3, Mask, Model, Observation, Problem};
 use hicp_sim::{Case, CaseMaker, Reconstruction, ReconstructionNoise};
 use hybrid_icp::BoxedStage;
-use hybrid_icp::icp::{Session, Workspace};
+use hybrid_icp::icp::{Observer, RegimeEvent, Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
 
 use super::config::Config;
@@ -39,6 +39,16 @@ struct Presented<'a> {
     mask: Mask,
     /// The model that is registered.
     model: &'a Model,
+}
+
+/// The first letters of the chosen regimes.
+#[derive(Default)]
+struct Regimes(String);
+
+impl Observer for Regimes {
+    fn on_regime(&mut self, event: &RegimeEvent) {
+        self.0.extend(event.regime.name().chars().next());
+    }
 }
 
 impl<'a> Runner<'a> {
@@ -120,10 +130,16 @@ impl<'a> Runner<'a> {
 
         // Every variant creates an observation: normals and search trees are part of its time.
         let (mask, start) = (presented.mask.clone(), thread_time());
-        let observation = Observation::new(depth, mask, case.camera);
+        let window = self.config.normals();
+        let observation = Observation::with_normal_window(depth, mask, case.camera, window);
         let observation = observation.map_err(|e| e.to_string())?;
         let problem = Problem::new(presented.model, &observation);
-        let outcome = stage.run(&problem, &case.init, &mut Session::new(workspace, &mut ()));
+        let mut regimes = Regimes::default();
+        let outcome = stage.run(
+            &problem,
+            &case.init,
+            &mut Session::new(workspace, &mut regimes),
+        );
         let time = thread_time().saturating_sub(start);
 
         // The next level starts from the same pose, and its time must include the render again.
@@ -141,6 +157,7 @@ impl<'a> Runner<'a> {
             steps: outcome.iterations,
             termination: outcome.termination.name().to_owned(),
             cpu_ms: self.config.times.then_some(1e3 * time.as_secs_f64()),
+            regimes: regimes.0,
             mahalanobis_squared: None,
         })
     }

@@ -37,7 +37,7 @@ pub(super) fn projective_fastest(judge: Judge<'_>) -> Option<Claim> {
     let nearest = contrasts.iter().max_by(by_estimate)?;
     judge.claim(
         "every projective variant is faster than hybrid and than every variant with nearest neighbors",
-        ClaimVerdict::negative(&contrasts),
+        ClaimVerdict::strictly_negative(&contrasts),
         format!("the nearest pair differs by {nearest:+} ms"),
     )
 }
@@ -66,7 +66,7 @@ pub(super) fn table_order(judge: Judge<'_>) -> Option<Claim> {
     let ranked = ranked.collect::<Vec<_>>().join(", ");
     judge.claim(
         "the order of Table I, every neighboring pair of it",
-        ClaimVerdict::negative(&pairs),
+        ClaimVerdict::strictly_negative(&pairs),
         format!("{agreeing} of 36 pairs are in the paper's order; fastest first, time in units of {NN}: {ranked}"),
     )
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use hicp_io::IoError;
+use hicp_io::{IoError, Place};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -32,6 +32,35 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
     ///
     /// [`IoError`] with the name of the first wrong field.
     fn check(&self, fields: &Fields<'_>) -> Result<(), IoError>;
+
+    /// Returns the configuration with one field changed: `field=value`, where the value is JSON, or
+    /// text without quotes.
+    ///
+    /// # Errors
+    ///
+    /// [`IoError`] with the name of the field, if there is no such field or it cannot have the
+    /// value.
+    fn with(&self, change: &str) -> Result<Self, IoError> {
+        let (field, text) = change.split_once('=').unwrap_or((change, ""));
+        let wrong = |found: String, expected: &str| {
+            IoError::new(
+                "configuration",
+                Place::Field(field.to_owned()),
+                found,
+                expected,
+            )
+        };
+        // The keys of all maps are text, so a configuration always serializes.
+        let mut fields = serde_json::to_value(self).unwrap_or_default();
+        let Some(value) = fields.get_mut(field) else {
+            return Err(wrong("no such field".to_owned(), "a field of config.json"));
+        };
+        *value = serde_json::from_str(text).unwrap_or_else(|_| text.into());
+        let changed: Self = serde_json::from_value(fields)
+            .map_err(|error| wrong(error.to_string(), "a value that config.json could have"))?;
+        changed.check(&Fields::new(&changed))?;
+        Ok(changed)
+    }
 
     /// Returns the rows of the study and their order.
     fn layout(&self) -> Layout<'_>;

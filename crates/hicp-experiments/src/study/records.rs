@@ -40,6 +40,7 @@ impl Default for CameraRecord {
     /// The camera of the studies: 640 × 480 pixels with a focal length of 573 pixels.
     fn default() -> Self {
         Self {
+            // Open: camera: §VI-A. That of the LINEMOD dataset, pixels.
             fx: 572.4,
             fy: 573.6,
             cx: 325.3,

@@ -36,6 +36,9 @@ pub struct Measured {
     pub termination: String,
     /// Processor time from depth image and mask to pose, milliseconds; `None` if not measured.
     pub cpu_ms: Option<f64>,
+    /// The choices of the switcher, one letter per outer iteration: `a` for aligned, `m` for
+    /// misaligned. Empty if the variant does not switch.
+    pub regimes: String,
     /// ξᵀΣ⁻¹ξ of the error of the fused pose, with the covariance that the method states.
     ///
     /// If that covariance is right, it is distributed like χ²₆. `None` without an estimate, and for
@@ -61,6 +64,7 @@ pub enum Column {
     Steps,
     Termination,
     CpuMs,
+    Regimes,
     MahalanobisSquared,
     Note,
 }
@@ -122,6 +126,7 @@ impl Row {
             Column::Steps => count(measured.map(|m| m.steps)),
             Column::Termination => measured.map_or(NOT_MADE, |m| &m.termination).to_owned(),
             Column::CpuMs => number(3, |m| m.cpu_ms),
+            Column::Regimes => measured.map_or_else(String::new, |m| m.regimes.clone()),
             Column::MahalanobisSquared => number(4, |m| m.mahalanobis_squared),
             Column::Note => self.note.replace(['\n', '\r'], " "),
         }
@@ -218,6 +223,7 @@ impl<'a> Line<'a> {
             steps: self.number(Column::Steps, |_| true, "a number")?,
             termination: self.text(Column::Termination).to_owned(),
             cpu_ms: optional(Column::CpuMs)?,
+            regimes: self.text(Column::Regimes).to_owned(),
             mahalanobis_squared: optional(Column::MahalanobisSquared)?,
         })
     }
@@ -253,6 +259,7 @@ mod tests {
                 add_final_mm: 1.5,
                 steps: 31,
                 termination: "converged".to_owned(),
+                regimes: "ma".to_owned(),
                 ..Measured::default()
             }),
             note: String::new(),

@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use hicp_experiments::{
-    Design, ExperimentError, FusionRule, Metric, Panel, Row, RunOptions, Subject, TrajectoryClock,
-    TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run,
+    Design, ExperimentError, FusionRule, Metric, Panel, PathDirection, Row, RunOptions, Subject,
+    TrajectoryClock, TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run,
 };
 use hicp_sim::Household;
-use hybrid_icp::Preset;
+use hybrid_icp::{Preset, WithoutPairs};
 
 const BOTH: [Preset; 2] = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
 
@@ -19,7 +19,9 @@ fn subjects() -> Vec<Subject> {
 /// Creates a study of one short trajectory per bin, with a small camera and a coarse
 /// reconstruction.
 fn config() -> TrajectoryConfig {
-    let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3).unwrap();
+    let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3)
+        .unwrap()
+        .improved();
     let camera = &mut config.camera;
     (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
     (camera.width, camera.height) = (160, 120);
@@ -28,6 +30,7 @@ fn config() -> TrajectoryConfig {
     config.underlying[1].seconds_per_estimate = 0.4;
     config.reconstruction_images = 20;
     config.reconstruction_voxel_m = 0.004;
+    config.reconstruction_truncation_m = Some(0.012);
     config
 }
 
@@ -67,7 +70,7 @@ fn a_small_study_runs_to_its_report() {
         assert!((0.0..=1.0).contains(&vsd_final), "{row:?}");
         // 12 cm at 0.1 m/s and 0.542 s per image: after 0, 5.42 and 10.84 cm. At 0.4 s: every 4 cm.
         let images = if row.setting == "hybrid" { 3 } else { 4 };
-        assert_eq!(config.n_images(usize::from(images == 4)), images);
+        assert_eq!(config.n_images(usize::from(images == 4), true), images);
         assert!(measured.steps <= images, "{row:?}");
         // A method with an estimate states a covariance.
         let distance = measured.mahalanobis_squared;
@@ -185,6 +188,45 @@ fn with_the_real_clock_every_method_runs_to_the_end() {
     report.write(folder.path()).unwrap();
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(html.contains("no run repeats this one"));
+}
+
+#[test]
+fn methods_that_need_an_mve_see_fewer_images() {
+    let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
+    config.methods = vec!["average".to_owned(), "weighted-average".to_owned()];
+    config.underlying.truncate(1);
+    (
+        config.underlying[0].seconds_per_estimate,
+        config.underlying[0].seconds_per_mve,
+    ) = (0.3, 0.3);
+    go(&config, folder.path(), 2, false).unwrap();
+    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    // 12 cm at 0.1 m/s: an image every 3 cm, and with an MVE every 6 cm.
+    let steps = |row: &Row| row.measured.as_ref().map(|m| m.steps);
+    let steps: Vec<_> = study.rows.iter().map(steps).collect();
+    assert_eq!(steps, [Some(5), Some(3)].repeat(10));
+}
+
+#[test]
+fn a_field_is_changed_by_name() {
+    let config = config();
+    let changed = config.with("reconstruction_truncation_m=0.012").unwrap();
+    assert_eq!(changed.reconstruction_truncation_m, Some(0.012));
+    let changed = changed
+        .with("path={\"target\":{\"offset_m\":0.05}}")
+        .unwrap();
+    assert_eq!(changed.path, PathDirection::Target { offset_m: 0.05 });
+    let changed = changed.with("without_pairs=nothing").unwrap();
+    assert_eq!(changed.without_pairs, WithoutPairs::Nothing);
+    for (change, part) in [
+        ("speed=1", "speed: found no such field"),
+        ("speed_m_s=fast", "speed_m_s"),
+        ("speed_m_s=-1", "speed_m_s"),
+        ("depth_noise=d435", "a noise"),
+    ] {
+        let error = config.with(change).unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    }
 }
 
 #[test]

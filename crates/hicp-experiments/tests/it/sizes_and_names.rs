@@ -43,9 +43,11 @@ fn the_time_of_an_estimate_decides_the_distance_between_images() {
     assert_eq!(config.layout().n_cases(), 3 * 10 * 2);
     assert_eq!(config.layout().rows_per_case(), 2 * FusionRule::ALL.len());
     config.underlying[1].seconds_per_estimate = 0.25;
-    assert!((config.step_m(1) - 0.025).abs() < 1e-15);
-    // 0.6 m in steps of 2.5 cm, both ends included.
-    assert_eq!(config.n_images(1), 25);
+    config.underlying[1].seconds_per_mve = 0.05;
+    // 0.6 m in steps of 2.5 cm and of 3 cm, both ends included.
+    assert_eq!(config.n_images(1, false), 25);
+    assert_eq!(config.n_images(1, true), 21);
+    assert_eq!(config.improved().n_images(1, true), 25);
 }
 
 #[test]

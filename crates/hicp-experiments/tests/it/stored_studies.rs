@@ -32,7 +32,7 @@ impl Stored {
             for case in 0..2 {
                 for variant in ["hybrid", "nn-point-to-point"] {
                     text += &format!(
-                        "{object},{case},{variant},0,{case},0.{case}5,0.04,1.5,9,converged,2.5,\n"
+                        "{object},{case},{variant},0,{case},0.{case}5,0.04,1.5,9,converged,2.5,,\n"
                     );
                 }
             }
@@ -255,7 +255,7 @@ fn fields_of_a_configuration_are_checked() {
 #[test]
 fn fields_of_a_sequential_configuration_are_checked() {
     let stored = Stored::sequential();
-    let hybrid = json!({"name": "hybrid", "pipeline": "", "seconds_per_estimate": 0.5});
+    let hybrid = json!({"name": "hybrid", "pipeline": "", "seconds_per_estimate": 0.5, "seconds_per_mve": 0.1});
     for (pointer, value, field, part) in [
         (
             "/experiment",
@@ -283,6 +283,25 @@ fn fields_of_a_sequential_configuration_are_checked() {
             "/underlying/0/seconds_per_estimate",
             json!(0.0),
             "underlying[0].seconds_per_estimate",
+            "above 0",
+        ),
+        (
+            "/underlying/0/seconds_per_mve",
+            json!(-0.1),
+            "underlying[0].seconds_per_mve",
+            "at least 0",
+        ),
+        ("/depth_noise", json!("d435"), "depth_noise", "a noise"),
+        (
+            "/path",
+            json!({"target": {"offset_m": -1.0}}),
+            "path.target.offset_m",
+            "at least 0",
+        ),
+        (
+            "/reconstruction_truncation_m",
+            json!(0.0),
+            "reconstruction_truncation_m",
             "above 0",
         ),
         ("/methods", json!([]), "methods", "1 to"),
@@ -346,7 +365,7 @@ fn rows_that_contradict_the_configuration_are_refused() {
         ),
         ("mug,0,hybrid,0,0,0.05,1e300", "vsd_final \"1e300\""),
         ("mug,0,hybrid,0,0,0.05,NaN", "vsd_final \"NaN\""),
-        ("mug,0,hybrid,0,0,0.05,0.04,1", "13 fields, expected 12"),
+        ("mug,0,hybrid,0,0,0.05,0.04,1", "14 fields, expected 13"),
     ] {
         let (line, what) = instead(row);
         assert!(line == 2 && what.contains(part), "{line}: {what}");
@@ -357,7 +376,8 @@ fn rows_that_contradict_the_configuration_are_refused() {
         "{line}: {what}"
     );
     // A run writes every row once, on one line, and no row after the last one.
-    let (line, what) = stored.with_rows(|rows| rows.replacen("2.5,\n", "2.5,\"two\nlines\"\n", 1));
+    let (line, what) =
+        stored.with_rows(|rows| rows.replacen("2.5,,\n", "2.5,,\"two\nlines\"\n", 1));
     assert!(line == 4 && what.contains("each on one line"), "{what}");
     let (line, what) = stored.with_rows(|rows| format!("{rows}{}", rows.lines().last().unwrap()));
     assert!(
@@ -610,7 +630,7 @@ fn the_committed_configurations_are_read() {
         eprintln!("SKIPPED: the package has no {}", docs.display());
         return;
     }
-    for name in ["beyond", "sequential", "sequential/calibrated"] {
+    for name in ["beyond", "sequential", "sequential/improved"] {
         let folder = tempfile::tempdir().unwrap();
         std::fs::copy(
             docs.join(name).join(CONFIG_FILE),
@@ -622,7 +642,7 @@ fn the_committed_configurations_are_read() {
         if name == "beyond" {
             put(
                 Config::ROWS_FILE,
-                header::<Config>() + "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,\n",
+                header::<Config>() + "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,,\n",
             );
             let outcome = Study::read(folder.path());
             assert!(
@@ -630,15 +650,9 @@ fn the_committed_configurations_are_read() {
                 "{name}"
             );
         } else {
-            let method = match name {
-                "sequential" => "last-estimate",
-                _ => "average",
-            };
-            let row = format!("\nbowl,0,0,hybrid,{method},0.05,0.04,1.5,9,2.5,\n");
-            put(
-                TrajectoryConfig::ROWS_FILE,
-                header::<TrajectoryConfig>() + &row,
-            );
+            let row = "\nbowl,0,0,hybrid,last-estimate,0.05,0.04,1.5,9,2.5,\n";
+            let rows = header::<TrajectoryConfig>() + row;
+            put(TrajectoryConfig::ROWS_FILE, rows);
             let outcome = TrajectoryStudy::read(folder.path());
             assert!(outcome.is_ok_and(|study| study.config.bins == 10), "{name}");
         }

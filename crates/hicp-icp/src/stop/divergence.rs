@@ -30,8 +30,9 @@ pub struct Divergence {
     /// The condition of rule 3.
     pub loss_rule: LossRule,
     /// Relative rise of the mean loss that does not count, because the convergence rule covers it.
-    // Deviation: rule 3 as written fires on a rise in the last digit. Every stage that converges
-    // would end as diverged. Here a rise within the convergence threshold is convergence.
+    // Deviation: tolerance of rule 3: §IV-B.2 ends a stage if the mean loss rises. As written, this
+    // fires on a rise in the last digit, and every stage that converges would end as diverged. Here
+    // a rise within the convergence threshold is convergence.
     pub rise_tolerance: f64,
 }
 

@@ -36,7 +36,8 @@ pub struct MeanVsd {
 /// Share of the pixels from which on those behind a measured surface are examined.
 const LEAST_NEARER: f64 = 0.02;
 
-// Deviation: masked pixels without depth count in neither mask; the paper's images have none.
+// Deviation: masked pixels without depth: §IV-A.2 does not mention them, and the paper's images
+// have none. Here they count in neither mask, because they are no evidence about the pose.
 impl MeanVsd {
     /// Creates the definition of §IV-A: every rendered pixel counts.
     #[must_use]

@@ -1,6 +1,7 @@
 //! The treatment of rendered pixels outside the mask.
 
 /// BOP's visibility tolerance δ for every dataset but ITODD, meters.
+// Open: δ of occluded pixels: §IV-A.2. BOP's visibility tolerance for its datasets.
 pub const VISIBILITY_TOLERANCE_METERS: f64 = 0.015;
 
 /// The rendered pixels outside the mask that count against a pose.

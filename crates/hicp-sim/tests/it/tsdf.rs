@@ -6,7 +6,7 @@ use hicp_core::{Facing, Model, PinholeCamera, Point3, TriMesh};
 use hicp_raster::render_depth_image;
 use hicp_sim::{
     EmptyPixels, Household, Reconstruction, ReconstructionNoise, SimError, Solid, TsdfConfig,
-    TsdfVolume, Unseen, components, object_pose, rng,
+    TsdfVolume, Unseen, WrongPose, components, object_pose, rng,
 };
 
 fn camera() -> PinholeCamera {
@@ -240,4 +240,44 @@ fn reconstructions_are_closed_and_less_accurate_at_every_level() {
             "{errors:?}"
         );
     }
+}
+
+#[test]
+fn noisy_images_and_wrong_cameras_make_a_worse_model_and_a_longer_truncation() {
+    let model = Household::Mug.model().unwrap();
+    let exact = ReconstructionNoise::default();
+    let noisy = ReconstructionNoise {
+        depth: "d435-ahn2019-axial".parse().unwrap(),
+        ..exact
+    };
+    let wrong = |wrong_pose| ReconstructionNoise {
+        translation_meters: 0.005,
+        rotation_degrees: 1.1,
+        wrong_pose,
+        ..noisy
+    };
+    // A camera turns far from the object, and so moves its surface more.
+    let noises = [
+        exact,
+        noisy,
+        wrong(WrongPose::Object),
+        wrong(WrongPose::Camera),
+    ];
+    let (mut errors, mut truncations) = (Vec::new(), Vec::new());
+    for noise in noises {
+        let settings = Reconstruction {
+            images: 60,
+            voxel_meters: 0.003,
+            ..Reconstruction::new(camera(), noise)
+        };
+        truncations.push(settings.truncation_meters(&model));
+        let made = settings.reconstruct(&model, "mug", 1).unwrap();
+        errors.push(surface_error(&made, &model));
+    }
+    let rises = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
+    assert!(
+        rises(&errors) && rises(&truncations),
+        "{errors:?}, {truncations:?}"
+    );
+    assert!((truncations[0] - 0.009).abs() < 1e-12);
 }

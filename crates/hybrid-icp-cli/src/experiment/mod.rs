@@ -124,6 +124,7 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let (poses, seed) = (arguments.poses, options.seed);
     let mut config = Config::new(experiment, &subjects, &variants, poses, seed)?;
     config.times = !arguments.no_times;
+    let config = options.changed(config)?;
     let out = options.folder(experiment.name());
     // Several threads would disturb each other's times.
     let threads = matches!(experiment, Experiment::Timing).then_some(1);

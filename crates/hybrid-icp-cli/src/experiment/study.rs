@@ -17,8 +17,9 @@ use crate::terminal::{progress_bar, say};
 #[derive(Debug, Args)]
 pub(super) struct StudyOptions {
     /// A folder of meshes in meters (OBJ, OFF, PLY or STL) instead of the ten household objects.
+    /// Can be repeated.
     #[arg(long, value_name = "DIR")]
-    objects: Option<PathBuf>,
+    objects: Vec<PathBuf>,
     /// Seed of all random numbers.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
@@ -29,6 +30,11 @@ pub(super) struct StudyOptions {
     /// The output folder, which is created if it does not exist; by default study/NAME.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Change a field of config.json, to a JSON value or a text. For example, normal_window=1 takes
+    /// normals from 3 × 3 pixels, and speed_m_s=0.2 doubles the speed of the camera in sequential.
+    /// Can be repeated.
+    #[arg(long = "set", value_name = "FIELD=VALUE")]
+    set: Vec<String>,
     /// Continue a study that was interrupted.
     #[arg(long)]
     resume: bool,
@@ -40,10 +46,20 @@ impl StudyOptions {
         &self,
         household: &[Household],
     ) -> Result<Vec<Subject>, ExperimentError> {
-        match &self.objects {
-            Some(folder) => Subject::read_folder(folder),
-            None => Subject::household(household),
+        if self.objects.is_empty() {
+            return Subject::household(household);
         }
+        let read = self
+            .objects
+            .iter()
+            .map(|folder| Subject::read_folder(folder));
+        Ok(read.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    /// Returns a configuration with the changes of `--set`.
+    pub(super) fn changed<D: Design>(&self, config: D) -> Result<D, hicp_io::IoError> {
+        let mut changes = self.set.iter();
+        changes.try_fold(config, |config, change| config.with(change))
     }
 
     /// Returns the folder of the study `name`.
@@ -99,7 +115,7 @@ pub(super) fn report<D: Reported>(studies: &[(&str, &Path)], out: &Path) -> anyh
     let report = ReportOf::of(studies);
     report.write(out)?;
     for (study, claim) in report.claims() {
-        let (verdict, text, figures) = (claim.verdict.name(), &claim.text, &claim.figures);
+        let (verdict, text, figures) = (claim.verdict.words(), &claim.text, &claim.figures);
         say(format_args!("{study}: {verdict}: {text} ({figures})"))?;
     }
     let page = out.join("report.html");
