@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 
-use checks::{deviations, fuzz, licenses, miri, mutants, tidy, valgrind};
+use checks::{fuzz, licenses, marks, miri, mutants, tidy, valgrind};
 use measure::{bench, counts, instructions, peers, repro, scale};
 use pages::{book, look, pictures};
 
@@ -23,9 +23,10 @@ cargo xtask COMMAND
 
   ci        everything that must pass before a change lands
   tidy      layer table, import cycles, confined libraries, crate documentation, open ends,
-            docs/deviations.md, style of comments and Markdown
+            docs/deviations.md and docs/paper-open.md, style of comments and Markdown
   licenses  licenses and sources of all dependencies, against deny.toml
-  bless     writes docs/deviations.md from the `// Deviation:` comments in the code
+  bless     writes docs/deviations.md and docs/paper-open.md from the `// Deviation:` and
+            `// Open:` comments in the code
 
   book      builds the book into target/book/site; fails on dead links
   pictures [--data]
@@ -60,7 +61,7 @@ cargo xtask COMMAND
   valgrind  the vectorized loops and the fuzz seeds under memcheck
   miri      unit tests under miri; needs a nightly toolchain
 
-  repro fig6|fig7|table1|alpha [--quick]
+  repro fig6|fig6-meshes|normals|table1|alpha|fig7|fig7-improved [--quick]
             reruns a part of the paper's studies into target/study; --quick takes minutes
 ";
 
@@ -86,7 +87,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["pictures", "--data"] => pictures::draw_data(),
         ["look", pages @ ..] => look::take(pages),
         ["licenses"] => licenses::run(),
-        ["bless"] => deviations::bless(),
+        ["bless"] => marks::bless(),
         ["python", options @ ..] => python::check(options),
         ["wheel"] => python::pack(),
         ["package"] => package::check(),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 
-use super::{cycles, deviations, prose};
+use super::{cycles, marks, prose};
 use crate::{read, rust_files};
 
 /// Every crate and its level. Dependencies within the workspace point to a lower level.
@@ -60,7 +60,7 @@ pub(crate) fn run() -> Result<()> {
         findings.extend(cycles::find(&Path::new("crates").join(&*name).join("src"))?);
     }
     left_open(&mut findings)?;
-    findings.extend(deviations::check()?);
+    findings.extend(marks::check()?);
     findings.extend(prose::check()?);
     ensure!(findings.is_empty(), "{}", findings.join("\nxtask: "));
     Ok(())
