@@ -1,4 +1,5 @@
-//! Draws the pictures of the book from simulated scenes: `cargo xtask pictures`.
+//! Draws the pictures of the book and of the studies from simulated scenes: `cargo xtask
+//! pictures`.
 
 // Pixels and counts become places in a picture.
 #![allow(clippy::cast_possible_truncation)]
@@ -11,6 +12,7 @@ mod curves;
 mod gallery;
 mod pairs;
 mod scene;
+mod studies;
 mod svg;
 
 use std::error::Error;
@@ -23,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).map_or(docs, PathBuf::from);
     std::fs::create_dir_all(&folder)?;
     type Draw = fn() -> Result<Svg, Box<dyn Error>>;
-    let pictures: [(&str, Draw); 9] = [
+    let pictures: [(&str, Draw); 12] = [
         ("before-after", gallery::before_after),
         ("selection", pairs::selection),
         ("correspondences", pairs::correspondences),
@@ -33,6 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("basin", curves::basin),
         ("successes", gallery::successes),
         ("failures", gallery::failures),
+        ("study-objects", studies::objects),
+        ("study-reconstructions", studies::reconstructions),
+        ("study-regimes", studies::regimes),
     ];
     let chosen = std::env::args().nth(2);
     for (name, draw) in pictures {

@@ -19,7 +19,7 @@ pub(crate) struct Placed {
     pub(crate) camera_from_object: Isometry3<f64>,
 }
 
-/// A depth image of objects, 640 × 480 pixels.
+/// A depth image of objects.
 pub(crate) struct Scene {
     pub(crate) camera: PinholeCamera,
     pub(crate) depth: DepthImage,
@@ -33,7 +33,8 @@ pub(crate) type Crop = (u32, u32, u32, u32);
 
 impl Scene {
     /// Puts objects on a table, each at (x, y) in meters and rotated around the vertical by
-    /// degrees. The camera looks at the origin from `distance` meters, 35° above the table.
+    /// degrees. The camera of 640 × 480 pixels looks at the origin from `distance` meters, 35°
+    /// above the table.
     pub(crate) fn on_a_table(
         distance: f64,
         objects: &[(Household, f64, f64, f64)],
@@ -83,6 +84,18 @@ impl Scene {
         })
     }
 
+    /// Shows one object without a table, and without noise.
+    pub(crate) fn alone(camera: PinholeCamera, object: Placed) -> Self {
+        let depth = render_depth_image(object.model.mesh(), &camera, &object.camera_from_object);
+        let owner = |z: &f32| (*z > 0.0).then_some(0);
+        Self {
+            camera,
+            owners: depth.pixels().iter().map(owner).collect(),
+            depth,
+            objects: vec![object],
+        }
+    }
+
     /// Observes an object through the mask of its visible pixels.
     pub(crate) fn observe(&self, index: usize) -> Result<Observation, Box<dyn Error>> {
         self.observe_where(|pixel| self.owners[pixel] == Some(index))
@@ -93,7 +106,8 @@ impl Scene {
         &self,
         on_object: impl Fn(usize) -> bool,
     ) -> Result<Observation, Box<dyn Error>> {
-        let mask = Mask::new(640, 480, (0..self.owners.len()).map(on_object).collect())?;
+        let masked = (0..self.owners.len()).map(on_object).collect();
+        let mask = Mask::new(self.camera.width(), self.camera.height(), masked)?;
         Ok(Observation::new(self.depth.clone(), mask, self.camera)?)
     }
 
@@ -107,7 +121,7 @@ impl Scene {
         crop: Crop,
     ) -> Result<(), Box<dyn Error>> {
         let (left, top, columns, rows) = crop;
-        let full = Observation::new(self.depth.clone(), Mask::full(640, 480), self.camera)?;
+        let full = self.observe_where(|_| true)?;
         let mut gray = vec![250; columns as usize * rows as usize];
         for (index, surfel) in full.surfels(1) {
             let (u, v) = full.pixel(index);
