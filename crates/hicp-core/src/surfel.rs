@@ -1,6 +1,6 @@
 //! Points with normals.
 
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// A surface element: a point in meters and the unit normal of the surface there.
 ///
@@ -13,4 +13,12 @@ pub struct Surfel {
     pub point: Point3<f32>,
     /// Unit normal.
     pub normal: UnitVector3<f32>,
+}
+
+impl Surfel {
+    /// The entry of a pixel without a surfel. Its depth is 0.
+    pub(crate) const NOTHING: Self = Self {
+        point: Point3::new(0.0, 0.0, 0.0),
+        normal: UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 1.0)),
+    };
 }

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, UnitVector3, Vector3};
-
 use crate::derived::Derived;
 use crate::id::Id;
 use crate::internal;
@@ -133,17 +131,6 @@ impl Observation {
         // vector.
         let n_measured = patch.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>() as usize;
 
-        let width = region.width();
-        let (xs, ys) = (
-            ray_slopes(region.u_min, region.u_max, camera.fx(), camera.cx()),
-            ray_slopes(region.v_min, region.v_max, camera.fy(), camera.cy()),
-        );
-        let nothing = Surfel {
-            point: Point3::origin(),
-            normal: Vector3::z_axis(),
-        };
-        let mut surfels = Vec::with_capacity(region.area());
-        let mut n_surfels = 0;
         let depth_patch = DepthPatch {
             region,
             camera: &camera,
@@ -152,25 +139,8 @@ impl Observation {
         // Deviation: pixels without normals leave C: §III-A gives every point of C a normal. Here a
         // pixel whose neighbors do not determine a plane (a flying pixel, a line) has no surfel. It
         // is not paired by any metric, and still counts toward the MVE.
-        estimate_normals(&depth_patch, normal_window, |row, first, normals| {
-            let start = row * width;
-            surfels.resize(start + first, nothing);
-            let (depth, xs) = (&patch[start + first..], &xs[first..]);
-            let pixels = normals.iter().zip(depth).zip(xs);
-            surfels.extend(pixels.map(|((normal, z), x)| {
-                let has_normal = *normal != [0.0; 3];
-                n_surfels += usize::from(has_normal);
-                if has_normal {
-                    Surfel {
-                        point: Point3::new(x * z, ys[row] * z, *z),
-                        normal: UnitVector3::new_unchecked(Vector3::from(*normal)),
-                    }
-                } else {
-                    nothing
-                }
-            }));
-            surfels.resize(start + width, nothing);
-        });
+        let surfels = estimate_normals(&depth_patch, normal_window);
+        let n_surfels = count(&surfels);
         Ok(Self {
             id: Id::next(),
             camera,
@@ -422,7 +392,7 @@ impl Observation {
             mask,
             region,
             normal_window: self.normal_window,
-            n_surfels: surfels.iter().filter(|s| s.point.z > 0.0).count(),
+            n_surfels: count(&surfels),
             surfels,
             n_measured,
             derived: Derived::default(),
@@ -437,9 +407,7 @@ impl Observation {
     }
 }
 
-#[allow(clippy::cast_possible_truncation)] // Slopes of a few units; f32 is the precision of buffers.
-fn ray_slopes(from: u32, to: u32, focal: f64, center: f64) -> Vec<f32> {
-    (from..to)
-        .map(|p| ((f64::from(p) - center) / focal) as f32)
-        .collect()
+/// Returns the number of pixels with a surfel.
+fn count(surfels: &[Surfel]) -> usize {
+    surfels.iter().filter(|s| s.point.z > 0.0).count()
 }

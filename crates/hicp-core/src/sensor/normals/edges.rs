@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::patch::DepthPatch;
+use super::size::EDGE_RADIUS;
 use crate::internal::{VectorLoop, vectorized};
 use crate::sensor::region::PixelRegion;
 
@@ -29,85 +30,99 @@ impl Edges {
         radius: usize,
     ) -> Option<Self> {
         let mut near = BitRows::new(&patch.region);
-        let (mut right, mut below) = (BitRows::new(&patch.region), BitRows::new(&patch.region));
-        let mut steps = Steps::default();
+        let mut bytes = Vec::new();
         let mut any = false;
-        for (v, span) in spans.iter().enumerate() {
-            if span.is_empty() {
+        for (v, span) in used(spans) {
+            let here = &patch.row(v)[span.clone()];
+            if judge::<false>(here, &here[1..], edge_step, &mut bytes) {
+                any = true;
+                near.set(v, span.start, &bytes);
+                near.set(v, span.start + 1, &bytes);
+            }
+            if v + 1 < spans.len() {
+                let below = &patch.row(v + 1)[span.clone()];
+                if judge::<false>(here, below, edge_step, &mut bytes) {
+                    any = true;
+                    near.set(v, span.start, &bytes);
+                    near.set(v + 1, span.start, &bytes);
+                }
+            }
+        }
+        if !any {
+            return None;
+        }
+        near.dilate(radius);
+        let (mut right, mut below) = (BitRows::new(&patch.region), BitRows::new(&patch.region));
+        for (v, span) in used(spans) {
+            // Only windows around pixels near edges are read.
+            let rows = v.saturating_sub(EDGE_RADIUS)..(v + EDGE_RADIUS + 1).min(spans.len());
+            if rows
+                .into_iter()
+                .all(|v| near.row(v).iter().all(|w| *w == 0))
+            {
                 continue;
             }
             let here = &patch.row(v)[span.clone()];
-            steps.judge(here, &here[1..], edge_step);
-            right.set(v, span.start, &steps.joined);
-            any |= near.set(v, span.start, &steps.edges);
-            any |= near.set(v, span.start + 1, &steps.edges);
+            judge::<true>(here, &here[1..], edge_step, &mut bytes);
+            right.set(v, span.start, &bytes);
             if v + 1 < spans.len() {
-                steps.judge(here, &patch.row(v + 1)[span.clone()], edge_step);
-                below.set(v, span.start, &steps.joined);
-                any |= near.set(v, span.start, &steps.edges);
-                any |= near.set(v + 1, span.start, &steps.edges);
+                judge::<true>(here, &patch.row(v + 1)[span.clone()], edge_step, &mut bytes);
+                below.set(v, span.start, &bytes);
             }
         }
-        any.then(|| {
-            near.dilate(radius);
-            Self { near, right, below }
-        })
+        Some(Self { near, right, below })
     }
 }
 
-/// The steps between the pixels of two rows: 1 where the step is an edge, or joins its pixels.
-#[derive(Default)]
-struct Steps {
-    edges: Vec<u8>,
-    joined: Vec<u8>,
+/// Iterates over the rows that use any columns.
+fn used(spans: &[Range<usize>]) -> impl Iterator<Item = (usize, &Range<usize>)> {
+    spans
+        .iter()
+        .enumerate()
+        .filter(|(_, span)| !span.is_empty())
 }
 
-impl Steps {
-    /// Classifies the steps from the pixels of one row to those of another, up to the shorter
-    /// length.
-    fn judge(&mut self, from: &[f32], to: &[f32], edge_step: f32) {
-        let n = from.len().min(to.len());
-        self.edges.resize(n, 0);
-        self.joined.resize(n, 0);
-        vectorized(Judge {
-            from: &from[..n],
-            to: &to[..n],
-            edge_step,
-            edges: &mut self.edges,
-            joined: &mut self.joined,
-        });
-    }
+/// Classifies the steps from the pixels of one row to those of another, up to the shorter length.
+///
+/// A byte is 1 where the step joins its pixels, or where it is an edge if `JOINED` is false.
+/// Returns whether any is.
+fn judge<const JOINED: bool>(
+    from: &[f32],
+    to: &[f32],
+    edge_step: f32,
+    bytes: &mut Vec<u8>,
+) -> bool {
+    let n = from.len().min(to.len());
+    bytes.resize(n, 0);
+    vectorized(Judge::<JOINED> {
+        from: &from[..n],
+        to: &to[..n],
+        edge_step,
+        bytes,
+    })
 }
 
-struct Judge<'a> {
+struct Judge<'a, const JOINED: bool> {
     from: &'a [f32],
     to: &'a [f32],
     edge_step: f32,
-    edges: &'a mut [u8],
-    joined: &'a mut [u8],
+    bytes: &'a mut [u8],
 }
 
-impl VectorLoop for Judge<'_> {
-    type Output = ();
+impl<const JOINED: bool> VectorLoop for Judge<'_, JOINED> {
+    type Output = bool;
 
     #[inline(always)]
-    fn run(self) {
-        judge(self.from, self.to, self.edge_step, self.edges, self.joined);
-    }
-}
-
-/// Classifies steps. All slices have one length; parameters let the compiler assume no overlap.
-#[inline(always)]
-fn judge(from: &[f32], to: &[f32], edge_step: f32, edges: &mut [u8], joined: &mut [u8]) {
-    let n = from.len();
-    let (to, edges, joined) = (&to[..n], &mut edges[..n], &mut joined[..n]);
-    for i in 0..n {
-        let (a, b) = (from[i], to[i]);
-        let nearer = if a < b { a } else { b };
-        let both = nearer > 0.0;
-        let torn = (a - b).abs() > edge_step * nearer;
-        edges[i] = u8::from(both & torn);
-        joined[i] = u8::from(both & !torn);
+    fn run(self) -> bool {
+        let steps = self.from.iter().zip(self.to);
+        let mut any = 0;
+        for (byte, (a, b)) in self.bytes.iter_mut().zip(steps) {
+            let nearer = if a < b { a } else { b };
+            let torn = (a - b).abs() > self.edge_step * nearer;
+            *byte = u8::from((*nearer > 0.0) & (torn != JOINED));
+            any |= *byte;
+        }
+        any != 0
     }
 }
 
@@ -127,16 +142,17 @@ impl BitRows {
         }
     }
 
+    fn row(&self, v: usize) -> &[u64] {
+        &self.words[v * self.words_per_row..][..self.words_per_row]
+    }
+
     fn row_mut(&mut self, v: usize) -> &mut [u64] {
         &mut self.words[v * self.words_per_row..][..self.words_per_row]
     }
 
     /// Sets the bits of row `v` from column `first` on that are 1 in `bytes`.
-    ///
-    /// Returns whether there were any.
-    fn set(&mut self, v: usize, first: usize, bytes: &[u8]) -> bool {
+    fn set(&mut self, v: usize, first: usize, bytes: &[u8]) {
         let row = self.row_mut(v);
-        let mut any = false;
         for (bytes, u) in bytes.chunks(8).zip((first..).step_by(8)) {
             let mut eight = [0; 8];
             eight[..bytes.len()].copy_from_slice(bytes);
@@ -144,27 +160,27 @@ impl BitRows {
             if eight == 0 {
                 continue;
             }
-            any = true;
             // Byte i, which is 0 or 1, becomes bit 56 + i: the partial products do not overlap.
             let bits = eight.wrapping_mul(0x0102_0408_1020_4080) >> 56;
             row[u / 64] |= bits << (u % 64);
             // The shift is split in two, because a shift by 64 is not allowed.
             row[u / 64 + 1] |= bits >> 1 >> (63 - u % 64);
         }
-        any
     }
 
     /// Iterates over the set columns of row `v` among the first `width`.
     pub(super) fn columns(&self, v: usize, width: usize) -> impl Iterator<Item = usize> {
-        let row = &self.words[v * self.words_per_row..][..self.words_per_row];
-        row.iter().enumerate().flat_map(move |(index, word)| {
-            let mut left = *word;
-            std::iter::from_fn(move || {
-                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
-                left &= left - 1;
-                Some(64 * index + bit).filter(|u| *u < width)
+        self.row(v)
+            .iter()
+            .enumerate()
+            .flat_map(move |(index, word)| {
+                let mut left = *word;
+                std::iter::from_fn(move || {
+                    let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+                    left &= left - 1;
+                    Some(64 * index + bit).filter(|u| *u < width)
+                })
             })
-        })
     }
 
     /// Returns the bits of `count` < 64 pixels from (u, v) to the right, the first in the lowest
@@ -229,7 +245,7 @@ mod tests {
                 let is_set = |u: usize| (31 * u * u + seed * u + v).is_multiple_of(every);
                 let end = width.min(first + 40 + v);
                 let run: Vec<u8> = (first..end).map(|u| u8::from(is_set(u))).collect();
-                assert_eq!(bits.set(v, first, &run), run.contains(&1));
+                bits.set(v, first, &run);
                 for (u, set) in (first..).zip(run) {
                     row[u] |= set == 1;
                 }

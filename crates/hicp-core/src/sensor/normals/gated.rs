@@ -5,6 +5,7 @@ use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use super::size::EDGE_RADIUS;
 use super::window::{Rays, WindowSums};
 use crate::internal::VectorLoop;
+use crate::surfel::Surfel;
 
 /// Columns that are summed in parallel: those of the largest window, and one that stays empty.
 const LANES: usize = 2 * EDGE_RADIUS + 2;
@@ -21,9 +22,8 @@ pub(super) struct FitGated<'a> {
     /// Half side of the window, at most [`EDGE_RADIUS`] pixels.
     pub(super) radius: usize,
     pub(super) v: usize,
-    /// The normals of the row from column `first` on. Those of other pixels are not changed.
-    pub(super) first: usize,
-    pub(super) normals: &'a mut [[f32; 3]],
+    /// The surfels of the row. Those of other pixels are not changed.
+    pub(super) surfels: &'a mut [Surfel],
 }
 
 impl VectorLoop for FitGated<'_> {
@@ -33,11 +33,13 @@ impl VectorLoop for FitGated<'_> {
     fn run(self) {
         let width = self.patch.region.width();
         for u in self.edges.near.columns(self.v, width) {
-            if self.patch.depth[self.v * width + u] >= MIN_DEPTH_METERS {
+            let z = self.patch.depth[self.v * width + u];
+            if z >= MIN_DEPTH_METERS {
                 let window = Window::around(self.patch, u, self.v, self.radius);
                 let sums = self.sums(&window, window.joined(self.edges));
                 let at = (u - window.left, self.v - window.top);
-                self.normals[u - self.first] = sums.normal(self.rays, (u, self.v), at);
+                let normal = sums.normal(self.rays, (u, self.v), at);
+                self.surfels[u] = self.rays.surfel((u, self.v), z, normal);
             }
         }
     }

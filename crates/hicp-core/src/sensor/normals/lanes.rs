@@ -12,11 +12,13 @@ impl<const N: usize> Lanes<N> {
         Self([number; N])
     }
 
-    /// Loads the numbers from an index on.
+    /// Converts integers.
     #[inline(always)]
-    pub(super) fn of(numbers: &[f64], from: usize) -> Self {
+    pub(super) fn of(integers: [i32; N]) -> Self {
         let mut lanes = [0.0; N];
-        lanes.copy_from_slice(&numbers[from..from + N]);
+        for (lane, integer) in lanes.iter_mut().zip(integers) {
+            *lane = f64::from(integer);
+        }
         Self(lanes)
     }
 

@@ -2,8 +2,7 @@
 //!
 //! For a plane seen by a pinhole camera, the inverse depth is *affine* in the pixel coordinates. A
 //! normal is therefore a linear least-squares fit of 1/z over a window of pixels, exact for planes
-//! at any tilt. The sums of the window are updated along columns and rows, so the cost per pixel
-//! does not depend on its size. By default, the size follows the noise of the image.
+//! at any tilt. By default, the size of the window follows the noise of the image.
 //!
 //! Windows never mix two sides of a depth edge. Near an edge, a small window uses only the
 //! neighbors that are connected to the pixel by steps that are not edges.
@@ -21,9 +20,10 @@ use edges::Edges;
 use gated::FitGated;
 pub(crate) use patch::DepthPatch;
 pub use size::NormalWindow;
-use window::{ColumnSums, Rays, RowFits};
+use window::{ColumnSums, Fit, Rays};
 
 use crate::internal::vectorized;
+use crate::surfel::Surfel;
 
 /// A step is a depth edge if it is steeper than a surface at this angle, degrees off frontal …
 // Open: depth edges in the normals of C: §III-A. No window mixes two sides of an edge. An edge is
@@ -34,21 +34,15 @@ const EDGE_SIGMAS: f64 = 5.0;
 /// Number of pixels for the noise estimate.
 const NOISE_SAMPLES: usize = 4096;
 
-/// Estimates normals, and calls `found(row, first_column, normals)` for every row.
+/// Returns the surfels of the patch, row-major.
 ///
-/// Each call covers the pixels from the first used one to the last. Normals are in the camera frame
-/// and face the camera. A pixel without a normal has zeros. Column and row are relative to the
-/// region's corner.
-///
-/// Pixels without depth have no normal. Neither have pixels with too few neighbors on their own
-/// side of the depth edges (flying pixels, single-pixel lines).
-pub(crate) fn estimate_normals(
-    patch: &DepthPatch<'_>,
-    window: NormalWindow,
-    mut found: impl FnMut(usize, usize, &[[f32; 3]]),
-) {
+/// Points and normals are in the camera frame, and normals face the camera. Pixels without a
+/// normal have [`Surfel::NOTHING`]: those without depth have pixels with too few neighbors on their own side of the depth edges
+/// (flying pixels, single-pixel lines).
+pub(crate) fn estimate_normals(patch: &DepthPatch<'_>, window: NormalWindow) -> Vec<Surfel> {
+    let mut surfels = Vec::with_capacity(patch.region.area());
     if patch.region.is_empty() {
-        return;
+        return surfels;
     }
     let (width, height) = (patch.region.width(), patch.region.height());
     let spans: Vec<_> = (0..height).map(|v| used(patch.row(v))).collect();
@@ -62,16 +56,20 @@ pub(crate) fn estimate_normals(
     let rays = Rays::new(patch);
 
     let mut columns = ColumnSums::new(width, radius);
-    let slide = |columns: &mut ColumnSums, v: usize| {
-        columns.slide(v, spans.get(v).map(|span| (span, patch.row(v))));
-    };
-    for v in 0..radius.min(height) {
-        slide(&mut columns, v);
+    for v in 0..radius {
+        columns.slide(v, patch, &spans);
     }
-    let mut fits = RowFits::default();
     for (v, span) in spans.iter().enumerate() {
-        slide(&mut columns, v + radius);
-        fits.fit(&columns, &rays, v, span.clone(), patch.row(v));
+        columns.slide(v + radius, patch, &spans);
+        surfels.resize(v * width + span.start, Surfel::NOTHING);
+        vectorized(Fit {
+            columns: &columns,
+            rays: &rays,
+            v,
+            span: span.clone(),
+            depth: patch.row(v),
+            surfels: &mut surfels,
+        });
         if let Some(edges) = &edges {
             vectorized(FitGated {
                 patch,
@@ -80,12 +78,12 @@ pub(crate) fn estimate_normals(
                 edge_step,
                 radius: edge_radius,
                 v,
-                first: span.start,
-                normals: &mut fits.normals,
+                surfels: &mut surfels[v * width..],
             });
         }
-        found(v, span.start, &fits.normals);
     }
+    surfels.resize(patch.region.area(), Surfel::NOTHING);
+    surfels
 }
 
 /// Returns the columns from the first pixel with depth to the last; empty if there is none.

@@ -1,13 +1,16 @@
-//! Plane fits over sliding windows, one row at a time.
+//! Plane fits over windows, several pixels of a row at a time.
 //!
-//! Sums over the window's rows are kept per column, each in a separate array. The windows of a row
-//! are differences of those sums, accumulated along the row. Several pixels are fitted at once.
+//! Sums over the window's rows are kept per column and slide down with the window. The sums of a
+//! window add up its columns, with places relative to its center. Where all pixels of a window are
+//! used, most of them are known in advance.
 
 use std::ops::Range;
 
 use super::lanes::Lanes;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
 use crate::internal::{VectorLoop, vectorized};
+use crate::surfel::Surfel;
+use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Smallest number of pixels that determine a plane.
 // Open: fewest pixels of a normal of C: §III-A. Twice the unknowns of a plane; a pixel with fewer
@@ -18,11 +21,12 @@ const LANES: usize = 8;
 
 /// Sums over the window's rows, one per column: n, Σv, Σv², Σw, Σvw with w = 1/z.
 ///
-/// Columns of zeros on both sides represent the outside of the patch.
+/// Zeros on both sides stand for the outside of the patch. Σv and Σv² wrap around: only sums
+/// relative to the window's center are read, which are small.
 pub(super) struct ColumnSums {
-    n: Vec<f64>,
-    v: Vec<f64>,
-    vv: Vec<f64>,
+    n: Vec<i32>,
+    v: Vec<i32>,
+    vv: Vec<i32>,
     w: Vec<f64>,
     vw: Vec<f64>,
     width: usize,
@@ -30,273 +34,272 @@ pub(super) struct ColumnSums {
     /// 1/z of the window's rows, so that the removed bits equal the added ones. Row r is stored at
     /// r modulo the number of rows.
     inverse: Vec<f64>,
-    /// The columns that those rows use.
-    spans: Vec<Range<usize>>,
+    /// A row without depth.
+    nothing: Vec<f32>,
 }
 
 impl ColumnSums {
     pub(super) fn new(width: usize, radius: usize) -> Self {
-        let rows = 2 * radius + 1;
         // A block of lanes may start at the last column.
-        let columns = || vec![0.0; width + 2 * (radius + 1) + LANES];
+        let columns = width + 2 * radius + LANES;
         Self {
-            n: columns(),
-            v: columns(),
-            vv: columns(),
-            w: columns(),
-            vw: columns(),
+            n: vec![0; columns],
+            v: vec![0; columns],
+            vv: vec![0; columns],
+            w: vec![0.0; columns],
+            vw: vec![0.0; columns],
             width,
             radius,
-            inverse: vec![0.0; width * rows],
-            spans: vec![0..0; rows],
+            inverse: vec![0.0; width * (2 * radius + 1)],
+            nothing: vec![0.0; width],
         }
     }
 
-    /// Adds the next row to the window (`None` below the patch) and removes the row that leaves it.
+    /// Moves the window down: row `entering` of the patch enters, and the last one leaves.
     ///
-    /// A row comes with the columns that it uses.
-    pub(super) fn slide(&mut self, entering: usize, row: Option<(&Range<usize>, &[f32])>) {
-        let slot = entering % self.spans.len();
-        let leaving = std::mem::replace(&mut self.spans[slot], 0..0);
-        if !leaving.is_empty() {
-            let v = entering as f64 - self.spans.len() as f64;
-            let (inverse, sums) = self.columns(slot, &leaving);
-            vectorized(SlideOut { inverse, sums, v });
-        }
-        let Some((span, depth)) = row else { return };
-        if !span.is_empty() {
-            let depth = &depth[span.clone()];
-            let (inverse, sums) = self.columns(slot, span);
-            vectorized(SlideIn {
-                depth,
-                inverse,
-                sums,
-                v: entering as f64,
-            });
-        }
-        self.spans[slot] = span.clone();
-    }
-
-    /// Returns the inverse depths of a kept row and the sums n, v, vv, w, vw in `span`.
-    /// `span`.
-    fn columns(&mut self, slot: usize, span: &Range<usize>) -> (&mut [f64], [&mut [f64]; 5]) {
-        let kept = slot * self.width;
-        let first = self.radius + 1;
-        let sums = [
-            &mut self.n,
-            &mut self.v,
-            &mut self.vv,
-            &mut self.w,
-            &mut self.vw,
-        ];
-        (
-            &mut self.inverse[kept + span.start..kept + span.end],
-            sums.map(|sums| &mut sums[first + span.start..first + span.end]),
-        )
-    }
-}
-
-/// The loop that removes a row from the window.
-struct SlideOut<'a> {
-    inverse: &'a [f64],
-    sums: [&'a mut [f64]; 5],
-    v: f64,
-}
-
-impl VectorLoop for SlideOut<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let [n, v, vv, w, vw] = self.sums;
-        add_row(self.inverse, n, v, vv, w, vw, self.v, -1.0);
+    /// Rows outside the patch are empty. `spans` are the columns that each row uses.
+    pub(super) fn slide(
+        &mut self,
+        entering: usize,
+        patch: &DepthPatch<'_>,
+        spans: &[Range<usize>],
+    ) {
+        let side = 2 * self.radius + 1;
+        let used = |v: Option<usize>| {
+            let span = v.and_then(|v| spans.get(v));
+            span.filter(|span| !span.is_empty()).cloned()
+        };
+        let leaving = entering.checked_sub(side);
+        let (added, removed) = (used(Some(entering)), used(leaving));
+        let range = match (&added, &removed) {
+            (Some(a), Some(r)) => a.start.min(r.start)..a.end.max(r.end),
+            (Some(one), None) | (None, Some(one)) => one.clone(),
+            (None, None) => return,
+        };
+        let row = |is_used: bool, v: usize| {
+            let row = if is_used { patch.row(v) } else { &self.nothing };
+            &row[range.clone()]
+        };
+        let kept = entering % side * self.width;
+        let columns = self.radius + range.start..self.radius + range.end;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // Sides of images.
+        vectorized(Slide {
+            rows: [
+                row(added.is_some(), entering),
+                row(removed.is_some(), leaving.unwrap_or(0)),
+            ],
+            at: [entering as i32, entering as i32 - side as i32],
+            inverse: &mut self.inverse[kept + range.start..kept + range.end],
+            n: &mut self.n[columns.clone()],
+            v: &mut self.v[columns.clone()],
+            vv: &mut self.vv[columns.clone()],
+            w: &mut self.w[columns.clone()],
+            vw: &mut self.vw[columns],
+        });
     }
 }
 
-/// The loop that adds a row to the window.
-struct SlideIn<'a> {
-    depth: &'a [f32],
+/// The loop that adds a row to the columns of the window and removes another.
+struct Slide<'a> {
+    /// The depth of the added and of the removed row.
+    rows: [&'a [f32]; 2],
+    /// Their places.
+    at: [i32; 2],
+    /// 1/z of the removed row, and afterwards of the added one.
     inverse: &'a mut [f64],
-    sums: [&'a mut [f64]; 5],
-    v: f64,
+    n: &'a mut [i32],
+    v: &'a mut [i32],
+    vv: &'a mut [i32],
+    w: &'a mut [f64],
+    vw: &'a mut [f64],
 }
 
-impl VectorLoop for SlideIn<'_> {
+impl VectorLoop for Slide<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (inverse, z) in self.inverse.iter_mut().zip(self.depth) {
-            let w = 1.0 / f64::from(*z);
-            *inverse = if *z >= MIN_DEPTH_METERS { w } else { 0.0 };
-        }
-        let [n, v, vv, w, vw] = self.sums;
-        add_row(self.inverse, n, v, vv, w, vw, self.v, 1.0);
+        slide_places(self.rows, self.at, self.n, self.v, self.vv);
+        slide_inverse(self.rows, self.at, self.inverse, self.w, self.vw);
     }
 }
 
-/// Adds a row of inverse depths to the sums, or removes it if the sign is −1.
-///
-/// The slices have one length.
+/// Slides n, Σv and Σv². The slices have one length.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // Parameters let the compiler assume no overlap.
-fn add_row(
-    inverse: &[f64],
-    n: &mut [f64],
-    v: &mut [f64],
-    vv: &mut [f64],
+fn slide_places(
+    [added, removed]: [&[f32]; 2],
+    [new, old]: [i32; 2],
+    n: &mut [i32],
+    v: &mut [i32],
+    vv: &mut [i32],
+) {
+    let len = added.len();
+    let (removed, n) = (&removed[..len], &mut n[..len]);
+    let (v, vv) = (&mut v[..len], &mut vv[..len]);
+    let [new_squared, old_squared] = [new.wrapping_mul(new), old.wrapping_mul(old)];
+    for u in 0..len {
+        // All bits are set where the pixel is used.
+        let add = -i32::from(added[u] >= MIN_DEPTH_METERS);
+        let remove = -i32::from(removed[u] >= MIN_DEPTH_METERS);
+        n[u] += remove - add;
+        v[u] = v[u].wrapping_add((add & new).wrapping_sub(remove & old));
+        vv[u] = vv[u].wrapping_add((add & new_squared).wrapping_sub(remove & old_squared));
+    }
+}
+
+/// Slides Σw and Σvw. The slices have one length.
+#[inline(always)]
+fn slide_inverse(
+    [added, removed]: [&[f32]; 2],
+    at: [i32; 2],
+    inverse: &mut [f64],
     w: &mut [f64],
     vw: &mut [f64],
-    row: f64,
-    sign: f64,
 ) {
-    let len = inverse.len();
-    let (n, v, vv) = (&mut n[..len], &mut v[..len], &mut vv[..len]);
+    let len = added.len();
+    let (removed, inverse) = (&removed[..len], &mut inverse[..len]);
     let (w, vw) = (&mut w[..len], &mut vw[..len]);
+    let [new, old] = at.map(f64::from);
     for u in 0..len {
-        let inverse = inverse[u];
-        let one = if inverse > 0.0 { sign } else { 0.0 };
-        let signed = inverse * sign;
-        n[u] += one;
-        v[u] += one * row;
-        vv[u] += one * (row * row);
-        w[u] += signed;
-        vw[u] += signed * row;
+        let quotient = 1.0 / f64::from(added[u]);
+        let is_removed = removed[u] >= MIN_DEPTH_METERS;
+        let add = if added[u] >= MIN_DEPTH_METERS {
+            quotient
+        } else {
+            0.0
+        };
+        let remove = if is_removed { inverse[u] } else { 0.0 };
+        inverse[u] = add;
+        w[u] = w[u] + add - remove;
+        vw[u] = vw[u] + add * new - remove * old;
     }
 }
 
-/// The sums of several windows, one per lane: n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw, Σvw.
-type Sums = [[f64; LANES]; 9];
-
-/// The fits of a row.
-#[derive(Default)]
-pub(super) struct RowFits {
-    /// Unit normals that face the camera; zero where there is none.
-    pub(super) normals: Vec<[f32; 3]>,
-    blocks: Vec<Sums>,
-}
-
-impl RowFits {
-    /// Fits the windows around the pixels of row `v` in the columns of `span`.
-    pub(super) fn fit(
-        &mut self,
-        columns: &ColumnSums,
-        rays: &Rays,
-        v: usize,
-        span: Range<usize>,
-        depth: &[f32],
-    ) {
-        let blocks = span.len().div_ceil(LANES);
-        self.blocks.resize(blocks, [[0.0; LANES]; 9]);
-        self.normals.resize(blocks * LANES, [0.0; 3]);
-        vectorized(Fit {
-            columns,
-            rays,
-            v,
-            first: span.start,
-            blocks: &mut self.blocks,
-            normals: &mut self.normals,
-        });
-        self.normals.truncate(span.len());
-        for (normal, z) in self.normals.iter_mut().zip(&depth[span]) {
-            if *z < MIN_DEPTH_METERS {
-                *normal = [0.0; 3];
-            }
-        }
-    }
-}
-
-/// The loop that fits the windows around a row's pixels from column `first` on.
-struct Fit<'a> {
-    columns: &'a ColumnSums,
-    rays: &'a Rays,
-    v: usize,
-    first: usize,
-    blocks: &'a mut [Sums],
-    normals: &'a mut [[f32; 3]],
-}
-
-impl Fit<'_> {
-    /// Computes the change of the sums when each window moves right by one pixel.
-    #[inline(always)]
-    fn differences(&mut self) {
-        let (columns, radius) = (self.columns, self.columns.radius);
-        for (block, from) in self.blocks.iter_mut().zip((self.first..).step_by(LANES)) {
-            // Column from + radius, and from − radius − 1. The zeros on the left place the latter
-            // at index `from`.
-            let (gained, lost) = (from + 2 * radius + 1, from);
-            let sums = [&columns.n, &columns.v, &columns.vv, &columns.w, &columns.vw];
-            let [gn, gv, gvv, gw, gvw] = sums.map(|sums| Lanes::of(sums, gained));
-            let [ln, lv, lvv, lw, lvw] = sums.map(|sums| Lanes::of(sums, lost));
-            let mut g = Lanes::all((from + radius) as f64);
-            let mut l = Lanes::all(from as f64 - radius as f64 - 1.0);
-            for lane in 0..LANES {
-                g.0[lane] += lane as f64;
-                l.0[lane] += lane as f64;
-            }
-            *block = [
-                gn - ln,
-                g * gn - l * ln,
-                gv - lv,
-                g * g * gn - l * l * ln,
-                g * gv - l * lv,
-                gvv - lvv,
-                gw - lw,
-                g * gw - l * lw,
-                gvw - lvw,
-            ]
-            .map(|difference| difference.0);
-        }
-    }
-
-    /// Returns the sums of the window around the pixel before the first one.
-    #[inline(always)]
-    fn window_before(&self) -> [f64; 9] {
-        let (columns, radius) = (self.columns, self.columns.radius);
-        let mut window = [0.0; 9];
-        for index in self.first..self.first + 2 * radius + 1 {
-            let u = index as f64 - radius as f64 - 1.0;
-            let (n, v, w) = (columns.n[index], columns.v[index], columns.w[index]);
-            let (vv, vw) = (columns.vv[index], columns.vw[index]);
-            let column = [n, u * n, v, u * u * n, u * v, vv, w, u * w, vw];
-            for (sum, column) in window.iter_mut().zip(column) {
-                *sum += column;
-            }
-        }
-        window
-    }
+/// The loop that fits the windows around the pixels of row `v` in the columns of `span`.
+pub(super) struct Fit<'a> {
+    pub(super) columns: &'a ColumnSums,
+    pub(super) rays: &'a Rays,
+    pub(super) v: usize,
+    pub(super) span: Range<usize>,
+    pub(super) depth: &'a [f32],
+    /// The surfels up to `span`, to which those of `span` are appended.
+    pub(super) surfels: &'a mut Vec<Surfel>,
 }
 
 impl VectorLoop for Fit<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self) {
-        self.differences();
-        let mut window = self.window_before();
-        for block in self.blocks.iter_mut() {
-            for lane in 0..LANES {
-                for (sum, lanes) in window.iter_mut().zip(block.iter_mut()) {
-                    *sum += lanes[lane];
-                    lanes[lane] = *sum;
+    fn run(self) {
+        let side = 2 * self.columns.radius + 1;
+        for from in self.span.clone().step_by(LANES) {
+            let mut n = [0; LANES];
+            for k in 0..side {
+                for (sum, n) in n.iter_mut().zip(lanes(&self.columns.n, from + k)) {
+                    *sum += n;
                 }
             }
-        }
-        let y = self.rays.y[self.v];
-        let fits = self.blocks.iter().zip(self.normals.chunks_exact_mut(LANES));
-        for ((block, normals), from) in fits.zip((self.first..).step_by(LANES)) {
-            let mut u = Lanes::all(from as f64);
-            for (lane, u) in u.0.iter_mut().enumerate() {
-                *u += lane as f64;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // At most 441.
+            let normals = if n == [(side * side) as i32; LANES] {
+                self.fit_full(from)
+            } else {
+                self.fit_any(n, from)
+            };
+            let pixels = (self.span.end - from).min(LANES);
+            let mut surfels = [Surfel::NOTHING; LANES];
+            for (lane, surfel) in surfels[..pixels].iter_mut().enumerate() {
+                let [x, y, z] = &normals;
+                let (pixel, normal) = ((from + lane, self.v), [x[lane], y[lane], z[lane]]);
+                *surfel = self.rays.surfel(pixel, self.depth[from + lane], normal);
             }
-            let x = Lanes::of(&self.rays.x, from);
-            let fit = plane_fit(block.map(Lanes), self.rays, u, self.v as f64, x, y);
-            let [x, y, z] = fit.map(Lanes::single);
-            for (lane, normal) in normals.iter_mut().enumerate() {
-                *normal = [x[lane], y[lane], z[lane]];
-            }
+            self.surfels.extend_from_slice(&surfels[..pixels]);
         }
     }
+}
+
+impl Fit<'_> {
+    /// Returns Σw, Σuw and Σvw of the windows from a column on, relative to their centers.
+    #[inline(always)]
+    fn inverse_sums(&self, from: usize) -> [Lanes<LANES>; 3] {
+        let (columns, radius) = (self.columns, self.columns.radius);
+        let center = from + radius;
+        let mut w = Lanes(*lanes(&columns.w, center));
+        let mut vw = Lanes(*lanes(&columns.vw, center));
+        let mut uw = Lanes::all(0.0);
+        for k in 1..=radius {
+            let right = Lanes(*lanes(&columns.w, center + k));
+            let left = Lanes(*lanes(&columns.w, center - k));
+            w = w + (left + right);
+            uw = uw + (right - left) * Lanes::all(k as f64);
+            let right = Lanes(*lanes(&columns.vw, center + k));
+            vw = vw + (Lanes(*lanes(&columns.vw, center - k)) + right);
+        }
+        [w, uw, vw - w * Lanes::all(self.v as f64)]
+    }
+
+    /// Fits windows in which every pixel is used.
+    ///
+    /// Then n = side², Σu = Σv = Σuv = 0, and Σu² = Σv² = n r (r + 1)/3.
+    #[inline(always)]
+    fn fit_full(&self, from: usize) -> [[f32; LANES]; 3] {
+        let (rays, radius) = (self.rays, self.columns.radius as f64);
+        let [w, b, c] = self.inverse_sums(from);
+        // The plane's w₀, b and c of `plane_fit`, times Σu².
+        let w0 = w * Lanes::all(radius * (radius + 1.0) / 3.0);
+        let (nx, ny) = (b * Lanes::all(rays.fx), c * Lanes::all(rays.fy));
+        let x = Lanes(*lanes(&rays.x, from));
+        let nz = w0 - x * nx - Lanes::all(rays.y[self.v]) * ny;
+        // Finite: depths from 1e-4 to 1000 m and focal lengths up to 1e9 pixels keep the squares
+        // between 1e-8 and 1e30.
+        let [mut nx, mut ny, mut nz] = [nx.single(), ny.single(), nz.single()];
+        for lane in 0..LANES {
+            let (x, y, z) = (nx[lane], ny[lane], nz[lane]);
+            let scale = -1.0 / (x * x + y * y + z * z).sqrt();
+            (nx[lane], ny[lane], nz[lane]) = (x * scale, y * scale, z * scale);
+        }
+        [nx, ny, nz]
+    }
+
+    /// Fits windows with any number of pixels. Their normals are zero if these are too few.
+    #[inline(always)]
+    fn fit_any(&self, n: [i32; LANES], from: usize) -> [[f32; LANES]; 3] {
+        let columns = self.columns;
+        let (mut u, mut uu, mut uv) = ([0_i32; LANES], [0_i32; LANES], [0_i32; LANES]);
+        let (mut v, mut vv) = ([0_i32; LANES], [0_i32; LANES]);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // At most 10, 32768.
+        let (radius, v0) = (columns.radius as i32, self.v as i32);
+        for (k, at) in (-radius..=radius).zip(from..) {
+            let (n, column_v) = (lanes(&columns.n, at), lanes(&columns.v, at));
+            let column_vv = lanes(&columns.vv, at);
+            for lane in 0..LANES {
+                // Relative to the row of the center.
+                let down = column_v[lane].wrapping_sub(v0.wrapping_mul(n[lane]));
+                let squares = column_vv[lane]
+                    .wrapping_sub(v0.wrapping_mul(column_v[lane].wrapping_add(down)));
+                u[lane] += k * n[lane];
+                uu[lane] += k * k * n[lane];
+                v[lane] += down;
+                uv[lane] += k * down;
+                vv[lane] += squares;
+            }
+        }
+        let [n, u, v] = [Lanes::of(n), Lanes::of(u), Lanes::of(v)];
+        let [uu, uv, vv] = [Lanes::of(uu), Lanes::of(uv), Lanes::of(vv)];
+        let [w, uw, vw] = self.inverse_sums(from);
+        let sums = [n, u, v, uu, uv, vv, w, uw, vw];
+        let (x, y) = (Lanes(*lanes(&self.rays.x, from)), self.rays.y[self.v]);
+        let [nx, ny, nz] = plane_fit(sums, self.rays, Lanes::all(0.0), 0.0, x, y);
+        [nx.single(), ny.single(), nz.single()]
+    }
+}
+
+/// Returns the numbers from an index on, one per lane.
+#[inline(always)]
+fn lanes<T>(numbers: &[T], from: usize) -> &[T; LANES] {
+    let Some(lanes) = numbers[from..].first_chunk() else {
+        unreachable!("columns and rays are padded by {LANES}")
+    };
+    lanes
 }
 
 /// Fits 1/z = w₀ + b (u−u₀) + c (v−v₀) and returns its normal at pixel (u₀, v₀).
@@ -344,7 +347,7 @@ fn plane_fit<const N: usize>(
     normal
 }
 
-/// The sums of one window in the order of [`Sums`], with columns and rows relative to its corner.
+/// The sums of one window in the order n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw, Σvw, with columns and rows relative to its corner.
 #[derive(Clone, Copy)]
 pub(super) struct WindowSums([f64; 9]);
 
@@ -399,7 +402,7 @@ impl WindowSums {
 }
 
 /// Ray slopes (x/z, y/z) of the region's columns and rows.
-pub(super) struct Rays {
+pub(crate) struct Rays {
     fx: f64,
     fy: f64,
     /// Followed by as many zeros as there are lanes.
@@ -419,6 +422,21 @@ impl Rays {
             y: (region.v_min..region.v_max)
                 .map(|v| (f64::from(v) - camera.cy()) / camera.fy())
                 .collect(),
+        }
+    }
+
+    /// Returns the surfel of a pixel, given its depth and normal.
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation)] // Surfels are of single precision.
+    pub(super) fn surfel(&self, (u, v): (usize, usize), z: f32, normal: [f32; 3]) -> Surfel {
+        let (x, y) = (self.x[u] as f32, self.y[v] as f32);
+        if z >= MIN_DEPTH_METERS && normal != [0.0; 3] {
+            Surfel {
+                point: Point3::new(x * z, y * z, z),
+                normal: UnitVector3::new_unchecked(Vector3::from(normal)),
+            }
+        } else {
+            Surfel::NOTHING
         }
     }
 }
