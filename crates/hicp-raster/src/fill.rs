@@ -13,6 +13,8 @@ pub(crate) struct Target<'a> {
     depth: &'a mut [f32],
     triangles: &'a mut [u32],
     width: usize,
+    /// Zero, which the compiler does not know; see [`keep_nearer`].
+    zero: i32,
 }
 
 impl<'a> Target<'a> {
@@ -24,6 +26,7 @@ impl<'a> Target<'a> {
             depth,
             triangles,
             width: region.width(),
+            zero: std::hint::black_box(0),
         }
     }
 
@@ -66,7 +69,7 @@ impl<'a> Target<'a> {
             ) else {
                 unreachable!("the row has N pixels")
             };
-            keep_nearer(depths, ids, &candidates, &outside, triangle);
+            keep_nearer(depths, ids, &candidates, &outside, triangle, self.zero);
             edges.next_row();
             start += self.width;
             v += 1.0;
@@ -106,6 +109,7 @@ impl VectorLoop for FillWide<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let (coverage, plane) = (self.coverage, self.plane);
+        let (triangle, zero) = (self.triangle, self.target.zero);
         let mut edges = coverage.edges;
         let mut start = self.target.index(coverage.u, coverage.v);
         let (first_u, mut v) = (to_f64(coverage.u), to_f64(coverage.v));
@@ -114,20 +118,26 @@ impl VectorLoop for FillWide<'_, '_> {
             if first < end {
                 let row = plane.at_row(v);
                 let mut u = first_u + to_f64(first);
-                let span = start + index(first)..start + index(end);
-                Work::PixelsTested.count(span.len());
-                let (depths, last_depths) =
-                    self.target.depth[span.clone()].as_chunks_mut::<LANES>();
-                let (ids, last_ids) = self.target.triangles[span].as_chunks_mut::<LANES>();
-                for (depths, ids) in depths.iter_mut().zip(ids) {
+                let (mut at, last) = (start + index(first), start + index(end));
+                Work::PixelsTested.count(last - at);
+                while at < last {
+                    let (Some(depths), Some(ids)) = (
+                        self.target.depth[at..].first_chunk_mut::<LANES>(),
+                        self.target.triangles[at..].first_chunk_mut::<LANES>(),
+                    ) else {
+                        break;
+                    };
                     let candidates = plane.depths(row, &columns_from::<LANES>(u));
-                    keep_nearer(depths, ids, &candidates, &[0; LANES], self.triangle);
+                    let outside = beyond(last - at);
+                    keep_nearer(depths, ids, &candidates, &outside, triangle, zero);
                     u += LANES as f64;
+                    at += LANES;
                 }
-                for (depth, id) in last_depths.iter_mut().zip(last_ids) {
-                    let candidate = plane.depth(row, u);
-                    let (depth, id) = (std::array::from_mut(depth), std::array::from_mut(id));
-                    keep_nearer(depth, id, &[candidate], &[0], self.triangle);
+                // At the end of the view.
+                for at in at..last {
+                    let depth = std::array::from_mut(&mut self.target.depth[at]);
+                    let id = std::array::from_mut(&mut self.target.triangles[at]);
+                    keep_nearer(depth, id, &[plane.depth(row, u)], &[0], triangle, zero);
                     u += 1.0;
                 }
             }
@@ -138,6 +148,23 @@ impl VectorLoop for FillWide<'_, '_> {
             v += 1.0;
         }
     }
+}
+
+/// Returns numbers that are negative for lanes from `columns` on.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "at most 32768"
+)]
+fn beyond<const N: usize>(columns: usize) -> [i32; N] {
+    let mut left = columns as i32 - 1;
+    let mut beyond = [0; N];
+    for lane in &mut beyond {
+        *lane = left;
+        left -= 1;
+    }
+    beyond
 }
 
 /// The largest edge function in 32 bits.
@@ -169,7 +196,7 @@ impl<const N: usize> LaneEdges<N> {
         let mut lanes = Self {
             values: [[0; N]; 3],
             per_v: [0; 3],
-            beyond: [0; N],
+            beyond: beyond(index(coverage.columns)),
         };
         for (index, edge) in coverage.edges.iter().enumerate() {
             // The largest magnitude at any of the tested pixels.
@@ -187,12 +214,6 @@ impl<const N: usize> LaneEdges<N> {
                 lane_value = lane_value.wrapping_add(per_u);
             }
             lanes.per_v[index] = per_v;
-        }
-        #[allow(clippy::cast_possible_truncation, reason = "a few columns")]
-        let mut left = coverage.columns as i32 - 1;
-        for beyond in &mut lanes.beyond {
-            *beyond = left;
-            left -= 1;
         }
         Some(lanes)
     }
@@ -250,26 +271,26 @@ fn keep_nearer<const N: usize>(
     candidates: &[f32; N],
     outside: &[i32; N],
     triangle: u32,
+    zero: i32,
 ) {
-    // Masks are all-ones or zero in each lane, because a choice would become a branch per lane.
-    let mut taken = [0_u32; N];
+    // Positive numbers are ordered like their bits; less one, a missing depth is the farthest. Signs
+    // become masks, all-ones or zero in each lane. If the compiler knew that (`zero`), it would make
+    // masked stores of them, which are an order of magnitude slower than others on some processors.
+    let mut taken = [0_i32; N];
     for lane in 0..N {
-        taken[lane] = !(outside[lane] >> 31).cast_unsigned();
-    }
-    let mut nearer = [0_u32; N];
-    for lane in 0..N {
-        let (old, candidate) = (depths[lane], candidates[lane]);
-        nearer[lane] = u32::from((old == 0.0) | (candidate < old)).wrapping_neg();
-    }
-    for lane in 0..N {
-        taken[lane] &= nearer[lane];
+        let old = depths[lane].to_bits().wrapping_sub(1) & (u32::MAX >> 1);
+        let candidate = candidates[lane].to_bits().wrapping_sub(1);
+        let nearer = candidate.wrapping_sub(old).cast_signed();
+        taken[lane] = (nearer & !outside[lane]) >> 31 | zero;
     }
     for lane in 0..N {
+        let taken = taken[lane].cast_unsigned();
         let (old, candidate) = (depths[lane].to_bits(), candidates[lane].to_bits());
-        depths[lane] = f32::from_bits((candidate & taken[lane]) | (old & !taken[lane]));
+        depths[lane] = f32::from_bits((candidate & taken) | (old & !taken));
     }
     for lane in 0..N {
-        ids[lane] = (triangle & taken[lane]) | (ids[lane] & !taken[lane]);
+        let taken = taken[lane].cast_unsigned();
+        ids[lane] = (triangle & taken) | (ids[lane] & !taken);
     }
 }
 

@@ -66,9 +66,9 @@ impl Default for RasterConfig {
 ///   region at the origin.
 /// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]. Of several triangles
 ///   at the same depth, it is the first.
-/// - Depth agrees with the intersection of the ray to about 10⁻⁷ of its value. Exceptions are
-///   positions within 2⁻²⁰ pixel of an edge, and triangles so nearly edge-on that the vertices do
-///   not determine it. It always lies in the depth range of the triangle.
+/// - Depth agrees with the intersection of the ray to two roundings to `f32`, 1.2·10⁻⁷ of its
+///   value. Exceptions are positions within 2⁻²⁰ pixel of an edge, and triangles so nearly edge-on
+///   that the vertices do not determine it. It always lies in the depth range of the triangle.
 /// - A pose that is not finite, or beyond 10³⁰ m, shows nothing.
 ///
 /// Cost: O(vertices + triangles + pixels of the view + covered pixels, including overdraw). The

@@ -13,44 +13,56 @@ const LANES: usize = 8;
 /// The weights of a row of pixels of the mask.
 pub(crate) trait Weights: Copy {
     /// The largest weight: all-ones if a pixel either counts or does not.
-    const ONE: u64;
+    const ONE: u32;
     /// Whether there are weights between 0 and the largest.
     const GRADED: bool;
 
     /// Returns the weights of `n` pixels from the pixel `first` on, and 0 beyond them.
-    fn load(&self, first: usize, n: usize) -> [u64; LANES];
+    fn load(&self, first: usize, n: usize) -> [u32; LANES];
 }
 
 /// An exact mask.
 impl Weights for &[bool] {
-    const ONE: u64 = u64::MAX;
+    const ONE: u32 = u32::MAX;
     const GRADED: bool = false;
 
     #[inline(always)]
-    fn load(&self, first: usize, n: usize) -> [u64; LANES] {
-        let mut masked = [false; LANES];
-        if n == LANES {
-            masked.copy_from_slice(&self[first..first + LANES]);
-        } else {
-            masked[..n].copy_from_slice(&self[first..]);
+    fn load(&self, first: usize, n: usize) -> [u32; LANES] {
+        let masked = lanes(self, first, n);
+        let mut weights = [0; LANES];
+        for (weight, masked) in weights.iter_mut().zip(masked) {
+            *weight = all_bits(masked);
         }
-        masked.map(all_bits)
+        weights
     }
 }
 
 /// Weights of an imperfect mask; `None` outside of its region.
 impl Weights for Option<&[u8]> {
-    const ONE: u64 = CERTAIN as u64;
+    const ONE: u32 = CERTAIN as u32;
     const GRADED: bool = true;
 
     #[inline(always)]
-    fn load(&self, first: usize, n: usize) -> [u64; LANES] {
+    fn load(&self, first: usize, n: usize) -> [u32; LANES] {
         let mut weights = [0; LANES];
         if let Some(row) = self {
-            weights[..n].copy_from_slice(&row[first..first + n]);
+            for (weight, byte) in weights.iter_mut().zip(lanes(row, first, n)) {
+                *weight = u32::from(byte);
+            }
         }
-        weights.map(u64::from)
+        weights
     }
+}
+
+/// Returns `n` values from the index `first` on, and defaults after them.
+#[inline(always)]
+fn lanes<T: Copy + Default>(values: &[T], first: usize, n: usize) -> [T; LANES] {
+    if let Some(full) = values[first..].first_chunk().filter(|_| n == LANES) {
+        return *full;
+    }
+    let mut lanes = [T::default(); LANES];
+    lanes[..n].copy_from_slice(&values[first..first + n]);
+    lanes
 }
 
 /// A row of pixels: rendered depth, measured depth and mask, from the same column on.
@@ -109,48 +121,44 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
 
     #[inline(always)]
     fn run(self) -> Found {
-        let limits = tolerances();
-        let inverse_diameter = 1.0 / self.diameter;
-        let mut correct = [[0_u64; LANES]; N_TOLERANCES];
-        let mut outside = [0_u64; LANES];
-        let (mut covered, mut nearer) = ([0_u64; LANES], [0_u64; LANES]);
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
+        let [cx, inverse_fx, diameter, hidden_beyond] =
+            [self.cx, self.inverse_fx, self.diameter, self.hidden_beyond].map(|value| value as f32);
+        let limits = tolerances().map(|share| share as f32 * diameter);
+        let mut all_correct = [[0_u64; LANES]; N_TOLERANCES];
+        let (mut all_outside, mut all_covered) = ([0_u64; LANES], [0_u64; LANES]);
+        let mut all_nearer = [0_u64; LANES];
         for row in self.rows {
-            let squared_y = row.y * row.y + 1.0;
+            // The sums of a row fit 32 bits.
+            let mut correct = [[0_u32; LANES]; N_TOLERANCES];
+            let mut outside = [0_u32; LANES];
+            let (mut covered, mut nearer) = ([0_u32; LANES], [0_u32; LANES]);
+            #[allow(clippy::cast_possible_truncation)]
+            let squared_y = (row.y * row.y + 1.0) as f32;
             let width = row.rendered.len();
-            let mut first = 0;
-            while first < width {
+            for first in (0..width).step_by(LANES) {
                 // The last pixels of a row are padded with pixels that do not count.
                 let n = (width - first).min(LANES);
-                let (mut rendered, mut observed) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-                let weights = if n == LANES {
-                    rendered.copy_from_slice(&row.rendered[first..first + LANES]);
-                    observed.copy_from_slice(&row.observed[first..first + LANES]);
-                    row.mask.load(first, LANES)
-                } else {
-                    rendered[..n].copy_from_slice(&row.rendered[first..]);
-                    observed[..n].copy_from_slice(&row.observed[first..]);
-                    row.mask.load(first, n)
-                };
+                let rendered = lanes(row.rendered, first, n);
                 if rendered == [0.0; LANES] {
-                    first += LANES;
                     continue;
                 }
+                let observed = lanes(row.observed, first, n);
+                let weights = row.mask.load(first, n);
                 // Masks are all-ones or zero instead of `bool`, which avoids a branch per pixel.
-                let mut relative = [0.0; LANES];
+                let mut distance = [0.0; LANES];
                 let mut certain = [0; LANES];
                 for lane in 0..LANES {
-                    let (z, measured) = (f64::from(rendered[lane]), f64::from(observed[lane]));
-                    let u = f64::from(row.u) + (first + lane) as f64;
-                    let x = (u - self.cx) * self.inverse_fx;
+                    let (z, measured) = (rendered[lane], observed[lane]);
+                    let x = ((row.u as usize + first + lane) as f32 - cx) * inverse_fx;
                     let distance_per_depth = (x * x + squared_y).sqrt();
                     let behind = (z - measured) * distance_per_depth;
                     let (seen, known) = (all_bits(z > 0.0), all_bits(measured > 0.0));
                     let outside_mask = W::ONE - weights[lane];
                     let counts = if W::GRADED {
                         // Outside the mask, a pixel counts half if it is near the surface.
-                        let through = all_bits(behind < -self.hidden_beyond) | !known;
-                        let front =
-                            all_bits(behind > self.hidden_beyond.max(0.25 * self.diameter)) & known;
+                        let through = all_bits(behind < -hidden_beyond) | !known;
+                        let front = all_bits(behind > hidden_beyond.max(0.25 * diameter)) & known;
                         let near = (outside_mask / 2) & seen & !through & !front;
                         outside[lane] += (outside_mask & seen & through) + near;
                         nearer[lane] += outside_mask & seen & front;
@@ -158,39 +166,48 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                         certain[lane] = weights[lane] + near;
                         all_bits(certain[lane] > 0)
                     } else {
-                        let hidden = known & all_bits(behind > self.hidden_beyond);
+                        let hidden = known & all_bits(behind > hidden_beyond);
                         outside[lane] += 1 & outside_mask & seen & !hidden;
                         weights[lane]
                     };
                     // NaN if the pixel does not count: NaN is below no limit.
                     let nothing = !(seen & known & counts);
-                    relative[lane] =
-                        f64::from_bits((behind.abs() * inverse_diameter).to_bits() | nothing);
+                    distance[lane] = f32::from_bits(behind.abs().to_bits() | nothing);
                 }
                 for (correct, limit) in correct.iter_mut().zip(limits) {
                     for lane in 0..LANES {
-                        correct[lane] += if W::GRADED {
-                            certain[lane] & all_bits(relative[lane] < limit)
-                        } else {
-                            u64::from(relative[lane] < limit)
-                        };
+                        let within = all_bits(distance[lane] < limit);
+                        correct[lane] += within & if W::GRADED { certain[lane] } else { 1 };
                     }
                 }
-                first += LANES;
             }
+            for (all, correct) in all_correct.iter_mut().zip(&correct) {
+                add(all, correct);
+            }
+            add(&mut all_outside, &outside);
+            add(&mut all_covered, &covered);
+            add(&mut all_nearer, &nearer);
         }
         let sum = |lanes: [u64; LANES]| lanes.iter().sum::<u64>();
         Found {
-            correct: correct.map(sum),
-            outside: sum(outside),
-            covered: sum(covered),
-            nearer: sum(nearer),
+            correct: all_correct.map(sum),
+            outside: sum(all_outside),
+            covered: sum(all_covered),
+            nearer: sum(all_nearer),
         }
+    }
+}
+
+/// Adds the counts of a row to those of all rows.
+#[inline(always)]
+fn add(all: &mut [u64; LANES], row: &[u32; LANES]) {
+    for (all, row) in all.iter_mut().zip(row) {
+        *all += u64::from(*row);
     }
 }
 
 /// Returns all-ones if the condition holds, otherwise zero.
 #[inline(always)]
-fn all_bits(condition: bool) -> u64 {
-    u64::from(condition).wrapping_neg()
+fn all_bits(condition: bool) -> u32 {
+    u32::from(condition).wrapping_neg()
 }

@@ -172,5 +172,8 @@ fn an_occluder_at_exactly_the_tolerance_does_not_hide() {
         };
         mve(mean_vsd, &drawn([0.5, 0.5]), &observation)
     };
-    assert_eq!((found(0.25), found(0.25_f64.next_down())), (0.5, 0.0));
+    assert_eq!(
+        (found(0.25), found(f64::from(0.25_f32.next_down()))),
+        (0.5, 0.0)
+    );
 }
