@@ -6,7 +6,7 @@ use std::cell::RefCell;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use hicp_benches::{OBJECTS, case, forget_renders};
-use hybrid_icp::core::{Observation, Problem};
+use hybrid_icp::core::{Observation, Problem, Translation3, UnitQuaternion, Vector3};
 use hybrid_icp::{Preset, Refiner};
 
 /// Measures warm refinements.
@@ -61,5 +61,29 @@ fn cold(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, pipeline, cold);
+/// Measures `auto` from starts that it leaves by a search, and the estimate of a pose without a
+/// start.
+///
+/// The starts are turned by half a turn around an axis across the view.
+fn search(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("pipeline");
+    let mut refiner = Refiner::preset(Preset::Auto);
+    for object in OBJECTS {
+        let case = case(object);
+        let (model, observation) = (&case.scene.model, &case.scene.observation);
+        let center = model.center().coords;
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let around_center = Translation3::from(center) * turn * Translation3::from(-center);
+        let turned = case.init * around_center;
+        group.bench_function(BenchmarkId::new("auto-searching", case.name), |bencher| {
+            bencher.iter(|| refiner.refine(model, observation, &turned));
+        });
+        group.bench_function(BenchmarkId::new("estimate", case.name), |bencher| {
+            bencher.iter(|| refiner.estimate(model, observation));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, pipeline, search, cold);
 criterion_main!(benches);

@@ -17,7 +17,7 @@ use hybrid_icp::icp::Workspace;
 use hybrid_icp::metric::Minimize;
 use hybrid_icp::metric::{PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::score::{MeanVsd, Score};
+use hybrid_icp::score::{MeanVsd, SampledMve, Score};
 
 fn cases() -> Vec<Case> {
     OBJECTS.into_iter().map(case).collect()
@@ -143,6 +143,16 @@ fn score(criterion: &mut Criterion) {
                 let mut context = workspace.context(&problem);
                 MeanVsd::default().score(&mut context, &case.init)
             });
+        });
+    }
+    // Poses per second of a ranking.
+    for case in cases() {
+        let problem = Problem::new(&case.scene.model, &case.scene.observation);
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut sampled = SampledMve::default();
+        group.throughput(Throughput::Elements(1));
+        group.bench_function(BenchmarkId::new("sampled-mve", case.name), |bencher| {
+            bencher.iter(|| sampled.score(&mut workspace.context(&problem), &case.init));
         });
     }
     group.finish();
