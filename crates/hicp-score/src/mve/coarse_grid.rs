@@ -4,23 +4,23 @@ use std::sync::Arc;
 
 use hicp_core::Observation;
 
-use crate::mve::sampled_mve::LANES;
 use crate::mve::trust_map::{CERTAIN, TrustMap};
 
-/// The pixels of a decimated observation, without most of the noise.
-///
-/// Row-major, and followed by [`LANES`] pixels without a measured depth.
-pub(crate) struct CoarseGrid {
-    /// Number of columns.
-    pub(crate) width: usize,
+/// A pixel of the coarse image.
+pub(crate) struct CoarsePixel {
     /// Meters; 0 without a measured depth.
-    pub(crate) measured: Vec<f32>,
-    /// The certainties that pixels show the object, at most [`CoarseGrid::one`].
-    pub(crate) weights: Vec<u32>,
-    /// Distances from the camera divided by the depth.
-    pub(crate) distance_per_depth: Vec<f32>,
+    pub(crate) measured: f32,
+    /// The certainty that it shows the object, at most [`CoarseGrid::one`].
+    pub(crate) weight: u64,
+    /// Distance from the camera divided by the depth.
+    pub(crate) distance_per_depth: f64,
+}
+
+/// The pixels of a decimated observation, without most of the noise.
+pub(crate) struct CoarseGrid {
+    pub(crate) pixels: Vec<CoarsePixel>,
     /// The weight of a pixel that certainly shows the object.
-    pub(crate) one: u32,
+    pub(crate) one: u64,
     /// The sum of the weights of measured pixels.
     pub(crate) total: u64,
     /// The distance behind the rendered surface from which on the camera sees through it; `None`
@@ -38,11 +38,11 @@ impl CoarseGrid {
     pub(crate) fn exact(fine: &Observation, coarse: &Observation) -> Arc<Self> {
         coarse.derived().get_or_build(0, || {
             let mask = coarse.mask().pixels();
-            let grid = Self::new(fine, coarse, |index, _| u32::from(mask[index]));
             Self {
+                pixels: pixels(fine, coarse, |index, _| u64::from(mask[index])),
                 one: 1,
                 total: coarse.n_measured() as u64,
-                ..grid
+                seen_through_meters: None,
             }
         })
     }
@@ -53,52 +53,15 @@ impl CoarseGrid {
     pub(crate) fn imperfect(fine: &Observation, coarse: &Observation, diameter: f64) -> Arc<Self> {
         coarse.derived().get_or_build(diameter.to_bits(), || {
             let trust = TrustMap::of(fine, diameter);
-            let grid = Self::new(fine, coarse, |_, (u, v)| u32::from(trust.weight(u, v)));
-            let pixels = grid.measured.iter().zip(&grid.weights);
-            let known = pixels.filter(|(z, _)| **z > 0.0);
+            let pixels = pixels(fine, coarse, |_, (u, v)| u64::from(trust.weight(u, v)));
+            let measured = pixels.iter().filter(|pixel| pixel.measured > 0.0);
             Self {
-                one: u32::from(CERTAIN),
-                total: known.map(|(_, weight)| u64::from(*weight)).sum(),
+                one: u64::from(CERTAIN),
+                total: measured.map(|pixel| pixel.weight).sum(),
                 seen_through_meters: Some(trust.seen_through_meters()),
-                ..grid
+                pixels,
             }
         })
-    }
-
-    /// Creates a grid with weights for the indices of pixels and their places in the fine image.
-    fn new(
-        fine: &Observation,
-        coarse: &Observation,
-        weight: impl Fn(usize, (u32, u32)) -> u32,
-    ) -> Self {
-        let (camera, factor) = (coarse.camera(), factor(fine, coarse));
-        let size = coarse.depth().pixels().len() + LANES;
-        let mut grid = Self {
-            width: camera.width() as usize,
-            measured: Vec::with_capacity(size),
-            weights: Vec::with_capacity(size),
-            distance_per_depth: Vec::with_capacity(size),
-            one: 0,
-            total: 0,
-            seen_through_meters: None,
-        };
-        let places = (0..camera.height()).flat_map(|v| (0..camera.width()).map(move |u| (u, v)));
-        let depth = coarse.depth().pixels().iter().enumerate();
-        for ((u, v), (index, z)) in places.zip(depth) {
-            let x = (f64::from(u) - camera.cx()) / camera.fx();
-            let y = (f64::from(v) - camera.cy()) / camera.fy();
-            let place = (u * factor, v * factor);
-            let measured = median_around(fine, place, factor).unwrap_or(*z);
-            grid.measured.push(measured);
-            grid.weights.push(weight(index, place));
-            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
-            grid.distance_per_depth
-                .push((x * x + y * y + 1.0).sqrt() as f32);
-        }
-        grid.measured.resize(size, 0.0);
-        grid.weights.resize(size, 0);
-        grid.distance_per_depth.resize(size, 1.0);
-        grid
     }
 }
 
@@ -108,6 +71,28 @@ fn factor(fine: &Observation, coarse: &Observation) -> u32 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small whole number.
     let factor = ratio.round() as u32;
     factor.max(1)
+}
+
+/// Returns the pixels, with weights for their indices and for their places in the fine image.
+fn pixels(
+    fine: &Observation,
+    coarse: &Observation,
+    weight: impl Fn(usize, (u32, u32)) -> u64,
+) -> Vec<CoarsePixel> {
+    let (camera, factor) = (coarse.camera(), factor(fine, coarse));
+    let places = (0..camera.height()).flat_map(|v| (0..camera.width()).map(move |u| (u, v)));
+    let depth = coarse.depth().pixels().iter().enumerate();
+    let pixels = places.zip(depth).map(|((u, v), (index, z))| {
+        let x = (f64::from(u) - camera.cx()) / camera.fx();
+        let y = (f64::from(v) - camera.cy()) / camera.fy();
+        let place = (u * factor, v * factor);
+        CoarsePixel {
+            measured: median_around(fine, place, factor).unwrap_or(*z),
+            weight: weight(index, place),
+            distance_per_depth: (x * x + y * y + 1.0).sqrt(),
+        }
+    });
+    pixels.collect()
 }
 
 /// Returns the median depth around a pixel of the mask.
