@@ -13,7 +13,7 @@ pub(crate) struct CoarsePixel {
     /// The certainty that it shows the object, at most [`CoarseGrid::one`].
     pub(crate) weight: u64,
     /// Distance from the camera divided by the depth.
-    pub(crate) distance_per_depth: f64,
+    pub(crate) distance_per_depth: f32,
 }
 
 /// The pixels of a decimated observation, without most of the noise.
@@ -89,7 +89,8 @@ fn pixels(
         CoarsePixel {
             measured: median_around(fine, place, factor).unwrap_or(*z),
             weight: weight(index, place),
-            distance_per_depth: (x * x + y * y + 1.0).sqrt(),
+            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
+            distance_per_depth: (x * x + y * y + 1.0).sqrt() as f32,
         }
     });
     pixels.collect()

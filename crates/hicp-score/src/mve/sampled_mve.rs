@@ -11,7 +11,7 @@ use crate::mve::coarse_grid::CoarseGrid;
 use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
 use crate::score::Score;
-use crate::tolerances::{AgreementCounts, mean};
+use crate::tolerances::N_TOLERANCES;
 
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
@@ -100,28 +100,33 @@ impl SampledMve {
 
     /// Compares the depth buffer with the observation, and clears it.
     fn compare(&mut self, grid: &CoarseGrid, diameter: f64) -> f64 {
-        let mut correct = AgreementCounts::new(diameter);
-        let mut outside = 0;
         let hidden_beyond = match grid.seen_through_meters {
             Some(meters) => -meters,
             None => self.occlusion.least_distance_behind(),
         };
+        // The tolerances are multiples of a twentieth of the diameter.
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
+        let (per_meter, hidden_beyond) = ((20.0 / diameter) as f32, hidden_beyond as f32);
+        let most = N_TOLERANCES as f32;
+        // The weights of pixels that agree, summed over the tolerances.
+        let (mut agreement, mut outside) = (0, 0);
         for index in self.touched.drain(..) {
             let pixel = &grid.pixels[index as usize];
-            let z = f64::from(std::mem::take(&mut self.buffer[index as usize]));
-            let behind = (z - f64::from(pixel.measured)) * pixel.distance_per_depth;
+            let z = std::mem::take(&mut self.buffer[index as usize]);
+            let behind = (z - pixel.measured) * pixel.distance_per_depth;
             let known = pixel.measured > 0.0;
-            if pixel.weight > 0 && known {
-                correct.add(behind.abs(), pixel.weight);
-            }
-            if !(known && behind > hidden_beyond) {
-                outside += grid.one - pixel.weight;
-            }
+            // A pixel agrees within a tolerance if it differs by less.
+            let beyond = whole((behind.abs() * per_meter).min(most));
+            let agrees = u64::from(known) * (N_TOLERANCES as u64 - u64::from(beyond));
+            agreement += agrees * pixel.weight;
+            let hidden = known & (behind > hidden_beyond);
+            outside += u64::from(!hidden) * (grid.one - pixel.weight);
         }
         if grid.total == 0 {
             return 1.0;
         }
-        mean(&correct.errors(grid.total + outside))
+        let most = N_TOLERANCES as u64 * (grid.total + outside);
+        (most - agreement) as f64 / most as f64
     }
 }
 
@@ -162,7 +167,8 @@ const LANES: usize = 16;
 
 /// Points and normals of some samples, by coordinate.
 ///
-/// The last ones are padded with points that are not numbers.
+/// The last ones are padded with points that are not numbers. Neighbors have similar normals, so
+/// that many blocks face away with all their samples.
 struct Block {
     points: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
@@ -177,14 +183,24 @@ struct Surface {
 
 impl Surface {
     fn of(model: &Model, samples: usize) -> Arc<Self> {
-        model.derived().get_or_build(samples as u64, || Self {
-            blocks: sample_surface(model.mesh(), samples)
-                .chunks(LANES)
-                .map(Block::new)
-                .collect(),
-            oriented: model.mesh().is_closed(),
+        model.derived().get_or_build(samples as u64, || {
+            let mut surfels = sample_surface(model.mesh(), samples);
+            surfels.sort_by_key(direction);
+            Self {
+                blocks: surfels.chunks(LANES).map(Block::new).collect(),
+                oriented: model.mesh().is_closed(),
+            }
         })
     }
+}
+
+/// Returns a number that is similar for similar normals: a cell on a cube around the origin.
+fn direction(surfel: &Surfel) -> (usize, bool, [i32; 2]) {
+    let normal = surfel.normal;
+    let axis = normal.iamax();
+    #[allow(clippy::cast_possible_truncation)] // From −2 to 2.
+    let cell = |step: usize| (2.9 * normal[(axis + step) % 3] / normal[axis].abs()) as i32;
+    (axis, normal[axis] > 0.0, [cell(1), cell(2)])
 }
 
 impl Block {
@@ -229,11 +245,17 @@ impl VectorLoop for Splat<'_> {
         let shift = pose.translation.vector;
         for block in &self.surface.blocks {
             let ([x, y, z], [a, b, c]) = (&block.points, &block.normals);
-            let (mut pixels, mut depths) = ([u32::MAX; LANES], [0.0; LANES]);
+            let mut away = [0.0; LANES];
             for lane in 0..LANES {
-                let away = a[lane] * (x[lane] - eye.x)
+                away[lane] = a[lane] * (x[lane] - eye.x)
                     + b[lane] * (y[lane] - eye.y)
                     + c[lane] * (z[lane] - eye.z);
+            }
+            if self.surface.oriented && away.iter().all(|away| *away >= 0.0) {
+                continue;
+            }
+            let (mut pixels, mut depths) = ([u32::MAX; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
                 let moved = |row: usize| {
                     rotation[(row, 0)] * x[lane]
                         + rotation[(row, 1)] * y[lane]
@@ -249,7 +271,7 @@ impl VectorLoop for Splat<'_> {
                     & (v >= 0.0)
                     & (u < width)
                     & (v < height)
-                    & !(self.surface.oriented & (away >= 0.0));
+                    & !(self.surface.oriented & (away[lane] >= 0.0));
                 let pixel = whole(v).wrapping_mul(stride).wrapping_add(whole(u));
                 pixels[lane] = if inside { pixel } else { u32::MAX };
                 depths[lane] = depth;

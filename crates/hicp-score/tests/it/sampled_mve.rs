@@ -268,6 +268,6 @@ fn an_occluder_at_exactly_the_tolerance_does_not_hide() {
         score(&mut sampled, &model, &observation, &pose)
     };
     // All others agree.
-    assert_eq!(found(0.25_f64.next_down()), 0.0);
+    assert_eq!(found(f64::from(0.25_f32.next_down())), 0.0);
     assert!((found(0.25) - 1.0 / 64.0).abs() < 1e-15);
 }
