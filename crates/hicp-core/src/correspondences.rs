@@ -26,6 +26,7 @@ pub struct Pair {
 impl Pair {
     /// Creates a pair of weight 1.
     #[must_use]
+    #[inline]
     pub fn new(source_index: u32, source: Surfel, target_index: u32, target: Surfel) -> Self {
         Self {
             source,
@@ -109,6 +110,7 @@ impl Correspondences {
     }
 
     /// Adds a pair.
+    #[inline]
     pub fn push(&mut self, pair: Pair) {
         self.pairs.push(pair);
     }

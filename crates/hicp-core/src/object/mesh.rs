@@ -130,6 +130,7 @@ impl TriMesh {
     ///
     /// If `triangle` is not below the number of triangles.
     #[must_use]
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Point3<f32>; 3] {
         self.triangles[triangle].map(|i| self.vertices[i as usize])
     }
@@ -142,6 +143,7 @@ impl TriMesh {
     ///
     /// If `triangle` is not below the number of triangles.
     #[must_use]
+    #[inline]
     pub fn normal(&self, triangle: usize) -> Option<UnitVector3<f32>> {
         let double_area = self.double_area_vector(triangle);
         let norm = double_area.norm();
@@ -220,10 +222,12 @@ impl TriMesh {
     ///
     /// If `triangle` is not below the number of triangles.
     #[must_use]
+    #[inline]
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         0.5 * self.double_area_vector(triangle).norm()
     }
 
+    #[inline]
     fn double_area_vector(&self, triangle: usize) -> Vector3<f64> {
         let [a, b, c] = self.corners(triangle).map(|p| p.cast::<f64>());
         (b - a).cross(&(c - a))
