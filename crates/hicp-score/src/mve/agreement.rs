@@ -122,9 +122,10 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
     #[inline(always)]
     fn run(self) -> Found {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
+        let single = |value: f64| value as f32;
         let [cx, inverse_fx, diameter, hidden_beyond] =
-            [self.cx, self.inverse_fx, self.diameter, self.hidden_beyond].map(|value| value as f32);
-        let limits = tolerances().map(|share| share as f32 * diameter);
+            [self.cx, self.inverse_fx, self.diameter, self.hidden_beyond].map(single);
+        let limits = tolerances().map(|share| single(share) * diameter);
         let mut all_correct = [[0_u64; LANES]; N_TOLERANCES];
         let (mut all_outside, mut all_covered) = ([0_u64; LANES], [0_u64; LANES]);
         let mut all_nearer = [0_u64; LANES];
