@@ -36,9 +36,9 @@ const NOISE_SAMPLES: usize = 4096;
 
 /// Returns the surfels of the patch, row-major.
 ///
-/// Points and normals are in the camera frame, and normals face the camera. Pixels without a
-/// normal have [`Surfel::NOTHING`]: those without depth have pixels with too few neighbors on their own side of the depth edges
-/// (flying pixels, single-pixel lines).
+/// Points and normals are in the camera frame, and normals face the camera. Pixels without a normal
+/// have [`Surfel::NOTHING`]: those without depth, and those with too few neighbors on their own
+/// side of the depth edges (flying pixels, single-pixel lines).
 pub(crate) fn estimate_normals(patch: &DepthPatch<'_>, window: NormalWindow) -> Vec<Surfel> {
     let mut surfels = Vec::with_capacity(patch.region.area());
     if patch.region.is_empty() {

@@ -1,7 +1,7 @@
 //! Plane fits over windows, several pixels of a row at a time.
 //!
 //! Sums over the window's rows are kept per column and slide down with the window. The sums of a
-//! window add up its columns, with places relative to its center. Where all pixels of a window are
+//! window add up its columns, with places relative to its center. If all pixels of a window are
 //! used, most of them are known in advance.
 
 use std::ops::Range;
@@ -347,7 +347,9 @@ fn plane_fit<const N: usize>(
     normal
 }
 
-/// The sums of one window in the order n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw, Σvw, with columns and rows relative to its corner.
+/// The sums of one window: n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw, Σvw.
+///
+/// Columns and rows are relative to its corner.
 #[derive(Clone, Copy)]
 pub(super) struct WindowSums([f64; 9]);
 
