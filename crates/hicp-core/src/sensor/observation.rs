@@ -24,7 +24,7 @@ use crate::surfel::Surfel;
 /// An empty mask or a depth image of zeros gives an observation without surfels. Refining against
 /// it ends with "no pairs".
 ///
-/// Cost of building one: 15 to 30 ns per pixel inside the mask's bounding box, more with more depth
+/// Cost of building one: 7 to 20 ns per pixel inside the mask's bounding box, more with more depth
 /// edges. Pixels outside cost nothing, since the observations of one image share its depth (an
 /// `Arc`). Share an observation between threads and hypotheses, because search trees are built once
 /// per observation, see [`Observation::derived`].
