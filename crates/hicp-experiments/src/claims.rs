@@ -14,7 +14,7 @@ pub enum ClaimVerdict {
     Holds,
     /// The claim does not hold, and the intervals exclude that it does.
     DoesNotHold,
-    /// There is no difference of more than [`EQUIVALENT_VSD`], and the intervals exclude one.
+    /// The intervals lie within ±[`EQUIVALENT_VSD`].
     Equivalent,
     /// The study cannot decide.
     Undecided {

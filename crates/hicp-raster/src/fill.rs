@@ -275,7 +275,7 @@ fn keep_nearer<const N: usize>(
 ) {
     // Positive numbers are ordered like their bits; less one, a missing depth is the farthest.
     // Signs become masks, all-ones or zero in each lane. If the compiler knew that (`zero`), it
-    // would make masked stores of them, which some processors run ten times slower than others.
+    // would make masked stores of them, which some processors run slowly.
     let mut taken = [0_i32; N];
     for lane in 0..N {
         let old = depths[lane].to_bits().wrapping_sub(1) & (u32::MAX >> 1);

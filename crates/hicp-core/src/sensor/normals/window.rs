@@ -404,7 +404,7 @@ impl WindowSums {
 }
 
 /// Ray slopes (x/z, y/z) of the region's columns and rows.
-pub(crate) struct Rays {
+pub(super) struct Rays {
     fx: f64,
     fy: f64,
     /// Followed by as many zeros as there are lanes.
