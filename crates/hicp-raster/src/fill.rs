@@ -208,10 +208,8 @@ impl<const N: usize> LaneEdges<N> {
             };
             #[allow(clippy::cast_possible_truncation, reason = "within reach")]
             let (per_u, per_v) = (edge.per_u as i32, edge.per_v as i32);
-            let mut lane_value = value;
-            for lane in &mut lanes.values[index] {
-                *lane = lane_value;
-                lane_value = lane_value.wrapping_add(per_u);
+            for (lane, u) in lanes.values[index].iter_mut().zip(0..) {
+                *lane = value + per_u * u;
             }
             lanes.per_v[index] = per_v;
         }

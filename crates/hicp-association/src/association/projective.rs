@@ -51,7 +51,7 @@ impl DataAssociation for Projective {
 }
 
 /// Number of points projected at once.
-const LANES: usize = 16;
+const LANES: usize = 64;
 
 struct Project<'a> {
     observation: &'a Observation,

@@ -167,7 +167,6 @@ fn about(from: &Point3<f64>, to: &Point3<f64>, rotation: UnitQuaternion<f64>) ->
 /// Returns the rotation R that maximizes tr(R H), for H = Σ w p qᵀ.
 ///
 /// It is Kabsch's V diag(1, 1, det(V Uᵀ)) Uᵀ.
-/// Uᵀ.
 ///
 /// The largest singular pair (u₁, v₁) comes from the eigenvectors of HᵀH, which determine smaller
 /// pairs only to √ε. The rest is the rotation around v₁ that maximizes the trace over the planes
