@@ -29,7 +29,7 @@ fn fused(criterion: &mut Criterion) {
         let mut context = workspace.context(&problem);
         let mut source = Vec::new();
         let stride = Stride::Pixels(1);
-        VisibleSurface { stride }.select(&mut context, &case.init, &mut source);
+        VisibleSurface::with_stride(stride).select(&mut context, &case.init, &mut source);
         group.throughput(Throughput::Elements(source.len() as u64));
 
         if let Some(fused) = Fused::new(&case.scene.observation, &source) {

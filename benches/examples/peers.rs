@@ -156,7 +156,7 @@ impl Loaded {
         let (model, observation) = (&instance.scene.model, &instance.scene.observation);
         let mut every_pixel = Vec::new();
         let stride = Stride::Pixels(1);
-        VisibleSurface { stride }.select(
+        VisibleSurface::with_stride(stride).select(
             &mut Workspace::new(Rasterizer::default()).context(&Problem::new(model, observation)),
             &instance.init,
             &mut every_pixel,

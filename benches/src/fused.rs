@@ -361,9 +361,7 @@ mod tests {
             let mut workspace = Workspace::new(Rasterizer::default());
             let mut context = workspace.context(&problem);
             let mut source = Vec::new();
-            let mut every_pixel = VisibleSurface {
-                stride: Stride::Pixels(1),
-            };
+            let mut every_pixel = VisibleSurface::with_stride(Stride::Pixels(1));
             every_pixel.select(&mut context, &case.init, &mut source);
             let mut pairs = Correspondences::new();
             pairs.begin(&case.init, source.len());

@@ -78,9 +78,7 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
     let observation = Observation::new(depth, mask, camera).expect("sizes agree");
     let mut source = Vec::new();
     let mut workspace = Workspace::new(Rasterizer::default());
-    let mut selection = VisibleSurface {
-        stride: Stride::AboutPoints(POINTS),
-    };
+    let mut selection = VisibleSurface::with_stride(Stride::AboutPoints(POINTS));
     selection.select(
         &mut workspace.context(&Problem::new(&model, &observation)),
         &init,

@@ -29,7 +29,7 @@ where
     M: ErrorMetric + Send + 'static,
 {
     Box::new(Icp {
-        selection: VisibleSurface { stride },
+        selection: VisibleSurface::with_stride(stride),
         association,
         filter: MaxDistance::meters(GATE_METERS),
         metric,

@@ -17,9 +17,7 @@ fn main() {
     let runs = std::env::args()
         .nth(1)
         .map_or(500, |text| text.parse().expect("RUNS is a whole number"));
-    let visible = VisibleSurface {
-        stride: Stride::Pixels(1),
-    };
+    let visible = VisibleSurface::with_stride(Stride::Pixels(1));
     let nearest = || NearestNeighbor::new(Stride::Pixels(1), SearchIndex::default());
     println!(
         "| pairs | object | noise | NEES of `covariance` | NEES of `sandwich_covariance` | 99 % band | RMS error of the center |"

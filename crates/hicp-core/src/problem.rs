@@ -243,13 +243,31 @@ pub struct Context<'a> {
     /// The source and the target.
     pub problem: Problem<'a>,
     renders: &'a mut RenderCache,
+    cascade_init: Option<Isometry3<f64>>,
 }
 
 impl<'a> Context<'a> {
     /// Combines a problem and a render cache.
     #[must_use]
     pub fn new(problem: Problem<'a>, renders: &'a mut RenderCache) -> Self {
-        Self { problem, renders }
+        Self {
+            problem,
+            renders,
+            cascade_init: None,
+        }
+    }
+
+    /// Sets the initial pose of the cascade that runs the stage, `camera_from_object`.
+    #[must_use]
+    pub fn in_cascade(mut self, init: Option<Isometry3<f64>>) -> Self {
+        self.cascade_init = init;
+        self
+    }
+
+    /// The initial pose of the cascade that runs the stage, `camera_from_object`, if one does.
+    #[must_use]
+    pub fn cascade_init(&self) -> Option<&Isometry3<f64>> {
+        self.cascade_init.as_ref()
     }
 
     /// Returns the model rendered at a pose, `camera_from_object`, in the observation's camera.

@@ -77,6 +77,9 @@ pub struct Session<'a> {
     pub workspace: &'a mut Workspace,
     /// The receiver of events.
     pub observer: &'a mut dyn Observer,
+    /// The initial pose of the cascade that is running, `camera_from_object`. A cascade sets it for
+    /// its stages.
+    pub cascade_init: Option<Isometry3<f64>>,
 }
 
 impl<'a> Session<'a> {
@@ -85,6 +88,7 @@ impl<'a> Session<'a> {
         Self {
             workspace,
             observer,
+            cascade_init: None,
         }
     }
 }

@@ -34,9 +34,7 @@ pub(crate) fn selection() -> Drawn {
     let mut svg = Svg::new(840.0, 400.0);
     let seen = (10.0, BEFORE, "toward the camera");
     key(&mut svg, &[seen, (190.0, OTHER, "away from the camera")]);
-    let mut visible = VisibleSurface {
-        stride: Stride::Pixels(6),
-    };
+    let mut visible = VisibleSurface::with_stride(Stride::Pixels(6));
     let panels: [(f64, &mut dyn PointSelection, &str); 2] = [
         (10.0, &mut AllSamples, "AllSamples: the whole surface"),
         (
@@ -146,10 +144,7 @@ fn paired(
     pose: &Isometry3<f64>,
 ) -> Correspondences {
     let mut source: Vec<Surfel> = Vec::new();
-    VisibleSurface {
-        stride: Stride::Pixels(3),
-    }
-    .select(context, pose, &mut source);
+    VisibleSurface::with_stride(Stride::Pixels(3)).select(context, pose, &mut source);
     let mut pairs = Correspondences::new();
     association.associate(context, &source, pose, &mut pairs);
     pairs

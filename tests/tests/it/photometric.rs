@@ -14,9 +14,7 @@ use crate::color::{board, colorful, lighting, photograph, pose, scene};
 
 fn projective(metric: impl Minimize + Send + 'static) -> Refiner {
     Refiner::boxed(Box::new(Icp {
-        selection: VisibleSurface {
-            stride: Stride::AboutPoints(1000),
-        },
+        selection: VisibleSurface::with_stride(Stride::AboutPoints(1000)),
         association: Projective,
         filter: MaxDistance::diameters(0.25),
         metric,

@@ -19,6 +19,6 @@ pub use point_selection::PointSelection;
 pub use random_sample::RandomSample;
 pub use stable_sampling::StableSampling;
 pub use uniform_count::UniformCount;
-pub use visible_surface::VisibleSurface;
+pub use visible_surface::{SelectAt, VisibleSurface};
 pub use voxel_grid::VoxelGrid;
 pub use without_boundary::WithoutBoundary;

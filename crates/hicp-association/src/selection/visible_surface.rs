@@ -5,17 +5,44 @@ use hicp_core::{Context, Isometry3, Point3, Problem, Surfel, UnitVector3};
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
 
-/// Selects the points of the model that are visible at the stage's initial estimate.
+/// The pose at which a stage selects the visible points.
 ///
-/// They are the vertex map V_O of §III-A.1. The model is rendered at the initial estimate; if the
-/// score has rendered it already, the render comes from the cache. Every rendered pixel on a grid
-/// that starts at the image's corner becomes a surfel, with the normal of its face toward the
-/// camera. If the object is behind the camera or outside the image, nothing is selected. Cost: one
-/// render, and O(rendered pixels).
+/// The first stage of a cascade starts where the cascade starts, so for it both are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SelectAt {
+    /// The stage's initial estimate: the second stage of a cascade pairs the surface that is
+    /// visible by then.
+    #[default]
+    Stage,
+    /// The initial estimate of the cascade that runs the stage: one V_O, and so one render, for all
+    /// its stages, as §III-A.1 and §IV-B can be read. Outside of a cascade it is the stage's own.
+    Cascade,
+}
+
+/// Selects the points of the model that are visible at an initial estimate.
+///
+/// They are the vertex map V_O of §III-A.1. The model is rendered at the initial estimate of the
+/// stage or of its cascade ([`SelectAt`]); if the score has rendered it already, the render comes
+/// from the cache. Every rendered pixel on a grid that starts at the image's corner becomes a
+/// surfel, with the normal of its face toward the camera. If the object is behind the camera or
+/// outside the image, nothing is selected. Cost: one render, and O(rendered pixels).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VisibleSurface {
     /// Spacing of the selected pixels.
     pub stride: Stride,
+    /// The pose at which the points are selected.
+    pub at: SelectAt,
+}
+
+impl VisibleSurface {
+    /// Selects at the stage's initial estimate, with this spacing.
+    #[must_use]
+    pub const fn with_stride(stride: Stride) -> Self {
+        Self {
+            stride,
+            at: SelectAt::Stage,
+        }
+    }
 }
 
 impl Default for VisibleSurface {
@@ -24,9 +51,7 @@ impl Default for VisibleSurface {
     // 2,000 of them, because the accuracy is the same in a fifth of the time. `Stride::Pixels(1)`
     // keeps every pixel.
     fn default() -> Self {
-        Self {
-            stride: Stride::AboutPoints(2000),
-        }
+        Self::with_stride(Stride::AboutPoints(2000))
     }
 }
 
@@ -41,7 +66,11 @@ impl PointSelection for VisibleSurface {
         // Deviation: V_O per stage: §III-A.1 renders V_O once, at the initial pose of ICP. Here
         // every stage renders it at its own initial pose, so the second stage of a cascade pairs
         // the surface that is visible by then. The first stage after a switch shares the render of
-        // the MVE.
+        // the MVE. `SelectAt::Cascade` renders once per cascade.
+        let camera_from_object = &match (self.at, context.cascade_init()) {
+            (SelectAt::Cascade, Some(init)) => *init,
+            _ => *camera_from_object,
+        };
         let (Some((model, observation)), Some(view)) =
             (problem.sides(), context.view(camera_from_object))
         else {

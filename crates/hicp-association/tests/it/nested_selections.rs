@@ -353,14 +353,14 @@ fn without_boundary_equals_its_definition() {
     for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
         let pose = scene.nearby(3);
         let stride = Stride::Pixels(1);
-        let all = scene.select(&mut VisibleSurface { stride }, &pose);
+        let all = scene.select(&mut VisibleSurface::with_stride(stride), &pose);
         let camera = scene.observation.camera();
         let focal = camera.fx().min(camera.fy());
         for (width, max_tilt_degrees) in [(0, 60.0), (1, 60.0), (2, 45.0), (1, 85.0), (3, f32::NAN)]
         {
             let slope = f64::from(max_tilt_degrees).to_radians().tan();
             let max_step = (slope / focal) as f32;
-            let inner = VisibleSurface { stride };
+            let inner = VisibleSurface::with_stride(stride);
             let mut selection = WithoutBoundary {
                 inner,
                 width,

@@ -148,10 +148,7 @@ fn a_render_is_paired_with_itself() {
         let mut renders = RenderCache::new(RayCaster);
         let mut context = Context::new(Problem::new(&model, &observation), &mut renders);
         let mut source = Vec::new();
-        VisibleSurface {
-            stride: Stride::Pixels(1),
-        }
-        .select(&mut context, &pose, &mut source);
+        VisibleSurface::with_stride(Stride::Pixels(1)).select(&mut context, &pose, &mut source);
         assert!(source.len() > 300, "{}", source.len());
         let mut pairs = Correspondences::new();
         Projective.associate(&mut context, &source, &pose, &mut pairs);

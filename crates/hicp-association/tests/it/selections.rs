@@ -47,9 +47,7 @@ fn the_visible_surface_has_the_pixels_of_the_grid_and_faces_the_camera() {
             at.translation.vector.z += 0.22;
             let observation = observe(&model, &camera(), &at);
             let source = select(
-                &mut VisibleSurface {
-                    stride: Stride::Pixels(stride),
-                },
+                &mut VisibleSurface::with_stride(Stride::Pixels(stride)),
                 &model,
                 &observation,
                 &at,
@@ -98,9 +96,7 @@ fn strides_select_about_the_requested_number_of_points() {
     let at = pose(0.0, 0.0, 0.3, 0.3, 0.4, 0.0);
     let observation = observe(&model, &camera(), &at);
     let all = select(
-        &mut VisibleSurface {
-            stride: Stride::Pixels(1),
-        },
+        &mut VisibleSurface::with_stride(Stride::Pixels(1)),
         &model,
         &observation,
         &at,
@@ -108,12 +104,16 @@ fn strides_select_about_the_requested_number_of_points() {
     .len();
     for points in [50, 200, 10_000] {
         let stride = Stride::AboutPoints(points);
-        let found = select(&mut VisibleSurface { stride }, &model, &observation, &at).len();
+        let found = select(
+            &mut VisibleSurface::with_stride(stride),
+            &model,
+            &observation,
+            &at,
+        )
+        .len();
         let pixels = stride.pixels(all);
         let thinned = select(
-            &mut VisibleSurface {
-                stride: Stride::Pixels(pixels),
-            },
+            &mut VisibleSurface::with_stride(Stride::Pixels(pixels)),
             &model,
             &observation,
             &at,

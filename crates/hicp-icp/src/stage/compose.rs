@@ -11,7 +11,8 @@ use crate::stage::stage_trait::Stage;
 /// A stage that diverges returns the pose that it accepted last, and the next stage starts there.
 /// If the first stage diverges in its first step, the second starts from the initial pose. If it
 /// diverges later, the second starts from the last pose before the divergence. Losses are never
-/// compared across stages.
+/// compared across stages. The stages can ask for the initial pose of the cascade
+/// ([`Session::cascade_init`]): `SelectAt::Cascade` selects there.
 ///
 /// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,10 +29,12 @@ macro_rules! cascade {
                 session: &mut Session<'_>,
             ) -> Outcome {
                 let ($first, $($next,)*) = &mut self.0;
+                let outer = session.cascade_init.replace(*init);
                 let outcome = $first.run(problem, init, session);
                 $(
                     let outcome = outcome.then($next.run(problem, &outcome.camera_from_object, session));
                 )*
+                session.cascade_init = outer;
                 outcome
             }
 
@@ -56,12 +59,14 @@ impl<T: Stage> Stage for Cascade<Vec<T>> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
+        let outer = session.cascade_init.replace(*init);
         let mut outcome: Option<Outcome> = None;
         for stage in &mut self.0 {
             let start = outcome.map_or(*init, |o| o.camera_from_object);
             let next = stage.run(problem, &start, session);
             outcome = Some(outcome.map_or(next, |o| o.then(next)));
         }
+        session.cascade_init = outer;
         outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
     }
 

@@ -74,7 +74,8 @@ where
     ) -> Outcome {
         let workspace = &mut *session.workspace;
         let (source, pairs) = (&mut workspace.source, &mut workspace.pairs);
-        let mut context = Context::new(*problem, &mut workspace.renders);
+        let mut context =
+            Context::new(*problem, &mut workspace.renders).in_cascade(session.cascade_init);
         let unsupported = (self.selection.unsupported(problem))
             .or_else(|| self.association.unsupported(problem))
             .or_else(|| self.filter.unsupported(problem));

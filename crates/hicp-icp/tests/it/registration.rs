@@ -5,7 +5,7 @@ use crate::support::{
 };
 use hicp_association::{
     AllSamples, DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection,
-    Projective, SearchIndex, Stride, VisibleSurface,
+    Projective, SearchIndex, SelectAt, Stride, VisibleSurface,
 };
 use hicp_core::Iteration;
 use hicp_core::{
@@ -26,9 +26,7 @@ fn truth() -> Isometry3<f64> {
     pose(0.003, -0.002, 0.25, 0.5, -0.4, 0.2)
 }
 
-const VISIBLE: VisibleSurface = VisibleSurface {
-    stride: Stride::Pixels(2),
-};
+const VISIBLE: VisibleSurface = VisibleSurface::with_stride(Stride::Pixels(2));
 
 fn stop() -> (Divergence, Convergence, IterationLimit) {
     (
@@ -100,6 +98,40 @@ fn small_errors_are_removed() {
     assert!(
         angles[14] < 3.0 && distances[14] < 0.004,
         "{angles:?} {distances:?}"
+    );
+}
+
+/// One V_O for a cascade: later stages find the first one's render, also in an inner cascade.
+#[test]
+fn a_selection_at_the_cascades_pose_renders_once() {
+    let model = Model::new(wedge());
+    let observation = observe(&model, &camera(), &truth());
+    let init = nudged(&mut Numbers(5), 3.0, 0.004);
+    let stage = |at| Icp {
+        selection: VisibleSurface { at, ..VISIBLE },
+        association: Projective,
+        filter: (),
+        metric: PointToPoint,
+        stop: IterationLimit(3),
+    };
+    let renders = |stage: &mut dyn Stage| {
+        let (mut workspace, mut observer) = (Workspace::new(RayCaster), ());
+        let mut session = Session::new(&mut workspace, &mut observer);
+        let outcome = stage.run(&Problem::new(&model, &observation), &init, &mut session);
+        assert_eq!(outcome.verdict, Verdict::Refined);
+        assert_eq!(session.cascade_init, None);
+        workspace.renders()
+    };
+    let (own, shared) = (stage(SelectAt::Stage), stage(SelectAt::Cascade));
+    assert_eq!(renders(&mut Cascade((own, own))), 2);
+    assert_eq!(renders(&mut Cascade((own, shared))), 1);
+    assert_eq!(renders(&mut Cascade(vec![shared, shared, shared])), 1);
+    // Outside of a cascade, the pose is the stage's own. An inner cascade has its own, too, and
+    // the outer one's is in force again after it.
+    assert_eq!(renders(&mut { shared }), 1);
+    assert_eq!(
+        renders(&mut Cascade((own, Cascade((shared, shared)), shared))),
+        2
     );
 }
 

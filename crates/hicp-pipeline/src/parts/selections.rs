@@ -1,7 +1,7 @@
 //! Point selections.
 
 use hicp_association::{
-    AllSamples, NormalSpace, ObservedSurface, RandomSample, StableSampling, UniformCount,
+    AllSamples, NormalSpace, ObservedSurface, RandomSample, SelectAt, StableSampling, UniformCount,
     VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 
@@ -22,11 +22,12 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(())
     });
     catalog.add_selection("visible-surface", |p| {
-        p.about = "Selects the points visible at the stage's initial estimate: V_O. \
-            Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";
-        Ok(VisibleSurface {
-            stride: stride(p, 2000, KEPT)?,
-        })
+        p.about = "Selects the points visible at the initial estimate of the stage or of its \
+            cascade: V_O. Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";
+        let stride = stride(p, 2000, KEPT)?;
+        let poses = [("stage", SelectAt::Stage), ("cascade", SelectAt::Cascade)];
+        let at = p.word("at", &poses, "whose initial estimate")?;
+        Ok(VisibleSurface { stride, at })
     });
     catalog.add_selection("observed-surface", |p| {
         p.about = "Selects the observed surface, moved into the object frame at the stage's \

@@ -67,9 +67,7 @@ fn stop(iterations: usize) -> PaperStop {
 /// Creates a projective stage of about `points` points.
 fn projective<M>(metric: M, points: usize, iterations: usize) -> GatedIcp<M> {
     Icp {
-        selection: VisibleSurface {
-            stride: Stride::AboutPoints(points),
-        },
+        selection: VisibleSurface::with_stride(Stride::AboutPoints(points)),
         association: Projective,
         filter: MaxDistance::diameters(TAU_DIAMETERS),
         metric,

@@ -10,9 +10,7 @@ use hybrid_icp::association::{Projective, Stride, VisibleSurface};
 use hybrid_icp::metric::{Generalized, PlaneToPoint, PointToPlane};
 
 const RUNS: usize = 500;
-const VISIBLE: VisibleSurface = VisibleSurface {
-    stride: Stride::Pixels(1),
-};
+const VISIBLE: VisibleSurface = VisibleSurface::with_stride(Stride::Pixels(1));
 
 fn assert_in_band(name: &str, mean: f64, nees: &Nees) {
     let (low, high) = nees.band();
