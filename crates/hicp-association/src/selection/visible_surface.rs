@@ -14,8 +14,9 @@ pub enum SelectAt {
     /// visible by then.
     #[default]
     Stage,
-    /// The initial estimate of the cascade that runs the stage: one V_O, and so one render, for all
-    /// its stages, as §III-A.1 and §IV-B can be read. Outside of a cascade it is the stage's own.
+    /// The initial estimate of the innermost cascade that runs the stage. All stages of the cascade
+    /// then share one V_O and one render, as §III-A.1 and §IV-B can be read. Outside of a cascade,
+    /// it is the stage's own.
     Cascade,
 }
 

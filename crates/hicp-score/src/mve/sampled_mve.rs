@@ -16,7 +16,7 @@ use crate::tolerances::N_TOLERANCES;
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
 /// It splats points of the model's surface into a coarse depth buffer and compares the buffer with
-/// the observation, as [`MeanVsd`](crate::MeanVsd) compares a render. It costs about 2 µs for
+/// the observation, as [`MeanVsd`](crate::MeanVsd) compares a render. It costs about 3 µs for
 /// every mesh. It does not replace the MVE for accepting or reporting a pose: pixels without a
 /// sample count as not rendered, and thin parts may be missed. Samples of a closed mesh that face
 /// away from the camera are skipped.
