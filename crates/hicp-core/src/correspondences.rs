@@ -19,11 +19,15 @@ pub struct Pair {
     /// is an index into the model's elements.
     pub source_index: u32,
     /// The index of the target element: row-major in the observation's region, see
-    /// [`Observation::surfel`](crate::Observation::surfel).
+    /// [`Observation::surfel`](crate::Observation::surfel). [`Pair::UNLISTED`] for other points.
     pub target_index: u32,
 }
 
 impl Pair {
+    /// The `target_index` of a target that is not a surfel of the observation, such as a point
+    /// outside of the mask.
+    pub const UNLISTED: u32 = u32::MAX;
+
     /// Creates a pair of weight 1.
     #[must_use]
     #[inline]

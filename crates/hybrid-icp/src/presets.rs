@@ -45,8 +45,8 @@
 mod beyond;
 
 pub use beyond::{
-    Align, ByColor, CloudToModelIcp, Explore, Far, GatedIcp, HybridVisible, Local, Near, Search,
-    auto, by_color, color, estimate_with, hybrid_visible, local, search, search_with,
+    Align, ByColor, CloudToModelIcp, Explore, Far, Fit, GatedIcp, HybridVisible, Local, Near,
+    Search, auto, by_color, color, estimate_with, hybrid_visible, local, search, search_with,
 };
 
 use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};

@@ -104,3 +104,48 @@ macro_rules! forward {
     )+};
 }
 forward!(Box<T>, &mut T);
+
+/// Joins the pairs of all members, in order.
+impl<T: DataAssociation> DataAssociation for Vec<T> {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        for association in self.iter_mut() {
+            association.associate(context, source, camera_from_object, pairs);
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "joined"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        self.iter().find_map(|member| member.unsupported(problem))
+    }
+}
+
+/// Joins the pairs of both members, in order.
+impl<A: DataAssociation, B: DataAssociation> DataAssociation for (A, B) {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        camera_from_object: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        self.0.associate(context, source, camera_from_object, pairs);
+        self.1.associate(context, source, camera_from_object, pairs);
+    }
+
+    fn name(&self) -> &'static str {
+        "joined"
+    }
+
+    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+        (self.0.unsupported(problem)).or_else(|| self.1.unsupported(problem))
+    }
+}

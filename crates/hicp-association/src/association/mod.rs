@@ -1,6 +1,7 @@
 //! Associations: the observed point for each model point.
 
 pub(crate) mod closest_point_on_mesh;
+pub(crate) mod contour;
 pub(crate) mod data_association;
 pub(crate) mod from_observation;
 pub(crate) mod k_nearest;
@@ -13,8 +14,10 @@ pub(crate) mod projective;
 pub(crate) mod projective_interpolated;
 pub(crate) mod projective_search;
 pub(crate) mod reciprocal;
+pub(crate) mod rendered_surface;
 
 pub use closest_point_on_mesh::ClosestPointOnMesh;
+pub use contour::Contour;
 pub use data_association::DataAssociation;
 pub use k_nearest::KNearest;
 pub use nearest_neighbor::{NearestNeighbor, SearchIndex};
@@ -25,3 +28,4 @@ pub use projective::Projective;
 pub use projective_interpolated::ProjectiveInterpolated;
 pub use projective_search::ProjectiveSearch;
 pub use reciprocal::Reciprocal;
+pub use rendered_surface::RenderedSurface;

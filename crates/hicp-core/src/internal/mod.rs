@@ -1,7 +1,9 @@
 //! Helpers that the crates of this workspace share. No stability is promised.
 
+mod background;
 mod index;
 mod label;
+mod noise;
 pub(crate) mod number;
 mod plane;
 mod seen_colors;
@@ -10,6 +12,7 @@ mod vectorized;
 mod whole;
 mod work;
 
+pub use background::{Background, Surroundings};
 pub use index::index;
 pub use label::type_label;
 pub use plane::DepthPlane;

@@ -1,16 +1,16 @@
 //! Data associations.
 
 use hicp_association::{
-    ClosestPointOnMesh, KNearest, Length, NearestNeighbor, NormalCompatible, NormalShooting,
-    ObservationToModel, Projective, ProjectiveInterpolated, ProjectiveSearch, Reciprocal,
-    SearchIndex, Stride,
+    ClosestPointOnMesh, Contour, KNearest, Length, NearestNeighbor, NormalCompatible,
+    NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated, ProjectiveSearch,
+    Reciprocal, RenderedSurface, SearchIndex, Stride,
 };
 
 use super::common::{length, stride};
 use crate::build::Parameters;
 use crate::catalog::{BoxedAssociation, Catalog};
 use crate::error::PipelineError;
-use crate::range::Range;
+use crate::range::{FACTOR, Range};
 use crate::work::Limited::{Neighbors, Samples};
 
 pub(super) fn add(catalog: &mut Catalog) {
@@ -94,6 +94,45 @@ pub(super) fn add(catalog: &mut Catalog) {
             stride: asking(p)?,
             visible_only: visible_only(p)?,
         })
+    });
+    catalog.add_association("rendered-surface", |p| {
+        p.about = "Pairs every rendered point with the depth measured along its ray, with the \
+            model's normal. For point-to-plane. Cost: a render, and O(pixels).";
+        Ok(RenderedSurface {
+            stride: stride(p, 2000, "rendered points to pair, about")?,
+            limit: length(
+                p,
+                "limit",
+                0.25,
+                "largest difference of depth, without noise",
+            )?,
+        })
+    });
+    catalog.add_association("contour", |p| {
+        p.about = "Pairs the rendered silhouette with the object's border in depth and mask, \
+            also if the mask is dilated or a box. For point-to-plane. Source: Harris & Stennett \
+            1990; Stoiber et al. 2022. Cost: a render, and O(pixels).";
+        let default = Contour::default();
+        let reach = Range::positive("diameters");
+        Ok(Contour::new(
+            p.count("lines", 1, 150, "lines across the silhouette, about")?,
+            p.number(
+                "reach",
+                reach,
+                default.reach_diameters,
+                "of a line to each side",
+            )?,
+            p.number(
+                "weight",
+                FACTOR,
+                default.weight,
+                "of borders relative to depths",
+            )?,
+        ))
+    });
+    catalog.add_association("joined", |p| {
+        p.about = "Joins the pairs of several associations. Cost: the sum of theirs.";
+        p.parts::<BoxedAssociation>("associations", None, "the associations, in order")
     });
 }
 

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use hicp_core::internal::Surroundings;
 use hicp_core::{Observation, PixelRegion};
 
-use crate::mve::background::Background;
 use crate::mve::distances::to_zero;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
 
@@ -79,8 +79,7 @@ impl TrustMap {
         };
         let mut trust = distance_to(false);
         let middle = middle_of(&depths, &trust);
-        let noise = noise_of(observation);
-        let plane = Background::around(observation, area, noise);
+        let Surroundings { noise, plane } = *Surroundings::of(observation);
         let doubt = 1.0 - certainty(&masked, &depths, width, noise);
         let beyond = if plane.is_some() {
             doubt * BEYOND_PIXELS
@@ -233,34 +232,4 @@ fn middle_of(depths: &[f32], distances: &[f32]) -> f32 {
     }
     let middle = inside.len() / 2;
     *inside.select_nth_unstable_by(middle, f32::total_cmp).1
-}
-
-/// Returns the standard deviation of the depth noise inside the mask, meters.
-///
-/// It is computed from the median distance of about 500 pixels from the mean of their neighbors in
-/// the row.
-fn noise_of(observation: &Observation) -> f64 {
-    let region = observation.region();
-    let (depth, mask) = (observation.depth(), observation.mask());
-    let step = (region.area() / 512).isqrt().max(1);
-    let mut differences: Vec<f32> = Vec::with_capacity(1024);
-    for v in (region.v_min..region.v_max).step_by(step) {
-        for u in (region.u_min..region.u_max).step_by(step) {
-            let at = |u: u32| match (mask.get(u, v), depth.get(u, v)) {
-                (Some(true), Some(z)) if z > 0.0 => Some(z),
-                _ => None,
-            };
-            let around = (at(u.wrapping_sub(1)), at(u), at(u + 1));
-            if let (Some(left), Some(z), Some(right)) = around {
-                differences.push((z - 0.5 * (left + right)).abs());
-            }
-        }
-    }
-    if differences.is_empty() {
-        return 0.0;
-    }
-    let middle = differences.len() / 2;
-    let median = *differences.select_nth_unstable_by(middle, f32::total_cmp).1;
-    // Of independent errors, the distance is larger by √1.5, and the median is 0.6745 of them.
-    f64::from(median) / (0.6745 * 1.5_f64.sqrt())
 }

@@ -6,8 +6,8 @@
 //! `docs/presets.md` states the effect of each change.
 
 use hicp_association::{
-    AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel, Projective,
-    Stride, UniformCount, VisibleSurface,
+    AllSamples, Contour, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel,
+    Projective, RenderedSurface, Stride, UniformCount, VisibleSurface,
 };
 use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
@@ -35,11 +35,13 @@ pub type HybridVisible = Repeat<
         Icp<VisibleSurface, NearestNeighbor, MaxNormalAngle, PointToPoint, PaperStop>,
     >,
 >;
+/// The stage that fits the rendered surface and its silhouette to the image.
+pub type Fit = Icp<(), (RenderedSurface, Contour), (), PointToPlane, (Convergence, IterationLimit)>;
 /// The type of [`local`].
 pub type Local = Cascade<(
+    Guard<Fit, MeanVsd>,
     SwitchUntilStall<MeanVsd, Near, Far>,
-    Descent<MeanVsd>,
-    Guard<GatedIcp<PointToPlane>, MeanVsd>,
+    Guard<Fit, MeanVsd>,
 )>;
 /// The stage that aligns hypotheses.
 pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
@@ -143,18 +145,36 @@ pub fn hybrid_visible() -> HybridVisible {
     }
 }
 
+/// Creates the stage that fits the rendered surface and its silhouette to the image.
+///
+/// It is accepted only if the score improves.
+fn fit() -> Guard<Fit, MeanVsd> {
+    Guard {
+        stage: Icp {
+            selection: (),
+            association: (RenderedSurface::default(), Contour::default()),
+            filter: (),
+            metric: PointToPlane,
+            stop: (Convergence::default(), IterationLimit(8)),
+        },
+        score: MeanVsd::imperfect_mask(),
+    }
+}
+
 /// `local`: local refinement that never returns a pose with a higher score than the initial one.
 ///
-/// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]).
-/// [`SwitchUntilStall`] runs up to six steps, until the score stalls or is at most 0.1, and keeps
-/// the pose with the lowest one. A step is the projective cascade if the estimate agrees with the
-/// image. Otherwise it pairs observed points with the model, first with point-to-point and then
-/// with the symmetric metric. If the score stays above 0.2, as with much noise, [`Descent`] lowers
-/// it directly. A last stage with twice as many points is accepted only if the score improves.
+/// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]). The first stage
+/// renders the model in each iteration, and fits the depth along the rays ([`RenderedSurface`]) and
+/// the silhouette ([`Contour`]). If the score is then above 0.1, [`SwitchUntilStall`] runs up to
+/// six steps, until the score stalls, and keeps the pose with the lowest one. A step is the
+/// projective cascade if the estimate agrees with the image. Otherwise it pairs observed points
+/// with the model, first with point-to-point and then with the symmetric metric. The first stage
+/// runs once more at the end.
 #[must_use]
 pub fn local() -> Local {
     let far = (300, 5000);
     Cascade((
+        fit(),
         SwitchUntilStall {
             score: MeanVsd::imperfect_mask(),
             alpha: PAPER_ALPHA,
@@ -167,14 +187,7 @@ pub fn local() -> Local {
             min_gain: 0.01,
             good_enough: 0.1,
         },
-        Descent {
-            score: MeanVsd::imperfect_mask(),
-            ..Descent::default()
-        },
-        Guard {
-            stage: projective(PointToPlane, 4000, 20),
-            score: MeanVsd::imperfect_mask(),
-        },
+        fit(),
     ))
 }
 

@@ -44,10 +44,8 @@ pub(super) struct Matcher {
 
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
-        let mut local = local();
-        let Cascade((steps, descent, _)) = &mut local;
-        // A frame has no time for it.
-        descent.good_enough = 1.0;
+        let local = local();
+        let Cascade((_, steps, _)) = &local;
         let (mut near, far) = (steps.aligned, steps.misaligned);
         near.0.0.selection.stride = Stride::AboutPoints(POINTS);
         near.0.1.selection.stride = Stride::AboutPoints(POINTS);

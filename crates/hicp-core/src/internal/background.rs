@@ -1,7 +1,12 @@
 //! The plane behind an object, such as the table it stands on.
 
-use hicp_core::internal::DepthPlane;
-use hicp_core::{Observation, Vector3};
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use crate::internal::noise::depth_noise;
+use crate::internal::plane::DepthPlane;
+use crate::sensor::observation::Observation;
 
 /// Width of the ring around the mask, as a share of the square root of the mask's area.
 const RING: f64 = 0.25;
@@ -17,8 +22,30 @@ const LEAST_HEIGHT_METERS: f64 = 0.004;
 /// Largest half width of the window over which heights are averaged, pixels.
 const MAX_HALF_WINDOW: usize = 4;
 
+/// The noise of an observation, and the plane around its mask.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings {
+    /// Standard deviation of the depth noise inside the mask, meters.
+    pub noise: f64,
+    /// The plane that most pixels around the mask lie on.
+    pub plane: Option<Background>,
+}
+
+impl Surroundings {
+    /// Returns the surroundings of an observation's mask, which are computed once and shared.
+    #[must_use]
+    pub fn of(observation: &Observation) -> Arc<Self> {
+        observation.derived().get_or_build(0, || {
+            let noise = depth_noise(observation);
+            let plane = Background::around(observation, noise);
+            Self { noise, plane }
+        })
+    }
+}
+
 /// The plane around a mask.
-pub(crate) struct Background {
+#[derive(Clone, Copy, Debug)]
+pub struct Background {
     plane: DepthPlane,
     noise: f64,
 }
@@ -27,7 +54,8 @@ impl Background {
     /// Finds the plane that most pixels around the mask lie on, or returns `None`.
     ///
     /// `noise` is the standard deviation of the depth, meters.
-    pub(crate) fn around(observation: &Observation, area: usize, noise: f64) -> Option<Self> {
+    fn around(observation: &Observation, noise: f64) -> Option<Self> {
+        let area = observation.n_measured();
         let (region, camera) = (observation.region(), observation.camera());
         let (depth, mask) = (observation.depth(), observation.mask());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Far below 2³².
@@ -61,10 +89,20 @@ impl Background {
         found.then_some(Self { plane, noise })
     }
 
+    /// Returns the distance of a pixel (u, v) of depth z in front of the plane, along the optical
+    /// axis, meters.
+    ///
+    /// If the plane is behind the camera at that pixel, it is infinite.
+    #[must_use]
+    pub fn height(&self, u: f64, v: f64, z: f64) -> f64 {
+        height(&self.plane, &Vector3::new(u, v, z))
+    }
+
     /// Returns the certainty that each of some pixels is not on the plane, 0 to 1.
     ///
     /// The pixels ((u, v), z) are the rows of a grid with `width` columns, `step` pixels apart.
-    pub(crate) fn off_plane(
+    #[must_use]
+    pub fn off_plane(
         &self,
         pixels: impl Iterator<Item = ((u32, u32), f32)>,
         width: usize,
