@@ -45,7 +45,7 @@ pub use errors::{
 };
 pub use hicp_core;
 pub use judgment::{
-    Confidence, Evidence, Flatness, LabeledScore, Misfit, N_FEATURES, ReliabilityBin, reliability,
+    Confidence, Doubt, Evidence, Flatness, LabeledScore, Misfit, N_FEATURES, ReliabilityBin, reliability,
     roc_area,
 };
 pub use mve::{MaskTrust, MeanVsd, Occlusion, SampledMve, VISIBILITY_TOLERANCE_METERS};

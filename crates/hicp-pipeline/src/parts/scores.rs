@@ -1,6 +1,6 @@
 //! Scores.
 
-use hicp_score::{MaskTrust, MeanVsd, Occlusion, SampledMve};
+use hicp_score::{Doubt, MaskTrust, MeanVsd, Occlusion, SampledMve};
 
 use crate::build::Parameters;
 use crate::catalog::Catalog;
@@ -23,6 +23,11 @@ pub(super) fn add(catalog: &mut Catalog) {
             occlusion: Occlusion::from_tolerance(tolerance),
             mask: mask_trust(p)?,
         })
+    });
+    catalog.add_score("doubt", |p| {
+        p.about = "Computes 1 minus the confidence: the probability that a pose is wrong. For \
+            decisions, not for ranking. Cost: as the MVE, and 40 µs.";
+        Ok(Doubt)
     });
     catalog.add_score("sampled-mve", |p| {
         p.about = "Computes the MVE at low resolution from points of the model instead of a \

@@ -114,7 +114,8 @@ pub(super) fn add(catalog: &mut Catalog) {
             p.part::<BoxedStage>("explore", None, "refines the best of them, cheaply")?,
             (
                 p.part::<BoxedScore>("ranking", "sampled-mve", "ranks hypotheses")?,
-                p.part::<BoxedScore>("score", "mve", "judges poses")?,
+                p.part::<BoxedScore>("score", "mve", "compares poses")?,
+                p.part::<BoxedScore>("doubt", "doubt", "decides if a pose is good enough")?,
             ),
             search_options(p)?,
         );
@@ -237,8 +238,8 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     let used = "use of the initial pose; if ignored, the search always runs";
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
-        threshold: p.number("threshold", FACTOR, 0.1, "searches above this score")?,
-        good_enough: p.number("good_enough", FACTOR, 0.03, "score that ends it")?,
+        threshold: p.number("threshold", FACTOR, 0.05, "searches above this doubt")?,
+        good_enough: p.number("good_enough", FACTOR, 0.02, "doubt that ends it")?,
         min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
         rotations: p.word("rotations", &rotations, tried)?,
         hypotheses: p.limited(Hypotheses, "hypotheses", 0, 1000, "rotations to rank")?,

@@ -3,6 +3,7 @@
 pub(crate) mod calibration;
 pub(crate) mod confidence;
 pub(crate) mod curves;
+pub(crate) mod doubt;
 pub(crate) mod evidence;
 pub(crate) mod flatness;
 pub(crate) mod grid;
@@ -12,6 +13,7 @@ pub(crate) mod misfit;
 
 pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
 pub use confidence::{Confidence, N_FEATURES};
+pub use doubt::Doubt;
 pub use evidence::Evidence;
 pub use flatness::Flatness;
 pub use misfit::Misfit;

@@ -14,7 +14,7 @@ use hicp_icp::{
     IterationLimit, Repeat, SearchOptions, Start,
 };
 use hicp_metric::{Conditioned, Photometric, PointToPlane, PointToPoint, Symmetric};
-use hicp_score::{MeanVsd, SampledMve};
+use hicp_score::{Doubt, MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
 use super::PaperStop;
@@ -50,7 +50,7 @@ pub type Explore = Descent<SampledMve>;
 /// The type of [`by_color`].
 pub type ByColor<S> = ColorChoice<S, GatedIcp<Conditioned<Photometric<PointToPlane>>>, MeanVsd>;
 /// The type of [`search`], [`auto`] and [`search_with`].
-pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd>;
+pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd, Doubt>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
@@ -230,18 +230,18 @@ fn explore() -> Explore {
 fn search_from<S>(
     stage: S,
     options: SearchOptions,
-) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd> {
-    let scores = (ranking(), MeanVsd::imperfect_mask());
+) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
+    let scores = (ranking(), MeanVsd::imperfect_mask(), Doubt);
     HypothesisSearch::new(stage, align(), explore(), scores, options)
 }
 
 /// A search without an initial pose that ends with `stage`, as in
 /// [`Refiner::estimate`](crate::Refiner::estimate).
 #[must_use]
-pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd> {
+pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
     let options = SearchOptions {
         start: Start::Ignored,
-        good_enough: 0.035,
+        good_enough: 0.02,
         hypotheses: 512,
         aligned: 128,
         refined: 12,
@@ -311,8 +311,8 @@ pub fn color() -> ByColor<Search> {
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
-        threshold: 0.2,
-        good_enough: 0.1,
+        threshold: 0.15,
+        good_enough: 0.05,
         hypotheses: 256,
         aligned: 64,
         refined: 6,

@@ -44,7 +44,7 @@ use crate::stage::stage_trait::Stage;
 /// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
 /// three times. The near symmetries of a model are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HypothesisSearch<S, A, E, R, C> {
+pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// Refines the initial pose, and the best hypotheses.
     pub stage: S,
     /// Moves many hypotheses to the image, at the cost of some scores.
@@ -53,8 +53,10 @@ pub struct HypothesisSearch<S, A, E, R, C> {
     pub explore: E,
     /// Ranks hypotheses; lower is better.
     pub ranking: R,
-    /// Scores poses; lower is better.
+    /// Compares poses; lower is better.
     pub score: C,
+    /// Decides whether a pose is good enough; lower is better.
+    pub doubt: D,
     /// Range, budget and conditions.
     pub options: SearchOptions,
     /// The best placed hypotheses, and the best aligned ones.
@@ -62,16 +64,18 @@ pub struct HypothesisSearch<S, A, E, R, C> {
     aligned: Shortlist,
     alike: LookAlikes,
     found: FoundPoses,
+    /// The pose that was judged last, and its doubt.
+    judged: Option<(Isometry3<f64>, f64)>,
 }
 
-impl<S, A, E, R, C> HypothesisSearch<S, A, E, R, C> {
+impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
     /// Creates the stage.
     #[must_use]
     pub fn new(
         stage: S,
         align: A,
         explore: E,
-        (ranking, score): (R, C),
+        (ranking, score, doubt): (R, C, D),
         options: SearchOptions,
     ) -> Self {
         Self {
@@ -80,11 +84,13 @@ impl<S, A, E, R, C> HypothesisSearch<S, A, E, R, C> {
             explore,
             ranking,
             score,
+            doubt,
             options,
             ranked: Shortlist::default(),
             aligned: Shortlist::default(),
             alike: LookAlikes::default(),
             found: FoundPoses::default(),
+            judged: None,
         }
     }
 
@@ -96,7 +102,9 @@ impl<S, A, E, R, C> HypothesisSearch<S, A, E, R, C> {
     }
 }
 
-impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, A, E, R, C> {
+impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
+    HypothesisSearch<S, A, E, R, C, D>
+{
     /// Adds a pose to the list of those found, unless it lies outside of the bound.
     fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, finished: bool) {
         let pose = &outcome.camera_from_object;
@@ -113,9 +121,20 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, A, E,
         }
     }
 
-    /// Returns whether the best pose found scores at most `enough`.
-    fn has(&self, enough: f64) -> bool {
-        self.found.best().is_some_and(|best| best.score <= enough)
+    /// Returns the doubt in the best pose found, or infinity if there is none.
+    fn doubt(&mut self, run: &mut Run<'_, '_>) -> f64 {
+        let Some(best) = self.found.best() else {
+            return f64::INFINITY;
+        };
+        let pose = best.outcome.camera_from_object;
+        match self.judged {
+            Some((judged, doubt)) if judged == pose => doubt,
+            _ => {
+                let doubt = run.score(&mut self.doubt, &pose);
+                self.judged = Some((pose, doubt));
+                doubt
+            }
+        }
     }
 
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
@@ -180,7 +199,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, A, E,
         self.aligned.clear();
         self.align(run, first);
         self.try_best(run);
-        if !self.has(self.options.good_enough) {
+        if self.doubt(run) > self.options.good_enough {
             self.align(run, others);
             self.explore(run, self.options.good_enough);
         }
@@ -191,7 +210,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> HypothesisSearch<S, A, E,
     fn explore(&mut self, run: &mut Run<'_, '_>, enough: f64) {
         let aligned = std::mem::take(&mut self.aligned);
         for (_, start) in aligned.poses() {
-            if run.is_over() || self.has(enough) {
+            if run.is_over() || self.doubt(run) <= enough {
                 break;
             }
             let outcome = run.refine(&mut self.explore, start);
@@ -224,7 +243,9 @@ const FIRST: usize = 32;
 const FINALISTS: usize = 2;
 const FINAL_GAP: f64 = 0.05;
 
-impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearch<S, A, E, R, C> {
+impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
+    for HypothesisSearch<S, A, E, R, C, D>
+{
     fn run(
         &mut self,
         problem: &Problem<'_>,
@@ -241,6 +262,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearc
             Start::Ignored => Outcome::kept(init, Termination::NoPairs),
         };
         self.found.clear();
+        self.judged = None;
         session.workspace.alternatives.clear();
         let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
         let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
@@ -262,19 +284,21 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearc
         if !run.allows(&local.camera_from_object) {
             local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        let mut score = f64::INFINITY;
+        let (mut score, mut doubt) = (f64::INFINITY, f64::INFINITY);
         if !ignored {
             self.add(&mut run, local, true);
             score = self.found.best().map_or(score, |found| found.score);
+            doubt = self.doubt(&mut run);
         }
-        let bad = score > self.options.threshold;
+        let bad = doubt > self.options.threshold;
         if bad {
             self.search(&mut run, &local.camera_from_object);
         }
         if let Some(best) = self.found.best() {
+            let bad = self.doubt(&mut run) > self.options.threshold;
             let mut alike = std::mem::take(&mut self.alike);
             let scores = (&mut self.ranking, &mut self.score);
-            let listed = alike.list(&mut run, &best, scores, &self.options);
+            let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
             self.aligned.clear();
             self.align(&mut run, listed.poses());
             self.alike = alike;
@@ -284,6 +308,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score> Stage for HypothesisSearc
         let mut returned = local;
         if let Some(best) = self.found.best()
             && best.score < score - self.options.min_gain
+            && self.doubt(&mut run) <= doubt
         {
             (returned, score) = (best.outcome, best.score);
         }

@@ -23,11 +23,11 @@ pub(crate) struct LookAlikes {
 impl LookAlikes {
     /// Lists the poses that look like `best` and may explain the image better or as well.
     ///
-    /// If the score of `best` is above the threshold, all that rank better are listed.
+    /// If `best` is `bad`, all that rank better are listed.
     pub(crate) fn list(
         &mut self,
         run: &mut Run<'_, '_>,
-        best: &Found,
+        (best, bad): (&Found, bool),
         (ranking, score): (&mut impl Score, &mut impl Score),
         options: &SearchOptions,
     ) -> &Shortlist {
@@ -41,7 +41,6 @@ impl LookAlikes {
             return &self.listed;
         }
         let base = &best.outcome.camera_from_object;
-        let bad = best.score > options.threshold;
         let gap = if bad { f64::INFINITY } else { MAX_GAP };
         let limit = run.score(ranking, base) + gap;
         let spacing = options.spacing_degrees;

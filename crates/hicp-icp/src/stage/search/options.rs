@@ -26,11 +26,11 @@ pub enum Start {
 pub struct SearchOptions {
     /// The use of the initial pose.
     pub start: Start,
-    /// The score above which the search starts.
+    /// The doubt above which the search starts.
     ///
     /// If the local stage ends at or below it, only poses that look like the local one are tried.
     pub threshold: f64,
-    /// The score at which no further hypotheses are refined.
+    /// The doubt at which no further hypotheses are refined.
     pub good_enough: f64,
     /// The gain in score by which a hypothesis must beat the local pose to replace it.
     ///
@@ -64,12 +64,13 @@ impl Default for SearchOptions {
     ///
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
-    /// The search starts above a score of 0.1, and a hypothesis must be better by 0.02.
+    /// The search starts above a doubt of 0.05. A hypothesis must be better by a score of 0.02, and not
+    /// be more doubtful.
     fn default() -> Self {
         Self {
             start: Start::Refined,
-            threshold: 0.1,
-            good_enough: 0.03,
+            threshold: 0.05,
+            good_enough: 0.02,
             min_gain: 0.02,
             rotations: Rotations::Even,
             hypotheses: 1000,
