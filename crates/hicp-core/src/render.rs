@@ -86,6 +86,7 @@ impl RenderedView {
     ///
     /// It is 0 if nothing was rendered there, and outside the region.
     #[must_use]
+    #[inline]
     pub fn depth_at(&self, u: u32, v: u32) -> f32 {
         self.region.index(u, v).map_or(0.0, |i| self.depth[i])
     }
@@ -96,6 +97,7 @@ impl RenderedView {
     /// Returns `None` if nothing was rendered there or `mesh` does not have the triangle. `mesh`,
     /// `camera` and `camera_from_object` must be those of the render.
     #[must_use]
+    #[inline]
     pub fn surfel_at(
         &self,
         u: u32,

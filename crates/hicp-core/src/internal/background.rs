@@ -94,6 +94,7 @@ impl Background {
     ///
     /// If the plane is behind the camera at that pixel, it is infinite.
     #[must_use]
+    #[inline]
     pub fn height(&self, u: f64, v: f64, z: f64) -> f64 {
         height(&self.plane, &Vector3::new(u, v, z))
     }
@@ -150,6 +151,7 @@ impl Background {
 }
 
 /// Returns the distance of a pixel (u, v, z) in front of a plane, along the optical axis, meters.
+#[inline]
 fn height(plane: &DepthPlane, pixel: &Vector3<f64>) -> f64 {
     let inverse = plane.inverse_depth(pixel.x, pixel.y);
     if inverse > 0.0 {

@@ -37,6 +37,7 @@ impl DepthPlane {
 
     /// Returns the inverse depth of the plane at a pixel; not positive behind the camera.
     #[must_use]
+    #[inline]
     pub fn inverse_depth(&self, u: f64, v: f64) -> f64 {
         self.0.dot(&Vector3::new(1.0, u, v))
     }

@@ -49,9 +49,25 @@ cascade!(A, B);
 cascade!(A, B, C);
 cascade!(A, B, C, D);
 
+/// A cascade without stages keeps the initial pose as converged, for a branch of a switch.
+impl Stage for Cascade<()> {
+    fn run(
+        &mut self,
+        _problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        _session: &mut Session<'_>,
+    ) -> Outcome {
+        Outcome::kept(init, crate::Termination::Converged)
+    }
+
+    fn name(&self) -> &'static str {
+        "cascade"
+    }
+}
+
 /// A cascade of any number of stages of one type, as read from a file.
 ///
-/// An empty one keeps the initial pose.
+/// An empty one keeps the initial pose as converged.
 impl<T: Stage> Stage for Cascade<Vec<T>> {
     fn run(
         &mut self,
@@ -67,7 +83,7 @@ impl<T: Stage> Stage for Cascade<Vec<T>> {
             outcome = Some(outcome.map_or(next, |o| o.then(next)));
         }
         session.cascade_init = outer;
-        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::Converged))
     }
 
     fn name(&self) -> &'static str {

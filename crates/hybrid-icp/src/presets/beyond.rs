@@ -40,10 +40,13 @@ pub type Fit = Icp<(), (RenderedSurface, Contour), (), PointToPlane, (Convergenc
 /// The type of [`local`].
 pub type Local = Cascade<(
     Guard<Fit, MeanVsd>,
-    SwitchUntilStall<MeanVsd, Near, Far>,
-    Guard<Fit, MeanVsd>,
+    Switch<
+        Threshold<Doubt>,
+        Cascade<()>,
+        Cascade<(SwitchUntilStall<MeanVsd, Near, Far>, Guard<Fit, MeanVsd>)>,
+    >,
 )>;
-/// The stage that aligns hypotheses.
+// The stage that aligns hypotheses.
 pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
 /// The stage that refines hypotheses.
 pub type Explore = Descent<SampledMve>;
@@ -173,21 +176,28 @@ fn fit() -> Guard<Fit, MeanVsd> {
 #[must_use]
 pub fn local() -> Local {
     let far = (300, 5000);
+    let steps = SwitchUntilStall {
+        score: MeanVsd::imperfect_mask(),
+        alpha: PAPER_ALPHA,
+        aligned: near(PointToPlane, 2000),
+        misaligned: Cascade((
+            observed(far, PointToPoint, coarse()),
+            observed(far, Symmetric, Convergence::default()),
+        )),
+        max_steps: 6,
+        min_gain: 0.01,
+        good_enough: 0.1,
+    };
     Cascade((
         fit(),
-        SwitchUntilStall {
-            score: MeanVsd::imperfect_mask(),
-            alpha: PAPER_ALPHA,
-            aligned: near(PointToPlane, 2000),
-            misaligned: Cascade((
-                observed(far, PointToPoint, coarse()),
-                observed(far, Symmetric, Convergence::default()),
-            )),
-            max_steps: 6,
-            min_gain: 0.01,
-            good_enough: 0.1,
+        Switch {
+            switcher: Threshold {
+                score: Doubt,
+                alpha: 0.1,
+            },
+            aligned: Cascade(()),
+            misaligned: Cascade((steps, fit())),
         },
-        fit(),
     ))
 }
 
@@ -242,9 +252,9 @@ pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Align, Explore, Sampled
     let options = SearchOptions {
         start: Start::Ignored,
         good_enough: 0.02,
-        hypotheses: 512,
-        aligned: 128,
-        refined: 12,
+        hypotheses: 1000,
+        aligned: 256,
+        refined: 24,
         ..SearchOptions::default()
     };
     search_from(stage, options)
@@ -313,9 +323,9 @@ pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.15,
         good_enough: 0.05,
-        hypotheses: 256,
-        aligned: 64,
-        refined: 6,
+        hypotheses: 512,
+        aligned: 128,
+        refined: 12,
         ..SearchOptions::default()
     })
 }

@@ -45,7 +45,7 @@ pub(super) struct Matcher {
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
         let local = local();
-        let Cascade((_, steps, _)) = &local;
+        let steps = &local.0.1.misaligned.0.0;
         let (mut near, far) = (steps.aligned, steps.misaligned);
         near.0.0.selection.stride = Stride::AboutPoints(POINTS);
         near.0.1.selection.stride = Stride::AboutPoints(POINTS);
