@@ -45,8 +45,8 @@ pub use errors::{
 };
 pub use hicp_core;
 pub use judgment::{
-    Confidence, Doubt, Evidence, Flatness, LabeledScore, Misfit, N_FEATURES, ReliabilityBin, reliability,
-    roc_area,
+    Confidence, Doubt, Evidence, Flatness, LabeledScore, Misfit, N_FEATURES, ReliabilityBin,
+    reliability, roc_area,
 };
 pub use mve::{MaskTrust, MeanVsd, Occlusion, SampledMve, VISIBILITY_TOLERANCE_METERS};
 pub use score::Score;

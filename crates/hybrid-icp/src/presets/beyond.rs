@@ -248,7 +248,9 @@ fn search_from<S>(
 /// A search without an initial pose that ends with `stage`, as in
 /// [`Refiner::estimate`](crate::Refiner::estimate).
 #[must_use]
-pub fn estimate_with<S>(stage: S) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
+pub fn estimate_with<S>(
+    stage: S,
+) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
     let options = SearchOptions {
         start: Start::Ignored,
         good_enough: 0.02,
@@ -321,11 +323,11 @@ pub fn color() -> ByColor<Search> {
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
-        threshold: 0.15,
+        threshold: 0.1,
         good_enough: 0.05,
-        hypotheses: 512,
-        aligned: 128,
-        refined: 12,
+        hypotheses: 1000,
+        aligned: 256,
+        refined: 24,
         ..SearchOptions::default()
     })
 }
