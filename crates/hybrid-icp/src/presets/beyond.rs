@@ -323,11 +323,11 @@ pub fn color() -> ByColor<Search> {
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
-        threshold: 0.1,
-        good_enough: 0.05,
-        hypotheses: 1000,
-        aligned: 256,
-        refined: 24,
+        threshold: 0.2,
+        good_enough: 0.1,
+        hypotheses: 512,
+        aligned: 128,
+        refined: 12,
         ..SearchOptions::default()
     })
 }
