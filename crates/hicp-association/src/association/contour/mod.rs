@@ -36,7 +36,7 @@ use split::Split;
 /// inverse variances of a border relative to those of a depth, so that both kinds of rows add up.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region.
-/// `target_index` is [`Pair::UNLISTED`]. Cost: one render, shared with other components that use
+/// `target_index` is [`Pair::UNLISTED`]. The lines are the candidates. Cost: one render, shared with other components that use
 /// this pose, O(rendered pixels), and 21 pixels per line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
@@ -111,6 +111,7 @@ impl DataAssociation for Contour {
             };
             lines.push(evidence.along(line));
         }
+        pairs.set_candidates(lines.len());
         border.compare(lines);
         let sigma = surroundings.noise.max(LEAST_SIGMA_METERS);
         for line in lines.iter() {
