@@ -10,7 +10,8 @@ use crate::scratch::Scratch;
 /// Source: Zinßer, Schmidt & Niemann 2003, Picky ICP. Model points without a counterpart share the
 /// targets of others, and the closest one is most likely right. Of equally close ones, the first is
 /// kept. The order of the pairs does not change. Pairs whose distance is not finite are removed.
-/// Targets that are not surfels of the observation ([`Pair::UNLISTED`]) count as different. Cost: O(n log n) for n pairs.
+/// Targets that are not surfels of the observation ([`Pair::UNLISTED`]) count as different.
+/// Cost: O(n log n) for n pairs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OneToOne {
     scratch: Scratch<Buffers>,
