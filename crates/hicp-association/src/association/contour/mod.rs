@@ -31,7 +31,8 @@ use split::Split;
 /// dilated by a constant width is therefore as good as an exact one, and a box has no influence.
 /// Pixels that something hides are no evidence, so a border that is hidden has no pair. Neither is
 /// missing depth: without measurements next to the object, depth shows no border, the mask cannot
-/// be compared, and there are few pairs or none.
+/// be compared, and there are few pairs or none. If the observation has no surfel at all, there are
+/// none.
 ///
 /// Use it with [`RenderedSurface`](crate::RenderedSurface) as a tuple, point-to-plane and the
 /// selection `()`. The normals of a pair lie in the image plane of the silhouette. Weights are the
@@ -89,9 +90,13 @@ impl DataAssociation for Contour {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        pairs.set_candidates(0);
         let Some((model, observation)) = context.problem.sides() else {
             return;
         };
+        if observation.n_surfels() == 0 {
+            return;
+        }
         let Some(view) = context.view(camera_from_object) else {
             return;
         };
