@@ -34,10 +34,13 @@
 //! | [`NormalSpace`] | [`ProjectiveInterpolated`] | [`BoundaryTargets`] | |
 //! | [`StableSampling`] | [`ObservationToModel`] | [`MinPairs`] | |
 //! | | [`ClosestPointOnMesh`] | | |
+//! | | [`RenderedSurface`] | | |
+//! | | [`Contour`] | | |
 //!
 //! Selections from [`WithoutBoundary`] on select from the points of another selection, and
 //! [`Reciprocal`] from the pairs of another association. Filters and weights implement the same
-//! trait and chain as tuples, in order.
+//! trait and chain as tuples, in order. Associations join: a pair of them, or a `Vec`, gives the
+//! pairs of all.
 //!
 //! [`estimate_normals`] and [`voxel_downsample`] prepare point clouds.
 

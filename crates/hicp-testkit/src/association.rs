@@ -2,11 +2,11 @@
 
 use hybrid_icp::association::DataAssociation;
 use hybrid_icp::core::{
-    Correspondences, Observation, Pair, Point3, Problem, RigidTransform, Surfel,
+    Correspondences, Observation, Pair, Point3, Problem, RigidTransform, Surfel, Vector3,
 };
 
 use crate::law::{Subject, Trial};
-use crate::scenes::{cases, sides, workspace};
+use crate::scenes::{Case, cases, sides, workspace};
 
 /// The laws that [`check_association`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,8 +14,10 @@ pub struct AssociationLaws {
     /// Every pair's source is `source[source_index]`, moved by the pose. False for an association
     /// that starts from the observation.
     pub sources_are_the_selected: bool,
-    /// Every pair's target is the observation's surfel of `target_index`. False for an association
-    /// that interpolates.
+    /// Every pair's target is the observation's surfel of `target_index`.
+    ///
+    /// False for an association that computes its targets, such as one that interpolates. Its
+    /// indices are still those of observed surfels, or [`Pair::UNLISTED`].
     pub targets_are_the_observed: bool,
 }
 
@@ -38,7 +40,8 @@ impl Default for AssociationLaws {
 /// - Pairs are finite. Weights are finite and not negative.
 /// - The source is the selected point, *moved*. The target is the observed surfel of its index (see
 ///   [`AssociationLaws`]). Indices are in range.
-/// - The pose stored in the pairs does not change.
+/// - The pose stored in the pairs, and pairs that are already there, do not change. The pairs added
+///   to those are the same as without them.
 ///
 /// # Panics
 ///
@@ -64,10 +67,39 @@ pub fn check_association<T: DataAssociation + 'static>(
             contract(&trial, laws, &source, sides(&case.problem).1, &pairs);
             let law = "the pose stored in the pairs does not change";
             trial.same(law, &case.pose, pairs.camera_from_object());
+            let (earlier, later) = trial.calm(|| joined(&mut make(), &case, &source));
+            let law = "pairs that are already there do not change";
+            trial.same(law, &earlier_pairs().map(Some), &earlier);
+            let law = "pairs that are already there do not change those that are added";
+            trial.same(law, &pairs.as_slice(), &later.as_slice());
             trial.pure::<dyn DataAssociation, _>(&pairs, [&mut used, &mut boxed], associate);
         }
     }
     subject.named([make().name(), used.name(), boxed.name()]);
+}
+
+/// Returns the first pairs, which another association left there, and those added to them.
+fn joined(
+    association: &mut impl DataAssociation,
+    case: &Case,
+    source: &[Surfel],
+) -> ([Option<Pair>; 2], Vec<Pair>) {
+    let (mut workspace, mut pairs) = (workspace(), Correspondences::new());
+    pairs.begin(&case.pose, source.len());
+    pairs.extend(earlier_pairs());
+    let mut context = workspace.context(&case.problem);
+    association.associate(&mut context, source, &case.pose, &mut pairs);
+    let mut pairs = pairs.as_slice().iter().copied();
+    ([pairs.next(), pairs.next()], pairs.collect())
+}
+
+/// Returns pairs of another association: one in the scene, and one far from it.
+fn earlier_pairs() -> [Pair; 2] {
+    let surfel = |z| Surfel {
+        point: Point3::new(0.0, 0.0, z),
+        normal: -Vector3::z_axis(),
+    };
+    [0.5, 50.0].map(|z| Pair::new(0, surfel(z), 0, surfel(z + 0.01)))
 }
 
 fn sources(problem: &Problem<'_>) -> [(&'static str, Vec<Surfel>); 4] {
@@ -111,14 +143,20 @@ fn contract(
                 format_args!("{pair:?}, expected the source {moved:?}"),
             );
         }
-        let Some(observed) = observation.surfel(pair.target_index) else {
-            trial.broken("target indices are those of observed surfels", found);
-        };
-        trial.holds(
-            "targets are the observed surfels of their indices",
-            !laws.targets_are_the_observed || pair.target == *observed,
-            format_args!("{pair:?}, expected the target {observed:?}"),
-        );
+        let observed = observation.surfel(pair.target_index);
+        if laws.targets_are_the_observed {
+            let law = "target indices are those of observed surfels";
+            trial.holds(law, observed.is_some(), found);
+            trial.holds(
+                "targets are the observed surfels of their indices",
+                observed == Some(&pair.target),
+                format_args!("{pair:?}, expected the target {observed:?}"),
+            );
+        } else {
+            let law = "target indices are those of observed surfels, or unlisted";
+            let listed = pair.target_index != Pair::UNLISTED;
+            trial.holds(law, observed.is_some() || !listed, found);
+        }
     }
 }
 

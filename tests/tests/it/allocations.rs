@@ -49,6 +49,7 @@ fn a_warm_run_allocates_nothing() {
 fn stage_with(part: &Part) -> Option<String> {
     let own = match part.name {
         "schedule" => "{ type = \"schedule\", filters = [\"max-distance\", \"trimmed\"] }".to_owned(),
+        "joined" => "{ type = \"joined\", associations = [\"rendered-surface\", \"contour\"] }".to_owned(),
         "weighted-sum" => {
             "{ type = \"weighted-sum\", metrics = [\"point-to-plane\", \"point-to-point\"], weights = [1.0, 0.1] }".to_owned()
         }

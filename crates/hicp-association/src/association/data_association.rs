@@ -7,12 +7,16 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 ///
 /// # Contract
 ///
-/// - `source` holds the selected surfels in the object frame, and `pairs` is empty.
+/// - `source` holds the selected surfels in the object frame.
+/// - Pairs are added after those that `pairs` already holds, which do not change. A join of
+///   associations leaves the pairs of its earlier members there.
 /// - Every pair holds the source *moved by* `camera_from_object` and its target. Both are in the
 ///   camera frame in meters, with finite coordinates.
 /// - The weight of a pair is finite and not negative: 1, unless the association has a better value.
 /// - `source_index` is the index of the point in `source`, and `target_index` that of the observed
-///   surfel. A point may have any number of pairs.
+///   surfel, or [`Pair::UNLISTED`](hicp_core::Pair::UNLISTED). A point may have any number of pairs.
+/// - An association that does not start from `source` sets the number of its candidates
+///   ([`Correspondences::set_candidates`]).
 /// - Pure: equal inputs give equal pairs in equal order. `&mut self` is scratch. Values that depend
 ///   only on the observation or the model belong into their `derived()` caches, where all threads
 ///   share them.
@@ -105,7 +109,7 @@ macro_rules! forward {
 }
 forward!(Box<T>, &mut T);
 
-/// Joins the pairs of all members, in order.
+/// Joins the pairs of all members, in order. The number of candidates is the sum of theirs.
 impl<T: DataAssociation> DataAssociation for Vec<T> {
     fn associate(
         &mut self,
@@ -114,9 +118,14 @@ impl<T: DataAssociation> DataAssociation for Vec<T> {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        let selected = pairs.n_candidates();
+        let mut candidates = 0;
         for association in self.iter_mut() {
+            pairs.set_candidates(selected);
             association.associate(context, source, camera_from_object, pairs);
+            candidates += pairs.n_candidates();
         }
+        pairs.set_candidates(candidates);
     }
 
     fn name(&self) -> &'static str {
@@ -128,7 +137,7 @@ impl<T: DataAssociation> DataAssociation for Vec<T> {
     }
 }
 
-/// Joins the pairs of both members, in order.
+/// Joins the pairs of both members, in order. The number of candidates is the sum of theirs.
 impl<A: DataAssociation, B: DataAssociation> DataAssociation for (A, B) {
     fn associate(
         &mut self,
@@ -137,8 +146,12 @@ impl<A: DataAssociation, B: DataAssociation> DataAssociation for (A, B) {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        let selected = pairs.n_candidates();
         self.0.associate(context, source, camera_from_object, pairs);
+        let candidates = pairs.n_candidates();
+        pairs.set_candidates(selected);
         self.1.associate(context, source, camera_from_object, pairs);
+        pairs.set_candidates(candidates + pairs.n_candidates());
     }
 
     fn name(&self) -> &'static str {

@@ -52,6 +52,7 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        let earlier = pairs.len();
         self.inner
             .associate(context, source, camera_from_object, pairs);
         let Moved { points, tree } = &mut self.scratch.0;
@@ -64,7 +65,12 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
                 .filter(|point| point.iter().all(|x| x.is_finite())),
         );
         tree.rebuild(points);
+        let mut position = 0;
         pairs.retain(|pair| {
+            position += 1;
+            if position <= earlier {
+                return true;
+            }
             let own = distance_squared(&pair.target.point, &pair.source.point);
             tree.nearest(&pair.target.point)
                 .is_some_and(|nearest| own <= nearest.distance_squared)

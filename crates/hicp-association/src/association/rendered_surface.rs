@@ -9,18 +9,19 @@ use crate::stride::Stride;
 
 /// Pairs every rendered point with the point that the camera measured along the same ray.
 ///
-/// Use it with [`PointToPlane`](https://docs.rs/hicp-metric) and the selection `()`. The target of
-/// a pair carries the normal of the *model*, and weights are t² / cos² θ, where θ is the angle
-/// between the ray and that normal. A row is then the error of depth along the ray, whose Jacobian
-/// has no noise. [`Projective`](crate::Projective) with point-to-plane uses the normals of the
-/// image instead, which are smoothed or noisy.
+/// Use it with the metric `PointToPlane` and the selection `()`. The target of a pair carries the
+/// normal of the *model*, and weights are t² / cos² θ, where θ is the angle between the ray and
+/// that normal. A row is then the error of depth along the ray, whose Jacobian has no noise.
+/// [`Projective`](crate::Projective) with point-to-plane uses the normals of the image instead,
+/// which are smoothed or noisy.
 ///
 /// The factor t falls from 1 to 0 at the limit (Tukey's biweight). The model is rendered at every
 /// iteration, so hidden parts never pair. Pixels outside of the mask pair, too: masks of detectors
-/// often miss a part of the object, and other surfaces are usually farther away than the limit.
+/// often miss a part of the object, and other surfaces are usually farther away than the limit. If
+/// the observation has no surfel at all, there are no pairs.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region, and
-/// `target_index` that in the observation's region, or [`Pair::UNLISTED`] outside of it. All
+/// `target_index` that of the observed surfel, or [`Pair::UNLISTED`] where the mask has none. All
 /// rendered points of the stride are candidates. Cost: one render, and O(rendered pixels).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderedSurface {
@@ -54,12 +55,16 @@ impl DataAssociation for RenderedSurface {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        pairs.set_candidates(0);
         let problem = context.problem;
         let (Some((model, observation)), Some(view)) =
             (problem.sides(), context.view(camera_from_object))
         else {
             return;
         };
+        if observation.n_surfels() == 0 {
+            return;
+        }
         let noise = Surroundings::of(observation).noise;
         let limit = f64::from(self.limit.meters(&problem)).max(LIMIT_SIGMAS * noise);
         let (camera, depth, region) = (observation.camera(), observation.depth(), view.region());
@@ -75,7 +80,6 @@ impl DataAssociation for RenderedSurface {
                 candidates += 1;
                 let measured = f64::from(depth.get(u, v).unwrap_or(0.0));
                 let behind = measured - f64::from(source.point.z);
-                // False for NaN, which a limit without a diameter is.
                 let near = measured > 0.0 && behind.abs() < limit;
                 let ray = source.point.coords.cast::<f64>();
                 let cosine = -source.normal.cast::<f64>().dot(&ray) / ray.norm();

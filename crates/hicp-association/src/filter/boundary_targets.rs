@@ -1,6 +1,6 @@
 //! Rejection of pairs at the edge of the observed surface.
 
-use hicp_core::{Correspondences, Iteration, Problem};
+use hicp_core::{Correspondences, Iteration, Pair, Problem};
 
 use crate::boundary::{BoundaryMap, BoundaryRule};
 use crate::filter::outlier_filter::OutlierFilter;
@@ -21,6 +21,10 @@ use crate::filter::outlier_filter::OutlierFilter;
 /// to 28 % for two solid objects, and from 0.05 mm to 0.11 mm for a thin hammer. It helped only for
 /// that hammer with 0.5 % of noise: from 0.36 mm to 0.26 mm (`cargo run --release -p hicp-tests
 /// --example nees_report 300`).
+///
+/// Pairs whose target is not a surfel of the observation ([`Pair::UNLISTED`]) are kept. Without a
+/// position in the region, nothing is known of them, and those of [`Contour`](crate::Contour) are
+/// meant to lie at the boundary.
 ///
 /// The filter cannot distinguish noise from steps. If the depths of neighbors differ by as much as
 /// the limit, it removes pairs at random, and more of them on steep surface.
@@ -55,7 +59,9 @@ impl OutlierFilter for BoundaryTargets {
         };
         let rule = BoundaryRule::new(self.width, self.max_tilt_degrees, observation.camera());
         let boundary = BoundaryMap::of(observation, rule);
-        pairs.retain(|pair| !boundary.contains(pair.target_index));
+        pairs.retain(|pair| {
+            pair.target_index == Pair::UNLISTED || !boundary.contains(pair.target_index)
+        });
     }
 
     fn name(&self) -> &'static str {

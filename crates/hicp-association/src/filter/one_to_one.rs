@@ -1,6 +1,6 @@
 //! One pair per observed point.
 
-use hicp_core::{Correspondences, Iteration};
+use hicp_core::{Correspondences, Iteration, Pair};
 
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::scratch::Scratch;
@@ -10,6 +10,7 @@ use crate::scratch::Scratch;
 /// Source: Zinßer, Schmidt & Niemann 2003, Picky ICP. Model points without a counterpart share the
 /// targets of others, and the closest one is most likely right. Of equally close ones, the first is
 /// kept. The order of the pairs does not change. Pairs whose distance is not finite are removed.
+/// Targets that are not surfels of the observation ([`Pair::UNLISTED`]) count as different.
 /// Cost: O(n log n) for n pairs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OneToOne {
@@ -45,7 +46,7 @@ impl OutlierFilter for OneToOne {
                 .then_with(|| a.1.total_cmp(&b.1))
                 .then_with(|| a.2.cmp(&b.2))
         });
-        claims.dedup_by_key(|(target, _, _)| *target);
+        claims.dedup_by(|a, b| a.0 == b.0 && a.0 != Pair::UNLISTED);
         kept.clear();
         kept.resize(pairs.len(), false);
         for (_, _, position) in claims {

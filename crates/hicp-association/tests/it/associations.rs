@@ -6,9 +6,9 @@ use crate::common::{
     Random, Scene, ball_scene, blind_scene, box_mesh, bumpy_ball, hostile_poses, scene_of, squared,
 };
 use hicp_association::{
-    AllSamples, ClosestPointOnMesh, DataAssociation, KNearest, Length, NearestNeighbor,
+    AllSamples, ClosestPointOnMesh, Contour, DataAssociation, KNearest, Length, NearestNeighbor,
     NormalCompatible, NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated,
-    ProjectiveSearch, Reciprocal, SearchIndex, Stride,
+    ProjectiveSearch, Reciprocal, RenderedSurface, SearchIndex, Stride,
 };
 use hicp_core::{
     DepthImage, Isometry3, Mask, Model, Observation, Pair, PinholeCamera, Point3, RigidTransform,
@@ -36,6 +36,9 @@ fn all_associations() -> Vec<Box<dyn DataAssociation>> {
         Box::new(ProjectiveInterpolated::default()),
         Box::new(ObservationToModel::default()),
         Box::new(ClosestPointOnMesh::default()),
+        Box::new(RenderedSurface::default()),
+        Box::new(Contour::default()),
+        Box::new((Projective, KNearest::default())),
     ]
 }
 
@@ -463,8 +466,13 @@ fn the_order_of_the_points_does_not_change_the_pairs() {
             .associate(&mut association, &shuffled, &pose)
             .as_slice()
             .to_vec();
-        let from_observation = ["observation-to-model", "closest-point-on-mesh"];
-        if !from_observation.contains(&association.name()) {
+        let without_selection = [
+            "observation-to-model",
+            "closest-point-on-mesh",
+            "rendered-surface",
+            "contour",
+        ];
+        if !without_selection.contains(&association.name()) {
             for pair in &mut other {
                 pair.source_index = order[pair.source_index as usize] as u32;
             }

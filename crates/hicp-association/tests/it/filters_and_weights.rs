@@ -227,6 +227,20 @@ proptest! {
     }
 
     #[test]
+    fn one_to_one_keeps_every_pair_whose_target_is_unlisted(d in distances()) {
+        let mut pairs = pairs_at(&d);
+        for pair in &mut pairs {
+            pair.target_index = if pair.source_index % 3 == 0 { 7 } else { Pair::UNLISTED };
+        }
+        let kept = run(OneToOne::new(), &pairs);
+        let unlisted = |pairs: &[Pair]| -> Vec<Pair> {
+            pairs.iter().filter(|pair| pair.target_index == Pair::UNLISTED).copied().collect()
+        };
+        prop_assert_eq!(unlisted(&kept), unlisted(&pairs));
+        prop_assert_eq!(kept.len() - unlisted(&kept).len(), 1.min(pairs.len()));
+    }
+
+    #[test]
     fn the_order_of_the_pairs_does_not_change_the_result(d in distances(), seed: u64) {
         let pairs = pairs_at(&d);
         let mut shuffled = pairs.clone();
@@ -451,13 +465,22 @@ fn boundary_targets_equal_their_definition() {
         }
         // An invalid index counts as boundary.
         let beyond = Pair {
-            target_index: u32::MAX,
+            target_index: u32::MAX - 1,
             ..pairs[0]
         };
         assert!(
             scene
                 .filter(&mut BoundaryTargets::default(), &[beyond])
                 .is_empty()
+        );
+        // A target that is not a surfel of the observation is kept.
+        let unlisted = Pair {
+            target_index: Pair::UNLISTED,
+            ..pairs[0]
+        };
+        assert_eq!(
+            scene.filter(&mut BoundaryTargets::default(), &[unlisted]),
+            [unlisted]
         );
     }
 }

@@ -21,5 +21,6 @@ mod nearest_neighbor;
 mod nested_selections;
 mod projective;
 mod selections;
+mod surface_and_silhouette;
 
 mod support;

@@ -227,6 +227,39 @@ impl DataAssociation for Spoilt {
     }
 }
 
+/// An association that removes pairs of other associations.
+struct Clears;
+
+impl DataAssociation for Clears {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        pose: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        pairs.retain(|_| false);
+        Projective.associate(context, source, pose, pairs);
+    }
+}
+
+/// An association that adds nothing to the pairs of others.
+struct Continues;
+
+impl DataAssociation for Continues {
+    fn associate(
+        &mut self,
+        context: &mut Context<'_>,
+        source: &[Surfel],
+        pose: &Isometry3<f64>,
+        pairs: &mut Correspondences,
+    ) {
+        if pairs.is_empty() {
+            Projective.associate(context, source, pose, pairs);
+        }
+    }
+}
+
 #[test]
 fn broken_associations_are_detected() {
     let laws = AssociationLaws::default();
@@ -245,8 +278,21 @@ fn broken_associations_are_detected() {
     caught("target indices", || {
         check_association(|| Spoilt(|_, pair| pair.target_index = u32::MAX), laws);
     });
+    let computing = AssociationLaws {
+        targets_are_the_observed: false,
+        ..laws
+    };
+    caught("or unlisted", || {
+        check_association(|| Spoilt(|_, pair| pair.target_index = 1 << 31), computing);
+    });
     caught("observed surfels of their indices", || {
         check_association(|| Spoilt(|_, pair| pair.target.point.z += 0.01), laws);
+    });
+    caught("already there do not change", || {
+        check_association(|| Clears, laws);
+    });
+    caught("change those that are added", || {
+        check_association(|| Continues, laws);
     });
     caught("pairs are finite", || {
         check_association(|| Spoilt(|_, pair| pair.source.point.z /= 0.0), laws);

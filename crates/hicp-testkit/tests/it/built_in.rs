@@ -10,12 +10,12 @@ use hicp_testkit::{
 };
 use hybrid_icp::Preset;
 use hybrid_icp::association::{
-    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, DistanceWeight, KNearest,
-    MadDistance, MaxDistance, MaxNormalAngle, MedianDistance, MinPairs, NearestNeighbor,
+    AllSamples, BoundaryTargets, ClosestPointOnMesh, ConstantWeight, Contour, DistanceWeight,
+    KNearest, MadDistance, MaxDistance, MaxNormalAngle, MedianDistance, MinPairs, NearestNeighbor,
     NormalCompatible, NormalShooting, NormalSpace, NormalWeight, ObservationToModel,
     ObservedSurface, OneToOne, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
-    Reciprocal, Schedule, SearchIndex, SensorNoiseWeight, StableSampling, Stride, Trimmed,
-    UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, WithoutBoundary,
+    Reciprocal, RenderedSurface, Schedule, SearchIndex, SensorNoiseWeight, StableSampling, Stride,
+    Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 use hybrid_icp::core::Matrix6;
 use hybrid_icp::icp::{
@@ -62,6 +62,21 @@ fn built_in_associations_keep_the_laws() {
         ..strict
     };
     check_association(ProjectiveInterpolated::default, interpolating);
+    check_association(
+        || (Projective, Reciprocal::new(NearestNeighbor::default())),
+        strict,
+    );
+    check_association(|| vec![Projective; 2], strict);
+    let from_a_render = AssociationLaws {
+        sources_are_the_selected: false,
+        targets_are_the_observed: false,
+    };
+    check_association(RenderedSurface::default, from_a_render);
+    check_association(Contour::default, from_a_render);
+    check_association(
+        || (RenderedSurface::default(), Contour::default()),
+        from_a_render,
+    );
     let from_the_observation = AssociationLaws {
         sources_are_the_selected: false,
         ..strict

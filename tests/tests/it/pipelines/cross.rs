@@ -21,7 +21,8 @@
 //! Combinations without meaning are left out:
 //!
 //! - The selection `none` with associations that start from the selected points.
-//! - Selections with associations that start from the observation, which ignore the selection.
+//! - Selections with associations that start from the observation or a render, which ignore the
+//!   selection.
 //! - Filters on the observed surface: if the association searches the observation, every point is
 //!   paired with itself, so that one line is enough.
 //!
@@ -53,8 +54,16 @@ const MAIN_FILTERS: [&str; 5] = [
     "one-to-one",
     "normal-weight",
 ];
-/// Associations that search the model points closest to the observed ones and ignore the selection.
-const FROM_OBSERVATION: [&str; 2] = ["observation-to-model", "closest-point-on-mesh"];
+/// Associations that start from the observation or a render and ignore the selection.
+///
+/// `joined` joins two of them here.
+const WITHOUT_SELECTION: [&str; 5] = [
+    "observation-to-model",
+    "closest-point-on-mesh",
+    "rendered-surface",
+    "contour",
+    "joined",
+];
 
 struct Case {
     scene: Scene,
@@ -134,6 +143,9 @@ fn parts(kind: PartKind) -> Vec<(&'static str, String)> {
                     ("schedule", "filters") => {
                         "[{ type = \"max-distance\", limit = 0.5 }, \"max-distance\"]".to_owned()
                     }
+                    ("joined", "associations") => format!(
+                        "[{{ type = \"rendered-surface\", points = {POINTS} }}, \"contour\"]"
+                    ),
                     ("without-boundary", "selection") => {
                         format!("{{ type = \"visible-surface\", points = {POINTS} }}")
                     }
@@ -162,7 +174,7 @@ fn lines() -> Vec<([&'static str; 3], [String; 3])> {
     for (selection, selection_text) in selections {
         for (association, association_text) in parts(PartKind::Association) {
             let usual = selection == "visible-surface";
-            if !usual && FROM_OBSERVATION.contains(&association) {
+            if !usual && WITHOUT_SELECTION.contains(&association) {
                 continue;
             }
             for (filter, filter_text) in &filters {

@@ -37,7 +37,7 @@ impl MaskBorder {
         self.offset = 0;
         if self.offsets.len() >= FEWEST {
             self.offsets.sort_unstable();
-            let at = |fifths: usize| self.offsets[(self.offsets.len() - 1) * fifths / 10];
+            let at = |tenths: usize| self.offsets[(self.offsets.len() - 1) * tenths / 10];
             self.offset = at(5);
             spread = f64::from(at(8) - at(2)) / 2.0;
         }

@@ -29,15 +29,20 @@ use split::Split;
 /// The mask is not taken for granted. Its border is compared with the borders that depth alone
 /// shows: the median offset is removed, and the spread decides the mask's influence. A mask that is
 /// dilated by a constant width is therefore as good as an exact one, and a box has no influence.
-/// Pixels that something hides are no evidence, so a border that is hidden has no pair.
+/// Pixels that something hides are no evidence, so a border that is hidden has no pair. Neither is
+/// missing depth: without measurements next to the object, depth shows no border, the mask cannot
+/// be compared, and there are few pairs or none. If the observation has no surfel at all, there are
+/// none.
 ///
 /// Use it with [`RenderedSurface`](crate::RenderedSurface) as a tuple, point-to-plane and the
 /// selection `()`. The normals of a pair lie in the image plane of the silhouette. Weights are the
 /// inverse variances of a border relative to those of a depth, so that both kinds of rows add up.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region.
-/// `target_index` is [`Pair::UNLISTED`]. Cost: one render, shared with other components that use
-/// this pose, O(rendered pixels), and 21 pixels per line.
+/// `target_index` is [`Pair::UNLISTED`]. The lines are the candidates.
+///
+/// Cost: one render, shared with other components that use this pose, O(rendered pixels), and 21
+/// pixels per line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
     /// Number of lines, about.
@@ -85,9 +90,13 @@ impl DataAssociation for Contour {
         camera_from_object: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        pairs.set_candidates(0);
         let Some((model, observation)) = context.problem.sides() else {
             return;
         };
+        if observation.n_surfels() == 0 {
+            return;
+        }
         let Some(view) = context.view(camera_from_object) else {
             return;
         };
@@ -111,6 +120,7 @@ impl DataAssociation for Contour {
             };
             lines.push(evidence.along(line));
         }
+        pairs.set_candidates(lines.len());
         border.compare(lines);
         let sigma = surroundings.noise.max(LEAST_SIGMA_METERS);
         for line in lines.iter() {
