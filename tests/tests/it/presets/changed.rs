@@ -16,15 +16,16 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.05, 0.8);
     let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
-    file.set("stages.1.max_steps=1").unwrap();
-    file.set("stages.1.misaligned.stages.1.association.points=200")
+    file.set("stages.1.misaligned.stages.0.max_steps=1")
+        .unwrap();
+    file.set("stages.1.misaligned.stages.0.misaligned.stages.1.association.points=200")
         .unwrap();
     let expected =
         Refiner::new(file.build().unwrap()).refine(&scene.model, &scene.observation, &init);
 
     let mut refiner = Refiner::new(presets::local());
     let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
-    let (_, steps, _) = &mut refiner.stage_mut().0;
+    let steps = &mut refiner.stage_mut().0.1.misaligned.0.0;
     steps.max_steps = 1;
     steps.misaligned.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
     let changed = refiner.refine(&scene.model, &scene.observation, &init);
@@ -32,7 +33,7 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     assert_ne!(changed, unchanged);
 
     let stage = refiner.into_stage();
-    assert_eq!(stage.0.1.max_steps, 1);
+    assert_eq!(stage.0.1.misaligned.0.0.max_steps, 1);
     let again = Refiner::new(stage).refine(&scene.model, &scene.observation, &init);
     assert_eq!(again, expected);
 }
