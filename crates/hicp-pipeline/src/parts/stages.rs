@@ -239,6 +239,12 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
         threshold: p.number("threshold", FACTOR, 0.05, "searches above this doubt")?,
+        least_score: p.number(
+            "least_score",
+            FACTOR,
+            0.05,
+            "searches only above this score",
+        )?,
         good_enough: p.number("good_enough", FACTOR, 0.02, "doubt that ends it")?,
         min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
         rotations: p.word("rotations", &rotations, tried)?,

@@ -46,7 +46,7 @@ pub type Local = Cascade<(
         Cascade<(SwitchUntilStall<MeanVsd, Near, Far>, Guard<Fit, MeanVsd>)>,
     >,
 )>;
-// The stage that aligns hypotheses.
+/// The stage that aligns hypotheses.
 pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
 /// The stage that refines hypotheses.
 pub type Explore = Descent<SampledMve>;
@@ -324,6 +324,7 @@ pub fn color() -> ByColor<Search> {
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.2,
+        least_score: 0.1,
         good_enough: 0.1,
         hypotheses: 512,
         aligned: 128,

@@ -15,9 +15,11 @@ const LEAST: f64 = -6.0;
 /// Logarithm of the likelihood under the plane from which on a pixel in front of the surface may be
 /// background, and does not hide the object.
 const ON_PLANE: f64 = -2.0;
-/// Errors of the surface and of the plane that are not noise, meters.
-const SURFACE_SIGMA_METERS: f64 = 0.004;
-const PLANE_SIGMA_METERS: f64 = 0.003;
+/// Errors of the surface and of the plane that are not noise, in diameters.
+const SURFACE_SIGMA: f64 = 0.03;
+const PLANE_SIGMA: f64 = 0.015;
+/// Logarithm of odds of a pixel outside the mask that has no depth: rather background.
+const NO_DEPTH: f64 = -0.6;
 /// Change of the object's depth per length outside of the silhouette that is expected.
 const SLOPE: f64 = 0.5;
 
@@ -26,6 +28,8 @@ pub(super) struct Evidence<'a> {
     pub(super) observation: &'a Observation,
     pub(super) view: &'a RenderedView,
     pub(super) surroundings: &'a Surroundings,
+    /// The diameter of the model, meters.
+    pub(super) diameter: f64,
 }
 
 impl Evidence<'_> {
@@ -46,7 +50,7 @@ impl Evidence<'_> {
         let mask = if masked { 1.0 } else { -1.0 };
         let measured = f64::from(self.observation.depth().get(u, v).unwrap_or(0.0));
         if measured <= 0.0 {
-            return (0.0, mask);
+            return (if masked { 0.0 } else { NO_DEPTH }, mask);
         }
         let rendered = f64::from(self.view.depth_at(u, v));
         let surface = if index <= SIDE && rendered > 0.0 {
@@ -56,12 +60,12 @@ impl Evidence<'_> {
         };
         let noise = self.surroundings.noise;
         let slope = SLOPE * Line::steps(index) * line.step_meters;
-        let variance = noise.powi(2) + SURFACE_SIGMA_METERS.powi(2) + slope.powi(2);
+        let variance = noise.powi(2) + (SURFACE_SIGMA * self.diameter).powi(2) + slope.powi(2);
         let behind = measured - surface;
         let object = (-behind.powi(2) / (2.0 * variance)).max(LEAST);
         let plane = self.surroundings.plane.map_or(f64::NEG_INFINITY, |plane| {
             let height = plane.height(f64::from(u), f64::from(v), measured);
-            -height.powi(2) / (2.0 * (noise.powi(2) + PLANE_SIGMA_METERS.powi(2)))
+            -height.powi(2) / (2.0 * (noise.powi(2) + (PLANE_SIGMA * self.diameter).powi(2)))
         });
         let odds = object - plane.max(ANYTHING);
         if behind < 0.0 && odds < 0.0 && plane < ON_PLANE {

@@ -77,8 +77,8 @@ impl Default for Contour {
 
 /// Standard deviation of a border, in steps along the line.
 const BORDER_SIGMA: f64 = 1.5;
-/// Smallest standard deviation of a depth, meters: errors of the mesh and the sensor.
-const LEAST_SIGMA_METERS: f64 = 0.001;
+/// Smallest standard deviation of a depth, in diameters: errors of the mesh and the sensor.
+const LEAST_SIGMA: f64 = 0.005;
 /// Largest weight of a pair, so that a few lines do not outweigh the surface.
 const MAX_WEIGHT: f64 = 20.0;
 
@@ -112,6 +112,7 @@ impl DataAssociation for Contour {
             observation,
             view,
             surroundings: &surroundings,
+            diameter: model.diameter(),
         };
         lines.clear();
         for (u, v) in silhouette.spread(self.lines) {
@@ -122,7 +123,7 @@ impl DataAssociation for Contour {
         }
         pairs.set_candidates(lines.len());
         border.compare(lines);
-        let sigma = surroundings.noise.max(LEAST_SIGMA_METERS);
+        let sigma = surroundings.noise.max(LEAST_SIGMA * model.diameter());
         for line in lines.iter() {
             let Some(split) = Split::of(&border.add_to(line)) else {
                 continue;

@@ -290,12 +290,13 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             score = self.found.best().map_or(score, |found| found.score);
             doubt = self.doubt(&mut run);
         }
-        let bad = doubt > self.options.threshold;
+        let bad = doubt > self.options.threshold && score > self.options.least_score;
         if bad {
             self.search(&mut run, &local.camera_from_object);
         }
         if let Some(best) = self.found.best() {
-            let bad = self.doubt(&mut run) > self.options.threshold;
+            let bad = self.doubt(&mut run) > self.options.threshold
+                && best.score > self.options.least_score;
             let mut alike = std::mem::take(&mut self.alike);
             let scores = (&mut self.ranking, &mut self.score);
             let listed = alike.list(&mut run, (&best, bad), scores, &self.options);

@@ -30,6 +30,10 @@ pub struct SearchOptions {
     ///
     /// If the local stage ends at or below it, only poses that look like the local one are tried.
     pub threshold: f64,
+    /// The score at or below which the search does not start, however doubtful the pose is.
+    ///
+    /// Depth images of real sensors have errors that raise the doubt in right poses.
+    pub least_score: f64,
     /// The doubt at which no further hypotheses are refined.
     pub good_enough: f64,
     /// The gain in score by which a hypothesis must beat the local pose to replace it.
@@ -64,12 +68,13 @@ impl Default for SearchOptions {
     ///
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
-    /// The search starts above a doubt of 0.05. A hypothesis must be better by a score of 0.02, and not
+    /// The search starts above a doubt of 0.05 and a score of 0.05. A hypothesis must be better by a score of 0.02, and not
     /// be more doubtful.
     fn default() -> Self {
         Self {
             start: Start::Refined,
             threshold: 0.05,
+            least_score: 0.05,
             good_enough: 0.02,
             min_gain: 0.02,
             rotations: Rotations::Even,
