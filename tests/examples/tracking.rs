@@ -130,7 +130,8 @@ impl Bench {
             let depth = Arc::new(view.depth.clone());
             let clock = Instant::now();
             let tracked = tracker.step(&depth, 1.0 / fps, None)?;
-            counts.tracker_ms.push(1e3 * clock.elapsed().as_secs_f64());
+            let ms = 1e3 * clock.elapsed().as_secs_f64();
+            counts.tracker_ms.push(ms);
             let pose = &tracked.camera_from_object;
             let off = mssd(pose, truth, &points, &motions) / model.diameter();
             counts.frame(&tracked, off, state);
@@ -158,7 +159,8 @@ impl Bench {
             }
             if self.trace {
                 println!(
-                    "{index} {} {percent:.1} % {frame} {off:.3} d, visible {visible:.2}: {tracked:?}",
+                    "{index} {} {percent:.1} % {frame} {off:.3} d, visible {visible:.2}, \
+                     {ms:.2} ms: {tracked:?}",
                     self.names[moving]
                 );
             }

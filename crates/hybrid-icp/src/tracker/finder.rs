@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use hicp_core::{
-    DepthImage, ImageError, Isometry3, Mask, Observation, Translation3, UnitQuaternion, Vector3,
+    DepthImage, ImageError, Isometry3, Mask, Observation, Point3, Translation3, UnitQuaternion,
+    Vector3,
 };
 
 use super::extent::DIFFERENT_DIAMETERS;
 use super::found::Found;
-use super::matcher::{Matcher, run};
+use super::matcher::{Matcher, ROUGH_ITERATIONS, run};
 use super::motion::Motion;
-use super::segments::{Sphere, segments};
+use super::segments::{Segment, Sphere, segments};
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
@@ -18,6 +19,34 @@ pub(super) const CLEARLY: f64 = 0.03;
 const CLEAR_ODDS: f64 = 2.5;
 /// Number of surfaces that are searched in an image.
 const SEGMENTS: usize = 4;
+/// Axes of the camera around which a search rotates the predicted pose, and the angle, radians.
+const ROTATIONS: [[f64; 3]; 7] = [
+    [0.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+];
+const ROTATION: f64 = 0.8;
+/// Factor by which the noise may rise per frame in which the object is searched.
+const RISE: f64 = 1.005;
+/// Largest noise that it rises to, in diameters.
+const MAX_NOISE: f64 = 0.5;
+/// Number of frames in which a surface that was searched in vain is not searched again.
+const REST: usize = 5;
+/// Movement in diameters and relative change of the area above which a surface is another one.
+const OTHER_MEAN: f64 = 0.1;
+const OTHER_AREA: f64 = 0.15;
+
+/// A surface that was searched in vain.
+pub(super) struct Rejected {
+    mean: Point3<f64>,
+    area: f64,
+    /// Number of frames until it is searched again.
+    rest: usize,
+}
 
 impl Matcher {
     /// Searches for the object around its predicted place.
@@ -34,36 +63,75 @@ impl Matcher {
             center: motion.center(),
             radius: 3.0 * deviation + model.radius(),
         };
+        // The noise changes with the distance, also while the object is not seen.
+        self.noise = self.noise.map(|noise| (noise * RISE).min(MAX_NOISE));
+        self.rejected.retain_mut(|rejected| {
+            rejected.rest -= 1;
+            rejected.rest > 0
+        });
+        let found = segments(depth, &camera, &sphere, model.diameter(), mask);
+        let is_rejected = |segment: &Segment| {
+            self.rejected.iter().any(|rejected| {
+                let moved = (segment.mean - rejected.mean).norm() / model.diameter();
+                let grown = (segment.area / rejected.area - 1.0).abs();
+                moved < OTHER_MEAN && grown < OTHER_AREA
+            })
+        };
+        let fresh = found.into_iter().filter(|segment| !is_rejected(segment));
+        let fresh: Vec<Segment> = fresh.take(SEGMENTS).collect();
         let mut best: Option<Found> = None;
-        for segment in segments(depth, &camera, &sphere, model.diameter(), mask)
-            .into_iter()
-            .take(SEGMENTS)
-        {
+        for segment in fresh {
+            let (mean, area) = (segment.mean, segment.area);
             let behind = 0.25 * model.diameter() / segment.mean.coords.norm();
             let center = segment.mean.coords * (1.0 + behind);
             let rotation = motion.pose().rotation;
             let shift = center - rotation * model.center().coords;
             let init = Isometry3::from_parts(Translation3::from(shift), rotation);
             let observation = Observation::new(Arc::clone(depth), segment.mask, camera)?;
-            let outcome = run(
-                &mut self.search,
-                &mut self.workspace,
-                &model,
-                &observation,
-                &init,
-            );
-            let pose = outcome.camera_from_object;
+            let pose = if let Some(near) = self.try_rotations(&observation, &init) {
+                near.pose
+            } else {
+                let (search, workspace) = (&mut self.search, &mut self.workspace);
+                run(search, workspace, &model, &observation, &init).camera_from_object
+            };
             let observation =
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
+            let Some(found) = found.filter(Found::stands_alone) else {
+                let rest = REST;
+                self.rejected.push(Rejected { mean, area, rest });
+                continue;
+            };
             let odds = |found: &Found| self.odds(found, Some(motion));
-            if let Some(found) = found.filter(Found::stands_alone)
-                && best.is_none_or(|best| odds(&best) < odds(&found))
-            {
+            if best.is_none_or(|best| odds(&best) < odds(&found)) {
                 best = Some(found);
+            }
+            if found.is_clear() {
+                break;
             }
         }
         Ok(best)
+    }
+
+    /// Returns the best registration from several rotations around the axes of the camera.
+    ///
+    /// It is cheaper than a search, and often enough after a short time.
+    fn try_rotations(&mut self, observation: &Observation, init: &Isometry3<f64>) -> Option<Found> {
+        let center = Translation3::from((init * self.model.center()).coords);
+        let mut best: Option<Found> = None;
+        for axis in ROTATIONS {
+            let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(axis) * ROTATION);
+            let start = center * rotation * center.inverse() * init;
+            let found = self.fit(observation, &start, ROUGH_ITERATIONS);
+            best = best
+                .into_iter()
+                .chain(found)
+                .max_by(|a, b| a.merit().total_cmp(&b.merit()));
+            if best.is_some_and(|best| best.is_unmistakable()) {
+                break;
+            }
+        }
+        best.filter(Found::is_unmistakable)
     }
 
     /// Compares a pose with its half turns around the axes of the object frame.

@@ -8,6 +8,8 @@ use hicp_score::Evidence;
 const AGREES: f64 = 0.1;
 /// Median distance from the mean of a normal distribution of deviation 1.
 const MEDIAN: f64 = 0.6745;
+/// Factor by which the noise may exceed that of the images before.
+const MAX_RISE: f64 = 1.1;
 
 /// A registered pose with its evidence.
 ///
@@ -17,9 +19,30 @@ pub(super) struct Found {
     pub(super) pose: Isometry3<f64>,
     pub(super) quality: Option<Quality>,
     pub(super) evidence: Evidence,
+    /// Standard deviation of the depth noise that the evidence is judged by, in diameters.
+    noise: f64,
 }
 
 impl Found {
+    /// Judges the evidence at a pose. `noise` is that of the images before, in diameters.
+    ///
+    /// Another surface can look noisier than the object, which would excuse its contradictions. The
+    /// noise of the images before therefore limits the measured one.
+    pub(super) fn new(
+        pose: Isometry3<f64>,
+        quality: Option<Quality>,
+        evidence: Evidence,
+        noise: Option<f64>,
+    ) -> Self {
+        let limit = noise.map_or(f64::INFINITY, |noise| MAX_RISE * noise);
+        Self {
+            pose,
+            quality,
+            evidence,
+            noise: (evidence.noise / MEDIAN).min(limit),
+        }
+    }
+
     /// Returns the share of the visible pixels that contradict the pose, without those of noise.
     fn contradiction(&self) -> f64 {
         let e = &self.evidence;
@@ -32,7 +55,7 @@ impl Found {
     ///
     /// As many pixels are moved behind it. The noise is normally distributed.
     fn outside(&self) -> f64 {
-        let tolerance = AGREES / (self.evidence.noise / MEDIAN).max(1e-3);
+        let tolerance = AGREES / self.noise.max(1e-3);
         // The upper tail of the normal distribution, to 2 % of its value below three deviations.
         0.5 * (-0.717 * tolerance - 0.416 * tolerance * tolerance).exp()
     }
@@ -66,8 +89,8 @@ impl Found {
         self.evidence.agrees > 0.15 && self.fills(0.2, 0.5) && ends
     }
 
-    /// Returns the standard deviation of the depth noise, in diameters.
-    pub(super) fn noise(&self) -> f64 {
+    /// Returns the standard deviation of the depth noise at the pose, in diameters.
+    pub(super) fn measured_noise(&self) -> f64 {
         self.evidence.noise / MEDIAN
     }
 
@@ -94,5 +117,10 @@ impl Found {
     pub(super) fn stands_alone(&self) -> bool {
         let ends = self.contour() > 0.7 || self.fills(0.03, 0.05);
         self.evidence.agrees > 0.4 && self.fills(0.06, 0.15) && ends
+    }
+
+    /// Returns whether the object was found, and no other pose needs to be tried.
+    pub(super) fn is_unmistakable(&self) -> bool {
+        self.stands_alone() && self.is_clear()
     }
 }

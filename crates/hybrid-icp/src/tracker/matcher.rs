@@ -2,25 +2,35 @@
 
 use std::sync::Arc;
 
-use hicp_association::Stride;
+use hicp_association::{Contour, RenderedSurface, Stride};
 use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera, Problem,
 };
-use hicp_icp::{Cascade, Outcome, Session, Stage, Verdict, Workspace};
+use hicp_icp::{
+    Cascade, Convergence, Icp, IterationLimit, Outcome, Session, Stage, Verdict, Workspace,
+};
+use hicp_metric::PointToPlane;
 use hicp_raster::Rasterizer;
 use hicp_score::Evidence;
 
 use super::extent::Extent;
+use super::finder::Rejected;
 use super::found::Found;
 use super::motion::{Motion, registered};
 use super::region::Widening;
-use crate::presets::{Far, Local, Near, Search, local, search};
+use crate::presets::{Far, Fit, Search, local, search};
 
 /// Factor on the deviations of a registration, whose errors are correlated.
 const INFLATION: f64 = 2.0;
-/// Number of model points of a registration.
+/// Numbers of points of a registration, and of lines across the silhouette.
 const POINTS: usize = 1000;
-/// Depth noise before it is measured, in diameters.
+const LINES: usize = 80;
+/// Numbers of iterations from a good initial pose and from a rough one.
+const ITERATIONS: usize = 3;
+pub(super) const ROUGH_ITERATIONS: usize = 8;
+/// Deviation of a prediction above which it is a rough initial pose, in diameters.
+const ROUGH_DIAMETERS: f64 = 0.05;
+/// Standard deviation of the depth noise before it is measured, in diameters.
 const START_NOISE: f64 = 0.02;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
@@ -30,36 +40,47 @@ pub(super) struct Matcher {
     pub(super) model: Arc<Model>,
     pub(super) camera: PinholeCamera,
     pub(super) extent: Extent,
-    /// A short cascade for good predictions.
-    near: Near,
+    /// The stage for good predictions.
+    near: Fit,
     /// The same after a stage that also pulls the object along its own surface.
-    far: Cascade<(Far, Near)>,
-    local: Local,
+    far: Cascade<(Far, Fit)>,
     pub(super) search: Search,
     pub(super) workspace: Workspace,
     widening: Widening,
-    /// Standard deviation of the depth noise, in diameters.
-    noise: f64,
+    /// Standard deviation of the depth noise in the images before, in diameters, once measured.
+    pub(super) noise: Option<f64>,
+    /// The surfaces that were recently searched in vain, at most 20.
+    pub(super) rejected: Vec<Rejected>,
 }
 
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
-        let local = local();
-        let steps = &local.0.1.misaligned.0.0;
-        let (mut near, far) = (steps.aligned, steps.misaligned);
-        near.0.0.selection.stride = Stride::AboutPoints(POINTS);
-        near.0.1.selection.stride = Stride::AboutPoints(POINTS);
+        let Cascade((_, steps, _)) = local();
+        let far = steps.misaligned;
+        let near = Icp {
+            selection: (),
+            association: (
+                RenderedSurface {
+                    stride: Stride::AboutPoints(POINTS),
+                    ..RenderedSurface::default()
+                },
+                Contour::new(LINES, 0.05, 0.5),
+            ),
+            filter: (),
+            metric: PointToPlane,
+            stop: (Convergence::default(), IterationLimit(ITERATIONS)),
+        };
         Self {
             extent: Extent::new(&model),
             model,
             camera,
+            far: Cascade((far, near.clone())),
             near,
-            far: Cascade((far, near)),
-            local,
             search: search(),
             workspace: Workspace::new(Rasterizer::default()),
             widening: Widening::default(),
-            noise: START_NOISE,
+            noise: None,
+            rejected: Vec::new(),
         }
     }
 
@@ -74,41 +95,34 @@ impl Matcher {
         let deviation = self.extent.deviation(motion);
         let meters = (3.0 * deviation + 0.03 * diameter).min(0.3 * diameter);
         let observation = self.observe(depth, mask, motion.pose(), meters)?;
+        let reach = JUMP_RADII * self.extent.radius + 4.0 * deviation;
+        let rough = deviation > ROUGH_DIAMETERS * diameter;
+        let iterations = if rough { ROUGH_ITERATIONS } else { ITERATIONS };
         let mut best: Option<Found> = None;
-        for effort in 0..3 {
-            let (model, workspace) = (&self.model, &mut self.workspace);
-            let outcome = match effort {
-                0 => run(
-                    &mut self.near,
-                    workspace,
-                    model,
-                    &observation,
-                    motion.pose(),
-                ),
-                1 => run(&mut self.far, workspace, model, &observation, motion.pose()),
-                _ => run(
-                    &mut self.local,
-                    workspace,
-                    model,
-                    &observation,
-                    motion.pose(),
-                ),
+        for thorough in [false, true] {
+            let found = if thorough {
+                self.fit_far(&observation, motion.pose())
+            } else {
+                self.fit(&observation, motion.pose(), iterations)
             };
-            let found = self.judge(&observation, &outcome);
-            let reach = JUMP_RADII * self.extent.radius + 4.0 * deviation;
+            if found.is_none() {
+                // Nothing was measured near the surface.
+                break;
+            }
             let found = found.filter(|f| self.extent.distance(&f.pose, motion.pose()) < reach);
             if let Some(found) = found
                 && best.is_none_or(|best| best.merit() < found.merit())
             {
                 best = Some(found);
             }
-            let enough = |f: Found| f.is_clear() || f.is_hidden() || effort == 1 && f.is_sure();
-            if best.is_some_and(enough) {
+            if best.is_some_and(|f| f.is_sure() || f.is_hidden()) {
                 break;
             }
         }
-        if let Some(best) = best.filter(|best| best.evidence.agrees > 0.3) {
-            self.noise += 0.2 * (best.noise() - self.noise);
+        if let Some(best) = best.filter(|best| best.is_sure() && best.evidence.agrees > 0.5) {
+            let measured = best.measured_noise();
+            let before = self.noise.unwrap_or(measured);
+            self.noise = Some(before + 0.2 * (measured - before));
         }
         Ok(best)
     }
@@ -119,12 +133,36 @@ impl Matcher {
         observation: &Observation,
         init: &Isometry3<f64>,
     ) -> Option<Found> {
-        let (model, workspace) = (&self.model, &mut self.workspace);
-        let near = run(&mut self.near, workspace, model, observation, init);
-        let far = run(&mut self.far, workspace, model, observation, init);
-        let found = [near, far].map(|outcome| self.judge(observation, &outcome));
-        let found = found.into_iter().flatten();
+        let near = self.fit(observation, init, ROUGH_ITERATIONS);
+        let far = self.fit_far(observation, init);
+        let found = near.into_iter().chain(far);
         found.max_by(|a, b| a.merit().total_cmp(&b.merit()))
+    }
+
+    /// Fits the rendered surface and its silhouette to the image.
+    pub(super) fn fit(
+        &mut self,
+        observation: &Observation,
+        init: &Isometry3<f64>,
+        iterations: usize,
+    ) -> Option<Found> {
+        self.near.stop.1 = IterationLimit(iterations);
+        let (stage, workspace) = (&mut self.near, &mut self.workspace);
+        let outcome = run(stage, workspace, &self.model, observation, init);
+        self.judge(observation, &outcome)
+    }
+
+    /// Does the same after a stage that also pulls the object along its own surface.
+    fn fit_far(&mut self, observation: &Observation, init: &Isometry3<f64>) -> Option<Found> {
+        let (stage, workspace) = (&mut self.far, &mut self.workspace);
+        let outcome = run(stage, workspace, &self.model, observation, init);
+        self.judge(observation, &outcome)
+    }
+
+    /// Forgets the noise and the surfaces of earlier images.
+    pub(super) fn forget(&mut self) {
+        self.noise = None;
+        self.rejected.clear();
     }
 
     /// Returns the pixels around a pose whose depth is near that of the object.
@@ -138,7 +176,7 @@ impl Matcher {
         let z = (pose * self.model.center()).z.max(self.extent.radius);
         let pixels = (self.camera.fx() * meters / z).clamp(2.0, 64.0);
         // Noise must not cut the surface at the border of the gate, which would hold it in place.
-        let meters = meters + 2.5 * self.noise * self.extent.diameter;
+        let meters = meters + 2.5 * self.noise.unwrap_or(START_NOISE) * self.extent.diameter;
         let view = self.workspace.view(&self.model, &self.camera, pose);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Clamped.
         let around = self
@@ -156,18 +194,14 @@ impl Matcher {
         Observation::new(Arc::clone(depth), around, self.camera)
     }
 
-    pub(super) fn judge(&mut self, observation: &Observation, outcome: &Outcome) -> Option<Found> {
+    fn judge(&mut self, observation: &Observation, outcome: &Outcome) -> Option<Found> {
         if matches!(outcome.verdict, Verdict::KeptInitial(_)) && outcome.evaluation.is_none() {
             return None;
         }
         let problem = Problem::new(&self.model, observation);
         let pose = outcome.camera_from_object;
         let evidence = Evidence::at(&mut self.workspace.context(&problem), &pose)?;
-        Some(Found {
-            pose,
-            quality: outcome.quality,
-            evidence,
-        })
+        Some(Found::new(pose, outcome.quality, evidence, self.noise))
     }
 
     pub(super) fn covariance(&self, found: &Found) -> Matrix6<f64> {

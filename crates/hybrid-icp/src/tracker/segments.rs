@@ -3,7 +3,7 @@
 use hicp_core::{DepthImage, Mask, PinholeCamera, PixelRegion, Point3};
 
 /// Number of cells across an object.
-const CELLS: f64 = 32.0;
+const CELLS: f64 = 24.0;
 /// Step in depth between neighboring cells that separates two surfaces, in diameters.
 const JUMP_DIAMETERS: f64 = 0.1;
 /// Largest distance of a surface from its mean, in diameters.
@@ -24,6 +24,8 @@ pub(super) struct Segment {
     pub(super) mask: Mask,
     /// Mean of its points, camera frame, meters.
     pub(super) mean: Point3<f64>,
+    /// Area across the line of sight, square meters.
+    pub(super) area: f64,
 }
 
 /// Returns the surfaces inside a sphere that are not larger than an object of a diameter.
@@ -61,19 +63,19 @@ pub(super) fn segments(
                 }
             }
         }
-        if let Some(mean) = cells.fits(&queue, camera, diameter) {
-            found.push((label, mean));
+        if let Some((mean, area)) = cells.fits(&queue, camera, diameter) {
+            found.push((label, mean, area));
         }
     }
     let away = |mean: &Point3<f64>| (mean - sphere.center).norm();
-    found.sort_by(|(_, a), (_, b)| away(a).total_cmp(&away(b)));
-    let found = found.into_iter().map(|(label, mean)| {
+    found.sort_by(|(_, a, _), (_, b, _)| away(a).total_cmp(&away(b)));
+    let found = found.into_iter().map(|(label, mean, area)| {
         let mask = Mask::in_region(depth.width(), depth.height(), &cells.region, |u, v| {
             let cell = cells.place(u, v);
             let z = depth.get(u, v).unwrap_or(0.0);
             labels[cell] == label && z > 0.0 && (z - cells.depth[cell]).abs() < cells.jump
         });
-        Segment { mask, mean }
+        Segment { mask, mean, area }
     });
     found.collect()
 }
@@ -101,8 +103,8 @@ impl Cells {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // Clamped.
         let side = (across / CELLS).clamp(1.0, 16.0) as usize;
-        // About nine pixels of a cell are enough for its median.
-        let skip = (side / 3).max(1);
+        // Four to nine pixels of a cell are enough for its median.
+        let skip = side.div_ceil(3);
         let columns = region.width().div_ceil(side);
         let rows = region.height().div_ceil(side);
         let mut medians = Vec::with_capacity(columns * rows);
@@ -123,7 +125,7 @@ impl Cells {
                         measured.extend(depth.get(u, v).filter(|z| *z > 0.0 && inside));
                     }
                 }
-                medians.push(median(&mut measured, (side / skip).pow(2) / 2).unwrap_or(0.0));
+                medians.push(median(&mut measured, side.div_ceil(skip).pow(2) / 2).unwrap_or(0.0));
             }
         }
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depths.
@@ -173,8 +175,13 @@ impl Cells {
         .flatten()
     }
 
-    /// Returns the mean of a surface if its size is that of the object or of a part.
-    fn fits(&self, cells: &[usize], camera: &PinholeCamera, diameter: f64) -> Option<Point3<f64>> {
+    /// Returns the mean and the area of a surface if its size is that of the object or of a part.
+    fn fits(
+        &self,
+        cells: &[usize],
+        camera: &PinholeCamera,
+        diameter: f64,
+    ) -> Option<(Point3<f64>, f64)> {
         let points = || cells.iter().map(|cell| self.point(*cell, camera));
         let side = self.side as f64 / camera.fx();
         let area: f64 = points().map(|p| (side * p.z).powi(2)).sum();
@@ -183,7 +190,7 @@ impl Cells {
         let extent = points().map(|p| (p - mean).norm()).fold(0.0, f64::max);
         let fits =
             area >= LEAST_AREA * diameter * diameter && extent <= EXTENT_DIAMETERS * diameter;
-        fits.then_some(mean)
+        fits.then_some((mean, area))
     }
 }
 
