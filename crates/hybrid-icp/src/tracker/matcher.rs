@@ -55,8 +55,7 @@ pub(super) struct Matcher {
 
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
-        let Cascade((_, steps, _)) = local();
-        let far = steps.misaligned;
+        let far = local().0.1.misaligned.0.0.misaligned;
         let near = Icp {
             selection: (),
             association: (
