@@ -3,15 +3,14 @@
 use std::sync::Arc;
 
 use hicp_core::{
-    DepthImage, ImageError, Isometry3, Mask, Observation, Point3, Translation3, UnitQuaternion,
-    Vector3,
+    DepthImage, ImageError, Isometry3, Mask, Observation, Translation3, UnitQuaternion, Vector3,
 };
 
 use super::extent::DIFFERENT_DIAMETERS;
 use super::found::Found;
 use super::matcher::{Matcher, ROUGH_ITERATIONS, run};
 use super::motion::Motion;
-use super::segments::{Segment, Sphere, segments};
+use super::segments::{Rejected, Segment, Sphere, segments};
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
@@ -34,19 +33,6 @@ const ROTATION: f64 = 0.8;
 const RISE: f64 = 1.005;
 /// Largest noise that it rises to, in diameters.
 const MAX_NOISE: f64 = 0.5;
-/// Number of frames in which a surface that was searched in vain is not searched again.
-const REST: usize = 5;
-/// Movement in diameters and relative change of the area above which a surface is another one.
-const OTHER_MEAN: f64 = 0.1;
-const OTHER_AREA: f64 = 0.15;
-
-/// A surface that was searched in vain.
-pub(super) struct Rejected {
-    mean: Point3<f64>,
-    area: f64,
-    /// Number of frames until it is searched again.
-    rest: usize,
-}
 
 impl Matcher {
     /// Searches for the object around its predicted place.
@@ -65,23 +51,16 @@ impl Matcher {
         };
         // The noise changes with the distance, also while the object is not seen.
         self.noise = self.noise.map(|noise| (noise * RISE).min(MAX_NOISE));
-        self.rejected.retain_mut(|rejected| {
-            rejected.rest -= 1;
-            rejected.rest > 0
-        });
+        self.rejected.retain_mut(Rejected::rests);
         let found = segments(depth, &camera, &sphere, model.diameter(), mask);
-        let is_rejected = |segment: &Segment| {
-            self.rejected.iter().any(|rejected| {
-                let moved = (segment.mean - rejected.mean).norm() / model.diameter();
-                let grown = (segment.area / rejected.area - 1.0).abs();
-                moved < OTHER_MEAN && grown < OTHER_AREA
-            })
-        };
-        let fresh = found.into_iter().filter(|segment| !is_rejected(segment));
+        let fresh = found.into_iter().filter(|segment| {
+            let mut rejected = self.rejected.iter();
+            !rejected.any(|rejected| rejected.is(segment, model.diameter()))
+        });
         let fresh: Vec<Segment> = fresh.take(SEGMENTS).collect();
         let mut best: Option<Found> = None;
         for segment in fresh {
-            let (mean, area) = (segment.mean, segment.area);
+            let in_vain = Rejected::new(&segment);
             let behind = 0.25 * model.diameter() / segment.mean.coords.norm();
             let center = segment.mean.coords * (1.0 + behind);
             let rotation = motion.pose().rotation;
@@ -98,8 +77,7 @@ impl Matcher {
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
             let Some(found) = found.filter(Found::stands_alone) else {
-                let rest = REST;
-                self.rejected.push(Rejected { mean, area, rest });
+                self.rejected.push(in_vain);
                 continue;
             };
             let odds = |found: &Found| self.odds(found, Some(motion));

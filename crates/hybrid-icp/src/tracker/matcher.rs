@@ -14,10 +14,10 @@ use hicp_raster::Rasterizer;
 use hicp_score::Evidence;
 
 use super::extent::Extent;
-use super::finder::Rejected;
 use super::found::Found;
 use super::motion::{Motion, registered};
 use super::region::Widening;
+use super::segments::Rejected;
 use crate::presets::{Far, Fit, Search, local, search};
 
 /// Factor on the deviations of a registration, whose errors are correlated.

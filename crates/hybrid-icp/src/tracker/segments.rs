@@ -10,6 +10,11 @@ const JUMP_DIAMETERS: f64 = 0.1;
 const EXTENT_DIAMETERS: f64 = 0.75;
 /// Smallest area of a surface, in squared diameters.
 const LEAST_AREA: f64 = 0.01;
+/// Number of frames in which a surface that was searched in vain is not searched again.
+const REST: usize = 5;
+/// Movement in diameters and relative change of the area above which a surface is another one.
+const OTHER_MEAN: f64 = 0.1;
+const OTHER_AREA: f64 = 0.15;
 
 /// A place in the camera frame, and a distance from it, meters.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +31,37 @@ pub(super) struct Segment {
     pub(super) mean: Point3<f64>,
     /// Area across the line of sight, square meters.
     pub(super) area: f64,
+}
+
+/// A surface that was searched in vain.
+pub(super) struct Rejected {
+    mean: Point3<f64>,
+    area: f64,
+    /// Number of frames until it is searched again.
+    rest: usize,
+}
+
+impl Rejected {
+    pub(super) fn new(segment: &Segment) -> Self {
+        Self {
+            mean: segment.mean,
+            area: segment.area,
+            rest: REST,
+        }
+    }
+
+    /// Counts a frame, and returns whether the surface still is not searched.
+    pub(super) fn rests(&mut self) -> bool {
+        self.rest -= 1;
+        self.rest > 0
+    }
+
+    /// Returns whether a surface has about the same place and area.
+    pub(super) fn is(&self, segment: &Segment, diameter: f64) -> bool {
+        let moved = (segment.mean - self.mean).norm() / diameter;
+        let grown = (segment.area / self.area - 1.0).abs();
+        moved < OTHER_MEAN && grown < OTHER_AREA
+    }
 }
 
 /// Returns the surfaces inside a sphere that are not larger than an object of a diameter.

@@ -341,7 +341,11 @@ fn a_search_without_refined_hypotheses_is_its_local_stage() {
         presets::local(),
         presets::hybrid(),
         presets::hybrid(),
-        (SampledMve::new(200, 400), MeanVsd::default()),
+        (
+            SampledMve::new(200, 400),
+            MeanVsd::default(),
+            MeanVsd::default(),
+        ),
         options,
     );
     let composed = Refiner::new(search).refine(&scene.model, &scene.observation, &init);
