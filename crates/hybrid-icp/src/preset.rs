@@ -75,11 +75,11 @@ declare! {
     HybridVisible, "hybrid-visible", hybrid_visible,
         "Hybrid ICP with visible points for nearest neighbors too, gates and the symmetric metric";
     Local, "local", local,
-        "local refinement that never raises the MVE: steps until it stalls, observed points to the model from afar";
+        "local refinement that never raises the MVE: fits surface and silhouette, and tries other pairs in doubt";
     Search, "search", search,
-        "global: local, and above an MVE of 0.1 a search over 1000 rotations; may end at an equivalent pose";
+        "global: local, and above a doubt of 0.05 a search over 1000 rotations; may end at an equivalent pose";
     Auto, "auto", auto,
-        "global where needed: local, and above an MVE of 0.2 a search over 256 rotations";
+        "global where needed: local, and above a doubt of 0.2 a search over 512 rotations";
     Color, "color", color,
         "global where needed: auto, and color decides among poses that depth cannot tell apart";
 }
@@ -149,7 +149,7 @@ mod tests {
             (Preset::Auto, presets::auto()),
         ] {
             let (least, count) = (built.options.threshold, built.options.hypotheses);
-            let stated = format!("above an MVE of {least} a search over {count} rotations");
+            let stated = format!("above a doubt of {least} a search over {count} rotations");
             assert!(preset.summary().contains(&stated), "{preset}: {stated}");
         }
     }

@@ -199,7 +199,7 @@ fn parts_that_need_an_image_are_named() {
         (Box::new(boundary), "boundary-targets"),
         (Box::new(guard), "mve"),
         (Preset::Hybrid.build(), "mve"),
-        (Preset::Local.build(), "mve"),
+        (Preset::Local.build(), "doubt"),
         (Preset::Auto.build(), "mve"),
     ];
     for (mut stage, part) in stages {

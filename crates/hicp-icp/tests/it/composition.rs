@@ -60,21 +60,20 @@ fn a_kept_outcome_has_the_initial_pose() {
         (kept.iterations, kept.evaluation, kept.n_pairs()),
         (0, None, 0)
     );
-    for outcome in [
-        run(&mut Cascade(Vec::<Box<dyn Stage>>::new()), &init),
-        run(
-            &mut Repeat {
-                times: 0,
-                stage: Scheduled::new(kept, 1.0),
-            },
-            &init,
+    let mut never = Repeat {
+        times: 0,
+        stage: Scheduled::new(kept, 1.0),
+    };
+    for (outcome, termination) in [
+        (run(&mut Cascade(()), &init), Termination::Converged),
+        (
+            run(&mut Cascade(Vec::<Box<dyn Stage>>::new()), &init),
+            Termination::Converged,
         ),
+        (run(&mut never, &init), Termination::IterationLimit),
     ] {
         assert_eq!(bits(&outcome.camera_from_object), bits(&init));
-        assert_eq!(
-            outcome.verdict,
-            Verdict::KeptInitial(Termination::IterationLimit)
-        );
+        assert_eq!(outcome.verdict, Verdict::KeptInitial(termination));
         assert_eq!(outcome.iterations, 0);
     }
 }

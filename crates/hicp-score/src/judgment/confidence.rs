@@ -7,7 +7,6 @@ use crate::judgment::evidence::Evidence;
 use crate::judgment::grid::Grid;
 use crate::judgment::insides::find_insides;
 use crate::judgment::misfit::Misfit;
-use crate::tolerances::{N_TOLERANCES, tolerances};
 
 /// Number of features.
 pub const N_FEATURES: usize = CURVES.len();
@@ -55,7 +54,7 @@ impl Confidence {
         "inside",
         "mask_missing",
         "log_pixels",
-        "excess",
+        "mve",
     ];
 
     /// Measures the evidence at a pose whose mean VSD estimate is `mve`, and the confidence.
@@ -116,7 +115,7 @@ impl Confidence {
             evidence.inside,
             evidence.mask_missing,
             (evidence.pixels as f64 * seen).max(1.0).ln(),
-            mve - noise_floor(misfit.sigma),
+            mve,
         ]
     }
 
@@ -138,23 +137,6 @@ impl Confidence {
     }
 }
 
-/// Returns the MVE that noise alone gives to a true pose with an exact mask.
-///
-/// `sigma` is the standard deviation of the depth in diameters. A pixel is wrong for a tolerance τ
-/// with the probability erfc(τ / (√2 σ)) of a normal deviate.
-fn noise_floor(sigma: f64) -> f64 {
-    let wrong = |tolerance: f64| erfc(tolerance / (std::f64::consts::SQRT_2 * sigma.max(1e-9)));
-    tolerances().map(wrong).iter().sum::<f64>() / N_TOLERANCES as f64
-}
-
-/// The complementary error function of a number that is not negative.
-///
-/// Source: Abramowitz & Stegun 1964, 7.1.25. The error is at most 2.5 · 10⁻⁵.
-fn erfc(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.470_47 * x);
-    t * (0.348_024_2 + t * (-0.095_879_8 + t * 0.747_855_6)) * (-x * x).exp()
-}
-
 impl Curve {
     /// Returns the values at `x`, which is clamped to the knots. NaN counts as the last one.
     fn at(&self, x: f64) -> [f64; 3] {
@@ -169,30 +151,5 @@ impl Curve {
                     .map(|y| y[right - 1] + share * (y[right] - y[right - 1]))
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_error_function_has_its_tabulated_values() {
-        for (x, value) in [
-            (0.0, 1.0),
-            (0.5, 0.479_500),
-            (1.0, 0.157_299),
-            (2.0, 0.004_678),
-        ] {
-            assert!((erfc(x) - value).abs() < 3e-5, "erfc({x}) = {}", erfc(x));
-        }
-    }
-
-    #[test]
-    fn noise_raises_the_floor_from_zero_to_one() {
-        let floors = [0.0, 0.01, 0.05, 0.2, 1.0, 100.0].map(noise_floor);
-        assert_eq!(floors[0], 0.0);
-        assert!(floors.is_sorted());
-        assert!(floors[5] > 0.99 && floors[5] <= 1.0);
     }
 }

@@ -16,6 +16,8 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let scene = scene(Household::Mug, 0.5, &mut rng);
     let init = perturb(&mut rng, &scene.truth, 0.05, 0.8);
     let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
+    // Without it, a sure pose would end the preset before the steps.
+    file.set("stages.1.switcher.alpha=0").unwrap();
     file.set("stages.1.misaligned.stages.0.max_steps=1")
         .unwrap();
     file.set("stages.1.misaligned.stages.0.misaligned.stages.1.association.points=200")
@@ -25,7 +27,9 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
 
     let mut refiner = Refiner::new(presets::local());
     let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
-    let steps = &mut refiner.stage_mut().0.1.misaligned.0.0;
+    let unless = &mut refiner.stage_mut().0.1;
+    unless.switcher.alpha = 0.0;
+    let steps = &mut unless.misaligned.0.0;
     steps.max_steps = 1;
     steps.misaligned.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
     let changed = refiner.refine(&scene.model, &scene.observation, &init);
