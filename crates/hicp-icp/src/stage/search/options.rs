@@ -68,8 +68,8 @@ impl Default for SearchOptions {
     ///
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
-    /// The search starts above a doubt of 0.05 and a score of 0.05. A hypothesis must be better by a score of 0.02, and not
-    /// be more doubtful.
+    /// The search starts above a doubt of 0.05 and a score of 0.05. A hypothesis must be better by
+    /// a score of 0.02, and not be more doubtful.
     fn default() -> Self {
         Self {
             start: Start::Refined,
