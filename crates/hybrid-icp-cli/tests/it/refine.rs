@@ -31,9 +31,10 @@ fn the_result_has_every_key_in_its_type() {
         let numbers = result[key].as_array().unwrap();
         assert!(numbers.len() == count && numbers.iter().all(Value::is_f64));
     }
-    for key in ["mve_initial", "mve", "time_ms"] {
+    for key in ["mve_initial", "time_ms"] {
         assert!(result[key].as_f64().unwrap() > 0.0, "{key}");
     }
+    assert!(result["mve"].as_f64().unwrap() >= 0.0);
     assert!(result["mve"].as_f64() < result["mve_initial"].as_f64());
     let confidence = result["confidence"].as_f64().unwrap();
     assert!((0.95..=1.0).contains(&confidence), "{result}");
@@ -55,7 +56,7 @@ fn the_result_has_every_key_in_its_type() {
     assert_eq!(result["warnings"], serde_json::json!([]));
 
     let stages = result["trace"].as_array().unwrap();
-    assert!(stages.len() >= 2);
+    assert!(!stages.is_empty());
     for (index, stage) in stages.iter().enumerate() {
         assert_eq!(stage["stage"].as_u64(), Some(index as u64 + 1));
         for key in [
@@ -168,7 +169,7 @@ fn the_result_has_every_warning() {
 fn a_trace_is_replayed_to_the_last_digit() {
     let scene = Scene::new()
         .with("--trace", "trace.jsonl")
-        .with("--set", "stage.stages.0.max_steps=2");
+        .with("--set", "stage.stages.1.misaligned.stages.0.max_steps=2");
     scene.result();
     let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
     let printed = replay().exits(0).out;
@@ -502,8 +503,14 @@ fn names_that_are_not_utf_8_are_accepted() {
 fn other_poses_that_a_search_finds_are_written() {
     let scene = Scene::new()
         .with("--alternatives", "others.json")
-        .with("--pipeline", "search")
-        .with("--set", "threshold=0");
+        .with("--pipeline", "always.toml");
+    let limits = "threshold = 0.05\nleast_score = 0.05\ngood_enough = 0.02\n";
+    let always = hybrid_icp::Preset::Search.toml();
+    let always = always.replace(
+        limits,
+        "threshold = 0.0\nleast_score = 0.0\ngood_enough = 0.0\n",
+    );
+    std::fs::write(scene.path("always.toml"), always).unwrap();
     scene.run().exits(0);
     let text = std::fs::read_to_string(scene.path("others.json")).unwrap();
     let others: Vec<Value> = serde_json::from_str(&text).unwrap();
