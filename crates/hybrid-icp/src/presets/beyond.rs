@@ -168,8 +168,8 @@ fn fit() -> Guard<Fit, MeanVsd> {
 ///
 /// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]). The first stage
 /// renders the model in each iteration, and fits the depth along the rays ([`RenderedSurface`]) and
-/// the silhouette ([`Contour`]). If the score is then above 0.1, [`SwitchUntilStall`] runs up to
-/// six steps, until the score stalls, and keeps the pose with the lowest one. A step is the
+/// the silhouette ([`Contour`]). If the [`Doubt`] is then 0.1 or more, [`SwitchUntilStall`] runs up
+/// to six steps, until the score stalls, and keeps the pose with the lowest one. A step is the
 /// projective cascade if the estimate agrees with the image. Otherwise it pairs observed points
 /// with the model, first with point-to-point and then with the symmetric metric. The first stage
 /// runs once more at the end.
@@ -280,7 +280,7 @@ pub fn search_with(options: SearchOptions) -> Search {
     search_from(local(), options)
 }
 
-/// `search`: [`local`], followed by a search if its score stays above 0.1.
+/// `search`: [`local`], followed by a search if its doubt and its score stay above 0.05.
 ///
 /// The search ranks 1000 rotations, aligns 256 of them and refines 24. The result can be far from
 /// the initial pose, also at a pose that is equivalent by symmetry.
@@ -316,9 +316,9 @@ pub fn color() -> ByColor<Search> {
     by_color(auto())
 }
 
-/// `auto`: [`local`], followed by a search if its score stays above 0.2.
+/// `auto`: [`local`], followed by a search above a doubt of 0.2 and a score of 0.1.
 ///
-/// The search ranks 256 rotations, aligns 64 of them and refines six. A hypothesis replaces the
+/// The search ranks 512 rotations, aligns 128 of them and refines 12. A hypothesis replaces the
 /// local pose if its score is better by 0.02; the result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {

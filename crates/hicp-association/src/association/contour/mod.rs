@@ -29,10 +29,9 @@ use split::Split;
 /// The mask is not taken for granted. Its border is compared with the borders that depth alone
 /// shows: the median offset is removed, and the spread decides the mask's influence. A mask that is
 /// dilated by a constant width is therefore as good as an exact one, and a box has no influence.
-/// Pixels that something hides are no evidence, so a border that is hidden has no pair. Neither is
-/// missing depth: without measurements next to the object, depth shows no border, the mask cannot
-/// be compared, and there are few pairs or none. If the observation has no surfel at all, there are
-/// none.
+/// Pixels that something hides are no evidence, so a border that is hidden has no pair. A pixel
+/// without depth is weak evidence of background outside of the mask, and none inside of it. If the
+/// observation has no surfel at all, there are no pairs.
 ///
 /// Use it with [`RenderedSurface`](crate::RenderedSurface) as a tuple, point-to-plane and the
 /// selection `()`. The normals of a pair lie in the image plane of the silhouette. Weights are the
