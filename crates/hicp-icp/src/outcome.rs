@@ -299,13 +299,20 @@ impl Outcome {
             &self
         };
         let moved = self.verdict == Verdict::Refined || next.verdict == Verdict::Refined;
+        // An empty cascade does nothing, so it does not end anything.
+        let empty = next.iterations == 0 && next.termination == Termination::Converged;
+        let termination = if empty {
+            self.termination
+        } else {
+            next.termination
+        };
         Self {
             camera_from_object: next.camera_from_object,
-            termination: next.termination,
+            termination,
             verdict: if moved {
                 Verdict::Refined
             } else {
-                Verdict::KeptInitial(next.termination)
+                Verdict::KeptInitial(termination)
             },
             iterations: self.iterations + next.iterations,
             evaluation: measured.evaluation,

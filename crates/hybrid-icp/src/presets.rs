@@ -44,6 +44,7 @@
 
 mod beyond;
 
+pub(crate) use beyond::{far, fit};
 pub use beyond::{
     Align, ByColor, CloudToModelIcp, Explore, Far, Fit, GatedIcp, HybridVisible, Local, Near,
     Search, auto, by_color, color, estimate_with, hybrid_visible, local, search, search_with,

@@ -36,7 +36,13 @@ pub type HybridVisible = Repeat<
     >,
 >;
 /// The stage that fits the rendered surface and its silhouette to the image.
-pub type Fit = Icp<(), (RenderedSurface, Contour), (), PointToPlane, (Convergence, IterationLimit)>;
+pub type Fit = Icp<
+    (),
+    (RenderedSurface, Contour),
+    (),
+    Conditioned<PointToPlane>,
+    (Convergence, IterationLimit),
+>;
 /// The type of [`local`].
 pub type Local = Cascade<(
     Guard<Fit, MeanVsd>,
@@ -59,6 +65,9 @@ pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd, D
 const TAU_DIAMETERS: f32 = 0.25;
 /// θ_max of nearest neighbors, degrees.
 const THETA_DEGREES: f32 = 90.0;
+/// Observability below which a direction stays as it is, relative to the best determined one. Noise
+/// and contours raise that of a can's axis above the default of 0.001.
+const UNDETERMINED: f64 = 0.005;
 
 /// Returns the paper's rules, except that a loss that rises with new pairs is not a divergence.
 fn stop(iterations: usize) -> PaperStop {
@@ -150,18 +159,35 @@ pub fn hybrid_visible() -> HybridVisible {
 
 /// Creates the stage that fits the rendered surface and its silhouette to the image.
 ///
-/// It is accepted only if the score improves.
-fn fit() -> Guard<Fit, MeanVsd> {
-    Guard {
-        stage: Icp {
-            selection: (),
-            association: (RenderedSurface::default(), Contour::default()),
-            filter: (),
-            metric: PointToPlane,
-            stop: (Convergence::default(), IterationLimit(8)),
+/// Directions that the image does not determine stay as they are.
+pub(crate) fn fit() -> Fit {
+    Icp {
+        selection: (),
+        association: (RenderedSurface::default(), Contour::default()),
+        filter: (),
+        metric: Conditioned {
+            threshold: UNDETERMINED,
+            ..Conditioned::default()
         },
+        stop: (Convergence::default(), IterationLimit(8)),
+    }
+}
+
+/// Creates the same stage, but it is accepted only if the score improves.
+fn guarded_fit() -> Guard<Fit, MeanVsd> {
+    Guard {
+        stage: fit(),
         score: MeanVsd::imperfect_mask(),
     }
+}
+
+/// Creates the stage of estimates that do not agree with the image.
+pub(crate) fn far() -> Far {
+    let sizes = (300, 5000);
+    Cascade((
+        observed(sizes, PointToPoint, coarse()),
+        observed(sizes, Symmetric, Convergence::default()),
+    ))
 }
 
 /// `local`: local refinement that never returns a pose with a higher score than the initial one.
@@ -175,28 +201,24 @@ fn fit() -> Guard<Fit, MeanVsd> {
 /// runs once more at the end.
 #[must_use]
 pub fn local() -> Local {
-    let far = (300, 5000);
     let steps = SwitchUntilStall {
         score: MeanVsd::imperfect_mask(),
         alpha: PAPER_ALPHA,
         aligned: near(PointToPlane, 2000),
-        misaligned: Cascade((
-            observed(far, PointToPoint, coarse()),
-            observed(far, Symmetric, Convergence::default()),
-        )),
+        misaligned: far(),
         max_steps: 6,
         min_gain: 0.01,
         good_enough: 0.1,
     };
     Cascade((
-        fit(),
+        guarded_fit(),
         Switch {
             switcher: Threshold {
                 score: Doubt,
                 alpha: 0.1,
             },
             aligned: Cascade(()),
-            misaligned: Cascade((steps, fit())),
+            misaligned: Cascade((steps, guarded_fit())),
         },
     ))
 }

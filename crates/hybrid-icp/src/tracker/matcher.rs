@@ -2,14 +2,11 @@
 
 use std::sync::Arc;
 
-use hicp_association::{Contour, RenderedSurface, Stride};
+use hicp_association::Stride;
 use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera, Problem,
 };
-use hicp_icp::{
-    Cascade, Convergence, Icp, IterationLimit, Outcome, Session, Stage, Verdict, Workspace,
-};
-use hicp_metric::PointToPlane;
+use hicp_icp::{Cascade, IterationLimit, Outcome, Session, Stage, Verdict, Workspace};
 use hicp_raster::Rasterizer;
 use hicp_score::Evidence;
 
@@ -18,7 +15,7 @@ use super::found::Found;
 use super::motion::{Motion, registered};
 use super::region::Widening;
 use super::segments::Rejected;
-use crate::presets::{Far, Fit, Search, local, search};
+use crate::presets::{Far, Fit, Search, far, fit, search};
 
 /// Factor on the deviations of a registration, whose errors are correlated.
 const INFLATION: f64 = 2.0;
@@ -55,25 +52,14 @@ pub(super) struct Matcher {
 
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
-        let far = local().0.1.misaligned.0.0.misaligned;
-        let near = Icp {
-            selection: (),
-            association: (
-                RenderedSurface {
-                    stride: Stride::AboutPoints(POINTS),
-                    ..RenderedSurface::default()
-                },
-                Contour::new(LINES, 0.05, 0.5),
-            ),
-            filter: (),
-            metric: PointToPlane,
-            stop: (Convergence::default(), IterationLimit(ITERATIONS)),
-        };
+        let mut near = fit();
+        near.association.0.stride = Stride::AboutPoints(POINTS);
+        near.association.1.lines = LINES;
         Self {
             extent: Extent::new(&model),
             model,
             camera,
-            far: Cascade((far, near.clone())),
+            far: Cascade((far(), near.clone())),
             near,
             search: search(),
             workspace: Workspace::new(Rasterizer::default()),

@@ -242,6 +242,13 @@ const FIRST: usize = 32;
 /// and the best one.
 const FINALISTS: usize = 2;
 const FINAL_GAP: f64 = 0.05;
+/// Doubt up to which a pose replaces the local one for the smallest gain, and the factor on that
+/// gain above it.
+///
+/// Errors of real sensors and meshes favor wrong sides of cans and bowls by up to 0.04 in score,
+/// but the doubt stays.
+const SURE: f64 = 0.1;
+const UNSURE_GAIN: f64 = 2.5;
 
 impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
     for HypothesisSearch<S, A, E, R, C, D>
@@ -307,11 +314,12 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         }
         self.finish(&mut run);
         let mut returned = local;
-        if let Some(best) = self.found.best()
-            && best.score < score - self.options.min_gain
-            && self.doubt(&mut run) <= doubt
-        {
-            (returned, score) = (best.outcome, best.score);
+        if let Some(best) = self.found.best() {
+            let found = self.doubt(&mut run);
+            let sure = if found <= SURE { 1.0 } else { UNSURE_GAIN };
+            if found <= doubt && best.score < score - sure * self.options.min_gain {
+                (returned, score) = (best.outcome, best.score);
+            }
         }
         self.found.list_alternatives(
             &returned.camera_from_object,

@@ -38,7 +38,8 @@ pub struct SearchOptions {
     pub good_enough: f64,
     /// The gain in score by which a hypothesis must beat the local pose to replace it.
     ///
-    /// Poses with a smaller gap may be ambiguous, so the one near the initial pose is kept.
+    /// Poses with a smaller gap may be ambiguous, so the one near the initial pose is kept. A pose
+    /// that is still doubtful (above 0.1) must gain 2.5 times as much.
     pub min_gain: f64,
     /// The rotations to try, next to the neighbors of the initial pose.
     pub rotations: Rotations,
