@@ -15,7 +15,9 @@
 use std::time::Instant;
 
 use hicp_io::{LengthUnit, read_mesh};
-use hicp_sim::{CaseConfig, CaseMaker, Corruption, Household, InitialPose, SimRng, stream};
+use hicp_sim::{
+    CaseConfig, CaseMaker, Corruption, DepthSensor, Household, InitialPose, SimRng, stream,
+};
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hicp_tests::{camera, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Point3, Problem, Vector3, rotation_grid};
@@ -389,7 +391,7 @@ fn handles(
                 depth: depth.into(),
                 visible,
                 visible_share: 2.0 / 3.0,
-                noise_percent: 0.0,
+                sensor: DepthSensor::default(),
                 camera: camera(),
             };
             visit(&Seen {

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use hicp_sim::{
-    Case, Clutter, Corruption, DepthNoise, DepthSensor, Household, MaskDefects, Proportions,
-    RelativeGaussian, SimError, SimRng, perturb, rotation, stream,
+    Case, Clutter, Corruption, DepthNoise, DepthSensor, Distortion, Dropout, Household,
+    MaskDefects, Proportions, RelativeGaussian, SimError, SimRng, perturb, rotation, stream,
 };
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera};
 use hybrid_icp::nalgebra::Vector3;
@@ -108,8 +108,8 @@ pub struct Seen {
     pub visible: Mask,
     /// Their share of the pixels that the object would cover alone.
     pub visible_share: f64,
-    /// Standard deviation of the depth noise, percent of the depth.
-    pub noise_percent: f64,
+    /// The sensor that measured the depth.
+    pub sensor: DepthSensor,
     /// The camera.
     pub camera: PinholeCamera,
 }
@@ -141,11 +141,40 @@ impl Tabletop {
     ///
     /// If there is no model.
     pub fn scene(&self, seed: u64) -> Result<Vec<Seen>, SimError> {
+        self.scene_of(seed, |random| white(3.0 * random.random::<f64>()))
+    }
+
+    /// Returns the same, but the sensor has systematic errors, as structured light and stereo have.
+    ///
+    /// # Errors
+    ///
+    /// If there is no model.
+    pub fn distorted_scene(&self, seed: u64) -> Result<Vec<Seen>, SimError> {
+        self.scene_of(seed, |random| DepthSensor {
+            distortion: Distortion {
+                percent: 0.8 * random.random::<f64>(),
+                area_pixels: random.random_range(8..80),
+                fattening_pixels: random.random_range(-3..4),
+            },
+            quantization_meters: Some(0.001),
+            dropout: Dropout {
+                max_incidence_degrees: Some(random.random_range(65.0..88.0)),
+                edge_pixels: random.random_range(0..3),
+            },
+            ..white(0.8 * random.random::<f64>().powi(2))
+        })
+    }
+
+    fn scene_of(
+        &self,
+        seed: u64,
+        sensor: impl FnOnce(&mut SimRng) -> DepthSensor,
+    ) -> Result<Vec<Seen>, SimError> {
         let mut random = stream(seed, &["tabletop"], 0);
         let clutter = Clutter::draw(&mut random, &self.models, OBJECTS)?;
         let perfect = DepthSensor::default();
         let view = clutter.view(&mut random, &self.models, &self.camera, &perfect)?;
-        let noise_percent = 3.0 * random.random::<f64>();
+        let sensor = sensor(&mut random);
         let mut seen = Vec::new();
         for (index, object) in (0..).zip(&view.instances) {
             let occluded_share = match index % 2 {
@@ -170,7 +199,7 @@ impl Tabletop {
             }
             let corruption = Corruption {
                 occluded_share,
-                sensor: sensor(noise_percent),
+                sensor,
                 ..Corruption::default()
             };
             let (depth, visible) = corruption.apply(&case)?;
@@ -184,7 +213,7 @@ impl Tabletop {
                 depth: Arc::new(depth),
                 visible,
                 visible_share,
-                noise_percent,
+                sensor,
                 camera: self.camera,
             });
         }
@@ -205,6 +234,14 @@ impl Tabletop {
 }
 
 impl Seen {
+    /// Returns the standard deviation of the depth noise, percent of the depth.
+    pub fn noise_percent(&self) -> f64 {
+        match self.sensor.noise {
+            DepthNoise::Relative(RelativeGaussian { percent }) => percent,
+            _ => 0.0,
+        }
+    }
+
     /// Returns the observation with a kind of mask.
     ///
     /// # Errors
@@ -236,7 +273,7 @@ impl Seen {
             (distance / normal.dot(&ray.coords)) as f32
         });
         let wall = DepthImage::from_meters(width, height, wall.collect())?;
-        let depth = sensor(self.noise_percent).measure(random, &wall, &self.camera)?;
+        let depth = self.sensor.measure(random, &wall, &self.camera)?;
         Ok(Self {
             depth: Arc::new(depth),
             visible: self.visible.clone(),
@@ -264,11 +301,10 @@ fn count(mask: &Mask) -> usize {
     mask.pixels().iter().filter(|on| **on).count()
 }
 
-fn sensor(noise_percent: f64) -> DepthSensor {
+/// A sensor with independent noise, percent of the depth.
+fn white(percent: f64) -> DepthSensor {
     DepthSensor {
-        noise: DepthNoise::Relative(RelativeGaussian {
-            percent: noise_percent,
-        }),
+        noise: DepthNoise::Relative(RelativeGaussian { percent }),
         ..DepthSensor::default()
     }
 }

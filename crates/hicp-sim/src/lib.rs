@@ -24,6 +24,7 @@ mod case;
 mod clutter;
 mod components;
 mod corruption;
+mod distortion;
 mod error;
 mod hand;
 mod household;
@@ -47,6 +48,7 @@ pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
 pub use clutter::{Clutter, ClutterView, PlacedObject, SeenObject};
 pub use components::{Component, components, join};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
+pub use distortion::{DEPTH_EDGE_METERS, Distortion};
 pub use error::SimError;
 pub use household::{Household, Proportions};
 pub use mask::MaskDefects;
@@ -60,7 +62,7 @@ pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
 };
-pub use sensor::{DEPTH_EDGE_METERS, DepthSensor, Dropout};
+pub use sensor::{DepthSensor, Dropout};
 pub use solid::Solid;
 pub use stream::stream;
 pub use trajectory::Trajectory;

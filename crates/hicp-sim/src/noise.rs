@@ -1,6 +1,7 @@
 //! Noise of depth sensors, independent per pixel.
 //!
-//! Real stereo noise is correlated between neighboring pixels; none of these models includes that.
+//! Real stereo noise is correlated between neighboring pixels; [`Distortion`](crate::Distortion)
+//! adds such errors.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,16 +1,19 @@
-//! A simulated depth sensor: missing pixels, noise and quantization.
+//! A simulated depth sensor: distortion, missing pixels, noise and quantization.
 
 use hicp_core::{DepthImage, PinholeCamera};
 use rand::Rng;
 
+use crate::distortion::{DEPTH_EDGE_METERS, Distortion};
 use crate::error::{SimError, check_range};
 use crate::noise::{DepthNoise, map_depths};
 
-/// The error model of a depth sensor: missing pixels, then noise, then rounding.
+/// The error model of a depth sensor: distortion and missing pixels, then noise, then rounding.
 ///
 /// The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DepthSensor {
+    /// Systematic errors.
+    pub distortion: Distortion,
     /// Noise of the measured depths.
     pub noise: DepthNoise,
     /// Step to which depths are rounded, meters; `None` or 0 for no rounding. A D435 uses 0.001 by
@@ -36,9 +39,6 @@ pub struct Dropout {
     pub edge_pixels: u32,
 }
 
-/// Depth difference between neighboring pixels that counts as a depth edge, meters.
-pub const DEPTH_EDGE_METERS: f64 = 0.02;
-
 impl DepthSensor {
     /// Returns the measurement of a perfect depth image.
     ///
@@ -57,7 +57,12 @@ impl DepthSensor {
         let step = self.quantization_meters.unwrap_or(0.0);
         check_range("quantization in meters", step, 0.0..=1.0)?;
         let lost = self.dropout.lost(perfect, camera)?;
-        let mut measured = self.noise.apply(rng, perfect);
+        let mut measured = if self.distortion == Distortion::default() {
+            self.noise.apply(rng, perfect)
+        } else {
+            let distorted = self.distortion.apply(rng, perfect)?;
+            self.noise.apply(rng, &distorted)
+        };
         if step > 0.0 {
             measured = map_depths(&measured, |z| (z / step).round() * step);
         }

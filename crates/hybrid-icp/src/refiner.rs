@@ -173,7 +173,7 @@ impl<S: Stage> Refiner<S> {
             init,
             &mut Session::new(&mut self.workspace, observer),
         );
-        self.judge(&problem, Some(mve_initial), outcome)
+        self.judge(&problem, Some((init, mve_initial)), outcome)
     }
 
     /// Finds the pose of a segmented object (`camera_from_object`, meters) without an initial pose.
@@ -228,7 +228,7 @@ impl<S: Stage> Refiner<S> {
     fn judge(
         &mut self,
         problem: &Problem<'_>,
-        mve_initial: Option<f64>,
+        start: Option<(&Isometry3<f64>, f64)>,
         outcome: Outcome,
     ) -> Refinement {
         let pose = &outcome.camera_from_object;
@@ -238,12 +238,22 @@ impl<S: Stage> Refiner<S> {
         let flatness = Flatness::at(&mut context, pose);
         let runner_up = self.workspace.alternatives().first().copied();
         let ambiguous = runner_up.is_some_and(|other| other.is_ambiguous());
+        // Two poses that explain the image equally well are equally likely, unless the initial pose
+        // is near one of them.
+        let started_near = || {
+            let sides = start.zip(problem.model());
+            sides.is_some_and(|((init, _), model)| is_near(model, init, pose))
+        };
+        let share = if ambiguous && !started_near() {
+            0.5
+        } else {
+            1.0
+        };
         Refinement {
             outcome,
-            mve_initial: mve_initial.unwrap_or(mve),
+            mve_initial: start.map_or(mve, |(_, mve)| mve),
             mve,
-            // Two poses that explain the image equally well are equally likely.
-            confidence: confidence.probability * if ambiguous { 0.5 } else { 1.0 },
+            confidence: confidence.probability * share,
             expected_error_meters: confidence.error_meters,
             expected_error_degrees: confidence.error_degrees,
             flatness,
@@ -286,4 +296,15 @@ impl<S> std::fmt::Debug for Refiner<S> {
             .field("workspace", &self.workspace)
             .finish_non_exhaustive()
     }
+}
+
+/// Largest motion of the object, in diameters, of a refinement from a pose that was nearly right.
+const NEAR_DIAMETERS: f64 = 0.25;
+
+/// Returns whether two poses are so near that one can be the refinement of the other.
+fn is_near(model: &Model, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
+    let center = model.center();
+    let shift = (pose * center - init * center).norm();
+    let turn = init.rotation.angle_to(&pose.rotation);
+    shift + 0.5 * turn * model.diameter() < NEAR_DIAMETERS * model.diameter()
 }

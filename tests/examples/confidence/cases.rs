@@ -112,13 +112,17 @@ impl Case {
 /// Factors of width and height by which the objects of the fit are stretched.
 const STRETCHES: [(f64, f64); 3] = [(1.0, 1.0), (0.8, 1.2), (1.25, 0.85)];
 
+/// Factors of width and height of models that do not quite fit.
+const ROUGH: (f64, f64) = (1.015, 0.985);
+
 /// Simulates cases of some objects until there are `count`.
 ///
-/// If `stretched`, two of three scenes have the objects in other proportions. Every visible object
-/// gets several poses, each with another random kind of mask.
+/// If `stretched`, two of three scenes have the objects in other proportions. If `distorted`, the
+/// sensor has systematic errors, and the model is not quite that of the object. Every visible
+/// object gets several poses, each with another random kind of mask.
 pub fn simulate(
     objects: &[Household],
-    stretched: bool,
+    (stretched, distorted): (bool, bool),
     seed: u64,
     count: usize,
 ) -> Result<Vec<Case>, Box<dyn Error>> {
@@ -130,11 +134,18 @@ pub fn simulate(
         })
     };
     let all: Vec<Tabletop> = scenes((1.0, 1.0)).collect::<Result<_, _>>()?;
+    let all_rough: Vec<Tabletop> = scenes(ROUGH).collect::<Result<_, _>>()?;
     let all_alike: Vec<Tabletop> = scenes((1.12, 0.92)).collect::<Result<_, _>>()?;
     let mut refiners = PRESETS.map(Refiner::preset);
     let mut cases = Vec::new();
-    for (scene, (scenes, alike)) in (seed..).zip(all.iter().zip(&all_alike).cycle()) {
-        for (place, seen) in (0..).zip(scenes.scene(scene)?) {
+    let models = all.iter().zip(&all_rough).zip(&all_alike);
+    for (scene, ((exact, rough), alike)) in (seed..).zip(models.cycle()) {
+        let (scenes, visible) = if distorted {
+            (rough, exact.distorted_scene(scene)?)
+        } else {
+            (exact, exact.scene(scene)?)
+        };
+        for (place, seen) in (0..).zip(visible) {
             let mut random = stream(scene, &["confidence"], place);
             let others = scenes.objects.len();
             let other = (seen.model + random.random_range(1..others)) % others;

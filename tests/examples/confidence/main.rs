@@ -1,7 +1,9 @@
 //! Measures the calibration of the confidence on simulated and real cases, as Markdown tables.
 //!
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
-//! objects, and `-- fit [CASES]` for the curves, which are fitted on the tuning objects.
+//! objects, and `-- fit [CASES]` for the curves, which are fitted on the tuning objects. `-- tuning
+//! [CASES]` and `-- distorted [CASES]` report on the tuning objects, the latter with systematic
+//! errors of sensor and model, which the fit does not have.
 
 mod cases;
 mod fit;
@@ -22,10 +24,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .and_then(|text| text.parse().ok())
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
-        Some("fit") => fit::print(&cases::simulate(&Household::TUNING, true, 0, count)?),
-        Some("tuning") => report(&cases::simulate(&Household::TUNING, false, 1 << 20, count)?),
+        Some("fit") => fit::print(&cases::simulate(
+            &Household::TUNING,
+            (true, false),
+            0,
+            count,
+        )?),
+        Some(name @ ("tuning" | "distorted")) => {
+            let options = (false, name == "distorted");
+            report(&cases::simulate(
+                &Household::TUNING,
+                options,
+                1 << 20,
+                count,
+            )?);
+        }
         _ => {
-            report(&cases::simulate(&Household::TEST, false, 0, count)?);
+            report(&cases::simulate(
+                &Household::TEST,
+                (false, false),
+                0,
+                count,
+            )?);
             if let Some(cases) = real::cases() {
                 println!("\n## Real frames\n");
                 report(&cases);

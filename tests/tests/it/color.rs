@@ -171,7 +171,7 @@ fn a_lamp_and_its_shadow_matter_least_if_the_surroundings_are_removed() {
 pub(crate) fn scene(object: Household, texture: Texture) -> (Painted, Seen) {
     let painted = Painted::new(&[object], &[texture]).unwrap();
     let scenes = (0..).flat_map(|seed| painted.scenes.scene(seed).unwrap());
-    let good = |seen: &Seen| seen.visible_share > 0.9 && seen.noise_percent < 1.0;
+    let good = |seen: &Seen| seen.visible_share > 0.9 && seen.noise_percent() < 1.0;
     let seen = scenes.into_iter().find(good).unwrap();
     (painted, seen)
 }

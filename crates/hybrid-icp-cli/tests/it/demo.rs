@@ -35,7 +35,7 @@ fn it_needs_nothing_and_shows_everything() {
         "ended",
         " ms ",
         "joined",
-        "point-to-plane",
+        "conditioned",
         "demo.png",
         "\n1 ",
     ] {

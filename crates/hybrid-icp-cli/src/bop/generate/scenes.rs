@@ -207,6 +207,7 @@ fn sensor() -> DepthSensor {
             max_incidence_degrees: Some(80.0),
             edge_pixels: 1,
         },
+        ..DepthSensor::default()
     }
 }
 
