@@ -28,8 +28,9 @@ pub struct Refinement {
     pub mve: f64,
     /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
     ///
-    /// At most a half if a search found another pose that explains the image equally well. Accept a
-    /// pose with 0.95 or more ([`ACCEPTED`](crate::ACCEPTED)).
+    /// At most a half if a search found another pose that explains the image equally well, unless
+    /// the pose is within 0.25 diameters of the initial one. Accept a pose with 0.95 or more
+    /// ([`ACCEPTED`](crate::ACCEPTED)).
     pub confidence: f64,
     /// The largest distance to expect of a surface point from its true place, meters.
     pub expected_error_meters: f64,

@@ -48,6 +48,11 @@ fn outcomes_of_consecutive_stages_combine() {
     let moved = outcome(0.0, LOST, 2, Some(5.0)).then(outcome(2.0, Refined, 1, None));
     assert_eq!(moved, outcome(2.0, Refined, 3, None));
     assert_eq!((moved.n_pairs(), neither.n_pairs()), (0, 10));
+    // An empty stage ends nothing, so the observer's stop of the one before it is reported.
+    let stopped = Verdict::KeptInitial(Termination::Stopped);
+    let stopped = outcome(1.0, stopped, 3, Some(5.0));
+    let empty = Outcome::kept(&stopped.camera_from_object, Termination::Converged);
+    assert_eq!(stopped.then(empty), stopped);
 }
 
 #[test]
