@@ -24,14 +24,12 @@ mod case;
 mod clutter;
 mod components;
 mod corruption;
-mod distortion;
 mod error;
 mod hand;
 mod household;
 mod mask;
 mod meshing;
 mod moving;
-mod noise;
 mod paint;
 mod photo;
 mod profile;
@@ -48,13 +46,11 @@ pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
 pub use clutter::{Clutter, ClutterView, PlacedObject, SeenObject};
 pub use components::{Component, components, join};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
-pub use distortion::{DEPTH_EDGE_METERS, Distortion};
 pub use error::SimError;
 pub use household::{Household, Proportions};
 pub use mask::MaskDefects;
 pub use meshing::ScalarGrid;
 pub use moving::{Hand, MovingConfig, MovingScene};
-pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
 pub use paint::Texture;
 pub use photo::Lighting;
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise, WrongPose};
@@ -62,7 +58,10 @@ pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
     object_pose, perturb, rotation, unit_vector,
 };
-pub use sensor::{DepthSensor, Dropout};
+pub use sensor::{
+    AxialPolynomial, DEPTH_EDGE_METERS, DepthNoise, DepthSensor, Distortion, Dropout,
+    RelativeGaussian, StereoDisparity,
+};
 pub use solid::Solid;
 pub use stream::stream;
 pub use trajectory::Trajectory;

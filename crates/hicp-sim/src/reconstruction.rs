@@ -7,8 +7,8 @@ use rand::Rng;
 
 use crate::components::{components, join};
 use crate::error::{SimError, check_range};
-use crate::noise::{DepthNoise, RelativeGaussian};
 use crate::sampling::{object_pose, perturb};
+use crate::sensor::{DepthNoise, RelativeGaussian};
 use crate::stream::stream;
 use crate::tsdf::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen};
 

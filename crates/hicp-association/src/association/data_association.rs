@@ -14,7 +14,8 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 ///   camera frame in meters, with finite coordinates.
 /// - The weight of a pair is finite and not negative: 1, unless the association has a better value.
 /// - `source_index` is the index of the point in `source`, and `target_index` that of the observed
-///   surfel, or [`Pair::UNLISTED`](hicp_core::Pair::UNLISTED). A point may have any number of pairs.
+///   surfel, or [`Pair::UNLISTED`](hicp_core::Pair::UNLISTED). A point may have any number of
+///   pairs.
 /// - An association that does not start from `source` sets the number of its candidates
 ///   ([`Correspondences::set_candidates`]).
 /// - Pure: equal inputs give equal pairs in equal order. `&mut self` is scratch. Values that depend

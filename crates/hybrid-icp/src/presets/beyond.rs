@@ -341,7 +341,8 @@ pub fn color() -> ByColor<Search> {
 /// `auto`: [`local`], followed by a search above a doubt of 0.2 and a score of 0.1.
 ///
 /// The search ranks 512 rotations, aligns 128 of them and refines 12. A hypothesis replaces the
-/// local pose if its score is better by 0.02; the result can then be far from the initial pose.
+/// local pose if its score is better by 0.02, or by 0.05 if its doubt is above 0.1. The result can
+/// then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {

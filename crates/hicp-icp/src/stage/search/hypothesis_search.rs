@@ -314,10 +314,12 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         }
         self.finish(&mut run);
         let mut returned = local;
-        if let Some(best) = self.found.best() {
+        if let Some(best) = self.found.best()
+            && best.score < score - self.options.min_gain
+        {
             let found = self.doubt(&mut run);
-            let sure = if found <= SURE { 1.0 } else { UNSURE_GAIN };
-            if found <= doubt && best.score < score - sure * self.options.min_gain {
+            let factor = if found <= SURE { 1.0 } else { UNSURE_GAIN };
+            if found <= doubt && best.score < score - factor * self.options.min_gain {
                 (returned, score) = (best.outcome, best.score);
             }
         }

@@ -3,9 +3,9 @@
 use hicp_core::{DepthImage, PinholeCamera};
 use rand::Rng;
 
-use crate::distortion::{DEPTH_EDGE_METERS, Distortion};
 use crate::error::{SimError, check_range};
-use crate::noise::{DepthNoise, map_depths};
+use crate::sensor::distortion::{DEPTH_EDGE_METERS, Distortion};
+use crate::sensor::noise::{DepthNoise, map_depths};
 
 /// The error model of a depth sensor: distortion and missing pixels, then noise, then rounding.
 ///
