@@ -260,8 +260,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     let score = runner.judge(seen, &pose);
                     let error = seen.error(&pose, &seen.truth);
                     eprintln!(
-                        "{} {k}: truth {best:.3}, ended at {score:.3}, {error:.2} d off",
-                        seen.name
+                        "{} {k}: truth {best:.3}, ended at {score:.3} with confidence {:.2}, {error:.2} d off",
+                        seen.name, refined.confidence
                     );
                 }
             }

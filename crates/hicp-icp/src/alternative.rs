@@ -34,6 +34,24 @@ impl Alternative {
     /// The gap in the agreement of colors from which on colors tell two poses apart.
     pub const COLOR_GAP: f64 = 0.15;
 
+    /// Returns how likely a pose is right, relative to one whose score is lower by `gap`.
+    ///
+    /// It is exp(−gap / [`Self::AMBIGUOUS_GAP`]), and 1 if the gap is negative.
+    #[must_use]
+    pub fn likelihood_of(gap: f64) -> f64 {
+        (-gap.max(0.0) / Self::AMBIGUOUS_GAP).exp()
+    }
+
+    /// Returns how likely the pose is right, relative to the returned one; 0 if colors tell them
+    /// apart.
+    #[must_use]
+    pub fn likelihood(&self) -> f64 {
+        match self.color_gap {
+            Some(gap) if gap >= Self::COLOR_GAP => 0.0,
+            _ => Self::likelihood_of(self.gap),
+        }
+    }
+
     /// Returns whether the pose explains the image as well as the returned one, in depth and color.
     #[must_use]
     pub fn is_ambiguous(&self) -> bool {

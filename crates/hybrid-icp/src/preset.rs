@@ -77,9 +77,9 @@ declare! {
     Local, "local", local,
         "local refinement that never raises the MVE: fits surface and silhouette, and tries other pairs in doubt";
     Search, "search", search,
-        "global: local, and above a doubt of 0.05 a search over 1000 rotations; may end at an equivalent pose";
+        "global: local, and if doubt × score is above 0.002 a search over 1000 rotations; may end at an equivalent pose";
     Auto, "auto", auto,
-        "global where needed: local, and above a doubt of 0.2 a search over 512 rotations";
+        "global where needed: local, and if doubt × score is above 0.03 a search over 512 rotations";
     Color, "color", color,
         "global where needed: auto, and color decides among poses that depth cannot tell apart";
 }
@@ -149,7 +149,7 @@ mod tests {
             (Preset::Auto, presets::auto()),
         ] {
             let (least, count) = (built.options.threshold, built.options.hypotheses);
-            let stated = format!("above a doubt of {least} a search over {count} rotations");
+            let stated = format!("doubt × score is above {least} a search over {count} rotations");
             assert!(preset.summary().contains(&stated), "{preset}: {stated}");
         }
     }

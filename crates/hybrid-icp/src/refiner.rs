@@ -1,9 +1,11 @@
 //! One call from an observation and a rough pose to a pose with its score.
 
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
-use hicp_icp::{Alternative, BoxedStage, Observer, Outcome, Session, Stage, Workspace};
+use hicp_icp::{
+    Alternative, BoxedStage, LookAlikeCount, Observer, Outcome, Session, Stage, Workspace, is_near,
+};
 use hicp_raster::Rasterizer;
-use hicp_score::{Confidence, Evidence, Flatness, MeanVsd, Score};
+use hicp_score::{Confidence, Evidence, Flatness, MeanVsd, SampledMve, Score};
 
 use crate::checks::{warning_of_runner_up, warnings_of_result};
 use crate::preset::Preset;
@@ -28,8 +30,8 @@ pub struct Refinement {
     pub mve: f64,
     /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
     ///
-    /// At most a half if a search found another pose that explains the image equally well, unless
-    /// the pose is within 0.25 diameters of the initial one. Accept a pose with 0.95 or more
+    /// Poses that look alike and explain the image as well lower it, unless the returned pose is
+    /// within 0.25 diameters of the initial one. Accept a pose with 0.95 or more
     /// ([`ACCEPTED`](crate::ACCEPTED)).
     pub confidence: f64,
     /// The largest distance to expect of a surface point from its true place, meters.
@@ -41,6 +43,10 @@ pub struct Refinement {
     pub flatness: Option<Flatness>,
     /// The evidence for and against the returned pose, and how well the mask fits it.
     pub evidence: Evidence,
+    /// The number of other poses that look alike and are as likely to be right, at most 4.
+    ///
+    /// 0 if the returned pose is near the initial one. Declared symmetries do not count.
+    pub look_alikes: f64,
     /// The best other pose that a search found; `None` without a search or another pose.
     ///
     /// [`Refiner::alternatives`] has all of them.
@@ -96,6 +102,7 @@ pub struct Refiner<S = BoxedStage> {
     stage: S,
     workspace: Workspace,
     score: MeanVsd,
+    look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
 }
 
 impl Refiner {
@@ -126,6 +133,7 @@ impl<S: Stage> Refiner<S> {
             stage,
             workspace: Workspace::new(renderer),
             score: MeanVsd::default(),
+            look_alikes: presets::look_alikes(),
         }
     }
 
@@ -233,34 +241,50 @@ impl<S: Stage> Refiner<S> {
         outcome: Outcome,
     ) -> Refinement {
         let pose = &outcome.camera_from_object;
+        let look_alikes = self.look_alikes(problem, start.map(|(init, _)| init), pose);
         let mut context = self.workspace.context(problem);
         let mve = self.score.score(&mut context, pose);
-        let (evidence, confidence) = Confidence::at(&mut context, pose, mve);
+        let (evidence, confidence) = Confidence::at(&mut context, pose, mve, look_alikes);
         let flatness = Flatness::at(&mut context, pose);
-        let runner_up = self.workspace.alternatives().first().copied();
-        let ambiguous = runner_up.is_some_and(|other| other.is_ambiguous());
-        // Two poses that explain the image equally well are equally likely, unless the initial pose
-        // is near one of them.
-        let started_near = || {
-            let sides = start.zip(problem.model());
-            sides.is_some_and(|((init, _), model)| is_near(model, init, pose))
-        };
-        let share = if ambiguous && !started_near() {
-            0.5
-        } else {
-            1.0
-        };
         Refinement {
             outcome,
             mve_initial: start.map_or(mve, |(_, mve)| mve),
             mve,
-            confidence: confidence.probability * share,
+            confidence: confidence.probability,
             expected_error_meters: confidence.error_meters,
             expected_error_degrees: confidence.error_degrees,
             flatness,
             evidence,
-            runner_up,
+            look_alikes,
+            runner_up: self.workspace.alternatives().first().copied(),
         }
+    }
+
+    /// Returns the number of other poses that are as likely as `pose`.
+    ///
+    /// A pose near the initial one is more likely than all others. If colors were compared, they
+    /// decide among the poses that look alike in depth.
+    fn look_alikes(
+        &mut self,
+        problem: &Problem<'_>,
+        init: Option<&Isometry3<f64>>,
+        pose: &Isometry3<f64>,
+    ) -> f64 {
+        let Some(model) = problem.model() else {
+            return 0.0;
+        };
+        if init.is_some_and(|init| is_near(model, init, pose)) {
+            return 0.0;
+        }
+        let others = self.workspace.alternatives();
+        let found = others.first().map_or(0.0, Alternative::likelihood);
+        if others.iter().any(|other| other.color_gap.is_some()) {
+            return found;
+        }
+        found.max(
+            self.look_alikes
+                .at(&mut self.workspace.context(problem), pose),
+        )
     }
 
     /// Returns the distinct other poses that the last run found, best first.
@@ -297,15 +321,4 @@ impl<S> std::fmt::Debug for Refiner<S> {
             .field("workspace", &self.workspace)
             .finish_non_exhaustive()
     }
-}
-
-/// Largest motion of the object, in diameters, of a refinement from a pose that was nearly right.
-const NEAR_DIAMETERS: f64 = 0.25;
-
-/// Returns whether two poses are so near that one can be the refinement of the other.
-fn is_near(model: &Model, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
-    let center = model.center();
-    let shift = (pose * center - init * center).norm();
-    let turn = init.rotation.angle_to(&pose.rotation);
-    shift + 0.5 * turn * model.diameter() < NEAR_DIAMETERS * model.diameter()
 }

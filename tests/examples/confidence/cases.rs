@@ -94,6 +94,7 @@ impl Case {
                 &refined.evidence,
                 &misfit.unwrap_or_default(),
                 refined.mve,
+                refined.look_alikes,
             ),
             confidence: refined.confidence,
             expected: [

@@ -1,140 +1,147 @@
-//! The fit of the confidence: logistic regression over piecewise linear curves.
+//! The fit of the confidence: a network with one hidden layer.
 
-use hybrid_icp::nalgebra::{DMatrix, DVector};
+use hicp_sim::{SimRng, stream};
 use hybrid_icp::score::N_FEATURES;
+use rand::RngExt;
 
 use crate::cases::Case;
 
-/// Number of knots of a curve.
-const KNOTS: usize = 6;
-/// Shares of the cases below the knots.
-const SHARES: [f64; KNOTS] = [0.02, 0.2, 0.45, 0.7, 0.9, 0.98];
-/// Weight of a value's square, and of the square of a change of slope.
-const SMALL: f64 = 0.3;
-const SMOOTH: f64 = 3.0;
+/// Number of hidden units.
+const UNITS: usize = 16;
+/// The outputs: the log-odds, and the logarithms of the two errors.
+const OUTPUTS: usize = 3;
+/// The parameters of a unit: its bias and weights, and its factors in the outputs.
+const UNIT: usize = 1 + N_FEATURES + OUTPUTS;
+/// All parameters: of the units, and the outputs without units.
+const PARAMETERS: usize = UNITS * UNIT + OUTPUTS;
+/// Weight of a squared error of a logarithm, relative to the cross-entropy.
+const ERROR_WEIGHT: f64 = 0.125;
+/// Weight of the sum of the squared parameters.
+const DECAY: f64 = 5e-5;
+/// Steps of Adam, and the size of the first ones. The size falls to 0 as a cosine.
+const STEPS: i32 = 2000;
+const STEP: f64 = 0.02;
 
-/// Fits the curves and prints them as the file `curves.rs` has them.
+type Parameters = [f64; PARAMETERS];
+
+/// A case with standardized features.
+struct Row {
+    features: [f64; N_FEATURES],
+    right: f64,
+    /// The logarithms of the errors, relative to their means; `None` if the model is wrong.
+    errors: Option<[f64; 2]>,
+}
+
+/// Fits the network and prints it as the file `network.rs` has it.
 pub fn print(cases: &[Case]) {
-    let knots: Vec<[f64; KNOTS]> = (0..N_FEATURES).map(|f| knots(cases, f)).collect();
-    let rows = |cases: &[&Case]| {
-        DMatrix::from_row_iterator(
-            cases.len(),
-            1 + N_FEATURES * KNOTS,
-            cases.iter().flat_map(|case| row(case, &knots)),
-        )
+    let scales: Vec<(f64, f64)> = (0..N_FEATURES)
+        .map(|k| mean_and_deviation(cases.iter().map(|case| case.features[k])))
+        .collect();
+    let logarithms = |which: usize| {
+        let errors = cases.iter().filter_map(move |case| case.errors);
+        errors.map(move |errors| errors[which].max(1e-4).ln())
     };
-    let all: Vec<&Case> = cases.iter().collect();
-    let right = DVector::from_iterator(cases.len(), cases.iter().map(|c| f64::from(c.right())));
-    let penalty = penalty(&knots);
-    let odds = logistic(&rows(&all), &right, &penalty);
-    // The errors of a wrong model are unknown.
-    let own: Vec<&Case> = cases.iter().filter(|case| case.errors.is_some()).collect();
-    let design = rows(&own);
-    let error = |which: usize| {
-        let logarithms = own.iter().map(|case| {
-            case.errors
-                .map_or(0.0, |errors| errors[which].max(1e-4).ln())
-        });
-        linear(
-            &design,
-            &DVector::from_iterator(own.len(), logarithms),
-            &penalty,
-        )
-    };
-    let fits = [odds, error(0), error(1)];
-    println!(
-        "pub(crate) const BASE: [f64; 3] = {:.4?};\n",
-        fits.each_ref().map(|fit| fit[0])
-    );
-    println!("pub(crate) const CURVES: [Curve; {N_FEATURES}] = [");
-    for (feature, knots) in knots.iter().enumerate() {
-        println!("    Curve {{\n        knots: {knots:.4?},\n        values: [");
-        for fit in &fits {
-            let values = fit.rows(1 + feature * KNOTS, KNOTS);
-            println!("            {:.4?},", values.as_slice());
-        }
-        println!("        ],\n    }},");
+    let means = [0, 1].map(|which| mean_and_deviation(logarithms(which)).0);
+    let rows: Vec<Row> = cases
+        .iter()
+        .map(|case| Row {
+            features: std::array::from_fn(|k| (case.features[k] - scales[k].0) / scales[k].1),
+            right: f64::from(case.right()),
+            errors: case
+                .errors
+                .map(|errors| [0, 1].map(|which| errors[which].max(1e-4).ln() - means[which])),
+        })
+        .collect();
+    let fitted = fit(&rows);
+
+    let base = &fitted[UNITS * UNIT..];
+    let base = [base[0], base[1] + means[0], base[2] + means[1]];
+    println!("pub(crate) const BASE: [f64; 3] = {base:.4?};\n");
+    println!("pub(crate) const UNITS: [Unit; {UNITS}] = [");
+    for unit in fitted[..UNITS * UNIT].chunks(UNIT) {
+        let (input, outputs) = unit.split_at(1 + N_FEATURES);
+        // The scales of the features become part of the weights.
+        let weights: Vec<f64> = input[1..]
+            .iter()
+            .zip(&scales)
+            .map(|(weight, (_, deviation))| weight / deviation)
+            .collect();
+        let shift = weights.iter().zip(&scales).map(|(w, (mean, _))| w * mean);
+        let bias = input[0] - shift.sum::<f64>();
+        println!("    Unit {{\n        bias: {bias:.4},\n        weights: {weights:.4?},");
+        println!("        outputs: {outputs:.4?},\n    }},");
     }
     println!("];");
 }
 
-/// Returns the knots of a feature: quantiles, kept apart.
-fn knots(cases: &[Case], feature: usize) -> [f64; KNOTS] {
-    let mut sorted: Vec<f64> = cases.iter().map(|case| case.features[feature]).collect();
-    sorted.sort_by(f64::total_cmp);
-    let mut last = f64::NEG_INFINITY;
-    SHARES.map(|share| {
-        let quantile = sorted[(share * (sorted.len() - 1) as f64) as usize];
-        last = quantile.max(last + 0.005);
-        (last * 1e4).round() / 1e4
-    })
-}
-
-/// Returns the row of a case: 1, and the weight of every knot.
-fn row(case: &Case, knots: &[[f64; KNOTS]]) -> Vec<f64> {
-    let mut row = vec![1.0];
-    for (x, knots) in case.features.iter().zip(knots) {
-        let x = x.clamp(knots[0], knots[KNOTS - 1]);
-        let right = knots.iter().position(|knot| x < *knot).unwrap_or(KNOTS - 1);
-        let (a, b) = (knots[right - 1], knots[right]);
-        let mut weights = [0.0; KNOTS];
-        weights[right] = (x - a) / (b - a);
-        weights[right - 1] = 1.0 - weights[right];
-        row.extend(weights);
+fn mean_and_deviation(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for value in values {
+        (count, sum, squares) = (count + 1.0, sum + value, squares + value * value);
     }
-    row
+    let mean: f64 = sum / count;
+    (mean, (squares / count - mean * mean).max(1e-12).sqrt())
 }
 
-/// Returns the penalty of large values and of changes of slope.
-fn penalty(knots: &[[f64; KNOTS]]) -> DMatrix<f64> {
-    let size = 1 + knots.len() * KNOTS;
-    let mut penalty = DMatrix::identity(size, size) * SMALL;
-    penalty[(0, 0)] = 1e-6;
-    for (feature, knots) in knots.iter().enumerate() {
-        let width = (knots[KNOTS - 1] - knots[0]) / (KNOTS - 1) as f64;
-        for knot in 1..KNOTS - 1 {
-            let left = width / (knots[knot] - knots[knot - 1]);
-            let right = width / (knots[knot + 1] - knots[knot]);
-            let mut change = DVector::zeros(size);
-            let at = 1 + feature * KNOTS + knot;
-            (change[at - 1], change[at], change[at + 1]) = (left, -left - right, right);
-            // Narrow intervals must not stiffen the curve.
-            let change = &change / change.norm().max(1.0);
-            penalty += &change * change.transpose() * SMOOTH;
+/// Minimizes the loss by Adam over all rows.
+fn fit(rows: &[Row]) -> Parameters {
+    let mut random: SimRng = stream(0, &["network"], 0);
+    let mut parameters: Parameters = std::array::from_fn(|_| 0.5 * (random.random::<f64>() - 0.5));
+    let (mut mean, mut square) = ([0.0; PARAMETERS], [0.0; PARAMETERS]);
+    for step in 1..=STEPS {
+        let gradient = gradient(&parameters, rows);
+        let turn = std::f64::consts::PI * f64::from(step) / f64::from(STEPS);
+        let size = STEP * 0.5 * (1.0 + turn.cos());
+        for (k, g) in gradient.iter().enumerate() {
+            mean[k] = 0.9 * mean[k] + 0.1 * g;
+            square[k] = 0.999 * square[k] + 0.001 * g * g;
+            let first: f64 = mean[k] / (1.0 - 0.9_f64.powi(step));
+            let second: f64 = square[k] / (1.0 - 0.999_f64.powi(step));
+            parameters[k] -= size * first / (second.sqrt() + 1e-8);
         }
     }
-    penalty
+    parameters
 }
 
-/// Returns the coefficients of the penalized logistic regression, by Newton's method.
-fn logistic(design: &DMatrix<f64>, right: &DVector<f64>, penalty: &DMatrix<f64>) -> DVector<f64> {
-    let mut beta = DVector::zeros(design.ncols());
-    for _ in 0..30 {
-        let probability = (design * &beta).map(|odds| 1.0 / (1.0 + (-odds).exp()));
-        let mut weighted = design.clone();
-        for (mut row, p) in weighted.row_iter_mut().zip(probability.iter()) {
-            row *= p * (1.0 - p) + 1e-6;
+/// Returns the gradient of the mean loss.
+fn gradient(parameters: &Parameters, rows: &[Row]) -> Parameters {
+    let mut gradient = [0.0; PARAMETERS];
+    let base = UNITS * UNIT;
+    for row in rows {
+        let mut values = [0.0; UNITS];
+        let mut outputs: [f64; OUTPUTS] = std::array::from_fn(|k| parameters[base + k]);
+        for (value, unit) in values.iter_mut().zip(parameters.chunks(UNIT)) {
+            let products = unit[1..].iter().zip(&row.features).map(|(w, x)| w * x);
+            *value = (unit[0] + products.sum::<f64>()).max(0.0);
+            for (output, factor) in outputs.iter_mut().zip(&unit[1 + N_FEATURES..]) {
+                *output += *value * factor;
+            }
         }
-        let gradient = design.transpose() * (right - &probability) - penalty * &beta;
-        let hessian = design.transpose() * weighted + penalty;
-        let step = hessian
-            .cholesky()
-            .expect("the penalty is positive")
-            .solve(&gradient);
-        beta += &step * (2.0 / step.amax()).min(1.0);
-        if step.amax() < 1e-6 {
-            break;
+        let probability = 1.0 / (1.0 + (-outputs[0]).exp());
+        let mut slopes = [probability - row.right, 0.0, 0.0];
+        if let Some(errors) = row.errors {
+            slopes[1] = 2.0 * ERROR_WEIGHT * (outputs[1] - errors[0]);
+            slopes[2] = 2.0 * ERROR_WEIGHT * (outputs[2] - errors[1]);
+        }
+        for (k, slope) in slopes.iter().enumerate() {
+            gradient[base + k] += slope;
+        }
+        let units = parameters.chunks(UNIT).zip(gradient.chunks_mut(UNIT));
+        for ((unit, gradient), value) in units.zip(values) {
+            if value <= 0.0 {
+                continue;
+            }
+            let mut slope = 0.0;
+            for (k, own) in slopes.iter().enumerate() {
+                gradient[1 + N_FEATURES + k] += own * value;
+                slope += own * unit[1 + N_FEATURES + k];
+            }
+            gradient[0] += slope;
+            for (g, x) in gradient[1..].iter_mut().zip(&row.features) {
+                *g += slope * x;
+            }
         }
     }
-    beta
-}
-
-/// Returns the coefficients of the penalized linear regression.
-fn linear(design: &DMatrix<f64>, values: &DVector<f64>, penalty: &DMatrix<f64>) -> DVector<f64> {
-    let hessian = design.transpose() * design + penalty;
-    let right = design.transpose() * values;
-    hessian
-        .cholesky()
-        .expect("the penalty is positive")
-        .solve(&right)
+    let count = rows.len() as f64;
+    std::array::from_fn(|k| gradient[k] / count + 2.0 * DECAY * parameters[k])
 }

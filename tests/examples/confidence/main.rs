@@ -1,9 +1,9 @@
 //! Measures the calibration of the confidence on simulated and real cases, as Markdown tables.
 //!
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
-//! objects, and `-- fit [CASES]` for the curves, which are fitted on the tuning objects. `-- tuning
-//! [CASES]` and `-- distorted [CASES]` report on the tuning objects, the latter with systematic
-//! errors of sensor and model, which the fit does not have.
+//! objects, and `-- fit [CASES]` for the network, which is fitted on the tuning objects: so many
+//! cases with white noise, and as many with systematic errors of sensor and model. `-- tuning
+//! [CASES]` and `-- distorted [CASES]` report on other cases of either kind.
 
 mod cases;
 mod fit;
@@ -24,12 +24,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .and_then(|text| text.parse().ok())
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
-        Some("fit") => fit::print(&cases::simulate(
-            &Household::TUNING,
-            (true, false),
-            0,
-            count,
-        )?),
+        Some("fit") => {
+            let half = |distorted| {
+                let cases = cases::simulate(&Household::TUNING, (true, distorted), 0, count);
+                cases.expect("the objects can be simulated")
+            };
+            let (mut cases, others) = std::thread::scope(|scope| {
+                let others = scope.spawn(|| half(true));
+                (half(false), others.join().expect("no panic"))
+            });
+            cases.extend(others);
+            fit::print(&cases);
+        }
         Some(name @ ("tuning" | "distorted")) => {
             let options = (false, name == "distorted");
             report(&cases::simulate(

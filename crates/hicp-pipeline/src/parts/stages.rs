@@ -238,20 +238,31 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     let used = "use of the initial pose; if ignored, the search always runs";
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
-        threshold: p.number("threshold", FACTOR, 0.05, "searches above this doubt")?,
-        least_score: p.number(
-            "least_score",
+        threshold: p.number(
+            "threshold",
             FACTOR,
-            0.05,
-            "searches only above this score",
+            0.002,
+            "searches above this doubt × score",
         )?,
         good_enough: p.number("good_enough", FACTOR, 0.02, "doubt that ends it")?,
-        min_gain: p.number("min_gain", FACTOR, 0.02, "gain that leaves the local pose")?,
+        min_gain: p.number(
+            "min_gain",
+            FACTOR,
+            0.02,
+            "gain that leaves a doubtful local pose",
+        )?,
+        sure_gain: p.number(
+            "sure_gain",
+            FACTOR,
+            0.08,
+            "gain that leaves a sure local pose",
+        )?,
         rotations: p.word("rotations", &rotations, tried)?,
         hypotheses: p.limited(Hypotheses, "hypotheses", 0, 1000, "rotations to rank")?,
         aligned: p.count("aligned", 0, 256, "hypotheses that are aligned")?,
         refined: p.count("refined", 0, 24, "hypotheses that are refined")?,
         spacing_degrees: p.number("spacing_degrees", DEGREES, 20.0, least)?,
+        widens: p.flag("widens", true, "goes on with all hypotheses if it fails")?,
         ..SearchOptions::default()
     };
     let far = "largest distance of the result from the initial pose";

@@ -2,26 +2,27 @@
 
 use hicp_core::{Context, Isometry3};
 
-use crate::judgment::curves::{BASE, CURVES, Curve, KNOTS};
 use crate::judgment::evidence::Evidence;
 use crate::judgment::grid::Grid;
 use crate::judgment::insides::find_insides;
 use crate::judgment::misfit::Misfit;
+use crate::judgment::network::{BASE, N_FEATURES, UNITS};
 
-/// Number of features.
-pub const N_FEATURES: usize = CURVES.len();
+/// Smallest distance, in diameters, that the logarithm of a distance tells from 0.
+const FINEST: f64 = 0.002;
+/// Largest magnitude of a feature.
+const LIMIT: f64 = 20.0;
 
 /// The calibrated probability that a pose is right, and the error to expect.
 ///
 /// A pose is right if no point of the surface is farther from its true place than a tenth of the
 /// diameter ([`mssd`](crate::mssd) up to declared symmetries).
 ///
-/// The model is a scorecard: each feature of the [`Evidence`], the [`Misfit`] and the score adds
-/// log-odds from a piecewise linear curve. The curves are fitted on simulated cases with imperfect
-/// masks, noise, occlusion, look-alikes, walls and wrong classes
-/// (`cargo run --release -p hicp-tests --example confidence -- fit`). A probability is right on
-/// average over such cases. It tells nothing about two orientations that explain the image equally
-/// well.
+/// The model is a network with a few hidden units. Its features are the [`Evidence`], the
+/// [`Misfit`], the score, and the number of poses that look alike. It is fitted on simulated cases
+/// with imperfect masks, noise, systematic errors of the sensor, occlusion, look-alikes, walls and
+/// wrong classes (`cargo run --release -p hicp-tests --example confidence -- fit`). A probability
+/// is right on average over such cases.
 ///
 /// ```
 /// use hicp_score::Confidence;
@@ -45,19 +46,25 @@ impl Confidence {
         "ahead",
         "rim_open",
         "rim_ahead",
-        "systematic",
+        "log_systematic",
         "bias",
         "weak",
         "unexplained",
-        "sigma",
+        "log_sigma",
         "hidden",
         "inside",
+        "unmeasured",
         "mask_missing",
         "log_pixels",
         "mve",
+        "log_look_alikes",
     ];
 
     /// Measures the evidence at a pose whose mean VSD estimate is `mve`, and the confidence.
+    ///
+    /// `look_alikes` is the number of other poses that may be the right one, because they explain
+    /// the image as well and nothing is known of the initial pose. With 0, the result is the
+    /// probability that the pose is right if it is the right one of those.
     ///
     /// Without a model, an image or a rendered pixel, the probability is 0. Cost: one render
     /// (shared with other components that use this pose) and about 40 µs. Allocates nothing.
@@ -66,6 +73,7 @@ impl Confidence {
         context: &mut Context<'_>,
         camera_from_object: &Isometry3<f64>,
         mve: f64,
+        look_alikes: f64,
     ) -> (Evidence, Self) {
         let diameter = context.problem.model().map_or(0.0, |m| m.diameter());
         let (Some((_, observation)), Some(view)) =
@@ -78,7 +86,7 @@ impl Confidence {
         find_insides(&mut grid);
         let evidence = Evidence::of(&grid);
         let confidence = if evidence.agrees > 0.0 {
-            let features = Self::features(&evidence, &Misfit::of(&grid), mve);
+            let features = Self::features(&evidence, &Misfit::of(&grid), mve, look_alikes);
             Self::of(&features, diameter)
         } else {
             Self::none(diameter)
@@ -100,22 +108,29 @@ impl Confidence {
 
     /// Returns the features of the model, in the order of [`Confidence::FEATURES`].
     #[must_use]
-    pub fn features(evidence: &Evidence, misfit: &Misfit, mve: f64) -> [f64; N_FEATURES] {
+    pub fn features(
+        evidence: &Evidence,
+        misfit: &Misfit,
+        mve: f64,
+        look_alikes: f64,
+    ) -> [f64; N_FEATURES] {
         let seen = 1.0 - evidence.hidden - evidence.unmeasured;
         [
             misfit.ahead,
             misfit.rim_open,
             misfit.rim_ahead,
-            misfit.systematic,
+            (misfit.systematic + FINEST).ln(),
             misfit.bias.abs(),
             misfit.weak,
             misfit.unexplained,
-            misfit.sigma,
+            (misfit.sigma + FINEST).ln(),
             evidence.hidden,
             evidence.inside,
+            evidence.unmeasured,
             evidence.mask_missing,
             (evidence.pixels as f64 * seen).max(1.0).ln(),
             mve,
+            look_alikes.ln_1p(),
         ]
     }
 
@@ -123,33 +138,23 @@ impl Confidence {
     #[must_use]
     pub fn of(features: &[f64; N_FEATURES], diameter: f64) -> Self {
         let mut sums = BASE;
-        for (curve, x) in CURVES.iter().zip(features) {
-            for (sum, y) in sums.iter_mut().zip(curve.at(*x)) {
-                *sum += y;
+        for unit in &UNITS {
+            let products = unit
+                .weights
+                .iter()
+                .zip(features)
+                .map(|(w, x)| w * x.clamp(-LIMIT, LIMIT));
+            // The maximum of NaN and 0 is 0.
+            let value = (unit.bias + products.sum::<f64>()).max(0.0);
+            for (sum, output) in sums.iter_mut().zip(unit.outputs) {
+                *sum += output * value;
             }
         }
         let [log_odds, log_error, log_degrees] = sums;
         Self {
             probability: 1.0 / (1.0 + (-log_odds).exp()),
-            error_meters: log_error.exp() * diameter,
+            error_meters: log_error.exp().min(1.0) * diameter,
             error_degrees: log_degrees.exp().min(180.0),
-        }
-    }
-}
-
-impl Curve {
-    /// Returns the values at `x`, which is clamped to the knots. NaN counts as the last one.
-    fn at(&self, x: f64) -> [f64; 3] {
-        let right = self.knots.iter().position(|knot| x < *knot);
-        match right.unwrap_or(KNOTS) {
-            0 => self.values.map(|values| values[0]),
-            KNOTS => self.values.map(|values| values[KNOTS - 1]),
-            right => {
-                let (a, b) = (self.knots[right - 1], self.knots[right]);
-                let share = (x - a) / (b - a);
-                self.values
-                    .map(|y| y[right - 1] + share * (y[right] - y[right - 1]))
-            }
         }
     }
 }

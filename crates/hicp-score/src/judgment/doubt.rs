@@ -6,7 +6,8 @@ use crate::judgment::confidence::Confidence;
 use crate::mve::mean_vsd::MeanVsd;
 use crate::score::Score;
 
-/// Scores a pose by the probability that it is wrong: 1 minus its [`Confidence`].
+/// Scores a pose by the probability that it is wrong: 1 minus its [`Confidence`], as if no other
+/// pose looked alike.
 ///
 /// It accounts for noise, hidden parts and imperfect masks, which raise the MVE of right poses. Use
 /// it to decide whether a pose is good enough. It is not smooth, and most wrong poses have a score
@@ -19,7 +20,7 @@ pub struct Doubt;
 impl Score for Doubt {
     fn score(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
         let mve = MeanVsd::default().score(context, camera_from_object);
-        let (_, confidence) = Confidence::at(context, camera_from_object, mve);
+        let (_, confidence) = Confidence::at(context, camera_from_object, mve, 0.0);
         1.0 - confidence.probability
     }
 

@@ -2,7 +2,6 @@
 
 pub(crate) mod calibration;
 pub(crate) mod confidence;
-pub(crate) mod curves;
 pub(crate) mod doubt;
 pub(crate) mod evidence;
 pub(crate) mod flatness;
@@ -10,10 +9,12 @@ pub(crate) mod grid;
 pub(crate) mod insides;
 pub(crate) mod median;
 pub(crate) mod misfit;
+pub(crate) mod network;
 
 pub use calibration::{LabeledScore, ReliabilityBin, reliability, roc_area};
-pub use confidence::{Confidence, N_FEATURES};
+pub use confidence::Confidence;
 pub use doubt::Doubt;
 pub use evidence::Evidence;
 pub use flatness::Flatness;
 pub use misfit::Misfit;
+pub use network::N_FEATURES;

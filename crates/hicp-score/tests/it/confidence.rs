@@ -38,7 +38,7 @@ fn judge(observation: &Observation, pose: &Isometry3<f64>) -> (Misfit, Confidenc
     let mut renders = RenderCache::new(RayCaster);
     let mut context = Context::new(Problem::new(&model, observation), &mut renders);
     let mve = MeanVsd::default().score(&mut context, pose);
-    let (evidence, confidence) = Confidence::at(&mut context, pose, mve);
+    let (evidence, confidence) = Confidence::at(&mut context, pose, mve, 0.0);
     assert_eq!(evidence, Evidence::at(&mut context, pose).unwrap());
     (Misfit::at(&mut context, pose).unwrap(), confidence)
 }
@@ -117,4 +117,21 @@ fn features_out_of_range_give_finite_numbers() {
         assert!((0.0..=1.0).contains(&confidence.probability), "{x}");
         assert!(confidence.error_meters.is_finite() && confidence.error_degrees <= 180.0);
     }
+}
+
+#[test]
+fn poses_that_look_alike_lower_the_probability() {
+    let at = at();
+    let scene = scene(|_, z| z);
+    let model = cube();
+    let mut renders = RenderCache::new(RayCaster);
+    let mut context = Context::new(Problem::new(&model, &scene), &mut renders);
+    let mve = MeanVsd::default().score(&mut context, &at);
+    let mut last = 1.0;
+    for look_alikes in [0.0, 0.3, 1.0, 4.0] {
+        let (_, confidence) = Confidence::at(&mut context, &at, mve, look_alikes);
+        assert!(confidence.probability < last, "{look_alikes}: {last}");
+        last = confidence.probability;
+    }
+    assert!(last < 0.7, "{last}");
 }

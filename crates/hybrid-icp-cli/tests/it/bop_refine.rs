@@ -29,7 +29,7 @@ fn every_row_is_refined_against_its_own_instance() {
 fn other_hypotheses_follow_the_rows() {
     let world = World::new();
     let rows = world.rows();
-    let always = ["--set", "threshold=0", "--set", "least_score=0"];
+    let always = ["--set", "threshold=0"];
     let search = [&["--pipeline", "search", "--no-time"][..], &always].concat();
     let (run, refined) = world.refine(&rows, &search);
     run.exits(0);

@@ -11,7 +11,7 @@ use hicp_association::{
 };
 use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
-    IterationLimit, Repeat, SearchOptions, Start,
+    IterationLimit, LookAlikeCount, Repeat, SearchOptions, Start,
 };
 use hicp_metric::{Conditioned, Photometric, PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{Doubt, MeanVsd, SampledMve};
@@ -230,6 +230,11 @@ fn ranking() -> SampledMve {
     score
 }
 
+/// Creates the count of poses that look alike, by the scores of the search.
+pub(crate) fn look_alikes() -> LookAlikeCount<SampledMve, MeanVsd> {
+    LookAlikeCount::new(ranking(), MeanVsd::imperfect_mask())
+}
+
 /// Creates the stage that moves many hypotheses to the image: few points, and no render.
 ///
 /// Points of the far side are paired, too, but the symmetric metric skips them by their normals.
@@ -302,7 +307,8 @@ pub fn search_with(options: SearchOptions) -> Search {
     search_from(local(), options)
 }
 
-/// `search`: [`local`], followed by a search if its doubt and its score stay above 0.05.
+/// `search`: [`local`], followed by a search if the product of its doubt and its score is above
+/// 0.002.
 ///
 /// The search ranks 1000 rotations, aligns 256 of them and refines 24. The result can be far from
 /// the initial pose, also at a pose that is equivalent by symmetry.
@@ -338,20 +344,20 @@ pub fn color() -> ByColor<Search> {
     by_color(auto())
 }
 
-/// `auto`: [`local`], followed by a search above a doubt of 0.2 and a score of 0.1.
+/// `auto`: [`local`], followed by a search if the product of its doubt and its score is above 0.03.
 ///
 /// The search ranks 512 rotations, aligns 128 of them and refines 12. A hypothesis replaces the
-/// local pose if its score is better by 0.02, or by 0.05 if its doubt is above 0.1. The result can
-/// then be far from the initial pose.
+/// local pose if its score is better by 0.02 to 0.08; the less doubtful the local pose, the more is
+/// needed. The result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
-        threshold: 0.2,
-        least_score: 0.1,
+        threshold: 0.03,
         good_enough: 0.1,
         hypotheses: 512,
         aligned: 128,
         refined: 12,
+        widens: false,
         ..SearchOptions::default()
     })
 }

@@ -7,13 +7,35 @@ use hicp_score::mssd;
 
 /// The share of the diameter by which distinct poses differ (MSSD).
 const APART: f64 = 0.1;
+/// The largest distance (MSSD), as a share of the diameter, between an initial pose that was nearly
+/// right and the right one.
+const NEAR: f64 = 0.25;
 
 /// The extreme points of an object with its expanded symmetries. Computed once per model.
 #[derive(Debug)]
 pub(crate) struct Distinct {
     points: Vec<Point3<f32>>,
     symmetries: Vec<Isometry3<f64>>,
-    apart_meters: f64,
+    diameter: f64,
+}
+
+/// Returns whether two poses of a model are so near that one can be the refinement of the other.
+///
+/// Their MSSD is then below a quarter of the diameter, up to declared symmetries. Cost: some
+/// hundred multiplications per symmetry.
+///
+/// ```
+/// # use hicp_core::{Isometry3, Model, Point3, TriMesh};
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// let moved = |meters| Isometry3::translation(meters, 0.0, 0.0);
+/// assert!(hicp_icp::is_near(&model, &moved(0.0), &moved(0.03)));
+/// assert!(!hicp_icp::is_near(&model, &moved(0.0), &moved(0.04)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[must_use]
+pub fn is_near(model: &Model, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    Distinct::of(model).mssd(a, b) < NEAR * model.diameter()
 }
 
 impl Distinct {
@@ -21,7 +43,7 @@ impl Distinct {
         model.derived().get_or_build(0, || Self {
             points: extremes(model),
             symmetries: model.symmetries().motions(),
-            apart_meters: APART * model.diameter(),
+            diameter: model.diameter(),
         })
     }
 
@@ -40,7 +62,7 @@ impl Distinct {
 
     /// Returns whether two poses differ by more than a tenth of the diameter.
     pub(crate) fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
-        self.mssd(a, b) > self.apart_meters
+        self.mssd(a, b) > APART * self.diameter
     }
 }
 

@@ -23,7 +23,9 @@ use crate::stage::stage_trait::Stage;
 ///    differ are kept.
 /// 3. **Try**: the local stage refines the best of the first 32. If that is good enough, the others
 ///    are not aligned, and nothing is explored.
-/// 4. **Explore**: a stage that costs some hundred scores refines each.
+/// 4. **Explore**: a stage that costs some hundred scores refines each. If the best pose is still
+///    bad, [`SearchOptions::widens`] repeats steps 2 and 4 for all ranked hypotheses. Twice as many
+///    are then refined, and they differ by half as much.
 /// 5. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
 ///    local pose is good, because the score of a rotated mug is good, too. If the image shows
@@ -42,7 +44,8 @@ use crate::stage::stage_trait::Stage;
 ///
 /// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
-/// three times. The near symmetries of a model are found once, in some 10 ms.
+/// three times, and about three times as much if it goes on. The near symmetries of a model are
+/// found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// Refines the initial pose, and the best hypotheses.
@@ -62,6 +65,8 @@ pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// The best placed hypotheses, and the best aligned ones.
     ranked: Shortlist,
     aligned: Shortlist,
+    /// The poses that were explored.
+    explored: Vec<Isometry3<f64>>,
     alike: LookAlikes,
     found: FoundPoses,
     /// The pose that was judged last, and its doubt.
@@ -88,6 +93,7 @@ impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
             options,
             ranked: Shortlist::default(),
             aligned: Shortlist::default(),
+            explored: Vec::new(),
             alike: LookAlikes::default(),
             found: FoundPoses::default(),
             judged: None,
@@ -96,7 +102,7 @@ impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
 
     /// Iterates over the hypotheses that the last search ranked best, with their scores.
     ///
-    /// The best comes first. Their number is at most [`SearchOptions::aligned`].
+    /// The best comes first.
     pub fn ranked(&self) -> impl Iterator<Item = &(f64, Isometry3<f64>)> {
         self.ranked.poses().iter()
     }
@@ -137,6 +143,13 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         }
     }
 
+    /// Returns whether the best pose found is bad enough to search for another one.
+    fn is_bad(&mut self, run: &mut Run<'_, '_>, threshold: f64) -> bool {
+        let doubt = self.doubt(run);
+        let best = self.found.best();
+        best.is_none_or(|best| doubt * best.score > threshold)
+    }
+
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
     fn rank(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.ranked.clear();
@@ -156,13 +169,18 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             }
             if let Some(pose) = pose {
                 let score = run.score(&mut self.ranking, &pose);
-                self.ranked.insert(score, pose, options.aligned, 0.0);
+                self.ranked.insert(score, pose, options.hypotheses, 0.0);
             }
         }
     }
 
-    /// Aligns poses and adds the best that differ to the list.
-    fn align(&mut self, run: &mut Run<'_, '_>, ranked: &[(f64, Isometry3<f64>)]) {
+    /// Aligns poses and adds the best that differ to the list, `refined` at most.
+    fn align(
+        &mut self,
+        run: &mut Run<'_, '_>,
+        ranked: &[(f64, Isometry3<f64>)],
+        (refined, spacing_degrees): (usize, f64),
+    ) {
         for (score, start) in ranked {
             if run.is_over() {
                 return;
@@ -174,9 +192,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             } else {
                 (*score, *start)
             };
-            let options = &self.options;
-            self.aligned
-                .insert(score, pose, options.refined, options.spacing_degrees);
+            self.aligned.insert(score, pose, refined, spacing_degrees);
         }
     }
 
@@ -195,13 +211,22 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.rank(run, local);
         let ranked = std::mem::take(&mut self.ranked);
-        let (first, others) = ranked.poses().split_at(FIRST.min(ranked.poses().len()));
+        let poses = ranked.poses();
+        let options = self.options;
+        let kept = (options.refined, options.spacing_degrees);
+        let most = options.aligned.min(poses.len());
+        let first = FIRST.min(most);
         self.aligned.clear();
-        self.align(run, first);
+        self.align(run, &poses[..first], kept);
         self.try_best(run);
-        if self.doubt(run) > self.options.good_enough {
-            self.align(run, others);
-            self.explore(run, self.options.good_enough);
+        if self.doubt(run) > options.good_enough {
+            self.align(run, &poses[first..most], kept);
+            self.explore(run, options.good_enough);
+            if options.widens && self.is_bad(run, options.threshold.max(FAILED)) {
+                self.aligned.clear();
+                self.align(run, poses, (2 * kept.0, 0.5 * kept.1));
+                self.explore(run, options.good_enough);
+            }
         }
         self.ranked = ranked;
     }
@@ -213,6 +238,10 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             if run.is_over() || self.doubt(run) <= enough {
                 break;
             }
+            if self.explored.contains(start) {
+                continue;
+            }
+            self.explored.push(*start);
             let outcome = run.refine(&mut self.explore, start);
             // A hypothesis that the stage keeps is still another pose than the initial one.
             let verdict = Verdict::Refined;
@@ -238,17 +267,12 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
 /// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
 const FIRST: usize = 32;
+/// Product of doubt and score above which the search of a part of the hypotheses has failed.
+const FAILED: f64 = 0.02;
 /// Number of distinct poses that the local stage refines, and the largest gap in score between them
 /// and the best one.
 const FINALISTS: usize = 2;
 const FINAL_GAP: f64 = 0.05;
-/// Doubt up to which a pose replaces the local one for the smallest gain, and the factor on that
-/// gain above it.
-///
-/// Errors of real sensors and meshes favor wrong sides of cans and bowls by up to 0.04 in score,
-/// but the doubt stays.
-const SURE: f64 = 0.1;
-const UNSURE_GAIN: f64 = 2.5;
 
 impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
     for HypothesisSearch<S, A, E, R, C, D>
@@ -269,6 +293,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             Start::Ignored => Outcome::kept(init, Termination::NoPairs),
         };
         self.found.clear();
+        self.explored.clear();
         self.judged = None;
         session.workspace.alternatives.clear();
         let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
@@ -297,31 +322,28 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             score = self.found.best().map_or(score, |found| found.score);
             doubt = self.doubt(&mut run);
         }
-        let bad = doubt > self.options.threshold && score > self.options.least_score;
+        let bad = self.is_bad(&mut run, self.options.threshold);
         if bad {
             self.search(&mut run, &local.camera_from_object);
         }
         if let Some(best) = self.found.best() {
-            let bad = self.doubt(&mut run) > self.options.threshold
-                && best.score > self.options.least_score;
+            let bad = self.is_bad(&mut run, self.options.threshold);
             let mut alike = std::mem::take(&mut self.alike);
             let scores = (&mut self.ranking, &mut self.score);
             let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
             self.aligned.clear();
-            self.align(&mut run, listed.poses());
+            let kept = (self.options.refined, self.options.spacing_degrees);
+            self.align(&mut run, listed.poses(), kept);
             self.alike = alike;
             self.explore(&mut run, f64::NEG_INFINITY);
         }
         self.finish(&mut run);
         let mut returned = local;
         if let Some(best) = self.found.best()
-            && best.score < score - self.options.min_gain
+            && best.score < score - self.options.needed_gain(doubt)
+            && self.doubt(&mut run) <= doubt
         {
-            let found = self.doubt(&mut run);
-            let factor = if found <= SURE { 1.0 } else { UNSURE_GAIN };
-            if found <= doubt && best.score < score - factor * self.options.min_gain {
-                (returned, score) = (best.outcome, best.score);
-            }
+            (returned, score) = (best.outcome, best.score);
         }
         self.found.list_alternatives(
             &returned.camera_from_object,

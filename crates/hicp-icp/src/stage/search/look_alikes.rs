@@ -1,13 +1,17 @@
 //! The poses that look like the best one found.
 
+use hicp_core::{Context, Isometry3};
 use hicp_score::Score;
 
+use crate::alternative::Alternative;
 use crate::stage::search::found::Found;
 use crate::stage::search::near_symmetries::NearSymmetries;
 use crate::stage::search::options::SearchOptions;
 use crate::stage::search::run::Run;
 use crate::stage::search::shortlist::Shortlist;
 
+/// Largest number of look-alikes that are scored to count them.
+const SCORED: usize = 4;
 /// Number of refined poses that look like a good pose.
 const ALIKE_OF_GOOD: usize = 2;
 /// Gap in score up to which a pose looks like a good one before it is refined.
@@ -70,5 +74,73 @@ impl LookAlikes {
             }
         }
         &self.listed
+    }
+}
+
+/// Counts the poses that look like a given one and explain the image as well.
+///
+/// A pose looks like another one if the model nearly covers it, such as a mug that is rotated
+/// around its axis while its handle is hidden. At most 4 of them are counted, each by
+/// [`Alternative::likelihood_of`] its gap in score. Declared symmetries are no look-alikes.
+///
+/// ```
+/// use hicp_icp::LookAlikeCount;
+/// use hicp_score::{MeanVsd, SampledMve};
+/// let count = LookAlikeCount::new(SampledMve::imperfect_mask(), MeanVsd::imperfect_mask());
+/// # let _ = count;
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct LookAlikeCount<R, C> {
+    /// Ranks poses; lower is better.
+    pub ranking: R,
+    /// Compares poses; lower is better.
+    pub score: C,
+    ranked: Shortlist,
+}
+
+impl<R: Score, C: Score> LookAlikeCount<R, C> {
+    /// Creates the count.
+    #[must_use]
+    pub fn new(ranking: R, score: C) -> Self {
+        Self {
+            ranking,
+            score,
+            ranked: Shortlist::default(),
+        }
+    }
+
+    /// Returns the count at a pose, `camera_from_object`; 0 without a model or an image.
+    ///
+    /// Cost: a projection of 256 points. If the image does not decide among look-alikes, also one
+    /// ranking score for each (at most 143), and the score of five poses. The near symmetries of a
+    /// model are found once, in some 10 ms.
+    pub fn at(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
+        let Some((model, observation)) = context.problem.sides() else {
+            return 0.0;
+        };
+        self.ranked.clear();
+        let near = NearSymmetries::of(model);
+        let mut undecided = near
+            .undecided(observation, camera_from_object, model.diameter())
+            .peekable();
+        if undecided.peek().is_none() {
+            return 0.0;
+        }
+        let limit = self.ranking.score(context, camera_from_object) + MAX_GAP;
+        for index in undecided {
+            let pose = camera_from_object * near.motion(index);
+            let score = self.ranking.score(context, &pose);
+            if score < limit {
+                self.ranked.insert(score, pose, SCORED, 0.0);
+            }
+        }
+        if self.ranked.poses().is_empty() {
+            return 0.0;
+        }
+        let own = self.score.score(context, camera_from_object);
+        let others = self.ranked.poses().iter();
+        others
+            .map(|(_, pose)| Alternative::likelihood_of(self.score.score(context, pose) - own))
+            .sum()
     }
 }

@@ -26,21 +26,22 @@ pub enum Start {
 pub struct SearchOptions {
     /// The use of the initial pose.
     pub start: Start,
-    /// The doubt above which the search starts.
+    /// The product of doubt and score above which the search starts.
     ///
-    /// If the local stage ends at or below it, only poses that look like the local one are tried.
+    /// A doubtful pose may still explain the image well, because errors of real sensors raise the
+    /// doubt. At or below the threshold, only poses that look like the local one are tried.
     pub threshold: f64,
-    /// The score at or below which the search does not start, however doubtful the pose is.
-    ///
-    /// Depth images of real sensors have errors that raise the doubt in right poses.
-    pub least_score: f64,
     /// The doubt at which no further hypotheses are refined.
     pub good_enough: f64,
-    /// The gain in score by which a hypothesis must beat the local pose to replace it.
+    /// The gain in score by which a hypothesis must beat a local pose of which nothing is sure.
     ///
-    /// Poses with a smaller gap may be ambiguous, so the one near the initial pose is kept. A pose
-    /// that is still doubtful (above 0.1) must gain 2.5 times as much.
+    /// Poses with a smaller gap may be ambiguous, so the one near the initial pose is kept.
     pub min_gain: f64,
+    /// The gain by which it must beat a local pose without doubt.
+    ///
+    /// In between, the gain falls linearly with the doubt. Errors of sensors and meshes make wrong
+    /// sides of cans and bowls better by up to 0.07, although the right pose is hardly doubtful.
+    pub sure_gain: f64,
     /// The rotations to try, next to the neighbors of the initial pose.
     pub rotations: Rotations,
     /// Number of these rotations.
@@ -53,6 +54,9 @@ pub struct SearchOptions {
     ///
     /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
     pub spacing_degrees: f64,
+    /// Whether a search that fails goes on: with all hypotheses aligned, twice as many refined, and
+    /// half of the spacing.
+    pub widens: bool,
     /// The largest distance of the result from the initial pose; `None` for no limit.
     pub bound: Option<Bound>,
     /// The longest time of a run. At the limit, the best pose so far is returned with
@@ -69,22 +73,30 @@ impl Default for SearchOptions {
     ///
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
-    /// The search starts above a doubt of 0.05 and a score of 0.05. A hypothesis must be better by
-    /// a score of 0.02, and not be more doubtful.
+    /// The search starts if doubt × score is above 0.002. A hypothesis must be better by
+    /// 0.08 (without doubt in the local pose) to 0.02 in score, and not be more doubtful.
     fn default() -> Self {
         Self {
             start: Start::Refined,
-            threshold: 0.05,
-            least_score: 0.05,
+            threshold: 0.002,
             good_enough: 0.02,
             min_gain: 0.02,
+            sure_gain: 0.08,
             rotations: Rotations::Even,
             hypotheses: 1000,
             aligned: 256,
             refined: 24,
             spacing_degrees: 20.0,
+            widens: true,
             bound: None,
             time_limit: None,
         }
+    }
+}
+
+impl SearchOptions {
+    /// Returns the gain by which a hypothesis must beat a local pose with this doubt.
+    pub(crate) fn needed_gain(&self, doubt: f64) -> f64 {
+        self.sure_gain + (self.min_gain - self.sure_gain) * doubt.clamp(0.0, 1.0)
     }
 }
