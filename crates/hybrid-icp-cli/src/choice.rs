@@ -14,14 +14,14 @@ use crate::limits::pipeline_limits;
 pub(crate) struct PipelineArguments {
     /// The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file.
     ///
-    /// `auto`, the default, refines locally, and searches if the MVE stays above 0.2. After a
+    /// `auto`, the default, refines locally, and searches if the result stays doubtful. After a
     /// search, the result may be far from the initial pose. `--set max_rotation_degrees=30` and
     /// `--set max_translation_meters=0.05` limit the distance. `color`, the default if color images
     /// are used and nothing is set, also lets color decide where depth cannot. `local` never
     /// searches. `hybrid` is the paper's method.
     #[arg(long, value_name = "NAME|FILE.toml")]
     pipeline: Option<Source>,
-    /// Override a field of the pipeline, such as threshold=0.2 of auto or times=3 of hybrid; may be
+    /// Override a field of the pipeline, such as threshold=0.1 of auto or times=3 of hybrid; may be
     /// given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     overrides: Vec<String>,

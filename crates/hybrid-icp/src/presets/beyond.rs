@@ -289,7 +289,8 @@ pub fn estimate_with<S>(
     search_from(stage, options)
 }
 
-/// [`local`], followed by a search if its score stays above a threshold.
+/// [`local`], followed by a search if the product of its doubt and its score stays above a
+/// threshold.
 ///
 /// The search scores poses with the MVE for the masks of detectors
 /// ([`MeanVsd::imperfect_mask`]). To change the options, for example to set a bound:
