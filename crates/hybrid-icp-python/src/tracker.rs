@@ -41,7 +41,9 @@ use crate::{depth, errors, results};
 /// >>> tracker = Tracker(model, camera, pose)
 /// >>> for frame in range(3):
 /// ...     pose[0, 3] += 0.004
-/// ...     tracked = tracker.step(render_depth(model, camera, pose), 1 / 30)
+/// ...     depth = render_depth(model, camera, pose)
+/// ...     depth[depth == 0] = 0.8  # The wall behind.
+/// ...     tracked = tracker.step(depth, 1 / 30)
 /// >>> bool(np.allclose(tracked.T_co, pose, atol=0.005))
 /// True
 #[pyclass(frozen, module = "hybrid_icp", name = "Tracker")]

@@ -8,6 +8,8 @@ use hicp_score::Evidence;
 const AGREES: f64 = 0.1;
 /// Median distance from the mean of a normal distribution of deviation 1.
 const MEDIAN: f64 = 0.6745;
+/// Confidence of a pose that is as good as a right one usually is.
+const SURE: f64 = 0.9;
 /// Factor by which the noise may exceed that of the images before.
 const MAX_RISE: f64 = 1.1;
 
@@ -19,19 +21,23 @@ pub(super) struct Found {
     pub(super) pose: Isometry3<f64>,
     pub(super) quality: Option<Quality>,
     pub(super) evidence: Evidence,
+    /// The probability that the pose is right, by the evidence alone.
+    confidence: f64,
     /// Standard deviation of the depth noise that the evidence is judged by, in diameters.
     noise: f64,
 }
 
 impl Found {
-    /// Judges the evidence at a pose. `noise` is that of the images before, in diameters.
+    /// Judges the evidence at a pose, and the probability that it is right.
+    ///
+    /// `noise` is that of the images before, in diameters.
     ///
     /// Another surface can look noisier than the object, which would excuse its contradictions. The
     /// noise of the images before therefore limits the measured one.
     pub(super) fn new(
         pose: Isometry3<f64>,
         quality: Option<Quality>,
-        evidence: Evidence,
+        (evidence, confidence): (Evidence, f64),
         noise: Option<f64>,
     ) -> Self {
         let limit = noise.map_or(f64::INFINITY, |noise| MAX_RISE * noise);
@@ -39,6 +45,7 @@ impl Found {
             pose,
             quality,
             evidence,
+            confidence,
             noise: (evidence.noise / MEDIAN).min(limit),
         }
     }
@@ -105,7 +112,8 @@ impl Found {
     pub(super) fn is_sure(&self) -> bool {
         let contour = self.contour();
         let ends = contour > 0.6 || (contour > 0.45 && self.unexplained() < 0.15);
-        self.explains() && self.contradiction() < 0.1 && (ends || self.fills(0.04, 0.05))
+        let fits = self.contradiction() < 0.1 && (ends || self.fills(0.04, 0.05));
+        self.explains() && fits && self.confidence >= SURE
     }
 
     /// Returns whether no other pose needs to be tried.

@@ -8,7 +8,7 @@ use hicp_core::{
 };
 use hicp_icp::{Cascade, IterationLimit, Outcome, Session, Stage, Verdict, Workspace};
 use hicp_raster::Rasterizer;
-use hicp_score::Evidence;
+use hicp_score::{Confidence, MeanVsd, Score};
 
 use super::extent::Extent;
 use super::found::Found;
@@ -185,8 +185,11 @@ impl Matcher {
         }
         let problem = Problem::new(&self.model, observation);
         let pose = outcome.camera_from_object;
-        let evidence = Evidence::at(&mut self.workspace.context(&problem), &pose)?;
-        Some(Found::new(pose, outcome.quality, evidence, self.noise))
+        let mut context = self.workspace.context(&problem);
+        let mve = MeanVsd::default().score(&mut context, &pose);
+        let (evidence, confidence) = Confidence::at(&mut context, &pose, mve, 0.0);
+        let judged = (evidence, confidence.probability);
+        Some(Found::new(pose, outcome.quality, judged, self.noise))
     }
 
     pub(super) fn covariance(&self, found: &Found) -> Matrix6<f64> {
