@@ -46,15 +46,21 @@ impl Alternative {
     /// apart.
     #[must_use]
     pub fn likelihood(&self) -> f64 {
-        match self.color_gap {
-            Some(gap) if gap >= Self::COLOR_GAP => 0.0,
-            _ => Self::likelihood_of(self.gap),
+        if self.is_told_apart() {
+            0.0
+        } else {
+            Self::likelihood_of(self.gap)
         }
     }
 
     /// Returns whether the pose explains the image as well as the returned one, in depth and color.
     #[must_use]
     pub fn is_ambiguous(&self) -> bool {
-        self.gap < Self::AMBIGUOUS_GAP && self.color_gap.is_none_or(|gap| gap < Self::COLOR_GAP)
+        self.gap < Self::AMBIGUOUS_GAP && !self.is_told_apart()
+    }
+
+    /// Returns whether colors tell the pose apart from the returned one.
+    fn is_told_apart(&self) -> bool {
+        self.color_gap.is_some_and(|gap| gap >= Self::COLOR_GAP)
     }
 }

@@ -63,8 +63,8 @@ impl Confidence {
     /// Measures the evidence at a pose whose mean VSD estimate is `mve`, and the confidence.
     ///
     /// `look_alikes` is the number of other poses that may be the right one, because they explain
-    /// the image as well and nothing is known of the initial pose. With 0, the result is the
-    /// probability that the pose is right if it is the right one of those.
+    /// the image as well and nothing is known of the initial pose. With 0, no other pose is
+    /// considered.
     ///
     /// Without a model, an image or a rendered pixel, the probability is 0. Cost: one render
     /// (shared with other components that use this pose) and about 40 µs. Allocates nothing.

@@ -1,5 +1,8 @@
 //! The network of the confidence, as `cargo run --release -p hicp-tests --example confidence --
-//! fit` prints it.
+//! fit 12000` prints it.
+//!
+//! It is fitted to results of the presets, which search by the network of the version before. So a
+//! new fit prints slightly different numbers.
 
 /// Number of features.
 pub const N_FEATURES: usize = 15;

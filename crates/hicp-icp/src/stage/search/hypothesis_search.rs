@@ -42,7 +42,7 @@ use crate::stage::stage_trait::Stage;
 /// local stage in a [`Guard`](crate::Guard) is never worse than the initial pose. With a bound, a
 /// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
-/// Cost: the local stage. If its score stays above the threshold, also `hypotheses` × the ranking
+/// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
 /// three times, and about three times as much if it goes on. The near symmetries of a model are
 /// found once, in some 10 ms.
@@ -158,6 +158,11 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             return;
         };
         let local = (options.start == Start::Refined).then_some(local);
+        let kept = if options.widens {
+            options.hypotheses
+        } else {
+            options.aligned
+        };
         let hypotheses = local
             .into_iter()
             .flat_map(|local| from.around_both(local))
@@ -169,7 +174,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             }
             if let Some(pose) = pose {
                 let score = run.score(&mut self.ranking, &pose);
-                self.ranked.insert(score, pose, options.hypotheses, 0.0);
+                self.ranked.insert(score, pose, kept, 0.0);
             }
         }
     }

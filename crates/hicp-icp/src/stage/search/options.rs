@@ -54,8 +54,9 @@ pub struct SearchOptions {
     ///
     /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
     pub spacing_degrees: f64,
-    /// Whether a search that fails goes on: with all hypotheses aligned, twice as many refined, and
-    /// half of the spacing.
+    /// Whether a search that fails goes on.
+    ///
+    /// It then aligns all hypotheses, refines twice as many, and halves the spacing.
     pub widens: bool,
     /// The largest distance of the result from the initial pose; `None` for no limit.
     pub bound: Option<Bound>,
