@@ -235,6 +235,8 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
     ];
     let tried = "rotations to try: of SO(3), around the viewing ray, or the declared symmetries";
     let least = "least angle between those; of two that are nearer the better ranked is refined";
+    let near = "gain that leaves a local pose near the initial pose";
+    let far = "gain that leaves one far from it";
     let used = "use of the initial pose; if ignored, the search always runs";
     let options = SearchOptions {
         start: p.word("start", &starts, used)?,
@@ -244,19 +246,15 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
             0.002,
             "searches above this doubt × score",
         )?,
+        far_threshold: p.number(
+            "far_threshold",
+            FACTOR,
+            0.002,
+            "the same if the local pose is far from the initial one",
+        )?,
         good_enough: p.number("good_enough", FACTOR, 0.02, "doubt that ends it")?,
-        min_gain: p.number(
-            "min_gain",
-            FACTOR,
-            0.02,
-            "gain that leaves a doubtful local pose",
-        )?,
-        sure_gain: p.number(
-            "sure_gain",
-            FACTOR,
-            0.08,
-            "gain that leaves a sure local pose",
-        )?,
+        near_gain: p.number("near_gain", FACTOR, 0.1, near)?,
+        far_gain: p.number("far_gain", FACTOR, 0.04, far)?,
         rotations: p.word("rotations", &rotations, tried)?,
         hypotheses: p.limited(Hypotheses, "hypotheses", 0, 1000, "rotations to rank")?,
         aligned: p.count("aligned", 0, 256, "hypotheses that are aligned")?,

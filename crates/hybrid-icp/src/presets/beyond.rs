@@ -347,13 +347,14 @@ pub fn color() -> ByColor<Search> {
 
 /// `auto`: [`local`], followed by a search if the product of its doubt and its score is above 0.03.
 ///
-/// The search ranks 512 rotations, aligns 128 of them and refines 12. A hypothesis replaces the
-/// local pose if its score is better by 0.02 to 0.08; the less doubtful the local pose, the more is
-/// needed. The result can then be far from the initial pose.
+/// If the local pose is far from the initial one, the threshold is 0.005. The search ranks 512
+/// rotations, aligns 128 of them and refines 12. A hypothesis must beat the local pose by a gain;
+/// the result can then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.03,
+        far_threshold: 0.005,
         good_enough: 0.1,
         hypotheses: 512,
         aligned: 128,

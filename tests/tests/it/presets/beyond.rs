@@ -348,6 +348,7 @@ fn a_search_without_refined_hypotheses_is_its_local_stage() {
     let init = flipped(&scene, Vector3::z());
     let options = SearchOptions {
         threshold: 1.0,
+        far_threshold: 1.0,
         refined: 0,
         ..SearchOptions::default()
     };

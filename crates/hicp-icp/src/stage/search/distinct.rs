@@ -35,7 +35,7 @@ pub(crate) struct Distinct {
 /// ```
 #[must_use]
 pub fn is_near(model: &Model, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
-    Distinct::of(model).mssd(a, b) < NEAR * model.diameter()
+    Distinct::of(model).near(a, b)
 }
 
 impl Distinct {
@@ -63,6 +63,11 @@ impl Distinct {
     /// Returns whether two poses differ by more than a tenth of the diameter.
     pub(crate) fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
         self.mssd(a, b) > APART * self.diameter
+    }
+
+    /// Returns whether two poses are so near that one can be the refinement of the other.
+    pub(crate) fn near(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        self.mssd(a, b) < NEAR * self.diameter
     }
 }
 

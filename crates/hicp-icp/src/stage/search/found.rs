@@ -11,8 +11,34 @@ use crate::stage::search::distinct::Distinct;
 pub(crate) struct Found {
     pub(crate) score: f64,
     pub(crate) outcome: Outcome,
+    /// The doubt, once it is known.
+    pub(crate) doubt: Option<f64>,
     /// `true` if the local stage refined it.
     pub(crate) finished: bool,
+}
+
+/// The score that outweighs a doubt of 1.
+const DOUBT_WEIGHT: f64 = 0.1;
+
+impl Found {
+    /// Returns the doubt; 1 if it is not known.
+    pub(crate) fn doubt(&self) -> f64 {
+        self.doubt.unwrap_or(1.0)
+    }
+
+    /// Returns the score plus a part of the doubt.
+    ///
+    /// Errors of the sensor shift the scores of poses that explain the same pixels. The doubt also
+    /// depends on where the errors are.
+    fn cost(&self) -> f64 {
+        self.score + DOUBT_WEIGHT * self.doubt()
+    }
+
+    /// Returns whether the cost is lower by a gain, and neither score nor doubt is higher.
+    pub(crate) fn beats(&self, other: &Self, gain: f64) -> bool {
+        let worse = self.score > other.score || self.doubt() > other.doubt();
+        !worse && self.cost() < other.cost() - gain
+    }
 }
 
 /// Distinct poses, best first.
@@ -28,8 +54,14 @@ impl FoundPoses {
     }
 
     /// Returns the pose with the lowest score.
-    pub(crate) fn best(&self) -> Option<Found> {
-        self.poses.first().copied()
+    pub(crate) fn best(&mut self) -> Option<&mut Found> {
+        self.poses.first_mut()
+    }
+
+    /// Returns the pose with the lowest sum of the score and a part of the doubt.
+    pub(crate) fn cheapest(&self) -> Option<Found> {
+        let poses = self.poses.iter().copied();
+        poses.min_by(|a, b| a.cost().total_cmp(&b.cost()))
     }
 
     /// Adds a pose. Of two poses that are not distinct, the one with the lower score stays.
@@ -47,15 +79,12 @@ impl FoundPoses {
         self.poses.insert(place, found);
     }
 
-    /// Takes the best pose that the local stage has not refined, up to a gap to the best score.
-    ///
-    /// It is marked as refined.
+    /// Removes the best pose that the local stage has not refined, up to a gap to the best score.
     pub(crate) fn next(&mut self, gap: f64) -> Option<Outcome> {
-        let best = self.best()?.score;
-        let unfinished = |found: &&mut Found| !found.finished && found.score <= best + gap;
-        let next = self.poses.iter_mut().find(unfinished)?;
-        next.finished = true;
-        Some(next.outcome)
+        let limit = self.poses.first()?.score + gap;
+        let unfinished = |found: &Found| !found.finished && found.score <= limit;
+        let next = self.poses.iter().position(unfinished)?;
+        Some(self.poses.remove(next).outcome)
     }
 
     /// Lists the poses that differ from the returned one.

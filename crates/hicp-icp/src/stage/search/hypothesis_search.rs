@@ -30,9 +30,11 @@ use crate::stage::stage_trait::Stage;
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
 ///    local pose is good, because the score of a rotated mug is good, too. If the image shows
 ///    enough of what tells the two poses apart, it costs only a projection of 256 points.
-/// 6. **Finish**: the local stage refines the two best poses that differ.
+/// 6. **Finish**: the local stage refines the two best poses that differ, and up to six more if all
+///    stay doubtful. They are compared by score + doubt / 10.
 ///
-/// The best pose is returned if it beats the local pose. The others are in
+/// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
+/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. The others are in
 /// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
 /// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image, also
@@ -44,8 +46,8 @@ use crate::stage::stage_trait::Stage;
 ///
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
-/// three times, and about three times as much if it goes on. The near symmetries of a model are
-/// found once, in some 10 ms.
+/// three to nine times, and about three times as much if it goes on. The near symmetries of a model
+/// are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// Refines the initial pose, and the best hypotheses.
@@ -69,8 +71,6 @@ pub struct HypothesisSearch<S, A, E, R, C, D> {
     explored: Vec<Isometry3<f64>>,
     alike: LookAlikes,
     found: FoundPoses,
-    /// The pose that was judged last, and its doubt.
-    judged: Option<(Isometry3<f64>, f64)>,
 }
 
 impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
@@ -96,7 +96,6 @@ impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
             explored: Vec::new(),
             alike: LookAlikes::default(),
             found: FoundPoses::default(),
-            judged: None,
         }
     }
 
@@ -116,14 +115,14 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         let pose = &outcome.camera_from_object;
         if run.allows(pose) {
             let score = run.score(&mut self.score, pose);
-            self.found.add(
-                Found {
-                    score,
-                    outcome,
-                    finished,
-                },
-                &run.distinct,
-            );
+            let doubt = finished.then(|| run.score(&mut self.doubt, pose));
+            let found = Found {
+                score,
+                outcome,
+                doubt,
+                finished,
+            };
+            self.found.add(found, &run.distinct);
         }
     }
 
@@ -133,14 +132,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             return f64::INFINITY;
         };
         let pose = best.outcome.camera_from_object;
-        match self.judged {
-            Some((judged, doubt)) if judged == pose => doubt,
-            _ => {
-                let doubt = run.score(&mut self.doubt, &pose);
-                self.judged = Some((pose, doubt));
-                doubt
-            }
-        }
+        let judge = || run.score(&mut self.doubt, &pose);
+        *best.doubt.get_or_insert_with(judge)
     }
 
     /// Returns whether the best pose found is bad enough to search for another one.
@@ -255,17 +248,25 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         self.aligned = aligned;
     }
 
-    /// Refines the best of all poses found by the local stage.
+    /// Refines the best of all poses found by the local stage, until one is good enough.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
-        for _ in 0..FINALISTS {
-            if run.is_over() {
+        for finalist in 0..MOST_FINALISTS {
+            let good = |best: Found| best.doubt() <= self.options.good_enough;
+            let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
+            if enough || run.is_over() {
                 return;
             }
             let Some(explored) = self.found.next(FINAL_GAP) else {
                 return;
             };
             let next = run.refine(&mut self.stage, &explored.camera_from_object);
-            self.add(run, explored.then(next), true);
+            let allowed = run.allows(&next.camera_from_object);
+            let refined = if allowed {
+                explored.then(next)
+            } else {
+                explored
+            };
+            self.add(run, refined, true);
         }
     }
 }
@@ -274,10 +275,11 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 const FIRST: usize = 32;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
-/// Number of distinct poses that the local stage refines, and the largest gap in score between them
-/// and the best one.
+/// Number of distinct poses that the local stage refines, and the most if all stay doubtful.
 const FINALISTS: usize = 2;
-const FINAL_GAP: f64 = 0.05;
+const MOST_FINALISTS: usize = 8;
+/// Largest gap in score between them and the best one.
+const FINAL_GAP: f64 = 0.1;
 
 impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
     for HypothesisSearch<S, A, E, R, C, D>
@@ -299,7 +301,6 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         };
         self.found.clear();
         self.explored.clear();
-        self.judged = None;
         session.workspace.alternatives.clear();
         let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
         let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
@@ -321,18 +322,21 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         if !run.allows(&local.camera_from_object) {
             local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        let (mut score, mut doubt) = (f64::INFINITY, f64::INFINITY);
+        let (mut threshold, mut gain) = (self.options.threshold, self.options.near_gain);
+        let pose = local.camera_from_object;
+        if !run.distinct.near(init, &pose) {
+            (threshold, gain) = (self.options.far_threshold, self.options.far_gain);
+        }
         if !ignored {
             self.add(&mut run, local, true);
-            score = self.found.best().map_or(score, |found| found.score);
-            doubt = self.doubt(&mut run);
         }
-        let bad = self.is_bad(&mut run, self.options.threshold);
+        let from = self.found.cheapest();
+        let bad = self.is_bad(&mut run, threshold);
         if bad {
-            self.search(&mut run, &local.camera_from_object);
+            self.search(&mut run, &pose);
         }
-        if let Some(best) = self.found.best() {
-            let bad = self.is_bad(&mut run, self.options.threshold);
+        if let Some(best) = self.found.best().copied() {
+            let bad = self.is_bad(&mut run, threshold);
             let mut alike = std::mem::take(&mut self.alike);
             let scores = (&mut self.ranking, &mut self.score);
             let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
@@ -343,10 +347,9 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             self.explore(&mut run, f64::NEG_INFINITY);
         }
         self.finish(&mut run);
-        let mut returned = local;
-        if let Some(best) = self.found.best()
-            && best.score < score - self.options.needed_gain(doubt)
-            && self.doubt(&mut run) <= doubt
+        let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
+        if let Some(best) = self.found.cheapest()
+            && from.is_none_or(|from| best.beats(&from, gain))
         {
             (returned, score) = (best.outcome, best.score);
         }

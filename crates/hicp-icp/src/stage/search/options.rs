@@ -31,17 +31,20 @@ pub struct SearchOptions {
     /// A doubtful pose may still explain the image well, because errors of real sensors raise the
     /// doubt. At or below the threshold, only poses that look like the local one are tried.
     pub threshold: f64,
+    /// The threshold if the local pose is far from the initial one.
+    pub far_threshold: f64,
     /// The doubt at which no further hypotheses are refined.
     pub good_enough: f64,
-    /// The gain in score by which a hypothesis must beat a local pose of which nothing is sure.
+    /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
-    /// Poses with a smaller gap may be ambiguous, so the one near the initial pose is kept.
-    pub min_gain: f64,
-    /// The gain by which it must beat a local pose without doubt.
+    /// Gains are in score + doubt / 10, and a hypothesis must not be more doubtful. Errors of
+    /// sensors and meshes make wrong sides of cans and bowls better by up to 0.07, so the initial
+    /// pose decides there. A pose is near up to an MSSD of a quarter of the diameter.
+    pub near_gain: f64,
+    /// The gain by which it must beat a local pose far from the initial pose.
     ///
-    /// In between, the gain falls linearly with the doubt. Errors of sensors and meshes make wrong
-    /// sides of cans and bowls better by up to 0.07, although the right pose is hardly doubtful.
-    pub sure_gain: f64,
+    /// As one of the two is wrong, the initial pose is then no evidence.
+    pub far_gain: f64,
     /// The rotations to try, next to the neighbors of the initial pose.
     pub rotations: Rotations,
     /// Number of these rotations.
@@ -74,15 +77,16 @@ impl Default for SearchOptions {
     ///
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
     ///
-    /// The search starts if doubt × score is above 0.002. A hypothesis must be better by
-    /// 0.08 (without doubt in the local pose) to 0.02 in score, and not be more doubtful.
+    /// The search starts if doubt × score is above 0.002. A hypothesis must be better by 0.1, or by
+    /// 0.04 if the local pose is far from the initial one.
     fn default() -> Self {
         Self {
             start: Start::Refined,
             threshold: 0.002,
+            far_threshold: 0.002,
             good_enough: 0.02,
-            min_gain: 0.02,
-            sure_gain: 0.08,
+            near_gain: 0.1,
+            far_gain: 0.04,
             rotations: Rotations::Even,
             hypotheses: 1000,
             aligned: 256,
@@ -92,12 +96,5 @@ impl Default for SearchOptions {
             bound: None,
             time_limit: None,
         }
-    }
-}
-
-impl SearchOptions {
-    /// Returns the gain by which a hypothesis must beat a local pose with this doubt.
-    pub(crate) fn needed_gain(&self, doubt: f64) -> f64 {
-        self.sure_gain + (self.min_gain - self.sure_gain) * doubt.clamp(0.0, 1.0)
     }
 }
