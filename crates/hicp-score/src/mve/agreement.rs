@@ -126,17 +126,17 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
         let [cx, inverse_fx, diameter, hidden_beyond] =
             [self.cx, self.inverse_fx, self.diameter, self.hidden_beyond].map(single);
         let limits = tolerances().map(|share| single(share) * diameter);
-        let mut all_correct = [[0_u64; LANES]; N_TOLERANCES];
-        let (mut all_outside, mut all_covered) = ([0_u64; LANES], [0_u64; LANES]);
-        let mut all_nearer = [0_u64; LANES];
+        let (mut all, mut some) = (Counts::<u64>::default(), Counts::<u32>::default());
+        let mut pixels = 0;
         for row in self.rows {
-            // The sums of a row fit 32 bits.
-            let mut correct = [[0_u32; LANES]; N_TOLERANCES];
-            let mut outside = [0_u32; LANES];
-            let (mut covered, mut nearer) = ([0_u32; LANES], [0_u32; LANES]);
             #[allow(clippy::cast_possible_truncation)]
             let squared_y = (row.y * row.y + 1.0) as f32;
             let width = row.rendered.len();
+            pixels += width;
+            if pixels > MOST_PIXELS {
+                all.take(&mut some);
+                pixels = width;
+            }
             for first in (0..width).step_by(LANES) {
                 // The last pixels of a row are padded with pixels that do not count.
                 let n = (width - first).min(LANES);
@@ -146,12 +146,14 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                 }
                 let observed = lanes(row.observed, first, n);
                 let weights = row.mask.load(first, n);
+                // Whole numbers up to 2²⁴ are exact.
+                let column = (row.u as usize + first) as f32;
                 // Masks are all-ones or zero instead of `bool`, which avoids a branch per pixel.
                 let mut distance = [0.0; LANES];
                 let mut certain = [0; LANES];
                 for lane in 0..LANES {
                     let (z, measured) = (rendered[lane], observed[lane]);
-                    let x = ((row.u as usize + first + lane) as f32 - cx) * inverse_fx;
+                    let x = (column + lane as f32 - cx) * inverse_fx;
                     let distance_per_depth = (x * x + squared_y).sqrt();
                     let behind = (z - measured) * distance_per_depth;
                     let (seen, known) = (all_bits(z > 0.0), all_bits(measured > 0.0));
@@ -161,54 +163,90 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                         let through = all_bits(behind < -hidden_beyond) | !known;
                         let front = all_bits(behind > hidden_beyond.max(0.25 * diameter)) & known;
                         let near = (outside_mask / 2) & seen & !through & !front;
-                        outside[lane] += (outside_mask & seen & through) + near;
-                        nearer[lane] += outside_mask & seen & front;
-                        covered[lane] += weights[lane] & seen & known;
+                        some.outside[lane] += (outside_mask & seen & through) + near;
+                        some.nearer[lane] += outside_mask & seen & front;
+                        some.covered[lane] += weights[lane] & seen & known;
                         certain[lane] = weights[lane] + near;
                         all_bits(certain[lane] > 0)
                     } else {
                         let hidden = known & all_bits(behind > hidden_beyond);
-                        outside[lane] += 1 & outside_mask & seen & !hidden;
+                        some.outside[lane] += 1 & outside_mask & seen & !hidden;
+                        certain[lane] = 1;
                         weights[lane]
                     };
                     // NaN if the pixel does not count: NaN is below no limit.
                     let nothing = !(seen & known & counts);
                     distance[lane] = f32::from_bits(behind.abs().to_bits() | nothing);
                 }
-                for (correct, limit) in correct.iter_mut().zip(limits) {
+                // Near the right pose, nearly all pixels agree within the least tolerance, and so
+                // within the others.
+                let mut between = 0;
+                for lane in 0..LANES {
+                    let within = all_bits(distance[lane] < limits[0]);
+                    some.correct[0][lane] += within & certain[lane];
+                    between |= all_bits(distance[lane] < limits[N_TOLERANCES - 1]) & !within;
+                }
+                if between == 0 {
+                    continue;
+                }
+                for (correct, limit) in some.correct[1..].iter_mut().zip(&limits[1..]) {
                     for lane in 0..LANES {
-                        let within = all_bits(distance[lane] < limit);
-                        correct[lane] += within & if W::GRADED { certain[lane] } else { 1 };
+                        let (least, distance) = (limits[0], distance[lane]);
+                        let within = all_bits((distance < *limit) & (distance >= least));
+                        correct[lane] += within & certain[lane];
                     }
                 }
             }
-            for (all, correct) in all_correct.iter_mut().zip(&correct) {
-                add(all, correct);
-            }
-            add(&mut all_outside, &outside);
-            add(&mut all_covered, &covered);
-            add(&mut all_nearer, &nearer);
         }
+        all.take(&mut some);
         let sum = |lanes: [u64; LANES]| lanes.iter().sum::<u64>();
+        let least = sum(all.correct[0]);
+        let mut correct = all.correct.map(|lanes| least + sum(lanes));
+        correct[0] = least;
         Found {
-            correct: all_correct.map(sum),
-            outside: sum(all_outside),
-            covered: sum(all_covered),
-            nearer: sum(all_nearer),
+            correct,
+            outside: sum(all.outside),
+            covered: sum(all.covered),
+            nearer: sum(all.nearer),
         }
     }
 }
 
-/// Adds the counts of a row to those of all rows.
-#[inline(always)]
-fn add(all: &mut [u64; LANES], row: &[u32; LANES]) {
-    for (all, row) in all.iter_mut().zip(row) {
-        *all += u64::from(*row);
+/// Number of pixels whose weights fit the sums of 32 bits.
+const MOST_PIXELS: usize = 1 << 24;
+
+/// Sums of weights, one per lane.
+#[derive(Default)]
+struct Counts<T> {
+    /// The pixels within the least tolerance. Then, for each other tolerance, the pixels within it
+    /// that are not within the least one.
+    correct: [[T; LANES]; N_TOLERANCES],
+    outside: [T; LANES],
+    covered: [T; LANES],
+    nearer: [T; LANES],
+}
+
+impl Counts<u64> {
+    /// Adds counts, and sets them to zero.
+    #[inline(always)]
+    fn take(&mut self, counts: &mut Counts<u32>) {
+        let add = |all: &mut [u64; LANES], some: &[u32; LANES]| {
+            for (all, some) in all.iter_mut().zip(some) {
+                *all += u64::from(*some);
+            }
+        };
+        for (all, some) in self.correct.iter_mut().zip(&counts.correct) {
+            add(all, some);
+        }
+        add(&mut self.outside, &counts.outside);
+        add(&mut self.covered, &counts.covered);
+        add(&mut self.nearer, &counts.nearer);
+        *counts = Counts::default();
     }
 }
 
 /// Returns all-ones if the condition holds, otherwise zero.
 #[inline(always)]
-fn all_bits(condition: bool) -> u32 {
+pub(crate) fn all_bits(condition: bool) -> u32 {
     u32::from(condition).wrapping_neg()
 }
