@@ -7,6 +7,7 @@ pub(crate) mod mask_trust;
 pub(crate) mod mean_vsd;
 pub(crate) mod occlusion;
 pub(crate) mod sampled_mve;
+pub(crate) mod splat;
 pub(crate) mod trust_map;
 
 pub use mask_trust::MaskTrust;
