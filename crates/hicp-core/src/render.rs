@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, UnitVector3};
 
 use crate::id::Id;
+use crate::internal::{VectorLoop, vectorized};
 use crate::object::mesh::TriMesh;
 use crate::object::model::Model;
 use crate::sensor::camera::PinholeCamera;
@@ -74,12 +75,7 @@ impl RenderedView {
     /// Number of pixels that show the surface.
     #[must_use]
     pub fn n_rendered(&self) -> usize {
-        // Chunks are small enough for 32-bit counters, and more of those fit into a vector.
-        let count = |depths: &[f32]| depths.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>();
-        self.depth
-            .chunks(1 << 16)
-            .map(|depths| count(depths) as usize)
-            .sum()
+        vectorized(CountRendered(&self.depth))
     }
 
     /// Returns the depth at an image pixel, in meters.
@@ -165,6 +161,21 @@ impl RenderedView {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
         let weights = [1.0 - second - third, second, third].map(|weight| weight as f32);
         mesh.color_at(triangle, weights)
+    }
+}
+
+/// The loop that counts the pixels with depth.
+struct CountRendered<'a>(&'a [f32]);
+
+impl VectorLoop for CountRendered<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        // Chunks are small enough for 32-bit counters, and more of those fit into a vector.
+        let count = |depths: &[f32]| depths.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>();
+        let chunks = self.0.chunks(1 << 16);
+        chunks.map(|depths| count(depths) as usize).sum()
     }
 }
 

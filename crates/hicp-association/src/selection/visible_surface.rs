@@ -86,19 +86,22 @@ impl PointSelection for VisibleSurface {
         let stride = self.stride.pixels(rendered);
         let object_from_camera = camera_from_object.inverse();
         let eye = Point3::from(object_from_camera.translation.vector);
+        let width = region.width();
         for v in (region.v_min.next_multiple_of(stride)..region.v_max).step_by(stride as usize) {
-            for u in (region.u_min.next_multiple_of(stride)..region.u_max).step_by(stride as usize)
-            {
-                let Some(index) = region.index(u, v) else {
-                    continue;
-                };
-                let depth = view.depth()[index];
+            let first = (v - region.v_min) as usize * width;
+            let depths = &view.depth()[first..first + width];
+            let triangles = &view.triangles()[first..first + width];
+            let start = region.u_min.next_multiple_of(stride) - region.u_min;
+            for column in (start as usize..width).step_by(stride as usize) {
+                let depth = depths[column];
                 if depth <= 0.0 {
                     continue;
                 }
-                let Some(normal) = mesh.normal(view.triangles()[index] as usize) else {
+                let Some(normal) = mesh.normal(triangles[column] as usize) else {
                     continue;
                 };
+                #[allow(clippy::cast_possible_truncation)] // A column of an image.
+                let u = region.u_min + column as u32;
                 let point = object_from_camera
                     * camera.unproject(f64::from(u), f64::from(v), f64::from(depth));
                 let toward_camera = normal.cast::<f64>().dot(&(eye - point)) >= 0.0;

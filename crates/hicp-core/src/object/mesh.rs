@@ -52,6 +52,8 @@ pub struct TriMesh {
     triangles: Vec<[u32; 3]>,
     color: Option<SurfaceColor>,
     facing: OnceLock<Facing>,
+    /// The unit normals of the triangles; zero if a triangle has no area.
+    normals: OnceLock<Vec<Vector3<f32>>>,
 }
 
 impl TriMesh {
@@ -102,6 +104,7 @@ impl TriMesh {
             triangles,
             color: None,
             facing: OnceLock::new(),
+            normals: OnceLock::new(),
         };
         if mesh.area() > 0.0 {
             Ok(mesh)
@@ -137,7 +140,8 @@ impl TriMesh {
 
     /// Returns the unit normal of a triangle, or `None` if its area is zero.
     ///
-    /// The winding determines its sign: the corners are counter-clockwise as seen from its tip.
+    /// The winding determines its sign: the corners are counter-clockwise as seen from its tip. The
+    /// first call computes the normals of all triangles, 12 bytes each.
     ///
     /// # Panics
     ///
@@ -145,9 +149,22 @@ impl TriMesh {
     #[must_use]
     #[inline]
     pub fn normal(&self, triangle: usize) -> Option<UnitVector3<f32>> {
-        let double_area = self.double_area_vector(triangle);
-        let norm = double_area.norm();
-        (norm > 0.0).then(|| UnitVector3::new_unchecked((double_area / norm).cast::<f32>()))
+        let normals = self.normals.get_or_init(|| {
+            let triangles = 0..self.triangles.len();
+            triangles
+                .map(|triangle| {
+                    let double_area = self.double_area_vector(triangle);
+                    let norm = double_area.norm();
+                    if norm > 0.0 {
+                        (double_area / norm).cast::<f32>()
+                    } else {
+                        Vector3::zeros()
+                    }
+                })
+                .collect()
+        });
+        let normal = normals[triangle];
+        (normal != Vector3::zeros()).then(|| UnitVector3::new_unchecked(normal))
     }
 
     /// Returns the mesh with the color of its surface. No geometric computation depends on it.
