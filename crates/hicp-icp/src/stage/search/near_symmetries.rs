@@ -16,6 +16,9 @@ const STEPS: usize = 24;
 const LEAST_SHARE: f64 = 0.6;
 /// Largest distance from the moved surface, as a share of the diameter.
 const TOLERANCE: f64 = 0.05;
+/// Smallest MSSD of a motion, as a share of the diameter. Half of that of distinct poses, because
+/// the two poses also differ by their own errors.
+const LEAST_MOTION: f64 = 0.05;
 /// Number of alignments of the moved surface with itself, and the stride of their samples.
 const ALIGNMENTS: usize = 3;
 const STRIDE: usize = 3;
@@ -135,7 +138,8 @@ impl NearSymmetries {
                 spins.push(UnitVector3::new_normalize(axis));
             }
             let mut known = motions.iter().map(|(motion, _)| motion);
-            if !distinct.apart(&motion, &identity) || known.any(|m| !distinct.apart(&motion, m)) {
+            let still = distinct.mssd(&motion, &identity) < LEAST_MOTION * model.diameter();
+            if still || known.any(|m| !distinct.apart(&motion, m)) {
                 continue;
             }
             let back: Isometry3<f32> = motion.inverse().cast();
