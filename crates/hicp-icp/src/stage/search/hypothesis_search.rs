@@ -30,8 +30,8 @@ use crate::stage::stage_trait::Stage;
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
 ///    local pose is good, because the score of a rotated mug is good, too. If the image shows
 ///    enough of what tells the two poses apart, it costs only a projection of 256 points.
-/// 6. **Finish**: the local stage refines the two best poses that differ, and up to six more if all
-///    stay doubtful. They are compared by score + doubt / 10.
+/// 6. **Finish**: the local stage refines the two best poses that differ, and up to a third of
+///    `refined` if all stay doubtful. They are compared by score + doubt / 10.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
 /// [`SearchOptions::far_gain`] if the local pose is far from the initial one. The others are in
@@ -46,8 +46,8 @@ use crate::stage::stage_trait::Stage;
 ///
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
-/// three to nine times, and about three times as much if it goes on. The near symmetries of a model
-/// are found once, in some 10 ms.
+/// three times or, if all poses stay doubtful, 1/3 `refined` times; and about three times as much if
+/// it goes on. The near symmetries of a model are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// Refines the initial pose, and the best hypotheses.
@@ -250,7 +250,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
     /// Refines the best of all poses found by the local stage, until one is good enough.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
-        for finalist in 0..MOST_FINALISTS {
+        for finalist in 0..FINALISTS.max(self.options.refined / 3) {
             let good = |best: Found| best.doubt() <= self.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
             if enough || run.is_over() {
@@ -275,9 +275,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 const FIRST: usize = 32;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
-/// Number of distinct poses that the local stage refines, and the most if all stay doubtful.
+/// Number of distinct poses that the local stage refines, even if one is good enough.
 const FINALISTS: usize = 2;
-const MOST_FINALISTS: usize = 8;
 /// Largest gap in score between them and the best one.
 const FINAL_GAP: f64 = 0.1;
 
