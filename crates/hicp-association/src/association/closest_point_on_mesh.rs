@@ -8,7 +8,7 @@ use hicp_core::{
 
 use crate::association::data_association::DataAssociation;
 use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
-use crate::search::box_tree::{Bounds, BoxTree, Element};
+use crate::search::box_tree::{Bounds, BoxTree, Element, Stack};
 use crate::search::triangle::closest_point;
 use crate::stride::Stride;
 
@@ -168,10 +168,15 @@ struct ClosestFace<'a> {
 
 impl IndexedSurface for ClosestFace<'_> {
     #[inline(always)]
-    fn closest(&self, query: &Point3<f32>, eye: &Point3<f32>) -> Option<(u32, Surfel)> {
+    fn closest(
+        &self,
+        query: &Point3<f32>,
+        eye: &Point3<f32>,
+        stack: &mut Stack,
+    ) -> Option<(u32, Surfel)> {
         let mut best: Option<(&Face, Point3<f32>)> = None;
         let mut bound = f32::MAX;
-        let mut leaves = self.mesh.tree.leaves_near(query);
+        let mut leaves = self.mesh.tree.leaves_near(query, stack);
         while let Some(slots) = leaves.next(bound) {
             for face in &self.mesh.faces[slots] {
                 if self.visible_only && !faces(&face.normal, &face.corners[0], eye) {

@@ -5,6 +5,7 @@ use hicp_core::{
     Correspondences, Isometry3, Observation, Pair, Point3, RigidTransform, Surfel, UnitVector3, se3,
 };
 
+use crate::search::box_tree::Stack;
 use crate::stride::Stride;
 
 /// The surface of a model, indexed in the object frame.
@@ -12,7 +13,12 @@ pub(crate) trait IndexedSurface {
     /// Returns the surfel closest to `query` and its index, in the object frame.
     ///
     /// `eye` is the position of the camera.
-    fn closest(&self, query: &Point3<f32>, eye: &Point3<f32>) -> Option<(u32, Surfel)>;
+    fn closest(
+        &self,
+        query: &Point3<f32>,
+        eye: &Point3<f32>,
+        stack: &mut Stack,
+    ) -> Option<(u32, Surfel)>;
 }
 
 /// Pairs observed points with the closest surfels of a model.
@@ -45,14 +51,14 @@ impl<S: IndexedSurface> VectorLoop for FromObservation<'_, S> {
         let eye = Point3::from(object_from_camera.translation.vector.cast::<f32>());
         let object_from_camera = RigidTransform::new(&object_from_camera);
         let camera_from_object = RigidTransform::new(self.camera_from_object);
-        let mut candidates = 0;
+        let (mut candidates, mut stack) = (0, Stack::default());
         for (target_index, target) in self.observation.surfels(stride) {
             candidates += 1;
             if !finite {
                 continue;
             }
             let query = object_from_camera.point(&target.point);
-            if let Some((source_index, source)) = self.surface.closest(&query, &eye) {
+            if let Some((source_index, source)) = self.surface.closest(&query, &eye, &mut stack) {
                 let source = camera_from_object.surfel(&source);
                 self.pairs
                     .push(Pair::new(source_index, source, target_index, *target));

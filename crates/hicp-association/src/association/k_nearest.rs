@@ -4,6 +4,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
+use crate::search::box_tree::Stack;
 use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
@@ -60,7 +61,7 @@ impl DataAssociation for KNearest {
         };
         let observed = ObservedPoints::<PointTree>::of(target, self.targets);
         let mover = RigidTransform::new(camera_from_object);
-        let found = &mut self.found.0;
+        let (found, mut stack) = (&mut self.found.0, Stack::default());
         pairs.reserve(
             source
                 .len()
@@ -70,7 +71,7 @@ impl DataAssociation for KNearest {
             let source = mover.surfel(surfel);
             observed
                 .index()
-                .nearest_n(&source.point, self.k.max(1), found);
+                .nearest_n(&source.point, self.k.max(1), &mut stack, found);
             let weight = 1.0 / found.len() as f32;
             for neighbor in &*found {
                 let (target_index, target) = observed.get(neighbor.element);

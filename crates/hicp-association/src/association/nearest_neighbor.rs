@@ -6,6 +6,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
 #[cfg(feature = "kiddo")]
+use crate::search::box_tree::Stack;
 use crate::search::kd_tree::KdTree;
 use crate::search::nearest::PointIndex;
 use crate::search::observed_points::ObservedPoints;
@@ -133,10 +134,11 @@ impl<T: PointIndex> VectorLoop for Search<'_, T> {
 
     #[inline(always)]
     fn run(self) {
+        let mut stack = Stack::default();
         for ((source_index, surfel), last) in (0..).zip(self.source).zip(self.last) {
             let source = self.camera_from_object.surfel(surfel);
             let start = self.observed.start_at(*last, &source.point);
-            let found = self.observed.index().nearest_from(&source.point, start);
+            let found = (self.observed.index()).nearest_from(&source.point, start, &mut stack);
             let Some(element) = found else { continue };
             *last = element;
             let (target_index, target) = self.observed.get(element);

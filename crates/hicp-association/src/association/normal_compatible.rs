@@ -5,6 +5,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 use crate::association::data_association::DataAssociation;
 use crate::filter::max_normal_angle::min_cosine;
 use crate::scratch::Scratch;
+use crate::search::box_tree::Stack;
 use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
@@ -65,13 +66,13 @@ impl DataAssociation for NormalCompatible {
         let observed = ObservedPoints::<PointTree>::of(target, self.targets);
         let mover = RigidTransform::new(camera_from_object);
         let min_cosine = min_cosine(self.max_angle_degrees);
-        let found = &mut self.found.0;
+        let (found, mut stack) = (&mut self.found.0, Stack::default());
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
             observed
                 .index()
-                .nearest_n(&source.point, self.k.max(1), found);
+                .nearest_n(&source.point, self.k.max(1), &mut stack, found);
             let compatible = found
                 .iter()
                 .map(|neighbor| observed.get(neighbor.element))

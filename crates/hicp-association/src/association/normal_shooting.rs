@@ -5,6 +5,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 use crate::association::data_association::DataAssociation;
 use crate::length::Length;
 use crate::scratch::Scratch;
+use crate::search::box_tree::Stack;
 use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;
 use crate::search::point_tree::PointTree;
@@ -73,13 +74,13 @@ impl DataAssociation for NormalShooting {
         let limit = self
             .max_offset
             .map_or(f32::INFINITY, |length| length.meters(&context.problem));
-        let found = &mut self.found.0;
+        let (found, mut stack) = (&mut self.found.0, Stack::default());
         pairs.reserve(source.len());
         for (source_index, surfel) in (0..).zip(source) {
             let source = mover.surfel(surfel);
             observed
                 .index()
-                .nearest_n(&source.point, self.k.max(1), found);
+                .nearest_n(&source.point, self.k.max(1), &mut stack, found);
             let mut best: Option<(f32, u32, Surfel)> = None;
             for neighbor in &*found {
                 let (target_index, target) = observed.get(neighbor.element);

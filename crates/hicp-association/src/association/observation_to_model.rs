@@ -8,6 +8,7 @@ use hicp_core::{
 
 use crate::association::data_association::DataAssociation;
 use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
+use crate::search::box_tree::Stack;
 use crate::search::nearest::PointIndex;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
@@ -122,15 +123,21 @@ struct ClosestPoint<'a> {
 
 impl IndexedSurface for ClosestPoint<'_> {
     #[inline(always)]
-    fn closest(&self, query: &Point3<f32>, eye: &Point3<f32>) -> Option<(u32, Surfel)> {
+    fn closest(
+        &self,
+        query: &Point3<f32>,
+        eye: &Point3<f32>,
+        stack: &mut Stack,
+    ) -> Option<(u32, Surfel)> {
         let ModelPoints {
             surfels,
             tree,
             oriented,
         } = self.points;
         let faces = |surfel: &Surfel| faces(&surfel.normal, &surfel.point, eye);
-        let found =
-            tree.nearest_where(query, |i| !self.visible_only || faces(&surfels[i as usize]))?;
+        let found = tree.nearest_where(query, stack, |i| {
+            !self.visible_only || faces(&surfels[i as usize])
+        })?;
         let mut surfel = surfels[found.element as usize];
         if !oriented && !faces(&surfel) {
             surfel.normal = -surfel.normal;

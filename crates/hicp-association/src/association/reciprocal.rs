@@ -4,6 +4,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Point3, Problem, RigidTrans
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
+use crate::search::box_tree::Stack;
 use crate::search::nearest::distance_squared;
 use crate::search::point_tree::PointTree;
 
@@ -65,14 +66,14 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
                 .filter(|point| point.iter().all(|x| x.is_finite())),
         );
         tree.rebuild(points);
-        let mut position = 0;
+        let (mut position, mut stack) = (0, Stack::default());
         pairs.retain(|pair| {
             position += 1;
             if position <= earlier {
                 return true;
             }
             let own = distance_squared(&pair.target.point, &pair.source.point);
-            tree.nearest(&pair.target.point)
+            tree.nearest(&pair.target.point, &mut stack)
                 .is_some_and(|nearest| own <= nearest.distance_squared)
         });
     }

@@ -3,6 +3,7 @@
 use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{Point3, UnitVector3, Vector3};
 
+use crate::search::box_tree::Stack;
 use crate::search::nearest::{Nearest, PointIndex};
 use crate::search::point_tree::PointTree;
 
@@ -51,13 +52,19 @@ impl<F: FnMut(usize, Option<UnitVector3<f32>>)> VectorLoop for Planes<'_, F> {
         let tree = PointTree::new(self.points);
         let k = self.k.min(self.points.len());
         let mut neighbors: Vec<Nearest> = Vec::with_capacity(3 * k);
-        let mut recent = Recent::default();
+        let (mut recent, mut stack) = (Recent::default(), Stack::default());
         // Neighbors in the order of the tree share its nodes.
         for element in tree.order() {
             let point = &self.points[*element as usize];
-            tree.gather(point, k, [0.0, recent.bound(point)], &mut neighbors);
+            tree.gather(
+                point,
+                k,
+                [0.0, recent.bound(point)],
+                &mut stack,
+                &mut neighbors,
+            );
             if neighbors.len() < k {
-                tree.gather(point, k, [0.0, f32::MAX], &mut neighbors);
+                tree.gather(point, k, [0.0, f32::MAX], &mut stack, &mut neighbors);
             }
             let farthest = neighbors.iter().map(|near| near.distance_squared);
             recent.add(point, farthest.fold(0.0, f32::max).sqrt());

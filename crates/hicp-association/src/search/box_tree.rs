@@ -9,6 +9,10 @@ use hicp_core::internal::Work;
 const WIDTH: usize = 8;
 /// Upper bound of the number of levels, for 2³² elements and nodes that are at least half full.
 const MAX_DEPTH: usize = 16;
+/// Number of nodes and leaves that a search may still have to visit.
+const STACK_SIZE: usize = MAX_DEPTH * WIDTH;
+/// The entry of a stack that starts a search.
+const ROOT: (u32, f32) = (0, 0.0);
 /// Marks a child that is a leaf.
 const LEAF: u32 = 1 << 31;
 /// Rounding may put the computed distance of a box slightly above that of an element inside it.
@@ -131,14 +135,19 @@ impl<const LEAF_SIZE: usize> BoxTree<LEAF_SIZE> {
 
     /// Starts a search for the elements nearest to a point.
     ///
-    /// If the query is not finite, nothing is found.
+    /// If the query is not finite, nothing is found. `stack` may have any content.
     #[inline(always)]
-    pub(crate) fn leaves_near(&self, query: &Point3<f32>) -> LeavesNear<'_, LEAF_SIZE> {
+    pub(crate) fn leaves_near<'a>(
+        &'a self,
+        query: &Point3<f32>,
+        stack: &'a mut Stack,
+    ) -> LeavesNear<'a, LEAF_SIZE> {
         let finite = query.iter().all(|x| x.is_finite());
+        stack.0[0] = ROOT;
         LeavesNear {
             tree: self,
             query: [query.x, query.y, query.z],
-            stack: [(0, 0.0); MAX_DEPTH * WIDTH],
+            stack: &mut stack.0,
             depth: usize::from(finite && !self.nodes.is_empty()),
         }
     }
@@ -179,13 +188,26 @@ fn halve<'a, const LEAF_SIZE: usize>(
     order.split_at_mut(middle)
 }
 
+/// Memory of a search.
+///
+/// Clearing it takes longer than a search that starts near its result, so a loop of searches shares
+/// one.
+#[derive(Debug)]
+pub(crate) struct Stack([(u32, f32); STACK_SIZE]);
+
+impl Default for Stack {
+    fn default() -> Self {
+        Self([ROOT; STACK_SIZE])
+    }
+}
+
 /// A search of a [`BoxTree`] that yields leaves, near ones first.
 #[derive(Debug)]
 pub(crate) struct LeavesNear<'a, const LEAF_SIZE: usize> {
     tree: &'a BoxTree<LEAF_SIZE>,
     query: [f32; 3],
     /// Nodes and leaves to visit, with their squared distances.
-    stack: [(u32, f32); MAX_DEPTH * WIDTH],
+    stack: &'a mut [(u32, f32); STACK_SIZE],
     depth: usize,
 }
 

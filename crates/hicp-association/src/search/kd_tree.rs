@@ -3,6 +3,7 @@
 use hicp_core::Point3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
+use crate::search::box_tree::Stack;
 use crate::search::nearest::{Nearest, PointIndex};
 
 /// kiddo's k-d tree, or `None` without points: kiddo would return item 0 at an infinite distance.
@@ -19,7 +20,12 @@ impl PointIndex for KdTree {
         )
     }
 
-    fn nearest_from(&self, query: &Point3<f32>, _start: Nearest) -> Option<u32> {
+    fn nearest_from(
+        &self,
+        query: &Point3<f32>,
+        _start: Nearest,
+        _stack: &mut Stack,
+    ) -> Option<u32> {
         let query: [f32; 3] = (*query).into();
         let found = self
             .0

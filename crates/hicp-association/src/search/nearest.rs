@@ -2,6 +2,8 @@
 
 use hicp_core::Point3;
 
+use crate::search::box_tree::Stack;
+
 /// Returns |a − b|², the same bits for (b, a).
 #[inline(always)]
 pub(crate) fn distance_squared(a: &Point3<f32>, b: &Point3<f32>) -> f32 {
@@ -48,5 +50,5 @@ pub(crate) trait PointIndex: Send + Sync + 'static {
     ///
     /// `start` is one of the points at its true distance, or [`Nearest::NONE`]. A near one saves
     /// time. The result does not depend on it. Returns `None` if no point is at a finite distance.
-    fn nearest_from(&self, query: &Point3<f32>, start: Nearest) -> Option<u32>;
+    fn nearest_from(&self, query: &Point3<f32>, start: Nearest, stack: &mut Stack) -> Option<u32>;
 }

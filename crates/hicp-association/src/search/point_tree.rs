@@ -2,7 +2,7 @@
 
 use hicp_core::Point3;
 
-use crate::search::box_tree::BoxTree;
+use crate::search::box_tree::{BoxTree, Stack};
 use crate::search::nearest::{Nearest, PointIndex};
 
 /// Points per leaf. Comparing two vectors of points costs less than visiting another node.
@@ -26,8 +26,8 @@ impl PointIndex for PointTree {
     }
 
     #[inline(always)]
-    fn nearest_from(&self, query: &Point3<f32>, start: Nearest) -> Option<u32> {
-        self.search(query, start, |_| true)
+    fn nearest_from(&self, query: &Point3<f32>, start: Nearest, stack: &mut Stack) -> Option<u32> {
+        self.search(query, start, stack, |_| true)
             .map(|nearest| nearest.element)
     }
 }
@@ -56,8 +56,8 @@ impl PointTree {
 
     /// Returns the nearest point.
     #[inline(always)]
-    pub(crate) fn nearest(&self, query: &Point3<f32>) -> Option<Nearest> {
-        self.search(query, Nearest::NONE, |_| true)
+    pub(crate) fn nearest(&self, query: &Point3<f32>, stack: &mut Stack) -> Option<Nearest> {
+        self.search(query, Nearest::NONE, stack, |_| true)
     }
 
     /// Returns the nearest of the points whose index `accept` accepts.
@@ -65,9 +65,10 @@ impl PointTree {
     pub(crate) fn nearest_where(
         &self,
         query: &Point3<f32>,
+        stack: &mut Stack,
         accept: impl Fn(u32) -> bool,
     ) -> Option<Nearest> {
-        self.search(query, Nearest::NONE, accept)
+        self.search(query, Nearest::NONE, stack, accept)
     }
 
     #[inline(always)]
@@ -75,6 +76,7 @@ impl PointTree {
         &self,
         query: &Point3<f32>,
         start: Nearest,
+        stack: &mut Stack,
         accept: impl Fn(u32) -> bool,
     ) -> Option<Nearest> {
         let mut best = if start.precedes(&Nearest::NONE) {
@@ -82,7 +84,7 @@ impl PointTree {
         } else {
             Nearest::NONE
         };
-        self.visit(query, best.distance_squared, |found| {
+        self.visit(query, best.distance_squared, stack, |found| {
             if found.precedes(&best) && accept(found.element) {
                 best = found;
             }
@@ -93,8 +95,14 @@ impl PointTree {
 
     /// Replaces the content of `found` by the `count` nearest points, nearest first.
     #[inline(always)]
-    pub(crate) fn nearest_n(&self, query: &Point3<f32>, count: usize, found: &mut Vec<Nearest>) {
-        self.gather(query, count, [-1.0, f32::MAX], found);
+    pub(crate) fn nearest_n(
+        &self,
+        query: &Point3<f32>,
+        count: usize,
+        stack: &mut Stack,
+        found: &mut Vec<Nearest>,
+    ) {
+        self.gather(query, count, [-1.0, f32::MAX], stack, found);
         found.sort_unstable_by_key(Nearest::key);
     }
 
@@ -109,6 +117,7 @@ impl PointTree {
         query: &Point3<f32>,
         count: usize,
         within: [f32; 2],
+        stack: &mut Stack,
         found: &mut Vec<Nearest>,
     ) {
         found.clear();
@@ -124,7 +133,7 @@ impl PointTree {
             found.truncate(count);
             last
         };
-        self.visit(query, bound, |next| {
+        self.visit(query, bound, stack, |next| {
             found.push(next);
             if found.len() >= full {
                 bound = select(found);
@@ -142,9 +151,15 @@ impl PointTree {
     /// Passes points to `take` until no other point is within the squared distance that `take`
     /// returned last.
     #[inline(always)]
-    fn visit(&self, query: &Point3<f32>, mut bound: f32, mut take: impl FnMut(Nearest) -> f32) {
+    fn visit(
+        &self,
+        query: &Point3<f32>,
+        mut bound: f32,
+        stack: &mut Stack,
+        mut take: impl FnMut(Nearest) -> f32,
+    ) {
         let order = self.tree.order();
-        let mut leaves = self.tree.leaves_near(query);
+        let mut leaves = self.tree.leaves_near(query, stack);
         while let Some(slots) = leaves.next(bound) {
             let distances = distances(&self.leaves[slots.start / LEAF_SIZE], query);
             let mut near = 0;
@@ -195,7 +210,7 @@ mod tests {
     /// Uses a coarse grid, where ties are common.
     #[test]
     fn results_equal_those_of_brute_force_for_every_start() {
-        let mut state = 5;
+        let (mut state, stack) = (5, &mut Stack::default());
         for count in [1, 2, 7, 8, 9, 16, 17, 63, 64, 65, 200, 1000, 4100] {
             for cells in [6.0, 1e6] {
                 let mut point =
@@ -210,20 +225,23 @@ mod tests {
                     };
                     let mut all: Vec<Nearest> = (0..count).map(at).collect();
                     all.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared));
-                    assert_eq!(tree.nearest(query), Some(all[0]));
+                    assert_eq!(tree.nearest(query, stack), Some(all[0]));
                     for start in [0, count - 1, count / 2].map(at) {
-                        let found = tree.nearest_from(query, start);
+                        let found = tree.nearest_from(query, start, stack);
                         assert_eq!(found, Some(all[0].element), "{count} {start:?}");
                     }
                     let odd = all.iter().find(|found| found.element % 2 == 1);
-                    assert_eq!(tree.nearest_where(query, |i| i % 2 == 1), odd.copied());
+                    assert_eq!(
+                        tree.nearest_where(query, stack, |i| i % 2 == 1),
+                        odd.copied()
+                    );
                     let mut found = Vec::new();
                     for n in [0, 1, 3, 20] {
-                        tree.nearest_n(query, n, &mut found);
+                        tree.nearest_n(query, n, stack, &mut found);
                         assert_eq!(found, all[..n.min(all.len())]);
                         let within = all[n.min(all.len() - 1)].distance_squared;
                         for bound in [within, f32::MAX] {
-                            tree.gather(query, n, [-1.0, bound], &mut found);
+                            tree.gather(query, n, [-1.0, bound], stack, &mut found);
                             found.sort_unstable_by_key(Nearest::key);
                             assert_eq!(found, all[..n.min(all.len())]);
                         }
@@ -235,7 +253,8 @@ mod tests {
 
     #[test]
     fn empty_trees_and_queries_that_are_not_finite_find_nothing() {
-        assert_eq!(PointTree::new(&[]).nearest(&Point3::origin()), None);
+        let stack = &mut Stack::default();
+        assert_eq!(PointTree::new(&[]).nearest(&Point3::origin(), stack), None);
         let tree = PointTree::new(&[Point3::origin()]);
         for x in [f32::NAN, f32::INFINITY, f32::MAX] {
             let query = Point3::new(x, 0.0, 0.0);
@@ -243,8 +262,8 @@ mod tests {
                 distance_squared: distance_squared(&query, &Point3::origin()),
                 element: 0,
             };
-            assert_eq!(tree.nearest_from(&query, start), None, "{x}");
-            assert_eq!(tree.nearest(&query), None, "{x}");
+            assert_eq!(tree.nearest_from(&query, start, stack), None, "{x}");
+            assert_eq!(tree.nearest(&query, stack), None, "{x}");
         }
     }
 }
