@@ -5,8 +5,8 @@ use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfe
 
 use crate::association::data_association::DataAssociation;
 use crate::scratch::Scratch;
-#[cfg(feature = "kiddo")]
 use crate::search::box_tree::Stack;
+#[cfg(feature = "kiddo")]
 use crate::search::kd_tree::KdTree;
 use crate::search::nearest::PointIndex;
 use crate::search::observed_points::ObservedPoints;
