@@ -78,7 +78,7 @@ struct FindBorder<'a> {
     line: &'a [f32],
     above: &'a [f32],
     below: &'a [f32],
-    /// Whether the pixels left and right of the row are empty.
+    /// `true` where the pixel left or right of the row is empty.
     ends: [bool; 2],
     border: &'a mut [u8],
 }

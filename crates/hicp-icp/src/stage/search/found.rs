@@ -111,3 +111,35 @@ impl FoundPoses {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::Termination;
+
+    fn found(score: f64, doubt: f64) -> Found {
+        Found {
+            score,
+            outcome: Outcome::kept(&Isometry3::identity(), Termination::Converged),
+            doubt: Some(doubt),
+            finished: true,
+        }
+    }
+
+    #[test]
+    fn a_pose_wins_by_a_gain_and_never_with_a_higher_score_or_doubt() {
+        let local = found(0.3, 0.5);
+        assert!(found(0.19, 0.5).beats(&local, 0.1));
+        assert!(!found(0.21, 0.5).beats(&local, 0.1));
+        // A tenth of the doubt counts.
+        assert!(found(0.21, 0.3).beats(&local, 0.1));
+        assert!(!found(0.1, 0.6).beats(&local, 0.1));
+        assert!(!found(0.31, 0.0).beats(&local, 0.0));
+        // An unknown doubt is the largest.
+        let unknown = Found {
+            doubt: None,
+            ..found(0.0, 0.0)
+        };
+        assert!(!unknown.beats(&local, 0.1));
+    }
+}

@@ -51,13 +51,16 @@ pub struct SearchOptions {
     pub hypotheses: usize,
     /// Number of best ranked hypotheses to align.
     pub aligned: usize,
-    /// Number of best aligned hypotheses to refine, and a third as many look-alikes of the best.
+    /// Number of best aligned hypotheses to refine.
+    ///
+    /// A third as many look-alikes of the best one are refined, and the local stage finishes at
+    /// most a third as many poses.
     pub refined: usize,
     /// The smallest angle between the rotations of refined hypotheses, degrees.
     ///
     /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
     pub spacing_degrees: f64,
-    /// Whether a search that fails goes on.
+    /// Continues a search that has failed.
     ///
     /// It then aligns all hypotheses, refines twice as many, and halves the spacing.
     pub widens: bool,
