@@ -135,6 +135,7 @@ pub(crate) fn result<'py>(
             confidence: refinement.confidence,
             expected_error_meters: refinement.expected_error_meters,
             expected_error_degrees: refinement.expected_error_degrees,
+            look_alikes: refinement.look_alikes,
             mve: refinement.mve,
             mve_initial: refinement.mve_initial,
             evidence: BTreeMap::from(refinement.evidence.named()),

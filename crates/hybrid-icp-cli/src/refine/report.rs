@@ -32,6 +32,8 @@ pub(crate) struct Report {
     confidence: f64,
     expected_error_mm: f64,
     expected_error_degrees: f64,
+    /// The number of other poses that look alike and are as likely to be right.
+    look_alikes: f64,
     /// The evidence for and against the pose, by the names of its fields.
     evidence: BTreeMap<&'static str, f64>,
     iterations: usize,
@@ -99,6 +101,7 @@ impl Report {
             confidence: refined.confidence,
             expected_error_mm: refined.expected_error_meters * 1e3,
             expected_error_degrees: refined.expected_error_degrees,
+            look_alikes: refined.look_alikes,
             evidence: BTreeMap::from(refined.evidence.named()),
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),

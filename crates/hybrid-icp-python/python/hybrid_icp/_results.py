@@ -183,6 +183,9 @@ class Result:
         Largest distance to expect of a surface point from its true place, meters.
     expected_error_degrees : float
         Rotation error to expect, degrees.
+    look_alikes : float
+        Number of other poses that look alike and are as likely to be right, at most 4. 0 if the
+        returned pose is near the initial one. They lower the confidence.
     mve : float
         Mean VSD estimate of the returned pose: 0 if it explains the image everywhere, 1 if
         nowhere. Imperfect masks raise it for right poses, too; `confidence` does not have this
@@ -250,6 +253,7 @@ class Result:
     confidence: float
     expected_error_meters: float
     expected_error_degrees: float
+    look_alikes: float
     mve: float
     mve_initial: float
     evidence: dict[str, float]
