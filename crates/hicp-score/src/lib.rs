@@ -34,6 +34,7 @@ mod color;
 mod errors;
 mod judgment;
 mod mve;
+mod parts;
 mod score;
 mod tolerances;
 

@@ -1,6 +1,7 @@
 //! The separation of cells inside a measured surface from those that it hides.
 
 use crate::judgment::grid::{CELLS, Cell, Grid};
+use crate::parts::Parts;
 
 /// Steepest slope of a continuous surface against the image plane, depth per width.
 const STEEPEST: f32 = 3.0;
@@ -25,7 +26,7 @@ pub(crate) fn find_insides(grid: &mut Grid) {
         }
     }
     let hidden = || hidden[..count].iter().map(|index| usize::from(*index));
-    let mut parts = Parts::new();
+    let mut parts = Parts::new([0; CELLS]);
     for index in hidden() {
         // The neighbors to the right and below: each pair once.
         for other in [Grid::SIDES[0], Grid::SIDES[2]].map(|side| Grid::offset(index, side)) {
@@ -62,29 +63,4 @@ pub(crate) fn inside_share(grid: &mut Grid) -> f64 {
 fn continues(grid: &Grid, index: usize, other: usize) -> bool {
     let (a, b) = (grid.measured(index), grid.measured(other));
     (a - b).abs() < (0.5 * grid.tolerance()).max(STEEPEST * grid.spread() * a.min(b))
-}
-
-/// Connected parts of the grid (union-find).
-struct Parts([u16; CELLS]);
-
-impl Parts {
-    fn new() -> Self {
-        #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
-        Self(std::array::from_fn(|index| index as u16))
-    }
-
-    fn find(&mut self, mut index: usize) -> usize {
-        while usize::from(self.0[index]) != index {
-            self.0[index] = self.0[usize::from(self.0[index])];
-            index = usize::from(self.0[index]);
-        }
-        index
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.find(a), self.find(b));
-        #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
-        let low = a.min(b) as u16;
-        self.0[a.max(b)] = low;
-    }
 }

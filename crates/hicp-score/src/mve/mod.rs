@@ -8,6 +8,7 @@ pub(crate) mod mean_vsd;
 pub(crate) mod occlusion;
 pub(crate) mod sampled_mve;
 pub(crate) mod splat;
+pub(crate) mod surfaces;
 pub(crate) mod trust_map;
 
 pub use mask_trust::MaskTrust;

@@ -8,6 +8,7 @@ use hicp_core::{Observation, PixelRegion};
 
 use crate::mve::distances::to_zero;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
+use crate::mve::surfaces::{Cells, trust_surfaces};
 
 /// Width of the uncertain border, as a share of the square root of the mask's area.
 const BORDER: f32 = 0.25;
@@ -80,7 +81,13 @@ impl TrustMap {
         let mut trust = distance_to(false);
         let middle = middle_of(&depths, &trust);
         let Surroundings { noise, plane } = *Surroundings::of(observation);
-        let doubt = 1.0 - certainty(&masked, &depths, width, noise);
+        let grid = Cells {
+            width,
+            masked: &masked,
+            depths: &depths,
+        };
+        let step_meters = STEP_METERS.max(4.0 * noise);
+        let doubt = 1.0 - certainty(&grid, step_meters);
         let beyond = if plane.is_some() {
             doubt * BEYOND_PIXELS
         } else {
@@ -88,8 +95,9 @@ impl TrustMap {
         };
         let scale = 1.0 / (doubt * BORDER * (area as f32).sqrt() + beyond).max(1.0);
         let outside = distance_to(true);
+        let near = |z: f32| z > 0.0 && f64::from((z - middle).abs()) <= diameter;
         for ((trust, outside), z) in trust.iter_mut().zip(outside).zip(&depths) {
-            let counts = *z > 0.0 && f64::from((*z - middle).abs()) <= diameter;
+            let counts = near(*z);
             let ramp = ((*trust - outside + beyond) * scale).clamp(0.0, 1.0);
             *trust = if counts { ramp * ramp } else { 0.0 };
         }
@@ -108,6 +116,11 @@ impl TrustMap {
                 } else if !on {
                     *trust = 0.0;
                 }
+            }
+            if separable && doubt > 0.0 {
+                let stands_out = |cell: usize| if near(depths[cell]) { off[cell] } else { 0.0 };
+                #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depths.
+                trust_surfaces(&mut trust, &grid, stands_out, step_meters as f32);
             }
         }
         let mut weights = Vec::with_capacity(region.area());
@@ -182,22 +195,18 @@ impl TrustMap {
 
 /// Returns the certainty that the border of the mask is that of the object, 0 to 1.
 ///
-/// It is 1 if the depth has a step, or is missing, at half of the border or more. A border that is
-/// too far outside crosses smooth background.
-fn certainty(masked: &[bool], depths: &[f32], width: usize, noise: f64) -> f32 {
-    let least = STEP_METERS.max(4.0 * noise);
+/// It is 1 if the depth has a step of `step_meters`, or is missing, at half of the border or more.
+/// A border that is too far outside crosses smooth background.
+fn certainty(cells: &Cells<'_>, step_meters: f64) -> f32 {
     let (mut border, mut steps) = (0.0_f32, 0.0_f32);
-    for index in 0..masked.len() {
-        let right = ((index + 1) % width > 0).then_some(index + 1);
-        for other in [right, Some(index + width)].into_iter().flatten() {
-            if other < masked.len() && masked[index] != masked[other] {
-                let (a, b) = (depths[index], depths[other]);
-                let step = a <= 0.0 || b <= 0.0 || f64::from((a - b).abs()) > least;
-                border += 1.0;
-                steps += f32::from(u8::from(step));
-            }
+    cells.for_pairs(|a, b| {
+        if cells.masked[a] != cells.masked[b] {
+            let (a, b) = (cells.depths[a], cells.depths[b]);
+            let step = a <= 0.0 || b <= 0.0 || f64::from((a - b).abs()) > step_meters;
+            border += 1.0;
+            steps += f32::from(u8::from(step));
         }
-    }
+    });
     if border > 0.0 {
         (4.0 * steps / border - 1.0).clamp(0.0, 1.0)
     } else {
