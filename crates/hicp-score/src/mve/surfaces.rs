@@ -11,6 +11,7 @@ const LEAST_SURFACE: f32 = 0.1;
 
 /// The cells of a mask and its surroundings, row by row.
 pub(crate) struct Cells<'a> {
+    /// Number of columns, at least 1.
     pub(crate) width: usize,
     pub(crate) masked: &'a [bool],
     /// Measured depth, meters.
@@ -20,7 +21,7 @@ pub(crate) struct Cells<'a> {
 impl Cells<'_> {
     /// Returns whether the mask is a rectangle.
     fn mask_is_box(&self) -> bool {
-        let rows = self.masked.chunks(self.width.max(1));
+        let rows = self.masked.chunks(self.width);
         let mut rows = rows.filter(|row| row.contains(&true));
         let Some(first) = rows.next() else {
             return false;
@@ -32,7 +33,7 @@ impl Cells<'_> {
     /// Calls a function with the pairs of neighbors, each once.
     #[inline(always)]
     pub(crate) fn for_pairs(&self, mut call: impl FnMut(usize, usize)) {
-        let (width, cells) = (self.width.max(1), self.masked.len());
+        let (width, cells) = (self.width, self.masked.len());
         for first in (0..cells).step_by(width) {
             for cell in first..first + width - 1 {
                 call(cell, cell + 1);
@@ -63,8 +64,8 @@ impl Surface {
 ///
 /// `stands_out` is the certainty that a cell does not show the background, and surfaces end at a
 /// `step` in depth, meters. A surface that continues outside the mask is another object and loses
-/// its trust. If the others are small, the mask is too small instead, and nothing changes. In a
-/// box, which says nothing about the border, the others are trusted up to it.
+/// its trust. If the others are small, the mask is too small instead, and nothing changes. The
+/// border of a box is not that of the object, so the others are then trusted up to the border.
 ///
 /// Cost: O(cells).
 pub(crate) fn trust_surfaces(

@@ -156,3 +156,17 @@ fn a_mask_without_depth_explains_nothing() {
         );
     }
 }
+
+#[test]
+fn an_object_that_continues_outside_a_box_is_not_the_one_of_the_mask() {
+    let (mut depth, mask) = scene();
+    // It stands next to the object, and nearer.
+    for (i, z) in depth.iter_mut().enumerate() {
+        if !mask[i] && i % SIDE >= 56 && (20..50).contains(&(i / SIDE)) {
+            *z = 0.3;
+        }
+    }
+    let observation = observe(depth, grown(&boxed(&mask), 8, false));
+    let truth = score(MeanVsd::imperfect_mask(), &observation, &at());
+    assert!(truth < 0.06, "{truth}");
+}
