@@ -39,6 +39,7 @@ struct Counts {
     reappeared: usize,
     found: usize,
     tracker_ms: Vec<f64>,
+    lost_ms: Vec<f64>,
     hybrid_ms: Vec<f64>,
 }
 
@@ -78,9 +79,9 @@ fn main() -> Result<(), Failure> {
         bench.sequence(index, hand, *fps, &mut counts[kind])?;
     }
     println!(
-        "| sequences | noise | frames | lost | tracking | wrong while tracking | found again | ms | `hybrid`, ms |"
+        "| sequences | noise | frames | lost | tracking | wrong while tracking | found again | ms | lost, ms | `hybrid`, ms |"
     );
-    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|");
+    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
     for (counts, (name, ..)) in counts.into_iter().zip(kinds) {
         for (counts, noise) in counts.into_iter().zip(["0 to 1 %", "1 to 3 %"]) {
             counts.print(name, noise);
@@ -132,6 +133,9 @@ impl Bench {
             let tracked = tracker.step(&depth, 1.0 / fps, None)?;
             let ms = 1e3 * clock.elapsed().as_secs_f64();
             counts.tracker_ms.push(ms);
+            if tracked.state == TrackState::Lost {
+                counts.lost_ms.push(ms);
+            }
             let pose = &tracked.camera_from_object;
             let off = mssd(pose, truth, &points, &motions) / model.diameter();
             counts.frame(&tracked, off, state);
@@ -203,8 +207,12 @@ impl Counts {
             0 => "–".to_owned(),
             reappeared => format!("{} of {reappeared}", self.found),
         };
+        let lost = match median(&mut self.lost_ms) {
+            0.0 => "–".to_owned(),
+            middle => format!("{middle:.0}, {:.0}", self.lost_ms[self.lost_ms.len() - 1]),
+        };
         println!(
-            "| {name} | {noise} | {} | {} | {:.1} % | {:.2} % | {found} | {:.2} | {:.2} |",
+            "| {name} | {noise} | {} | {} | {:.1} % | {:.2} % | {found} | {:.2} | {lost} | {:.2} |",
             self.frames,
             self.lost,
             percent(self.tracking),

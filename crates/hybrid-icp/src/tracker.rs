@@ -6,6 +6,7 @@ mod found;
 mod matcher;
 mod motion;
 mod region;
+mod rejections;
 mod segments;
 mod tracked;
 

@@ -10,14 +10,14 @@ use super::extent::DIFFERENT_DIAMETERS;
 use super::found::Found;
 use super::matcher::{Matcher, ROUGH_ITERATIONS, run};
 use super::motion::Motion;
-use super::segments::{Rejected, Segment, Sphere, segments};
+use super::segments::{Segment, Segments, Sphere};
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
 /// Difference of the logarithms of two probabilities for the same.
 const CLEAR_ODDS: f64 = 2.5;
 /// Number of surfaces that are searched in an image.
-const SEGMENTS: usize = 4;
+const SEGMENTS: usize = 2;
 /// Axes of the camera around which a search rotates the predicted pose, and the angle, radians.
 const ROTATIONS: [[f64; 3]; 7] = [
     [0.0, 0.0, 0.0],
@@ -51,22 +51,23 @@ impl Matcher {
         };
         // The noise changes with the distance, also while the object is not seen.
         self.noise = self.noise.map(|noise| (noise * RISE).min(MAX_NOISE));
-        self.rejected.retain_mut(Rejected::rests);
-        let found = segments(depth, &camera, &sphere, model.diameter(), mask);
-        let fresh = found.into_iter().filter(|segment| {
-            let mut rejected = self.rejected.iter();
-            !rejected.any(|rejected| rejected.is(segment, model.diameter()))
-        });
-        let fresh: Vec<Segment> = fresh.take(SEGMENTS).collect();
+        let size = (model.diameter(), model.mesh().area());
+        let segments = Segments::new(depth, &camera, &sphere, size, mask);
+        let mut fresh: Vec<Segment> = Vec::new();
+        for segment in self.rejected.fresh(&segments.found, model.diameter()) {
+            if fresh.len() < SEGMENTS && !fresh.iter().any(|s| segments.are_parts(s, &segment)) {
+                fresh.push(segment);
+            }
+        }
         let mut best: Option<Found> = None;
         for segment in fresh {
-            let in_vain = Rejected::new(&segment);
             let behind = 0.25 * model.diameter() / segment.mean.coords.norm();
             let center = segment.mean.coords * (1.0 + behind);
             let rotation = motion.pose().rotation;
             let shift = center - rotation * model.center().coords;
             let init = Isometry3::from_parts(Translation3::from(shift), rotation);
-            let observation = Observation::new(Arc::clone(depth), segment.mask, camera)?;
+            let observation =
+                Observation::new(Arc::clone(depth), segments.mask(&segment, depth), camera)?;
             let pose = if let Some(near) = self.try_rotations(&observation, &init) {
                 near.pose
             } else {
@@ -77,7 +78,7 @@ impl Matcher {
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
             let Some(found) = found.filter(Found::stands_alone) else {
-                self.rejected.push(in_vain);
+                self.rejected.add(&segment, model.diameter());
                 continue;
             };
             let odds = |found: &Found| self.odds(found, Some(motion));

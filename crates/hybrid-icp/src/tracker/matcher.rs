@@ -6,7 +6,9 @@ use hicp_association::Stride;
 use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera, Problem,
 };
-use hicp_icp::{Cascade, IterationLimit, Outcome, Session, Stage, Verdict, Workspace};
+use hicp_icp::{
+    Cascade, IterationLimit, Outcome, SearchOptions, Session, Stage, Verdict, Workspace,
+};
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, Score};
 
@@ -14,8 +16,8 @@ use super::extent::Extent;
 use super::found::Found;
 use super::motion::{Motion, registered};
 use super::region::Widening;
-use super::segments::Rejected;
-use crate::presets::{Far, Fit, Search, far, fit, search};
+use super::rejections::Rejections;
+use crate::presets::{Far, Fit, Search, far, fit, search_with};
 
 /// Factor on the deviations of a registration, whose errors are correlated.
 const INFLATION: f64 = 2.0;
@@ -46,8 +48,8 @@ pub(super) struct Matcher {
     widening: Widening,
     /// Standard deviation of the depth noise in the images before, in diameters, once measured.
     pub(super) noise: Option<f64>,
-    /// The surfaces that were recently searched in vain, at most 20.
-    pub(super) rejected: Vec<Rejected>,
+    /// The surfaces that were searched in vain.
+    pub(super) rejected: Rejections,
 }
 
 impl Matcher {
@@ -61,11 +63,11 @@ impl Matcher {
             camera,
             far: Cascade((far(), near.clone())),
             near,
-            search: search(),
+            search: quick_search(),
             workspace: Workspace::new(Rasterizer::default()),
             widening: Widening::default(),
             noise: None,
-            rejected: Vec::new(),
+            rejected: Rejections::default(),
         }
     }
 
@@ -210,6 +212,20 @@ impl Matcher {
             [radius, 1.0],
         )
     }
+}
+
+/// Creates a search that searches unless it is sure, with fewer hypotheses than `search`.
+///
+/// A surface that is not the object must not take long, because most are not.
+fn quick_search() -> Search {
+    search_with(SearchOptions {
+        good_enough: 0.1,
+        hypotheses: 512,
+        aligned: 128,
+        refined: 8,
+        widens: false,
+        ..SearchOptions::default()
+    })
 }
 
 /// Runs a stage on an image.

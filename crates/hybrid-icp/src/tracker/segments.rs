@@ -10,11 +10,8 @@ const JUMP_DIAMETERS: f64 = 0.1;
 const EXTENT_DIAMETERS: f64 = 0.75;
 /// Smallest area of a surface, in squared diameters.
 const LEAST_AREA: f64 = 0.01;
-/// Number of frames in which a surface that was searched in vain is not searched again.
-const REST: usize = 5;
-/// Movement in diameters and relative change of the area above which a surface is another one.
-const OTHER_MEAN: f64 = 0.1;
-const OTHER_AREA: f64 = 0.15;
+/// Distance between two surfaces that may be parts of one object, in diameters.
+const PART_DIAMETERS: f64 = 0.6;
 
 /// A place in the camera frame, and a distance from it, meters.
 #[derive(Clone, Copy, Debug)]
@@ -24,96 +21,113 @@ pub(super) struct Sphere {
 }
 
 /// A connected surface of about the size of the object.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
-    pub(super) mask: Mask,
+    /// Its number in [`Segments`].
+    pub(super) label: u32,
     /// Mean of its points, camera frame, meters.
     pub(super) mean: Point3<f64>,
     /// Area across the line of sight, square meters.
     pub(super) area: f64,
 }
 
-/// A surface that was searched in vain.
-pub(super) struct Rejected {
-    mean: Point3<f64>,
-    area: f64,
-    /// Number of frames until it is searched again.
-    rest: usize,
-}
-
-impl Rejected {
-    pub(super) fn new(segment: &Segment) -> Self {
-        Self {
-            mean: segment.mean,
-            area: segment.area,
-            rest: REST,
-        }
-    }
-
-    /// Counts a frame, and returns whether the surface still is not searched.
-    pub(super) fn rests(&mut self) -> bool {
-        self.rest -= 1;
-        self.rest > 0
-    }
-
-    /// Returns whether a surface has about the same place and area.
-    pub(super) fn is(&self, segment: &Segment, diameter: f64) -> bool {
-        let moved = (segment.mean - self.mean).norm() / diameter;
-        let grown = (segment.area / self.area - 1.0).abs();
-        moved < OTHER_MEAN && grown < OTHER_AREA
-    }
-}
-
-/// Returns the surfaces inside a sphere that are not larger than an object of a diameter.
+/// The surfaces inside a sphere that an object may have.
 ///
-/// A surface ends at steps in depth. Surfaces nearer to the center of the sphere come first.
-/// `within` restricts the pixels. Cost: O(pixels of the sphere).
-pub(super) fn segments(
-    depth: &DepthImage,
-    camera: &PinholeCamera,
-    sphere: &Sphere,
+/// A surface ends at steps in depth. An object may have several surfaces, such as a mug and its
+/// handle.
+pub(super) struct Segments {
+    cells: Cells,
+    /// The number of the surface of each cell.
+    labels: Vec<u32>,
+    camera: PinholeCamera,
+    /// Diameter of the object, meters.
     diameter: f64,
-    within: Option<&Mask>,
-) -> Vec<Segment> {
-    let cells = Cells::new(depth, camera, sphere, diameter, within);
-    let mut labels = vec![0_u32; cells.depth.len()];
-    let mut found = Vec::new();
-    let mut queue = Vec::new();
-    let mut label = 0;
-    for start in 0..labels.len() {
-        if labels[start] != 0 || cells.depth[start] <= 0.0 {
-            continue;
-        }
-        label += 1;
-        labels[start] = label;
-        queue.clear();
-        queue.push(start);
-        let mut next = 0;
-        while let Some(&cell) = queue.get(next) {
-            next += 1;
-            for other in cells.neighbors(cell) {
-                let step = (cells.depth[other] - cells.depth[cell]).abs();
-                if labels[other] == 0 && cells.depth[other] > 0.0 && step < cells.jump {
-                    labels[other] = label;
-                    queue.push(other);
+    /// The surfaces, the most probable first.
+    pub(super) found: Vec<Segment>,
+}
+
+impl Segments {
+    /// Separates the surfaces, and keeps those that are not larger than an object of a diameter
+    /// (meters) and a surface area (square meters).
+    ///
+    /// Those near the center of the sphere, and of about the area that an object shows, come first.
+    /// `within` restricts the pixels. Cost: O(pixels of the sphere).
+    pub(super) fn new(
+        depth: &DepthImage,
+        camera: &PinholeCamera,
+        sphere: &Sphere,
+        (diameter, surface): (f64, f64),
+        within: Option<&Mask>,
+    ) -> Self {
+        let cells = Cells::new(depth, camera, sphere, diameter, within);
+        let mut labels = vec![0_u32; cells.depth.len()];
+        let mut found = Vec::new();
+        let mut queue = Vec::new();
+        let mut label = 0;
+        for start in 0..labels.len() {
+            if labels[start] != 0 || cells.depth[start] <= 0.0 {
+                continue;
+            }
+            label += 1;
+            labels[start] = label;
+            queue.clear();
+            queue.push(start);
+            let mut next = 0;
+            while let Some(&cell) = queue.get(next) {
+                next += 1;
+                for other in cells.neighbors(cell) {
+                    let step = (cells.depth[other] - cells.depth[cell]).abs();
+                    if labels[other] == 0 && cells.depth[other] > 0.0 && step < cells.jump {
+                        labels[other] = label;
+                        queue.push(other);
+                    }
                 }
             }
+            if let Some((mean, area)) = cells.fits(&queue, camera, diameter)
+                && area <= surface
+            {
+                found.push(Segment { label, mean, area });
+            }
         }
-        if let Some((mean, area)) = cells.fits(&queue, camera, diameter) {
-            found.push((label, mean, area));
+        // The distance in deviations of the prediction, and the area as a factor. A convex object
+        // shows a fourth of its surface on average.
+        let cost = |segment: &Segment| {
+            let away = 3.0 * (segment.mean - sphere.center).norm() / sphere.radius;
+            let area = (4.0 * segment.area / surface).ln();
+            away * away + area * area
+        };
+        found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        Self {
+            cells,
+            labels,
+            camera: *camera,
+            diameter,
+            found,
         }
     }
-    let away = |mean: &Point3<f64>| (mean - sphere.center).norm();
-    found.sort_by(|(_, a, _), (_, b, _)| away(a).total_cmp(&away(b)));
-    let found = found.into_iter().map(|(label, mean, area)| {
-        let mask = Mask::in_region(depth.width(), depth.height(), &cells.region, |u, v| {
+
+    /// Returns whether two surfaces may be parts of one object.
+    pub(super) fn are_parts(&self, a: &Segment, b: &Segment) -> bool {
+        (a.mean - b.mean).norm() <= PART_DIAMETERS * self.diameter
+    }
+
+    /// Returns the pixels of a surface, and of those that may be parts of the same object.
+    pub(super) fn mask(&self, segment: &Segment, depth: &DepthImage) -> Mask {
+        let parts = self.found.iter().filter(|s| self.are_parts(s, segment));
+        let labels: Vec<u32> = parts.map(|part| part.label).collect();
+        let sphere = Sphere {
+            center: segment.mean,
+            radius: (PART_DIAMETERS + EXTENT_DIAMETERS) * self.diameter,
+        };
+        let cells = &self.cells;
+        let region = around(&self.camera, &sphere).intersection(&cells.region);
+        Mask::in_region(depth.width(), depth.height(), &region, |u, v| {
             let cell = cells.place(u, v);
             let z = depth.get(u, v).unwrap_or(0.0);
-            labels[cell] == label && z > 0.0 && (z - cells.depth[cell]).abs() < cells.jump
-        });
-        Segment { mask, mean, area }
-    });
-    found.collect()
+            let same = labels.contains(&self.labels[cell]);
+            same && z > 0.0 && (z - cells.depth[cell]).abs() < cells.jump
+        })
+    }
 }
 
 /// The median depths of square cells.
@@ -284,25 +298,36 @@ mod tests {
             _ => 0.8,
         });
         let depth = DepthImage::from_meters(160, 120, depth.collect()).unwrap();
-        let find = |x, radius, within: Option<&Mask>| {
+        let find = |x, radius, surface, within: Option<&Mask>| {
             let sphere = Sphere {
                 center: Point3::new(x, 0.0, 0.5),
                 radius,
             };
-            segments(&depth, &camera, &sphere, 0.12, within)
+            Segments::new(&depth, &camera, &sphere, (0.12, surface), within)
         };
-        let found = find(0.04, 1.0, None);
+        let segments = find(0.04, 1.0, 0.03, None);
+        let found = &segments.found;
         assert_eq!(found.len(), 2);
         // The nearer to the place comes first.
         assert!(found[0].mean.x > found[1].mean.x);
         for (segment, low) in found.iter().zip([72, 40]) {
-            let set = |u, v| segment.mask.get(u, v) == Some(true);
+            let mask = segments.mask(segment, &depth);
+            let set = |u, v| mask.get(u, v) == Some(true);
             let pixels = (0..160 * 120).filter(|i| set(i % 160, i / 160)).count();
             assert!((32 * 32 - 130..=32 * 32).contains(&pixels), "{pixels}");
             assert!(set(low + 16, 56) && !set(low + 40, 56) && !set(low + 16, 90));
         }
-        assert_eq!(find(0.04, 0.06, None).len(), 1);
+        // They are too far apart for an object of 12 cm, but not for one of 20 cm.
+        let larger = Segments {
+            diameter: 0.2,
+            ..find(0.04, 1.0, 0.03, None)
+        };
+        let mask = larger.mask(&larger.found[0], &depth);
+        assert!([56, 88].iter().all(|u| mask.get(*u, 56) == Some(true)));
+        // They have 52 and 64 cm², which is too much for an object of 50 cm².
+        assert!(find(0.04, 1.0, 0.005, None).found.is_empty());
+        assert_eq!(find(0.04, 0.06, 0.03, None).found.len(), 1);
         let left = Mask::in_region(160, 120, &camera.region(), |u, _| u < 72);
-        assert_eq!(find(0.04, 1.0, Some(&left)).len(), 1);
+        assert_eq!(find(0.04, 1.0, 0.03, Some(&left)).found.len(), 1);
     }
 }
