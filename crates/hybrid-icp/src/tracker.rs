@@ -42,11 +42,12 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// pose: an object that is hidden entirely is lost after
 /// [`TrackerConfig::coast_seconds`]. A lost object is searched, in a region that grows with time,
 /// among the surfaces of about its size. A found pose is [`TrackState::Doubtful`] until the next
-/// image confirms it. If another pose is as likely, it stays doubtful until an image shows the
-/// difference.
+/// image confirms it. If a pose that looks like it is as likely, it stays doubtful until an image
+/// shows the difference.
 ///
-/// Cost of a step while tracking: about that of `hybrid`, including the observation. Steps in which
-/// the object is searched cost 2 to 300 ms. Use one tracker per object and thread.
+/// Cost of a step while tracking: about that of `hybrid`, including the observation. A step in which
+/// the object is searched costs about 0.1 s, and rarely up to 1 s. Use one tracker per object and
+/// thread.
 ///
 /// ```
 /// use std::sync::Arc;

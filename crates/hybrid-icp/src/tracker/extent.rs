@@ -1,6 +1,6 @@
 //! Sizes of displacements of an object.
 
-use hicp_core::{Isometry3, Matrix6, Model, Point3, UnitVector3, Vector6};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Model, Point3, UnitVector3, Vector3};
 use hicp_score::mssd;
 
 use super::motion::{Motion, difference};
@@ -14,6 +14,9 @@ pub(super) struct Extent {
     pub(super) center: Point3<f64>,
     pub(super) radius: f64,
     pub(super) diameter: f64,
+    /// The map from a rotation vector to the displacement of the surface, object frame, meters per
+    /// radian.
+    levers: Matrix3<f64>,
     /// Directions of the axes of continuous symmetries, object frame.
     axes: Vec<UnitVector3<f64>>,
     points: Vec<Point3<f32>>,
@@ -27,6 +30,7 @@ impl Extent {
             center: model.center(),
             radius: model.radius(),
             diameter: model.diameter(),
+            levers: levers(model),
             axes: axes.map(|axis| axis.direction()).collect(),
             points: model.samples().iter().map(|s| s.point).collect(),
             symmetries: model.symmetries().motions(),
@@ -40,7 +44,7 @@ impl Extent {
 
     /// Returns the standard deviation of the least determined displacement, meters.
     ///
-    /// Rotations count by the radius. Those around declared axes of symmetry do not count.
+    /// Rotations around declared axes of symmetry do not count.
     pub(super) fn deviation(&self, motion: &Motion) -> f64 {
         let scale = self.scale(motion.pose());
         let covariance = scale * motion.covariance() * scale.transpose();
@@ -53,15 +57,67 @@ impl Extent {
     }
 
     /// Returns the map from a displacement of a pose (meters, radians) to one of the surface.
-    fn scale(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
-        let radius = self.radius;
+    pub(super) fn displacement(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
         let mut scale = Matrix6::identity();
+        let levers = rotation * self.levers * rotation.transpose();
+        scale.fixed_view_mut::<3, 3>(3, 3).copy_from(&levers);
+        scale
+    }
+
+    /// Returns the same map without rotations around declared axes of symmetry.
+    fn scale(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
+        let mut scale = self.displacement(pose);
         for axis in &self.axes {
             let direction = (pose.rotation * axis).into_inner();
             let mut block = scale.fixed_view_mut::<3, 3>(3, 3);
-            let free = direction * (direction.transpose() * &block);
+            let free = &block * direction * direction.transpose();
             block -= free;
         }
-        scale * Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius, radius, radius))
+        scale
+    }
+}
+
+/// Returns the map from a rotation vector to the largest displacement of the surface.
+///
+/// It is exact for rotations around the principal axes. Around the long axis of a knife, a rotation
+/// moves the surface little.
+fn levers(model: &Model) -> Matrix3<f64> {
+    let center = model.center();
+    let samples = model.samples().iter();
+    let points: Vec<_> = samples.map(|s| s.point.cast::<f64>() - center).collect();
+    let covariance: Matrix3<f64> = points.iter().map(|p| p * p.transpose()).sum();
+    let axes = covariance.symmetric_eigen().eigenvectors;
+    let lever = |axis: usize| {
+        let distances = points.iter().map(|p| axes.column(axis).cross(p).norm());
+        distances.fold(0.0, f64::max)
+    };
+    let levers = Vector3::new(lever(0), lever(1), lever(2));
+    axes * Matrix3::from_diagonal(&levers) * axes.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use hicp_core::{Translation3, UnitQuaternion};
+    use hicp_sim::Household;
+
+    use super::*;
+
+    #[test]
+    fn distances_are_displacements_of_the_surface_around_each_principal_axis() {
+        let extent = Extent::new(&Household::Knife.model().unwrap());
+        let eigen = extent.levers.symmetric_eigen();
+        for axis in eigen.eigenvectors.column_iter() {
+            let center = Translation3::from(extent.center.coords);
+            let turned = center * UnitQuaternion::new(axis * 0.05) * center.inverse();
+            let distance = extent.distance(&turned, &Isometry3::identity());
+            let largest = mssd(&turned, &Isometry3::identity(), &extent.points, &[]);
+            assert!(
+                (distance / largest - 1.0).abs() < 0.01,
+                "{distance} {largest}"
+            );
+        }
+        // A rotation around the long axis of a knife moves its surface little.
+        assert!(eigen.eigenvalues.min() < 0.2 * eigen.eigenvalues.max());
     }
 }

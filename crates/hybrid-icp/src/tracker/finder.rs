@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use hicp_core::{
-    DepthImage, ImageError, Isometry3, Mask, Observation, Translation3, UnitQuaternion, Vector3,
+    DepthImage, ImageError, Isometry3, Mask, Observation, Problem, Translation3, UnitQuaternion,
+    Vector3,
 };
 
 use super::extent::DIFFERENT_DIAMETERS;
@@ -29,6 +30,8 @@ const ROTATIONS: [[f64; 3]; 7] = [
     [-1.0, 0.0, 0.0],
 ];
 const ROTATION: f64 = 0.8;
+/// Smallest angle between the rotations of poses that look alike, degrees.
+const SPACING_DEGREES: f64 = 30.0;
 /// Factor by which the noise may rise per frame in which the object is searched.
 const RISE: f64 = 1.005;
 /// Largest noise that it rises to, in diameters.
@@ -113,7 +116,7 @@ impl Matcher {
         best.filter(Found::is_unmistakable)
     }
 
-    /// Compares a pose with its half turns around the axes of the object frame.
+    /// Compares a pose with those that look like it.
     ///
     /// Returns the most probable pose, and whether another one is as probable. Without a motion,
     /// all are equally probable before the image.
@@ -126,16 +129,18 @@ impl Matcher {
     ) -> Result<(Found, bool), ImageError> {
         let model = Arc::clone(&self.model);
         let mut rivals = vec![found];
-        for axis in [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()] {
-            let turn = UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI);
-            let turned = found.pose
-                * Translation3::from(model.center().coords)
-                * turn
-                * Translation3::from(-model.center().coords);
+        let meters = DIFFERENT_DIAMETERS * model.diameter();
+        let observation = self.observe(depth, mask, &found.pose, meters)?;
+        let problem = Problem::new(&model, &observation);
+        let mut context = self.workspace.context(&problem);
+        let alike = self
+            .look_alikes
+            .list(&mut context, &found.pose, SPACING_DEGREES);
+        let alike: Vec<_> = alike.iter().map(|(_, pose)| *pose).collect();
+        for turned in alike {
             if !self.is_new(&turned, &rivals) {
                 continue;
             }
-            let meters = DIFFERENT_DIAMETERS * model.diameter();
             let observation = self.observe(depth, mask, &turned, meters)?;
             let rival = self.register(&observation, &turned);
             if let Some(rival) = rival.filter(|rival| self.is_new(&rival.pose, &rivals)) {

@@ -7,17 +7,18 @@ use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera, Problem,
 };
 use hicp_icp::{
-    Cascade, IterationLimit, Outcome, SearchOptions, Session, Stage, Verdict, Workspace,
+    Cascade, IterationLimit, LookAlikeCount, Outcome, SearchOptions, Session, Stage, Verdict,
+    Workspace,
 };
 use hicp_raster::Rasterizer;
-use hicp_score::{Confidence, MeanVsd, Score};
+use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
 use super::extent::Extent;
 use super::found::Found;
 use super::motion::{Motion, registered};
 use super::region::Widening;
 use super::rejections::Rejections;
-use crate::presets::{Far, Fit, Search, far, fit, search_with};
+use crate::presets::{Far, Fit, Search, far, fit, look_alikes, search_with};
 
 /// Factor on the deviations of a registration, whose errors are correlated.
 const INFLATION: f64 = 2.0;
@@ -44,6 +45,8 @@ pub(super) struct Matcher {
     /// The same after a stage that also pulls the object along its own surface.
     far: Cascade<(Far, Fit)>,
     pub(super) search: Search,
+    /// Lists the poses that look like a given one.
+    pub(super) look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
     pub(super) workspace: Workspace,
     widening: Widening,
     /// Standard deviation of the depth noise in the images before, in diameters, once measured.
@@ -64,6 +67,7 @@ impl Matcher {
             far: Cascade((far(), near.clone())),
             near,
             search: quick_search(),
+            look_alikes: look_alikes(),
             workspace: Workspace::new(Rasterizer::default()),
             widening: Widening::default(),
             noise: None,
@@ -207,6 +211,7 @@ impl Matcher {
         registered(
             &information,
             &center,
+            &self.extent.displacement(&found.pose),
             scale.max(1e-8),
             [0.005 * radius, 0.005],
             [radius, 1.0],

@@ -2,6 +2,8 @@
 
 use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
 
+use crate::presets::UNDETERMINED;
+
 /// Largest speed (m/s and rad/s) and time constant (seconds).
 const MAX: f64 = 1e3;
 /// Smallest time constant, seconds.
@@ -119,11 +121,14 @@ impl Motion {
 
 /// Returns the covariance of a pose around the object's center from that of its registration.
 ///
-/// `information` is for the twist around the camera's origin. Directions without information get a
-/// large covariance. `scale` is the variance of a residual, and `floor` is added.
+/// `information` is for the twist around the camera's origin, and `displacement` the map from one
+/// around the center to the displacement of the surface. Directions of little information get a
+/// large covariance, because facets of a mesh and noise have some in each direction. `scale` is the
+/// variance of a residual, and `floor` is added.
 pub(super) fn registered(
     information: &Matrix6<f64>,
     center: &Point3<f64>,
+    displacement: &Matrix6<f64>,
     scale: f64,
     floor: [f64; 2],
     unknown: [f64; 2],
@@ -131,8 +136,15 @@ pub(super) fn registered(
     let mut change = Matrix6::identity();
     let arm: Matrix3<f64> = so3::hat(&center.coords);
     change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
+    let information = change.transpose() * information * change;
     let prior = Matrix6::from_diagonal(&squares(unknown).map(|x| 1.0 / x));
-    let information = change.transpose() * information * change / scale + prior;
+    let unit = displacement.try_inverse().unwrap_or_else(Matrix6::identity);
+    let mut eigen = (unit.transpose() * information * unit).symmetric_eigen();
+    let least = UNDETERMINED * eigen.eigenvalues.max();
+    eigen
+        .eigenvalues
+        .apply(|x| *x = if *x < least { 0.0 } else { *x });
+    let information = displacement.transpose() * eigen.recompose() * displacement / scale + prior;
     let covariance = information.try_inverse();
     let floor = Matrix6::from_diagonal(&squares(floor));
     covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
@@ -222,7 +234,8 @@ mod tests {
             let row = joined(&Vector3::z(), &point.cross(&Vector3::z()));
             information += row * row.transpose();
         }
-        let covariance = registered(&information, &at, 1e-6, [0.0; 2], [0.1, 1.0]);
+        let displacement = Matrix6::from_diagonal(&joined(&Vector3::repeat(1.0), &[0.1; 3].into()));
+        let covariance = registered(&information, &at, &displacement, 1e-6, [0.0; 2], [0.1, 1.0]);
         let pose = *motion.pose();
         motion.update(&pose, &covariance);
         let deviations = motion.covariance().diagonal().map(f64::sqrt);

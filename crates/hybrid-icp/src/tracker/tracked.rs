@@ -67,8 +67,9 @@ pub struct Tracked {
     pub evidence: Evidence,
     /// Standard deviation of the least determined displacement of the object, meters.
     ///
-    /// Rotations count by the object's radius, and those around declared axes of symmetry do not
-    /// count. It comes from the motion and the registration, without errors of the model.
+    /// Rotations count by the distance of the surface from their axis, and those around declared
+    /// axes of symmetry do not count. It comes from the motion and the registration, without errors
+    /// of the model.
     pub deviation_meters: f64,
 }
 

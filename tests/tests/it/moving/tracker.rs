@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use hicp_sim::{DepthSensor, Hand, Household, MovingConfig, MovingScene, stream};
-use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, PinholeCamera, se3};
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, Translation3, UnitQuaternion, Vector3, se3,
+};
+use hybrid_icp::score::mssd;
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
 
 const SECONDS: f64 = 1.0 / 30.0;
@@ -91,6 +94,32 @@ fn a_hidden_object_is_lost_and_found_again() {
         assert_eq!(found.state, TrackState::Tracking, "{frame}");
         assert!(shift < 0.03 && angle < 5.0, "{frame}: {shift} {angle}");
     }
+}
+
+#[test]
+fn a_mug_that_turns_with_its_handle_behind_is_doubtful() {
+    let model = Household::Mug.model().unwrap();
+    // The handle is on the axis x of the object, and points away from the camera at 0.
+    let upright =
+        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
+    let pose = |degrees: f64| {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
+        Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), upright * turn)
+    };
+    let points: Vec<_> = model.samples().iter().map(|s| s.point).collect();
+    let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
+    tracker.start(&pose(-30.0));
+    let mut states = Vec::new();
+    for frame in 0..21 {
+        let truth = pose(3.0 * f64::from(frame) - 30.0);
+        let (depth, _) = hicp_tests::render(&model, &camera(), &truth);
+        let tracked = tracker.step(&Arc::new(depth), SECONDS, None).unwrap();
+        let off = mssd(&tracked.camera_from_object, &truth, &points, &[]) / model.diameter();
+        let sure = tracked.state == TrackState::Tracking;
+        assert!(!sure || off < 0.1, "{frame}: {off}");
+        states.push(tracked.state);
+    }
+    assert_eq!(states[20], TrackState::Doubtful);
 }
 
 #[test]

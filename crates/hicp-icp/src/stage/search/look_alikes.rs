@@ -115,26 +115,7 @@ impl<R: Score, C: Score> LookAlikeCount<R, C> {
     /// ranking score for each (at most 143), and the score of five poses. The near symmetries of a
     /// model are found once, in some 10 ms.
     pub fn at(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
-        let Some((model, observation)) = context.problem.sides() else {
-            return 0.0;
-        };
-        self.ranked.clear();
-        let near = NearSymmetries::of(model);
-        let mut undecided = near
-            .undecided(observation, camera_from_object, model.diameter())
-            .peekable();
-        if undecided.peek().is_none() {
-            return 0.0;
-        }
-        let limit = self.ranking.score(context, camera_from_object) + MAX_GAP;
-        for index in undecided {
-            let pose = camera_from_object * near.motion(index);
-            let score = self.ranking.score(context, &pose);
-            if score < limit {
-                self.ranked.insert(score, pose, SCORED, 0.0);
-            }
-        }
-        if self.ranked.poses().is_empty() {
+        if self.list(context, camera_from_object, 0.0).is_empty() {
             return 0.0;
         }
         let own = self.score.score(context, camera_from_object);
@@ -142,5 +123,37 @@ impl<R: Score, C: Score> LookAlikeCount<R, C> {
         others
             .map(|(_, pose)| Alternative::likelihood_of(self.score.score(context, pose) - own))
             .sum()
+    }
+
+    /// Lists the best four poses that look like a given one, with their ranking scores.
+    ///
+    /// They may explain the image as well, and their rotations differ by `spacing_degrees` or more.
+    /// Cost: that of [`LookAlikeCount::at`] without the scores of five poses.
+    pub fn list(
+        &mut self,
+        context: &mut Context<'_>,
+        camera_from_object: &Isometry3<f64>,
+        spacing_degrees: f64,
+    ) -> &[(f64, Isometry3<f64>)] {
+        self.ranked.clear();
+        let Some((model, observation)) = context.problem.sides() else {
+            return self.ranked.poses();
+        };
+        let near = NearSymmetries::of(model);
+        let mut undecided = near
+            .undecided(observation, camera_from_object, model.diameter())
+            .peekable();
+        if undecided.peek().is_none() {
+            return self.ranked.poses();
+        }
+        let limit = self.ranking.score(context, camera_from_object) + MAX_GAP;
+        for index in undecided {
+            let pose = camera_from_object * near.motion(index);
+            let score = self.ranking.score(context, &pose);
+            if score < limit {
+                self.ranked.insert(score, pose, SCORED, spacing_degrees);
+            }
+        }
+        self.ranked.poses()
     }
 }
