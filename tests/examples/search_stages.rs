@@ -4,9 +4,9 @@
 //!
 //! SET is `tuning` or `test` for household objects on a table, and `undeclared` for tuning objects
 //! without their declared symmetries. With `handles`, a nearly round object with a handle stands
-//! alone, and a third of it is hidden; `handles-test` has those that nothing was tuned on. MASK is
-//! `exact`, `dilated`, `soft` or `box`. With the variable FAST, no rivals are computed, and every
-//! case counts as won.
+//! alone, and a third of it is hidden; `handles-test` has those that the search was not tuned on.
+//! MASK is `exact`, `dilated`, `soft` or `box`. With the variable FAST, no rivals are computed, and
+//! every case counts as won.
 //!
 //! The truth *wins* a case if `local` from the truth ends with a score at least 0.02 below that of
 //! every other pose that `local` reaches from 72 even rotations at the centroid of the mask. A pose
@@ -14,10 +14,10 @@
 
 use std::time::Instant;
 
-use hicp_io::{LengthUnit, read_mesh};
 use hicp_sim::{
     CaseConfig, CaseMaker, Corruption, DepthSensor, Household, InitialPose, SimRng, stream,
 };
+use hicp_tests::mugs::public_mugs;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hicp_tests::{camera, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Point3, Problem, Vector3, rotation_grid};
@@ -362,19 +362,10 @@ fn handles(
 ) -> Result<(), Box<dyn std::error::Error>> {
     let mut models = vec![];
     if set == "handles" {
-        models.push(("teapot".to_owned(), Household::Teapot.model()?));
+        models.push(("teapot", Household::Teapot.model()?));
     } else {
-        models.push(("mug".to_owned(), Household::Mug.model()?));
-        let folder =
-            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/meshes");
-        for (path, name) in [
-            ("public_small_20/coffeemug.ply", "coffeemug"),
-            ("public_ycb_ccby4/025_mug.obj", "025_mug"),
-            ("public_ycb_ccby4/019_pitcher_base.obj", "019_pitcher_base"),
-        ] {
-            let mesh = read_mesh(folder.join(path), LengthUnit::Meters)?;
-            models.push((name.to_owned(), Model::new(mesh)));
-        }
+        models.push(("mug", Household::Mug.model()?));
+        models.extend(public_mugs()?);
     }
     let mut maker = CaseMaker::new(CaseConfig::new(camera(), InitialPose::mean_error()))?;
     for seed in seeds {

@@ -1,9 +1,10 @@
 //! Measures the tracker on simulated sequences of moving objects, with noise of 0 to 3 % of the
 //! depth and hands that pass in front.
 //!
-//! `cargo run --release -p hicp-tests --example tracking -- [tuning] [SEQUENCES] [trace]`
+//! `cargo run --release -p hicp-tests --example tracking -- [tuning|mugs] [SEQUENCES] [trace]`
 //!
 //! - `tuning`: the tuning objects instead of the test objects.
+//! - `mugs`: two public mugs and a pitcher, of the shared data.
 //! - `SEQUENCES`: their number, 200 if not given. Every third has no hand, a passing one, and one
 //!   that hides the object for 1 to 3 s.
 //! - `trace`: one line per frame.
@@ -15,6 +16,7 @@ use hicp_sim::{
     ClutterView, DepthNoise, DepthSensor, Hand, Household, MovingConfig, MovingScene,
     RelativeGaussian, Trajectory, perturb, stream,
 };
+use hicp_tests::mugs::public_mugs;
 use hybrid_icp::core::{Isometry3, Mask, Model, Observation, PinholeCamera, Point3};
 use hybrid_icp::score::mssd;
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
@@ -54,15 +56,21 @@ fn main() -> Result<(), Failure> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let has = |word: &str| words.iter().any(|w| w == word);
     let sequences = words.iter().find_map(|w| w.parse().ok()).unwrap_or(200);
-    let objects = if has("tuning") {
-        Household::TUNING
+    let objects = if has("mugs") {
+        public_mugs()?
     } else {
-        Household::TEST
+        let set = if has("tuning") {
+            Household::TUNING
+        } else {
+            Household::TEST
+        };
+        let models = set.map(|object| object.model().map(|model| (object.name(), model)));
+        models.into_iter().collect::<Result<_, _>>()?
     };
-    let models = objects.iter().map(|object| object.model());
+    let (names, models) = objects.into_iter().unzip();
     let bench = Bench {
-        names: objects.iter().map(|object| object.name()).collect(),
-        models: models.collect::<Result<_, _>>()?,
+        names,
+        models,
         camera: PinholeCamera::new(570.0, 570.0, 319.5, 239.5, 640, 480)?,
         trace: has("trace"),
     };

@@ -2,6 +2,7 @@
 
 pub mod allocations;
 pub mod fuzz;
+pub mod mugs;
 pub mod nees;
 pub mod painted;
 pub mod room;

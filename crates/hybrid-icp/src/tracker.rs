@@ -45,8 +45,8 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// image confirms it. If a pose that looks like it is as likely, it stays doubtful until an image
 /// shows the difference.
 ///
-/// Cost of a step while tracking: about that of `hybrid`, including the observation. A step in which
-/// the object is searched costs about 0.1 s, and rarely up to 1 s. Use one tracker per object and
+/// Cost of a step while tracking: about that of `hybrid`, including the observation. A step that
+/// searches for the object costs about 0.1 s, and rarely up to 1 s. Use one tracker per object and
 /// thread.
 ///
 /// ```
