@@ -141,7 +141,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     fn is_bad(&mut self, run: &mut Run<'_, '_>, threshold: f64) -> bool {
         let doubt = self.doubt(run);
         let best = self.found.best();
-        best.is_none_or(|best| doubt * best.score > threshold)
+        best.is_none_or(|best| doubt.max(LEAST_DOUBT) * best.score > threshold)
     }
 
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
@@ -274,6 +274,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
 /// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
 const FIRST: usize = 32;
+/// The doubt in every pose: of those without doubt, some percent are wrong.
+const LEAST_DOUBT: f64 = 0.05;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
 /// Number of distinct poses that the local stage refines, even if one is good enough.

@@ -29,7 +29,8 @@ pub struct SearchOptions {
     /// The product of doubt and score above which the search starts.
     ///
     /// A doubtful pose may still explain the image well, because errors of real sensors raise the
-    /// doubt. At or below the threshold, only poses that look like the local one are tried.
+    /// doubt. A doubt below 0.05 counts as 0.05. At or below the threshold, only poses that look
+    /// like the local one are tried.
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one.
     pub far_threshold: f64,
