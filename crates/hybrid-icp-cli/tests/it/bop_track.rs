@@ -13,7 +13,7 @@ const TRACK: &str = "bop track --dataset set --scene 1 --object 1 --output out.j
 fn moving(images: u32) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let words = format!(
-        "bop generate --scenes 1 --images {images} --instances 3 --seed 2 --moving --out set"
+        "bop generate --scenes 1 --images {images} --instances 3 --seed 6 --moving --out set"
     );
     run(folder.path(), words.split(' ')).exits(0);
     folder
