@@ -122,8 +122,8 @@ impl Motion {
 /// Returns the covariance of a pose around the object's center from that of its registration.
 ///
 /// `information` is for the twist around the camera's origin, and `displacement` the map from one
-/// around the center to the displacement of the surface. Directions of little information get a
-/// large covariance, because facets of a mesh and noise have some in each direction. `scale` is the
+/// around the center to the displacement of the surface. Rotations of little information get a
+/// large covariance, because facets of a mesh and noise have some around each axis. `scale` is the
 /// variance of a residual, and `floor` is added.
 pub(super) fn registered(
     information: &Matrix6<f64>,
@@ -141,9 +141,16 @@ pub(super) fn registered(
     let unit = displacement.try_inverse().unwrap_or_else(Matrix6::identity);
     let mut eigen = (unit.transpose() * information * unit).symmetric_eigen();
     let least = UNDETERMINED * eigen.eigenvalues.max();
-    eigen
+    for (value, direction) in eigen
         .eigenvalues
-        .apply(|x| *x = if *x < least { 0.0 } else { *x });
+        .iter_mut()
+        .zip(eigen.eigenvectors.column_iter())
+    {
+        let is_rotation = direction.fixed_rows::<3>(3).norm_squared() > 0.5;
+        if is_rotation && *value < least {
+            *value = 0.0;
+        }
+    }
     let information = displacement.transpose() * eigen.recompose() * displacement / scale + prior;
     let covariance = information.try_inverse();
     let floor = Matrix6::from_diagonal(&squares(floor));

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use hicp_sim::{DepthSensor, Hand, Household, MovingConfig, MovingScene, stream};
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, PinholeCamera, Translation3, UnitQuaternion, Vector3, se3,
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, Translation3, TriMesh,
+    UnitQuaternion, Vector3, se3,
 };
 use hybrid_icp::score::mssd;
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
@@ -120,6 +121,32 @@ fn a_mug_that_turns_with_its_handle_behind_is_doubtful() {
         states.push(tracked.state);
     }
     assert_eq!(states[20], TrackState::Doubtful);
+}
+
+#[test]
+fn an_object_that_shows_a_flat_side_is_followed() {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [0.1, 0.0, 0.0],
+        [0.0, 0.08, 0.0],
+        [0.0, 0.0, 0.06],
+    ];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let mesh = TriMesh::new(corners.map(Point3::from).to_vec(), triangles).unwrap();
+    let model = Model::new(mesh);
+    let pose = |x| Isometry3::translation(x, 0.0, 0.5);
+    let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
+    tracker.start(&pose(0.0));
+    for frame in 1..4 {
+        let truth = pose(0.004 * f64::from(frame));
+        let (depth, _) = hicp_tests::render(&model, &camera(), &truth);
+        let wall = |z: &f32| if *z > 0.0 { *z } else { 0.8 };
+        let depths = depth.pixels().iter().map(wall).collect();
+        let depth = DepthImage::from_meters(320, 240, depths).unwrap();
+        let tracked = tracker.step(&Arc::new(depth), SECONDS, None).unwrap();
+        let (_, distance) = se3::pose_distance(&tracked.camera_from_object, &truth);
+        assert!(distance < 0.003, "{frame}: {distance}");
+    }
 }
 
 #[test]
