@@ -48,7 +48,7 @@ pub use beyond::{
     Align, ByColor, CloudToModelIcp, Explore, Far, Fit, GatedIcp, HybridVisible, Local, Near,
     Search, auto, by_color, color, estimate_with, hybrid_visible, local, search, search_with,
 };
-pub(crate) use beyond::{UNDETERMINED, far, fit, look_alikes};
+pub(crate) use beyond::{far, fit, look_alikes};
 
 use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};
 use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat};

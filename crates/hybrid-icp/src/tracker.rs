@@ -12,7 +12,7 @@ mod tracked;
 
 use std::sync::Arc;
 
-use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Model, PinholeCamera, se3};
+use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
 use hicp_score::Evidence;
 
 use self::finder::CLEARLY;
@@ -160,14 +160,17 @@ impl Tracker {
         if self.matcher.extent.deviation(&motion) < NEAR_DIAMETERS * diameter {
             found = self.matcher.follow(depth, mask, &motion)?;
         }
-        let mut seen = found.filter(|f| if lost { f.stands_alone() } else { f.explains() });
-        if let Some(found) = &seen {
-            motion.update(&found.pose, &self.matcher.covariance(found));
+        let counts = |f: &Found| if lost { f.stands_alone() } else { f.explains() };
+        let measured = found.filter(|(found, _)| counts(found));
+        if let Some((found, covariance)) = &measured {
+            motion.update(&found.pose, covariance);
         }
+        let found = found.map(|(found, _)| found);
+        let mut seen = measured.map(|(found, _)| found);
         if let Some(found) = seen.filter(|_| self.ambiguous) {
             let (better, ambiguous) = self.matcher.settle(depth, mask, found, None)?;
-            if better.pose != found.pose {
-                (motion, seen) = (self.at(&better), Some(better));
+            if better.0.pose != found.pose {
+                (motion, seen) = (self.at(&better), Some(better.0));
             }
             self.ambiguous = ambiguous;
         }
@@ -183,7 +186,7 @@ impl Tracker {
             let better = |again: &Found| seen.is_none_or(|s| again.merit() > s.merit() + CLEARLY);
             if let Some(again) = again.filter(better) {
                 let (again, ambiguous) = self.matcher.settle(depth, mask, again, Some(&around))?;
-                (motion, seen) = (self.at(&again), Some(again));
+                (motion, seen) = (self.at(&again), Some(again.0));
                 (self.ambiguous, self.without_found) = (ambiguous, Some(around));
                 confirmed = false;
             }
@@ -216,9 +219,9 @@ impl Tracker {
     }
 
     /// Returns the filter after a search that found a pose.
-    fn at(&self, found: &Found) -> Motion {
+    fn at(&self, (found, covariance): &(Found, Matrix6<f64>)) -> Motion {
         let mut motion = self.at_rest(&found.pose, SEARCHED_RADII);
-        motion.update(&found.pose, &self.matcher.covariance(found));
+        motion.update(&found.pose, covariance);
         motion
     }
 

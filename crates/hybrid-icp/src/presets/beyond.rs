@@ -66,9 +66,8 @@ const TAU_DIAMETERS: f32 = 0.25;
 /// θ_max of nearest neighbors, degrees.
 const THETA_DEGREES: f32 = 90.0;
 /// Observability below which a direction stays as it is, relative to the best determined one. Noise
-/// and contours raise that of a can's axis above the default of 0.001. The tracker counts such a
-/// rotation as unknown.
-pub(crate) const UNDETERMINED: f64 = 0.005;
+/// and contours raise that of a can's axis above the default of 0.001.
+const UNDETERMINED: f64 = 0.005;
 
 /// Returns the paper's rules, except that a loss that rises with new pairs is not a divergence.
 fn stop(iterations: usize) -> PaperStop {

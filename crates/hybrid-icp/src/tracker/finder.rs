@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use hicp_core::{
-    DepthImage, ImageError, Isometry3, Mask, Observation, Problem, Translation3, UnitQuaternion,
-    Vector3,
+    DepthImage, ImageError, Isometry3, Mask, Matrix6, Observation, Problem, Translation3,
+    UnitQuaternion, Vector3,
 };
 
 use super::extent::DIFFERENT_DIAMETERS;
@@ -118,15 +118,15 @@ impl Matcher {
 
     /// Compares a pose with those that look like it.
     ///
-    /// Returns the most probable pose, and whether another one is as probable. Without a motion,
-    /// all are equally probable before the image.
+    /// Returns the most probable pose with its covariance, and whether another one is as probable.
+    /// Without a motion, all are equally probable before the image.
     pub(super) fn settle(
         &mut self,
         depth: &Arc<DepthImage>,
         mask: Option<&Mask>,
         found: Found,
         motion: Option<&Motion>,
-    ) -> Result<(Found, bool), ImageError> {
+    ) -> Result<((Found, Matrix6<f64>), bool), ImageError> {
         let model = Arc::clone(&self.model);
         let mut rivals = vec![found];
         let meters = DIFFERENT_DIAMETERS * model.diameter();
@@ -152,7 +152,8 @@ impl Matcher {
         let ambiguous = rivals
             .get(1)
             .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
-        Ok((rivals[0], ambiguous))
+        let covariance = self.covariance(&observation, &rivals[0]);
+        Ok(((rivals[0], covariance), ambiguous))
     }
 
     /// Returns the logarithm of the probability of a pose, up to a constant.

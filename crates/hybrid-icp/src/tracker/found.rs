@@ -20,6 +20,8 @@ const MAX_RISE: f64 = 1.1;
 pub(super) struct Found {
     pub(super) pose: Isometry3<f64>,
     pub(super) quality: Option<Quality>,
+    /// The MVE in the image.
+    pub(super) mve: f64,
     pub(super) evidence: Evidence,
     /// The probability that the pose is right, by the evidence alone.
     confidence: f64,
@@ -37,13 +39,14 @@ impl Found {
     pub(super) fn new(
         pose: Isometry3<f64>,
         quality: Option<Quality>,
-        (evidence, confidence): (Evidence, f64),
+        (mve, evidence, confidence): (f64, Evidence, f64),
         noise: Option<f64>,
     ) -> Self {
         let limit = noise.map_or(f64::INFINITY, |noise| MAX_RISE * noise);
         Self {
             pose,
             quality,
+            mve,
             evidence,
             confidence,
             noise: (evidence.noise / MEDIAN).min(limit),

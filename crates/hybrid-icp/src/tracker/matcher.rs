@@ -13,9 +13,9 @@ use hicp_icp::{
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
-use super::extent::Extent;
+use super::extent::{DIFFERENT_DIAMETERS, Extent};
 use super::found::Found;
-use super::motion::{Motion, registered};
+use super::motion::{Motion, Registered, moved};
 use super::region::Widening;
 use super::rejections::Rejections;
 use crate::presets::{Far, Fit, Search, far, fit, look_alikes, search_with};
@@ -32,6 +32,8 @@ pub(super) const ROUGH_ITERATIONS: usize = 8;
 const ROUGH_DIAMETERS: f64 = 0.05;
 /// Standard deviation of the depth noise before it is measured, in diameters.
 const START_NOISE: f64 = 0.02;
+/// Rise of the score up to which an image does not contradict a move.
+const SAME_SCORE: f64 = 0.03;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
 
@@ -75,13 +77,13 @@ impl Matcher {
         }
     }
 
-    /// Registers the object near its predicted pose.
+    /// Registers the object near its predicted pose. The result has a covariance.
     pub(super) fn follow(
         &mut self,
         depth: &Arc<DepthImage>,
         mask: Option<&Mask>,
         motion: &Motion,
-    ) -> Result<Option<Found>, ImageError> {
+    ) -> Result<Option<(Found, Matrix6<f64>)>, ImageError> {
         let diameter = self.extent.diameter;
         let deviation = self.extent.deviation(motion);
         let meters = (3.0 * deviation + 0.03 * diameter).min(0.3 * diameter);
@@ -115,7 +117,7 @@ impl Matcher {
             let before = self.noise.unwrap_or(measured);
             self.noise = Some(before + 0.2 * (measured - before));
         }
-        Ok(best)
+        Ok(best.map(|found| (found, self.covariance(&observation, &found))))
     }
 
     /// Returns the better of two registrations from a pose.
@@ -194,11 +196,16 @@ impl Matcher {
         let mut context = self.workspace.context(&problem);
         let mve = MeanVsd::default().score(&mut context, &pose);
         let (evidence, confidence) = Confidence::at(&mut context, &pose, mve, 0.0);
-        let judged = (evidence, confidence.probability);
+        let judged = (mve, evidence, confidence.probability);
         Some(Found::new(pose, outcome.quality, judged, self.noise))
     }
 
-    pub(super) fn covariance(&self, found: &Found) -> Matrix6<f64> {
+    /// Returns the covariance of a registered pose around the object's center.
+    ///
+    /// A direction of little information is unknown if the image does not contradict a move by a
+    /// tenth of the diameter in it, because facets of a mesh and noise have some in each one.
+    /// An example is the rotation of a mug whose handle is hidden.
+    pub(super) fn covariance(&mut self, observation: &Observation, found: &Found) -> Matrix6<f64> {
         let radius = self.extent.radius;
         let center = found.pose * self.model.center();
         let (scale, information) = match found.quality {
@@ -208,14 +215,26 @@ impl Matcher {
             ),
             None => (1.0, Matrix6::zeros()),
         };
-        registered(
-            &information,
-            &center,
-            &self.extent.displacement(&found.pose),
-            scale.max(1e-8),
-            [0.005 * radius, 0.005],
-            [radius, 1.0],
-        )
+        let displacement = self.extent.displacement(&found.pose);
+        let mut registered = Registered::new(&information, &center, &displacement);
+        let weak = (0..6).filter_map(|direction| Some((direction, registered.weak(direction)?)));
+        let weak: Vec<_> = weak.collect();
+        if !weak.is_empty() {
+            let meters = DIFFERENT_DIAMETERS * self.extent.diameter;
+            let problem = Problem::new(&self.model, observation);
+            let mut context = self.workspace.context(&problem);
+            let center = self.model.center();
+            for (direction, step) in weak {
+                let mut is_good = |meters: f64| {
+                    let away = moved(&found.pose, &center, &(step * meters));
+                    MeanVsd::default().score(&mut context, &away) < found.mve + SAME_SCORE
+                };
+                if is_good(meters) || is_good(-meters) {
+                    registered.forget(direction);
+                }
+            }
+        }
+        registered.covariance(scale.max(1e-8), [0.005 * radius, 0.005], [radius, 1.0])
     }
 }
 

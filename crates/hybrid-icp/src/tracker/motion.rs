@@ -1,13 +1,14 @@
 //! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
 
+use hicp_core::nalgebra::{Const, SymmetricEigen};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
-
-use crate::presets::UNDETERMINED;
 
 /// Largest speed (m/s and rad/s) and time constant (seconds).
 const MAX: f64 = 1e3;
 /// Smallest time constant, seconds.
 const MIN_SECONDS: f64 = 1e-3;
+/// Information of a direction, relative to the best determined one, that is little.
+const WEAK: f64 = 0.01;
 
 /// A filter over the pose and the velocity of an object, in the camera frame.
 ///
@@ -111,50 +112,79 @@ impl Motion {
 
     /// Moves the center and rotates the object around it.
     fn apply(&mut self, step: &Vector6<f64>) {
-        let center = self.center() + step.fixed_rows::<3>(0);
-        let mut rotation = so3::exp(&step.fixed_rows::<3>(3).into_owned()) * self.pose.rotation;
-        rotation.renormalize();
-        let shift = center - rotation * self.center;
-        self.pose = Isometry3::from_parts(Translation3::from(shift), rotation);
+        self.pose = moved(&self.pose, &self.center, step);
     }
 }
 
-/// Returns the covariance of a pose around the object's center from that of its registration.
-///
-/// `information` is for the twist around the camera's origin, and `displacement` the map from one
-/// around the center to the displacement of the surface. Rotations of little information get a
-/// large covariance, because facets of a mesh and noise have some around each axis. `scale` is the
-/// variance of a residual, and `floor` is added.
-pub(super) fn registered(
-    information: &Matrix6<f64>,
-    center: &Point3<f64>,
-    displacement: &Matrix6<f64>,
-    scale: f64,
-    floor: [f64; 2],
-    unknown: [f64; 2],
-) -> Matrix6<f64> {
-    let mut change = Matrix6::identity();
-    let arm: Matrix3<f64> = so3::hat(&center.coords);
-    change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
-    let information = change.transpose() * information * change;
-    let prior = Matrix6::from_diagonal(&squares(unknown).map(|x| 1.0 / x));
-    let unit = displacement.try_inverse().unwrap_or_else(Matrix6::identity);
-    let mut eigen = (unit.transpose() * information * unit).symmetric_eigen();
-    let least = UNDETERMINED * eigen.eigenvalues.max();
-    for (value, direction) in eigen
-        .eigenvalues
-        .iter_mut()
-        .zip(eigen.eigenvectors.column_iter())
-    {
-        let is_rotation = direction.fixed_rows::<3>(3).norm_squared() > 0.5;
-        if is_rotation && *value < least {
-            *value = 0.0;
+/// The information of a registration, around the object's center.
+pub(super) struct Registered {
+    /// Information in displacements of the surface, by direction.
+    eigen: SymmetricEigen<f64, Const<6>>,
+    /// The map from a displacement of the pose to one of the surface, and its inverse.
+    displacement: Matrix6<f64>,
+    unit: Matrix6<f64>,
+}
+
+impl Registered {
+    /// Changes the information of a registration to the object's center.
+    ///
+    /// `information` is for the twist around the camera's origin, and `displacement` the map from
+    /// one around the center to the displacement of the surface.
+    pub(super) fn new(
+        information: &Matrix6<f64>,
+        center: &Point3<f64>,
+        displacement: &Matrix6<f64>,
+    ) -> Self {
+        let mut change = Matrix6::identity();
+        let arm: Matrix3<f64> = so3::hat(&center.coords);
+        change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
+        let unit = displacement.try_inverse().unwrap_or_else(Matrix6::identity);
+        let change = change * unit;
+        Self {
+            eigen: (change.transpose() * information * change).symmetric_eigen(),
+            displacement: *displacement,
+            unit,
         }
     }
-    let information = displacement.transpose() * eigen.recompose() * displacement / scale + prior;
-    let covariance = information.try_inverse();
-    let floor = Matrix6::from_diagonal(&squares(floor));
-    covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
+
+    /// Returns a direction of little information, as the displacement of the pose that moves the
+    /// surface by 1 m.
+    pub(super) fn weak(&self, direction: usize) -> Option<Vector6<f64>> {
+        let values = &self.eigen.eigenvalues;
+        let is_weak = values[direction] < WEAK * values.max();
+        is_weak.then(|| self.unit * self.eigen.eigenvectors.column(direction))
+    }
+
+    /// Counts a direction as unknown.
+    pub(super) fn forget(&mut self, direction: usize) {
+        self.eigen.eigenvalues[direction] = 0.0;
+    }
+
+    /// Returns the covariance of the pose.
+    ///
+    /// Directions without information get a large one. `scale` is the variance of a residual, and
+    /// `floor` is added.
+    pub(super) fn covariance(self, scale: f64, floor: [f64; 2], unknown: [f64; 2]) -> Matrix6<f64> {
+        let prior = Matrix6::from_diagonal(&squares(unknown).map(|x| 1.0 / x));
+        let information = self.eigen.recompose() / scale;
+        let information = self.displacement.transpose() * information * self.displacement + prior;
+        let floor = Matrix6::from_diagonal(&squares(floor));
+        let covariance = information.try_inverse();
+        covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
+    }
+}
+
+/// Moves the object's center by a displacement, and rotates the object around it.
+pub(super) fn moved(
+    pose: &Isometry3<f64>,
+    center: &Point3<f64>,
+    step: &Vector6<f64>,
+) -> Isometry3<f64> {
+    let at = pose * center + step.fixed_rows::<3>(0);
+    let mut rotation = so3::exp(&step.fixed_rows::<3>(3).into_owned()) * pose.rotation;
+    rotation.renormalize();
+    let shift = at - rotation * center;
+    Isometry3::from_parts(Translation3::from(shift), rotation)
 }
 
 /// Returns the displacement from pose `b` to pose `a` around an object's center.
@@ -242,7 +272,8 @@ mod tests {
             information += row * row.transpose();
         }
         let displacement = Matrix6::from_diagonal(&joined(&Vector3::repeat(1.0), &[0.1; 3].into()));
-        let covariance = registered(&information, &at, &displacement, 1e-6, [0.0; 2], [0.1, 1.0]);
+        let registered = Registered::new(&information, &at, &displacement);
+        let covariance = registered.covariance(1e-6, [0.0; 2], [0.1, 1.0]);
         let pose = *motion.pose();
         motion.update(&pose, &covariance);
         let deviations = motion.covariance().diagonal().map(f64::sqrt);
