@@ -19,6 +19,8 @@ pub(crate) struct Found {
 
 /// The score that outweighs a doubt of 1.
 const DOUBT_WEIGHT: f64 = 0.1;
+/// The doubt in every pose: of those without doubt, some percent are wrong.
+pub(crate) const LEAST_DOUBT: f64 = 0.05;
 
 impl Found {
     /// Returns the doubt; 1 if it is not known.
@@ -35,8 +37,10 @@ impl Found {
     }
 
     /// Returns whether the cost is lower by a gain, and neither score nor doubt is higher.
+    ///
+    /// A doubt up to [`LEAST_DOUBT`] never counts as higher.
     pub(crate) fn beats(&self, other: &Self, gain: f64) -> bool {
-        let worse = self.score > other.score || self.doubt() > other.doubt();
+        let worse = self.score > other.score || self.doubt() > other.doubt().max(LEAST_DOUBT);
         !worse && self.cost() < other.cost() - gain
     }
 }
@@ -135,6 +139,9 @@ mod tests {
         assert!(found(0.21, 0.3).beats(&local, 0.1));
         assert!(!found(0.1, 0.6).beats(&local, 0.1));
         assert!(!found(0.31, 0.0).beats(&local, 0.0));
+        // A doubt is not exact to a few percent.
+        assert!(found(0.1, 0.04).beats(&found(0.3, 0.01), 0.1));
+        assert!(!found(0.1, 0.06).beats(&found(0.3, 0.01), 0.1));
         // An unknown doubt is the largest.
         let unknown = Found {
             doubt: None,

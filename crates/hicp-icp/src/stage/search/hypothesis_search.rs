@@ -6,7 +6,7 @@ use hicp_score::Score;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
-use crate::stage::search::found::{Found, FoundPoses};
+use crate::stage::search::found::{Found, FoundPoses, LEAST_DOUBT};
 use crate::stage::search::hypotheses::Hypotheses;
 use crate::stage::search::look_alikes::LookAlikes;
 use crate::stage::search::options::{SearchOptions, Start};
@@ -144,6 +144,11 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         best.is_none_or(|best| doubt.max(LEAST_DOUBT) * best.score > threshold)
     }
 
+    /// Returns whether no further poses are needed.
+    fn is_good(&mut self, run: &mut Run<'_, '_>, threshold: f64) -> bool {
+        self.doubt(run) <= self.options.good_enough && !self.is_bad(run, threshold)
+    }
+
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
     fn rank(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.ranked.clear();
@@ -207,7 +212,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     }
 
     /// Searches the whole range for poses.
-    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
+    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>, threshold: f64) {
         self.rank(run, local);
         let ranked = std::mem::take(&mut self.ranked);
         let poses = ranked.poses();
@@ -218,23 +223,23 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         self.aligned.clear();
         self.align(run, &poses[..first], kept);
         self.try_best(run);
-        if self.doubt(run) > options.good_enough {
+        if !self.is_good(run, threshold) {
             self.align(run, &poses[first..most], kept);
-            self.explore(run, options.good_enough);
+            self.explore(run, Some(threshold));
             if options.widens && self.is_bad(run, options.threshold.max(FAILED)) {
                 self.aligned.clear();
                 self.align(run, poses, (2 * kept.0, 0.5 * kept.1));
-                self.explore(run, options.good_enough);
+                self.explore(run, Some(threshold));
             }
         }
         self.ranked = ranked;
     }
 
     /// Refines the aligned poses at low cost, until one is good enough.
-    fn explore(&mut self, run: &mut Run<'_, '_>, enough: f64) {
+    fn explore(&mut self, run: &mut Run<'_, '_>, threshold: Option<f64>) {
         let aligned = std::mem::take(&mut self.aligned);
         for (_, start) in aligned.poses() {
-            if run.is_over() || self.doubt(run) <= enough {
+            if run.is_over() || threshold.is_some_and(|limit| self.is_good(run, limit)) {
                 break;
             }
             if self.explored.contains(start) {
@@ -274,8 +279,6 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
 /// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
 const FIRST: usize = 32;
-/// The doubt in every pose: of those without doubt, some percent are wrong.
-const LEAST_DOUBT: f64 = 0.05;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
 /// Number of distinct poses that the local stage refines, even if one is good enough.
@@ -335,7 +338,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         let from = self.found.cheapest();
         let bad = self.is_bad(&mut run, threshold);
         if bad {
-            self.search(&mut run, &pose);
+            self.search(&mut run, &pose, threshold);
         }
         if let Some(best) = self.found.best().copied() {
             let bad = self.is_bad(&mut run, threshold);
@@ -346,7 +349,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             let kept = (self.options.refined, self.options.spacing_degrees);
             self.align(&mut run, listed.poses(), kept);
             self.alike = alike;
-            self.explore(&mut run, f64::NEG_INFINITY);
+            self.explore(&mut run, None);
         }
         self.finish(&mut run);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));

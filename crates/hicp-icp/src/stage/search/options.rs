@@ -34,7 +34,8 @@ pub struct SearchOptions {
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one.
     pub far_threshold: f64,
-    /// The doubt at which no further hypotheses are refined.
+    /// The doubt at which no further hypotheses are refined, unless the score still starts a
+    /// search.
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
