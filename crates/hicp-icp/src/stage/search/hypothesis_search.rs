@@ -145,8 +145,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     }
 
     /// Returns whether no further poses are needed.
-    fn is_good(&mut self, run: &mut Run<'_, '_>, threshold: f64) -> bool {
-        self.doubt(run) <= self.options.good_enough && !self.is_bad(run, threshold)
+    fn is_good(&mut self, run: &mut Run<'_, '_>) -> bool {
+        self.doubt(run) <= self.options.good_enough && !self.is_bad(run, UNEXPLAINED)
     }
 
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
@@ -212,7 +212,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     }
 
     /// Searches the whole range for poses.
-    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>, threshold: f64) {
+    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.rank(run, local);
         let ranked = std::mem::take(&mut self.ranked);
         let poses = ranked.poses();
@@ -223,23 +223,23 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         self.aligned.clear();
         self.align(run, &poses[..first], kept);
         self.try_best(run);
-        if !self.is_good(run, threshold) {
+        if !self.is_good(run) {
             self.align(run, &poses[first..most], kept);
-            self.explore(run, Some(threshold));
+            self.explore(run, true);
             if options.widens && self.is_bad(run, options.threshold.max(FAILED)) {
                 self.aligned.clear();
                 self.align(run, poses, (2 * kept.0, 0.5 * kept.1));
-                self.explore(run, Some(threshold));
+                self.explore(run, true);
             }
         }
         self.ranked = ranked;
     }
 
-    /// Refines the aligned poses at low cost, until one is good enough.
-    fn explore(&mut self, run: &mut Run<'_, '_>, threshold: Option<f64>) {
+    /// Refines the aligned poses at low cost, and ends at a good one if asked to.
+    fn explore(&mut self, run: &mut Run<'_, '_>, ends: bool) {
         let aligned = std::mem::take(&mut self.aligned);
         for (_, start) in aligned.poses() {
-            if run.is_over() || threshold.is_some_and(|limit| self.is_good(run, limit)) {
+            if run.is_over() || ends && self.is_good(run) {
                 break;
             }
             if self.explored.contains(start) {
@@ -279,6 +279,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
 /// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
 const FIRST: usize = 32;
+/// Product of doubt and score above which even a confident pose is not good enough: a score of 0.1.
+const UNEXPLAINED: f64 = 0.005;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
 /// Number of distinct poses that the local stage refines, even if one is good enough.
@@ -338,7 +340,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         let from = self.found.cheapest();
         let bad = self.is_bad(&mut run, threshold);
         if bad {
-            self.search(&mut run, &pose, threshold);
+            self.search(&mut run, &pose);
         }
         if let Some(best) = self.found.best().copied() {
             let bad = self.is_bad(&mut run, threshold);
@@ -349,7 +351,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             let kept = (self.options.refined, self.options.spacing_degrees);
             self.align(&mut run, listed.poses(), kept);
             self.alike = alike;
-            self.explore(&mut run, None);
+            self.explore(&mut run, false);
         }
         self.finish(&mut run);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));

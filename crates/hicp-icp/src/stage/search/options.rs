@@ -34,8 +34,7 @@ pub struct SearchOptions {
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one.
     pub far_threshold: f64,
-    /// The doubt at which no further hypotheses are refined, unless the score still starts a
-    /// search.
+    /// The doubt at which no further hypotheses are refined, unless the score is above 0.1.
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
