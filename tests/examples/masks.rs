@@ -32,6 +32,8 @@ type Failure = Box<dyn std::error::Error>;
 #[derive(Clone, Default)]
 struct Results {
     failed: Vec<bool>,
+    /// Errors of the right poses, percent of the diameter.
+    errors: Vec<f64>,
     milliseconds: Vec<f64>,
 }
 
@@ -86,7 +88,11 @@ impl Study {
                 let time = start.elapsed().as_secs_f64() * 1e3;
                 results[index].milliseconds.push(time);
                 let mssd = points.mssd(&refined.outcome.camera_from_object, truth);
-                results[index].failed.push(mssd > 0.1 * model.diameter());
+                let error = 100.0 * mssd / model.diameter();
+                results[index].failed.push(error > 10.0);
+                results[index]
+                    .errors
+                    .extend(Some(error).filter(|error| *error <= 10.0));
             }
         }
         Ok(())
@@ -96,9 +102,9 @@ impl Study {
         println!("{} cases per kind of mask.\n", self.done);
         for (name, _, results) in &self.refiners {
             println!(
-                "| `{name}`: mask | failed % | difference, points, 95 % | ms | time ratio | score of the true pose |"
+                "| `{name}`: mask | failed % | difference, points, 95 % | error of the right poses, % of d | ms | time ratio | score of the true pose |"
             );
-            println!("|---|---:|---:|---:|---:|---:|");
+            println!("|---|---:|---:|---:|---:|---:|---:|");
             let exact = &results[0];
             let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
             for (index, results) in results.iter().enumerate() {
@@ -113,9 +119,10 @@ impl Study {
                 let failed = results.failed.iter().filter(|failed| **failed).count();
                 let time = mean(&results.milliseconds);
                 println!(
-                    "| {} | {:.2} | {difference:+.2} ± {half:.2} | {time:.2} | {:.2} | {:.3} |",
+                    "| {} | {:.2} | {difference:+.2} ± {half:.2} | {:.2} | {time:.2} | {:.2} | {:.3} |",
                     MaskKind::ALL[index].name(),
                     100.0 * failed as f64 / n,
+                    mean(&results.errors),
                     time / mean(&exact.milliseconds),
                     median(&mut self.scores[index]),
                 );

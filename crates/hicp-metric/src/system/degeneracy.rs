@@ -25,6 +25,15 @@ pub enum Degeneracy {
     ///
     /// It is the solution remapping of Zhang, Kaess & Singh 2016.
     Freeze,
+    /// No rotation around degenerate axes, and the translations that minimize the loss without it.
+    ///
+    /// An axis is degenerate if the information about the rotation, at the best translations, is at
+    /// most a threshold times the largest eigenvalue. A translation stays only at 10⁻⁴ or less.
+    ///
+    /// It suits pairs of a surface and its silhouette. Noise and facets give some information about
+    /// rotations that nothing determines, such as that of a can around its axis. A silhouette
+    /// often has no more information about the translation of a flat side, but that determines it.
+    FreezeRotations,
     /// No step if a direction is degenerate, otherwise the undamped step.
     Refuse,
     /// The undamped step for every threshold; no step if the matrix is singular.

@@ -1,6 +1,6 @@
 //! Solutions of the normal equations.
 
-use hicp_core::{Isometry3, Matrix6, Vector6, se3};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Vector6, se3};
 use nalgebra::SymmetricEigen;
 
 use crate::system::degeneracy::Degeneracy;
@@ -13,6 +13,8 @@ use crate::system::normal_equations::NormalEquations;
 const DAMPING: f64 = 1e-6;
 /// Smallest diagonal entry for Marquardt's damping, as a share of the mean.
 const DIAGONAL_FLOOR: f64 = 1e-6;
+/// Share of the largest eigenvalue at which [`Degeneracy::FreezeRotations`] freezes a translation.
+const LEAST_SHIFT: f64 = 1e-4;
 /// Largest number of eigenvalue iterations: more than any 6×6 matrix needs.
 const EIGEN_ITERATIONS: usize = 1000;
 
@@ -72,6 +74,7 @@ impl NormalEquations {
         let y = match self.policy {
             Degeneracy::Damp => self.factored(DAMPING * mean_diagonal, lambda)?,
             Degeneracy::Freeze => self.remapped(lambda)?,
+            Degeneracy::FreezeRotations => self.marginalized(lambda)?,
             Degeneracy::Refuse if self.is_degenerate()? => return None,
             Degeneracy::Refuse | Degeneracy::Ignore => self.factored(0.0, lambda)?,
         };
@@ -144,6 +147,33 @@ impl NormalEquations {
         Some(y)
     }
 
+    /// Returns the unknowns without degenerate rotations, with the translations that they leave.
+    fn marginalized(&self, lambda: f64) -> Option<Vector6<f64>> {
+        let (hessian, gradient) = reduce(
+            &self.basis(),
+            &self.scaled_hessian(),
+            &self.scaled_gradient(),
+        );
+        let largest = eigen(hessian)?.eigenvalues.max().max(0.0);
+        let limit = self.threshold.max(0.0) * largest;
+        let both = hessian.fixed_view::<3, 3>(0, 3);
+        let (of_shift, of_turn) = (gradient.fixed_rows::<3>(0), gradient.fixed_rows::<3>(3));
+        let shifts = inverse_above(
+            hessian.fixed_view::<3, 3>(0, 0).into_owned(),
+            limit.min(LEAST_SHIFT * largest),
+        )?;
+        let marginal = hessian.fixed_view::<3, 3>(3, 3) - both.transpose() * shifts * both;
+        let turns = inverse_above(marginal, limit)?;
+        let turn = turns * (both.transpose() * shifts * of_shift - of_turn);
+        let shift = -shifts * (of_shift + both * turn);
+        let mut y = Vector6::zeros();
+        y.fixed_rows_mut::<3>(0).copy_from(&shift);
+        y.fixed_rows_mut::<3>(3).copy_from(&turn);
+        y /= 1.0 + lambda;
+        self.clear_held(&mut y);
+        Some(y)
+    }
+
     /// Returns whether a direction that is not frozen is degenerate.
     fn is_degenerate(&self) -> Option<bool> {
         let (hessian, _) = reduce(
@@ -197,4 +227,12 @@ pub(crate) fn eigen(matrix: Matrix6<f64>) -> Option<SymmetricEigen<f64, nalgebra
         });
     }
     SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS)
+}
+
+/// Returns the inverse of a symmetric matrix in the directions whose eigenvalue is above a limit.
+fn inverse_above(matrix: Matrix3<f64>, limit: f64) -> Option<Matrix3<f64>> {
+    let mut eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS)?;
+    let inverse = |value: f64| if value > limit { 1.0 / value } else { 0.0 };
+    eigen.eigenvalues = eigen.eigenvalues.map(inverse);
+    Some(eigen.recompose())
 }

@@ -2,7 +2,7 @@
 
 use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel};
 use hicp_core::Iteration;
-use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Surfel, Vector3};
+use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Surfel, Vector3, Vector6};
 use hicp_metric::Minimize;
 use hicp_metric::{Conditioned, Degeneracy, NormalEquations, PointToPlane, PointToPoint};
 
@@ -136,7 +136,8 @@ fn nothing_slides_along_a_plane() {
         let motion = numbers.motion(&center(), 100.0, 0.2);
         let (pairs, normal) = lifted(&mut numbers, &motion);
         let middle = motion * center();
-        for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
+        let freezing = [Degeneracy::Freeze, Degeneracy::FreezeRotations];
+        for policy in [Degeneracy::Damp].into_iter().chain(freezing) {
             let step = conditioned(PointToPlane, policy)
                 .minimize(&Iteration::default(), &pairs)
                 .unwrap();
@@ -190,7 +191,12 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     let expected = conditioned(PointToPlane, Degeneracy::Ignore)
         .minimize(&Iteration::default(), &pairs)
         .unwrap();
-    for policy in [Degeneracy::Damp, Degeneracy::Freeze, Degeneracy::Refuse] {
+    for policy in [
+        Degeneracy::Damp,
+        Degeneracy::Freeze,
+        Degeneracy::FreezeRotations,
+        Degeneracy::Refuse,
+    ] {
         let step = conditioned(PointToPlane, policy)
             .minimize(&Iteration::default(), &pairs)
             .unwrap();
@@ -214,6 +220,44 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     );
     let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
     assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
+}
+
+/// Little information moves a plate sideways, but does not turn it.
+#[test]
+fn weak_translations_are_solved_without_weak_rotations() {
+    let mut numbers = Numbers(87);
+    let plate = at_rest(&plane(&mut numbers));
+    let mut system = PointToPlane.system(&Iteration::default(), &plate).unwrap();
+    // A thousandth of the information of the 200 points about their distance.
+    let edge = 0.2_f64.sqrt();
+    // Two edges across x on one side of the center, and one across y.
+    for (x, y, normal) in [
+        (0.1, 0.08, Vector3::x()),
+        (0.1, 0.02, Vector3::x()),
+        (0.0, 0.1, Vector3::y()),
+    ] {
+        let point = center() + Vector3::new(x, y, 0.0);
+        system.add_row(&point, &(normal * edge), 0.003 * edge, 1.0);
+    }
+    let step = |policy| system.solve_with(policy, 5e-3).unwrap();
+    let (shift, still) = (step(Degeneracy::FreezeRotations), step(Degeneracy::Freeze));
+    assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-9);
+    let moved = shift * center() - center();
+    assert!(
+        (moved.x.abs() - 0.003).abs() < 1e-9 && (moved.y.abs() - 0.003).abs() < 1e-9,
+        "{moved}"
+    );
+    assert!(shift.rotation.angle() < 1e-9, "{}", shift.rotation.angle());
+    // Below the information of the rotation, nothing stays.
+    let pulled = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.01);
+    system.add_twist(&pulled, &Matrix6::identity(), &(Matrix6::identity() * 1e-2));
+    let all = system
+        .solve_with(Degeneracy::FreezeRotations, 1e-6)
+        .unwrap();
+    let same = system.solve_with(Degeneracy::Ignore, 0.0).unwrap();
+    let (angle, distance) = crate::scenes::difference(&all, &same);
+    assert!(angle < 1e-9 && distance < 1e-9, "{angle} {distance}");
+    assert!(all.rotation.angle() > 1e-4, "{}", all.rotation.angle());
 }
 
 /// The threshold is a share of the largest eigenvalue. Above 1 all directions are degenerate; at 0,
@@ -272,6 +316,7 @@ fn numbers_that_are_not_finite_give_none() {
     for policy in [
         Degeneracy::Damp,
         Degeneracy::Freeze,
+        Degeneracy::FreezeRotations,
         Degeneracy::Refuse,
         Degeneracy::Ignore,
     ] {

@@ -18,6 +18,7 @@ fn the_policy_of_a_system_applies_to_its_solution() {
     for policy in [
         Degeneracy::Damp,
         Degeneracy::Freeze,
+        Degeneracy::FreezeRotations,
         Degeneracy::Refuse,
         Degeneracy::Ignore,
     ] {

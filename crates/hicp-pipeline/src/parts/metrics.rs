@@ -115,6 +115,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             Kaess & Singh 2016. Cost: the metric and a 6×6 eigendecomposition.";
         let policies = [
             ("freeze", Degeneracy::Freeze),
+            ("freeze-rotations", Degeneracy::FreezeRotations),
             ("damp", Degeneracy::Damp),
             ("refuse", Degeneracy::Refuse),
             ("ignore", Degeneracy::Ignore),

@@ -178,7 +178,11 @@ fn robust_metrics_keep_the_laws() {
 #[test]
 fn decorated_metrics_keep_the_laws() {
     let all = MetricLaws::default();
-    for policy in [Degeneracy::Damp, Degeneracy::Freeze] {
+    for policy in [
+        Degeneracy::Damp,
+        Degeneracy::Freeze,
+        Degeneracy::FreezeRotations,
+    ] {
         let conditioned = || Conditioned {
             metric: PointToPlane,
             policy,

@@ -13,7 +13,7 @@ use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
     IterationLimit, LookAlikeCount, Repeat, SearchOptions, Start,
 };
-use hicp_metric::{Conditioned, Photometric, PointToPlane, PointToPoint, Symmetric};
+use hicp_metric::{Conditioned, Degeneracy, Photometric, PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{Doubt, MeanVsd, SampledMve};
 use hicp_switch::{PAPER_ALPHA, Switch, SwitchUntilStall, Threshold};
 
@@ -166,8 +166,9 @@ pub(crate) fn fit() -> Fit {
         association: (RenderedSurface::default(), Contour::default()),
         filter: (),
         metric: Conditioned {
+            metric: PointToPlane,
+            policy: Degeneracy::FreezeRotations,
             threshold: UNDETERMINED,
-            ..Conditioned::default()
         },
         stop: (Convergence::default(), IterationLimit(8)),
     }

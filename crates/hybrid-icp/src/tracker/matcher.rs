@@ -10,6 +10,7 @@ use hicp_icp::{
     Cascade, IterationLimit, LookAlikeCount, Outcome, SearchOptions, Session, Stage, Verdict,
     Workspace,
 };
+use hicp_metric::Degeneracy;
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
@@ -62,6 +63,8 @@ impl Matcher {
         let mut near = fit();
         near.association.0.stride = Stride::AboutPoints(POINTS);
         near.association.1.lines = LINES;
+        // The far stage follows flat sides that move sideways.
+        near.metric.policy = Degeneracy::Freeze;
         Self {
             extent: Extent::new(&model),
             model,

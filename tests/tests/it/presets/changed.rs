@@ -14,7 +14,7 @@ use hybrid_icp::{Preset, Refiner, presets};
 fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let mut rng = rng(31);
     let scene = scene(Household::Mug, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.05, 0.8);
+    let init = perturb(&mut rng, &scene.truth, 0.05, 1.5);
     let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
     // Without it, a sure pose would end the preset before the steps.
     file.set("stages.1.switcher.alpha=0").unwrap();
