@@ -263,7 +263,6 @@ fn poses_that_look_the_same_are_ambiguous_unless_declared() {
     assert!(!ambiguous(Preset::Local, &undeclared));
 }
 
-/// Without a near initial pose, each pose that looks the same may be the right one.
 #[test]
 fn a_flat_side_is_shifted_to_its_silhouette() {
     let scene = scene(Household::Carton, 0.0, &mut rng(7));
@@ -273,6 +272,8 @@ fn a_flat_side_is_shifted_to_its_silhouette() {
     assert!(distance < 1e-3, "{distance}");
 }
 
+/// Without a near initial pose, each pose that looks the same may be the right one. With one, they
+/// do not count.
 #[test]
 fn poses_that_look_the_same_lower_the_confidence_unless_declared() {
     let scene = scene(Household::Plate, 0.3, &mut rng(5));
