@@ -116,7 +116,7 @@ impl NormalEquations {
         if self.freedom.is_none() {
             return Some(hessian.cholesky()?.solve(&-self.scaled_gradient()));
         }
-        let (mut reduced, gradient) = reduce(&self.basis(), &hessian, &self.scaled_gradient());
+        let (mut reduced, gradient) = self.reduced(&hessian);
         self.fill_held(&mut reduced);
         let mut y = reduced.cholesky()?.solve(&-gradient);
         self.clear_held(&mut y);
@@ -125,11 +125,7 @@ impl NormalEquations {
 
     /// Returns the unknowns from an eigendecomposition without the degenerate directions.
     fn remapped(&self, lambda: f64) -> Option<Vector6<f64>> {
-        let (hessian, gradient) = reduce(
-            &self.basis(),
-            &self.scaled_hessian(),
-            &self.scaled_gradient(),
-        );
+        let (hessian, gradient) = self.reduced(&self.scaled_hessian());
         let eigen = eigen(hessian)?;
         let limit = self.threshold.max(0.0) * eigen.eigenvalues.max().max(0.0);
         let mut y = Vector6::zeros();
@@ -149,11 +145,7 @@ impl NormalEquations {
 
     /// Returns the unknowns without degenerate rotations, with the translations that they leave.
     fn marginalized(&self, lambda: f64) -> Option<Vector6<f64>> {
-        let (hessian, gradient) = reduce(
-            &self.basis(),
-            &self.scaled_hessian(),
-            &self.scaled_gradient(),
-        );
+        let (hessian, gradient) = self.reduced(&self.scaled_hessian());
         let largest = eigen(hessian)?.eigenvalues.max().max(0.0);
         let limit = self.threshold.max(0.0) * largest;
         let both = hessian.fixed_view::<3, 3>(0, 3);
@@ -176,15 +168,16 @@ impl NormalEquations {
 
     /// Returns whether a direction that is not frozen is degenerate.
     fn is_degenerate(&self) -> Option<bool> {
-        let (hessian, _) = reduce(
-            &self.basis(),
-            &self.scaled_hessian(),
-            &self.scaled_gradient(),
-        );
+        let (hessian, _) = self.reduced(&self.scaled_hessian());
         let eigen = eigen(hessian)?;
         let limit = self.threshold.max(0.0) * eigen.eigenvalues.max();
         let determined = eigen.eigenvalues.iter().filter(|v| **v > limit).count();
         Some(determined < self.n_free())
+    }
+
+    /// Returns a matrix and the gradient without the frozen unknowns.
+    fn reduced(&self, hessian: &Matrix6<f64>) -> (Matrix6<f64>, Vector6<f64>) {
+        reduce(&self.basis(), hessian, &self.scaled_gradient())
     }
 
     /// Applies Marquardt's damping relative to each diagonal entry.

@@ -171,7 +171,7 @@ fn the_result_has_every_warning() {
 fn a_trace_is_replayed_to_the_last_digit() {
     let scene = Scene::new()
         .with("--trace", "trace.jsonl")
-        .with("--set", "stage.stages.1.misaligned.stages.0.max_steps=2");
+        .with("--set", "stage.stages.1.misaligned.stages.1.max_steps=2");
     scene.result();
     let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
     let printed = replay().exits(0).out;

@@ -6,7 +6,7 @@
 //! `docs/presets.md` states the effect of each change.
 
 use hicp_association::{
-    AllSamples, Contour, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel,
+    AllSamples, Contour, Length, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel,
     Projective, RenderedSurface, Stride, UniformCount, VisibleSurface,
 };
 use hicp_icp::{
@@ -43,14 +43,12 @@ pub type Fit = Icp<
     Conditioned<PointToPlane>,
     (Convergence, IterationLimit),
 >;
+/// The steps of [`local`] from doubtful poses.
+pub type Steps = SwitchUntilStall<MeanVsd, Cascade<(Near, Fit)>, Cascade<(Far, Fit)>>;
 /// The type of [`local`].
 pub type Local = Cascade<(
     Guard<Fit, MeanVsd>,
-    Switch<
-        Threshold<Doubt>,
-        Cascade<()>,
-        Cascade<(SwitchUntilStall<MeanVsd, Near, Far>, Guard<Fit, MeanVsd>)>,
-    >,
+    Switch<Threshold<Doubt>, Cascade<()>, Cascade<(Guard<Fit, MeanVsd>, Steps)>>,
 )>;
 /// The stage that aligns hypotheses.
 pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
@@ -63,6 +61,14 @@ pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd, D
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
+/// Largest difference of depth in a fit, as a fraction of the diameter. With twice as much, a
+/// surface beside the object can pull a good pose away within the iterations of one fit.
+const FIT_DIAMETERS: f32 = 0.12;
+/// The same in the wide fit of doubtful poses, which may be farther from the surface.
+const WIDE_DIAMETERS: f32 = 0.25;
+/// Number of iterations of a fit, and of one that ends a step.
+const FIT_ITERATIONS: usize = 8;
+const STEP_FIT_ITERATIONS: usize = 4;
 /// θ_max of nearest neighbors, degrees.
 const THETA_DEGREES: f32 = 90.0;
 /// Observability below which a direction stays as it is, relative to the best determined one. Noise
@@ -159,25 +165,35 @@ pub fn hybrid_visible() -> HybridVisible {
 
 /// Creates the stage that fits the rendered surface and its silhouette to the image.
 ///
-/// Directions that the image does not determine stay as they are.
-pub(crate) fn fit() -> Fit {
+/// Depths that differ by more than `diameters` do not count. Rotations that the image does not
+/// determine stay as they are.
+fn fit_within(diameters: f32, iterations: usize) -> Fit {
+    let surface = RenderedSurface {
+        limit: Length::Diameters(diameters),
+        ..RenderedSurface::default()
+    };
     Icp {
         selection: (),
-        association: (RenderedSurface::default(), Contour::default()),
+        association: (surface, Contour::default()),
         filter: (),
         metric: Conditioned {
             metric: PointToPlane,
             policy: Degeneracy::FreezeRotations,
             threshold: UNDETERMINED,
         },
-        stop: (Convergence::default(), IterationLimit(8)),
+        stop: (Convergence::default(), IterationLimit(iterations)),
     }
 }
 
-/// Creates the same stage, but it is accepted only if the score improves.
-fn guarded_fit() -> Guard<Fit, MeanVsd> {
+/// Creates this stage for poses near the surface.
+pub(crate) fn fit() -> Fit {
+    fit_within(FIT_DIAMETERS, FIT_ITERATIONS)
+}
+
+/// Creates a fit that is accepted only if the score improves.
+fn guarded(stage: Fit) -> Guard<Fit, MeanVsd> {
     Guard {
-        stage: fit(),
+        stage,
         score: MeanVsd::imperfect_mask(),
     }
 }
@@ -195,31 +211,34 @@ pub(crate) fn far() -> Far {
 ///
 /// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]). The first stage
 /// renders the model in each iteration, and fits the depth along the rays ([`RenderedSurface`]) and
-/// the silhouette ([`Contour`]). If the [`Doubt`] is then 0.1 or more, [`SwitchUntilStall`] runs up
-/// to six steps, until the score stalls, and keeps the pose with the lowest one. A step is the
-/// projective cascade if the estimate agrees with the image. Otherwise it pairs observed points
-/// with the model, first with point-to-point and then with the symmetric metric. The first stage
-/// runs once more at the end.
+/// the silhouette ([`Contour`]). Depths count up to a difference of 0.12 diameters. If the
+/// [`Doubt`] is then 0.1 or more, the same stage runs with 0.25 diameters. Then
+/// [`SwitchUntilStall`] runs up to six steps, until the score stalls, and keeps the pose with the
+/// lowest one. A step starts with the projective cascade if the estimate agrees with the image.
+/// Otherwise it pairs observed points with the model, first with point-to-point and then with the
+/// symmetric metric. It ends with four iterations of the first stage.
 #[must_use]
 pub fn local() -> Local {
+    let step_fit = fit_within(FIT_DIAMETERS, STEP_FIT_ITERATIONS);
+    let wide = fit_within(WIDE_DIAMETERS, FIT_ITERATIONS);
     let steps = SwitchUntilStall {
         score: MeanVsd::imperfect_mask(),
         alpha: PAPER_ALPHA,
-        aligned: near(PointToPlane, 2000),
-        misaligned: far(),
+        aligned: Cascade((near(PointToPlane, 2000), step_fit.clone())),
+        misaligned: Cascade((far(), step_fit)),
         max_steps: 6,
         min_gain: 0.01,
         good_enough: 0.1,
     };
     Cascade((
-        guarded_fit(),
+        guarded(fit()),
         Switch {
             switcher: Threshold {
                 score: Doubt,
                 alpha: 0.1,
             },
             aligned: Cascade(()),
-            misaligned: Cascade((steps, guarded_fit())),
+            misaligned: Cascade((guarded(wide), steps)),
         },
     ))
 }

@@ -10,7 +10,6 @@ use hicp_icp::{
     Cascade, IterationLimit, LookAlikeCount, Outcome, SearchOptions, Session, Stage, Verdict,
     Workspace,
 };
-use hicp_metric::Degeneracy;
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
@@ -63,8 +62,6 @@ impl Matcher {
         let mut near = fit();
         near.association.0.stride = Stride::AboutPoints(POINTS);
         near.association.1.lines = LINES;
-        // The far stage follows flat sides that move sideways.
-        near.metric.policy = Degeneracy::Freeze;
         Self {
             extent: Extent::new(&model),
             model,

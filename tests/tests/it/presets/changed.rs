@@ -18,9 +18,9 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
     // Without it, a sure pose would end the preset before the steps.
     file.set("stages.1.switcher.alpha=0").unwrap();
-    file.set("stages.1.misaligned.stages.0.max_steps=1")
+    file.set("stages.1.misaligned.stages.1.max_steps=1")
         .unwrap();
-    file.set("stages.1.misaligned.stages.0.misaligned.stages.1.association.points=200")
+    file.set("stages.1.misaligned.stages.1.misaligned.stages.1.association.points=200")
         .unwrap();
     let expected =
         Refiner::new(file.build().unwrap()).refine(&scene.model, &scene.observation, &init);
@@ -29,15 +29,15 @@ fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
     let unchanged = refiner.refine(&scene.model, &scene.observation, &init);
     let unless = &mut refiner.stage_mut().0.1;
     unless.switcher.alpha = 0.0;
-    let steps = &mut unless.misaligned.0.0;
+    let steps = &mut unless.misaligned.0.1;
     steps.max_steps = 1;
-    steps.misaligned.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
+    steps.misaligned.0.0.0.1.association.stride = hybrid_icp::association::Stride::AboutPoints(200);
     let changed = refiner.refine(&scene.model, &scene.observation, &init);
     assert_eq!(changed, expected);
     assert_ne!(changed, unchanged);
 
     let stage = refiner.into_stage();
-    assert_eq!(stage.0.1.misaligned.0.0.max_steps, 1);
+    assert_eq!(stage.0.1.misaligned.0.1.max_steps, 1);
     let again = Refiner::new(stage).refine(&scene.model, &scene.observation, &init);
     assert_eq!(again, expected);
 }
