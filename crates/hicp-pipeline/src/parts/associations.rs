@@ -103,7 +103,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             limit: length(
                 p,
                 "limit",
-                0.25,
+                0.12,
                 "largest difference of depth, without noise",
             )?,
         })

@@ -61,14 +61,8 @@ pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd, D
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
-/// Largest difference of depth in a fit, as a fraction of the diameter. With twice as much, a
-/// surface beside the object can pull a good pose away within the iterations of one fit.
-const FIT_DIAMETERS: f32 = 0.12;
-/// The same in the wide fit of doubtful poses, which may be farther from the surface.
+/// Largest difference of depth in the fit of doubtful poses, which may be farther from the surface.
 const WIDE_DIAMETERS: f32 = 0.25;
-/// Number of iterations of a fit, and of one that ends a step.
-const FIT_ITERATIONS: usize = 8;
-const STEP_FIT_ITERATIONS: usize = 4;
 /// θ_max of nearest neighbors, degrees.
 const THETA_DEGREES: f32 = 90.0;
 /// Observability below which a direction stays as it is, relative to the best determined one. Noise
@@ -165,29 +159,19 @@ pub fn hybrid_visible() -> HybridVisible {
 
 /// Creates the stage that fits the rendered surface and its silhouette to the image.
 ///
-/// Depths that differ by more than `diameters` do not count. Rotations that the image does not
-/// determine stay as they are.
-fn fit_within(diameters: f32, iterations: usize) -> Fit {
-    let surface = RenderedSurface {
-        limit: Length::Diameters(diameters),
-        ..RenderedSurface::default()
-    };
+/// Rotations that the image does not determine stay as they are.
+pub(crate) fn fit() -> Fit {
     Icp {
         selection: (),
-        association: (surface, Contour::default()),
+        association: (RenderedSurface::default(), Contour::default()),
         filter: (),
         metric: Conditioned {
             metric: PointToPlane,
             policy: Degeneracy::FreezeRotations,
             threshold: UNDETERMINED,
         },
-        stop: (Convergence::default(), IterationLimit(iterations)),
+        stop: (Convergence::default(), IterationLimit(8)),
     }
-}
-
-/// Creates this stage for poses near the surface.
-pub(crate) fn fit() -> Fit {
-    fit_within(FIT_DIAMETERS, FIT_ITERATIONS)
 }
 
 /// Creates a fit that is accepted only if the score improves.
@@ -219,13 +203,14 @@ pub(crate) fn far() -> Far {
 /// symmetric metric. It ends with four iterations of the first stage.
 #[must_use]
 pub fn local() -> Local {
-    let step_fit = fit_within(FIT_DIAMETERS, STEP_FIT_ITERATIONS);
-    let wide = fit_within(WIDE_DIAMETERS, FIT_ITERATIONS);
+    let (mut wide, mut short) = (fit(), fit());
+    wide.association.0.limit = Length::Diameters(WIDE_DIAMETERS);
+    short.stop.1 = IterationLimit(4);
     let steps = SwitchUntilStall {
         score: MeanVsd::imperfect_mask(),
         alpha: PAPER_ALPHA,
-        aligned: Cascade((near(PointToPlane, 2000), step_fit.clone())),
-        misaligned: Cascade((far(), step_fit)),
+        aligned: Cascade((near(PointToPlane, 2000), short.clone())),
+        misaligned: Cascade((far(), short)),
         max_steps: 6,
         min_gain: 0.01,
         good_enough: 0.1,
