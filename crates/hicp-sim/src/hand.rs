@@ -5,7 +5,7 @@ use rand::Rng;
 
 use crate::clutter::within;
 use crate::error::SimError;
-use crate::solid::Solid;
+use crate::objects::Solid;
 
 /// Distance of the hand from the camera, relative to that of the object.
 const NEARER: f64 = 0.5;

@@ -22,36 +22,27 @@
 
 mod case;
 mod clutter;
-mod components;
 mod corruption;
 mod error;
 mod hand;
-mod household;
 mod mask;
-mod meshing;
 mod moving;
-mod paint;
+mod objects;
 mod photo;
-mod profile;
 mod reconstruction;
 mod sampling;
 mod sensor;
-mod shapes;
-mod solid;
 mod stream;
 mod trajectory;
 mod tsdf;
 
 pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
 pub use clutter::{Clutter, ClutterView, PlacedObject, SeenObject};
-pub use components::{Component, components, join};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
 pub use error::SimError;
-pub use household::{Household, Proportions};
 pub use mask::MaskDefects;
-pub use meshing::ScalarGrid;
 pub use moving::{Hand, MovingConfig, MovingScene};
-pub use paint::Texture;
+pub use objects::{Household, Proportions, Solid, Texture};
 pub use photo::Lighting;
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise, WrongPose};
 pub use sampling::{
@@ -62,10 +53,12 @@ pub use sensor::{
     AxialPolynomial, DEPTH_EDGE_METERS, DepthNoise, DepthSensor, Distortion, Dropout,
     RelativeGaussian, StereoDisparity,
 };
-pub use solid::Solid;
 pub use stream::stream;
 pub use trajectory::Trajectory;
-pub use tsdf::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
+pub use tsdf::{
+    Component, EmptyPixels, MAX_VOXELS, ScalarGrid, TsdfConfig, TsdfVolume, Unseen, components,
+    join,
+};
 
 /// The random generator of all simulations: small, fast, and the same on every machine and in every
 /// version.

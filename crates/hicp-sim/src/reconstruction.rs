@@ -5,12 +5,12 @@ use hicp_raster::render_depth_image;
 
 use rand::Rng;
 
-use crate::components::{components, join};
 use crate::error::{SimError, check_range};
 use crate::sampling::{object_pose, perturb};
 use crate::sensor::{DepthNoise, RelativeGaussian};
 use crate::stream::stream;
 use crate::tsdf::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen};
+use crate::tsdf::{components, join};
 
 /// The errors of the images from which a model is reconstructed.
 // Deviation: object instead of camera poses: §VI-C.2 reconstructs with wrong camera poses. By

@@ -19,24 +19,17 @@ mod align;
 mod array;
 mod batch;
 mod bop;
-mod camera;
-mod color;
-mod depth;
 mod errors;
-mod fusion;
-mod image;
-mod model;
+mod input;
 mod mutex;
-mod observation;
 mod observer;
 mod pipeline;
 mod program;
 mod results;
 mod score;
-mod sequential;
+mod sequence;
 mod step;
 mod toml;
-mod tracker;
 
 /// The native module that the package re-exports.
 #[pyo3::pymodule]
@@ -47,17 +40,15 @@ mod native {
     #[pymodule_export]
     use crate::bop::{PyDatasetRefiner, read_images, result_header};
     #[pymodule_export]
-    use crate::camera::PyCamera;
+    use crate::input::camera::PyCamera;
     #[pymodule_export]
-    use crate::depth::PyDepthImage;
+    use crate::input::depth::PyDepthImage;
     #[pymodule_export]
-    use crate::fusion::{PyFuser, PyPoseEstimate, fuse};
+    use crate::input::image::{read_depth, read_depth_png, read_mask, read_mask_png, read_pose};
     #[pymodule_export]
-    use crate::image::{read_depth, read_depth_png, read_mask, read_mask_png, read_pose};
+    use crate::input::model::PyModel;
     #[pymodule_export]
-    use crate::model::PyModel;
-    #[pymodule_export]
-    use crate::observation::PyObservation;
+    use crate::input::observation::PyObservation;
     #[pymodule_export]
     use crate::pipeline::PyPipeline;
     #[pymodule_export]
@@ -65,11 +56,13 @@ mod native {
     #[pymodule_export]
     use crate::score::{add, adi, mspd, mssd, mve, render_depth, vsd};
     #[pymodule_export]
-    use crate::sequential::PySequentialEstimator;
+    use crate::sequence::fusion::{PyFuser, PyPoseEstimate, fuse};
+    #[pymodule_export]
+    use crate::sequence::sequential::PySequentialEstimator;
+    #[pymodule_export]
+    use crate::sequence::tracker::PyTracker;
     #[pymodule_export]
     use crate::step::{point_to_plane_step, point_to_point_step};
     #[pymodule_export]
     use crate::toml::parts;
-    #[pymodule_export]
-    use crate::tracker::PyTracker;
 }

@@ -11,9 +11,9 @@ use pyo3::prelude::*;
 use crate::array::{self, Motion};
 use crate::batch;
 use crate::errors::{self, InputError};
-use crate::model::PyModel;
+use crate::input::model::PyModel;
+use crate::input::observation::PyObservation;
 use crate::mutex::locked;
-use crate::observation::PyObservation;
 use crate::observer::Watch;
 use crate::{results, toml};
 

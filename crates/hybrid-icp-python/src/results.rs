@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{Matrix, Motion};
-use crate::model::PyModel;
+use crate::input::model::PyModel;
 
 /// An instance of a dataclass of `hybrid_icp._results`.
 pub(crate) type Record<'py> = PyResult<Bound<'py, PyAny>>;

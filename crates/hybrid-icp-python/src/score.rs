@@ -8,11 +8,11 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
-use crate::camera::PyCamera;
-use crate::depth;
 use crate::errors;
-use crate::model::PyModel;
-use crate::observation::PyObservation;
+use crate::input::camera::PyCamera;
+use crate::input::depth;
+use crate::input::model::PyModel;
+use crate::input::observation::PyObservation;
 
 /// Renders the depth of a model at a pose.
 ///

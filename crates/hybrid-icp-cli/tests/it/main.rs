@@ -11,18 +11,7 @@
 
 mod align;
 mod book;
-mod bop_chain;
-mod bop_compare;
-mod bop_eval;
-mod bop_generate;
-mod bop_malformed;
-mod bop_masks;
-mod bop_refine;
-mod bop_scale;
-mod bop_sequence;
-mod bop_show;
-mod bop_track;
-mod bop_warnings;
+mod bop;
 mod color;
 mod command_line;
 mod common;

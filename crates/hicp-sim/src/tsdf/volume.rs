@@ -6,7 +6,7 @@
 use hicp_core::{DepthImage, ImageError, Isometry3, PinholeCamera, Point3, TriMesh, Vector3};
 
 use crate::error::{SimError, check_range};
-use crate::meshing::ScalarGrid;
+use crate::tsdf::meshing::ScalarGrid;
 
 /// Largest number of voxels. A voxel has two numbers of 4 bytes each.
 pub const MAX_VOXELS: usize = 400_000_000;

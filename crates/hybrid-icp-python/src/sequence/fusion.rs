@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
 use crate::errors;
-use crate::model::PyModel;
+use crate::input::model::PyModel;
 use crate::mutex::locked;
 
 /// An estimate of the pose of an object, with its covariance and, if known, its MVE.

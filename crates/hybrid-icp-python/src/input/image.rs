@@ -6,8 +6,8 @@ use hicp_io::{LengthUnit, MaskRule};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
-use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
+use crate::input::depth::{self, PyDepthImage};
 
 /// Reads a 16-bit gray PNG as an array of meters.
 ///

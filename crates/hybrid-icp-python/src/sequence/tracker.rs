@@ -6,10 +6,11 @@ use hybrid_icp::{Tracker, TrackerConfig};
 use pyo3::prelude::*;
 
 use crate::array;
-use crate::camera::PyCamera;
-use crate::model::PyModel;
+use crate::input::camera::PyCamera;
+use crate::input::depth;
+use crate::input::model::PyModel;
 use crate::mutex::locked;
-use crate::{depth, errors, results};
+use crate::{errors, results};
 
 /// Tracks a moving object from depth image to depth image, without masks.
 ///

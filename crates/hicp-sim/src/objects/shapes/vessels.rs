@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use hicp_core::{Isometry3, Point3};
 
-use crate::profile::{bowl_profile, curve, refine};
-use crate::solid::Solid;
+use crate::objects::profile::{bowl_profile, curve, refine};
+use crate::objects::solid::Solid;
 
 /// A cup with a thin wall and a handle.
 pub(crate) fn mug() -> Solid {

@@ -9,8 +9,8 @@ use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, unexpected};
-use crate::camera::PyCamera;
 use crate::errors::{self, InputError};
+use crate::input::camera::PyCamera;
 
 const EXPECTED_DEPTH: &str =
     "an (H, W) array of float32 meters, or of uint16 together with scale= (meters per unit)";

@@ -2,8 +2,8 @@
 
 use hicp_core::{Isometry3, Point3, Vector3};
 
-use crate::profile::{curve, refine, subdivide};
-use crate::solid::Solid;
+use crate::objects::profile::{curve, refine, subdivide};
+use crate::objects::solid::Solid;
 
 /// An angle bracket of two thin plates.
 pub(crate) fn bracket() -> Solid {

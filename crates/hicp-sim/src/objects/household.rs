@@ -5,8 +5,8 @@ use hicp_core::{
 };
 use rand::RngExt;
 
-use crate::shapes::{boxes, tools, vessels};
-use crate::solid::Solid;
+use crate::objects::shapes::{boxes, tools, vessels};
+use crate::objects::solid::Solid;
 use crate::stream::stream;
 
 /// A procedural household object with declared symmetries.

@@ -2,7 +2,7 @@
 //!
 //! The printed text must equal `golden/bop_chain.txt`. This is possible because the dataset follows
 //! from its seed, no pose depends on the number of threads, and numbers are rounded to three
-//! digits. `HICP_BLESS=1 cargo test -p hybrid-icp-cli --test it bop_chain` writes the file again;
+//! digits. `HICP_BLESS=1 cargo test -p hybrid-icp-cli --test it bop::chain` writes the file again;
 //! the commit message must explain the change.
 
 use std::fmt::Write as _;

@@ -18,8 +18,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
-use crate::color;
 use crate::errors::{self, InputError};
+use crate::input::color;
 
 /// The model of an object: its mesh, surface samples, size and symmetries.
 ///

@@ -8,12 +8,12 @@ use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
 use crate::errors;
-use crate::fusion::{self, PyPoseEstimate};
-use crate::model::PyModel;
+use crate::input::model::PyModel;
+use crate::input::observation::PyObservation;
 use crate::mutex::locked;
-use crate::observation::PyObservation;
 use crate::pipeline::PyPipeline;
 use crate::results;
+use crate::sequence::fusion::{self, PyPoseEstimate};
 
 /// Estimates the pose of a static object from the images of a moving camera (§V of the paper).
 ///

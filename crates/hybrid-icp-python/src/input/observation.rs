@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{self, Matrix};
-use crate::camera::PyCamera;
-use crate::color;
-use crate::depth::{self, PyDepthImage};
 use crate::errors::{self, InputError};
-use crate::model::PyModel;
+use crate::input::camera::PyCamera;
+use crate::input::color;
+use crate::input::depth::{self, PyDepthImage};
+use crate::input::model::PyModel;
 
 /// The positional and the named arguments that create an observation again.
 type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict>);
