@@ -30,6 +30,5 @@ mod outputs;
 mod pipeline_limits;
 mod pipelines;
 mod refine;
-mod refine_refusals;
 mod world;
 mod ycbv;

@@ -1,0 +1,221 @@
+//! The JSON of the result, the trace, and where they are written.
+
+use super::*;
+
+#[test]
+fn the_result_has_every_key_in_its_type() {
+    let scene = Scene::new().with("--overlay", "overlay.png");
+    let result = scene.result();
+    assert_improved(&pose_of(&result), &truth());
+    for (key, count) in [("cam_R_m2c", 9), ("cam_t_m2c", 3)] {
+        let numbers = result[key].as_array().unwrap();
+        assert!(numbers.len() == count && numbers.iter().all(Value::is_f64));
+    }
+    for key in ["mve_initial", "time_ms"] {
+        assert!(result[key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    assert!(result["mve"].as_f64().unwrap() >= 0.0);
+    assert!(result["mve"].as_f64() < result["mve_initial"].as_f64());
+    let confidence = result["confidence"].as_f64().unwrap();
+    assert!((0.95..=1.0).contains(&confidence), "{result}");
+    assert!(result["expected_error_mm"].as_f64().unwrap() < 20.0);
+    assert!(result["expected_error_degrees"].as_f64().unwrap() < 20.0);
+    // The result is near the initial pose, so other poses do not count.
+    assert_eq!(result["look_alikes"], 0.0);
+    let evidence = &result["evidence"];
+    assert!(evidence["agrees"].as_f64().unwrap() > 0.9, "{evidence}");
+    assert!(
+        evidence["seen_through"].as_f64().unwrap() < 0.1,
+        "{evidence}"
+    );
+    for key in ["iterations", "n_pairs"] {
+        assert!(result[key].as_u64().unwrap() > 0, "{key}");
+    }
+    for key in ["termination", "reason", "pipeline"] {
+        assert!(!result[key].as_str().unwrap().is_empty(), "{key}");
+    }
+    assert_eq!(result["outcome"], "refined");
+    assert_eq!(result["warnings"], serde_json::json!([]));
+
+    let stages = result["trace"].as_array().unwrap();
+    assert!(!stages.is_empty());
+    for (index, stage) in stages.iter().enumerate() {
+        assert_eq!(stage["stage"].as_u64(), Some(index as u64 + 1));
+        for key in [
+            "association",
+            "metric",
+            "selection",
+            "termination",
+            "outcome",
+        ] {
+            assert!(stage[key].is_string(), "{key}");
+        }
+        for key in ["filters", "stop_rules"] {
+            assert!(stage[key].is_array(), "{key}");
+        }
+        for key in ["iterations", "n_pairs", "n_source"] {
+            assert!(stage[key].is_u64(), "{key}");
+        }
+        assert!(stage["mean_loss"].as_f64().unwrap() >= 0.0);
+    }
+    let sum: u64 = stages
+        .iter()
+        .map(|s| s["iterations"].as_u64().unwrap())
+        .sum();
+    assert_eq!(result["iterations"].as_u64(), Some(sum));
+
+    let overlay = hicp_io::read_color(scene.path("overlay.png")).unwrap();
+    let (width, height) = (overlay.width(), overlay.height());
+    // Twice as large, without rows far above and below the object, and with a legend.
+    assert!(width == 640 && (370..530).contains(&height), "{height}");
+    for color in [[230, 159, 0], [86, 180, 233]] {
+        assert!(overlay.pixels().contains(&color));
+    }
+}
+
+#[test]
+fn without_an_output_the_json_is_printed_alone() {
+    let scene = Scene::new();
+    let mut written = scene.result();
+    let printed = scene.without("--output").run().exits(0);
+    let mut printed: Value = serde_json::from_str(&printed.out).unwrap();
+    for result in [&mut written, &mut printed] {
+        result["time_ms"] = Value::Null;
+    }
+    assert_eq!(written, printed);
+}
+
+#[test]
+fn every_line_of_a_trace_can_be_the_start_of_another_run() {
+    // `hybrid` returns the pose of its last stage; `auto` returns the best of its stages.
+    let scene = Scene::new()
+        .with("--trace", "trace.jsonl")
+        .with("--pipeline", "hybrid");
+    let result = scene.result();
+    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let of = |event: &str| {
+        lines
+            .iter()
+            .filter(|l| l["event"] == event)
+            .collect::<Vec<_>>()
+    };
+    let stages = result["trace"].as_array().unwrap();
+    assert_eq!(of("stage_end").len(), stages.len());
+    assert_eq!(of("regime").len(), 2);
+    // An iteration without pairs evaluates nothing and has no line.
+    assert!(of("iteration").len() <= result["iterations"].as_u64().unwrap() as usize);
+    let last = of("stage_end")[stages.len() - 1];
+    assert_eq!(last["cam_R_m2c"], result["cam_R_m2c"]);
+    assert_eq!(last["cam_t_m2c"], result["cam_t_m2c"]);
+    // A run from the pose of the last line starts with the MVE of this result.
+    scene.write("init.json", last.to_string());
+    let again = scene.result();
+    assert_eq!(again["mve_initial"], result["mve"]);
+}
+
+/// The result has the same warnings as standard error, word for word.
+#[test]
+fn the_result_has_every_warning() {
+    let told = |scene: &Scene, parts: &[&str]| {
+        let run = scene.run().exits(0).complains(parts);
+        let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
+        let result: Value = serde_json::from_str(&text).unwrap();
+        let warnings = result["warnings"].as_array().unwrap().iter();
+        let lines = warnings.map(|text| format!("warning: {}\n", text.as_str().unwrap()));
+        assert_eq!(lines.collect::<String>(), run.err);
+        result
+    };
+    let scene = Scene::new().with("--depth-scale", "1");
+    told(
+        &scene,
+        &["the median depth inside the mask", "do not trust it"],
+    );
+
+    // The search finds the car in its mask from any initial pose, and its confidence is high.
+    let scene = Scene::new();
+    let aside = Isometry3::translation(3.0, 0.0, 0.0) * truth();
+    scene.write("init.json", pose_json(&aside).to_string());
+    let result = told(&scene, &[]);
+    let confidence = result["confidence"].as_f64().unwrap();
+    assert!(
+        confidence >= 0.95 && result["mve_initial"] == 1.0,
+        "{result}"
+    );
+}
+
+#[test]
+fn a_trace_is_replayed_to_the_last_digit() {
+    let scene = Scene::new()
+        .with("--trace", "trace.jsonl")
+        .with("--set", "stage.stages.1.misaligned.stages.1.max_steps=2");
+    scene.result();
+    let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
+    let printed = replay().exits(0).out;
+    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    assert!(printed.contains(&format!("{} lines, all equal", text.lines().count())));
+    // A changed line is reported.
+    let (number, line) = text
+        .lines()
+        .enumerate()
+        .find(|(_, line)| line.contains("mean_loss"))
+        .unwrap();
+    let mut changed: Value = serde_json::from_str(line).unwrap();
+    changed["n_pairs"] = 1.into();
+    scene.write("trace.jsonl", text.replace(line, &changed.to_string()));
+    let complaint = format!("trace.jsonl:{} differs", number + 1);
+    replay().exits(1).complains(&[&complaint]);
+    // Other files are refused.
+    for (content, expected) in [
+        ("", "empty, expected a trace"),
+        ("{", "trace.jsonl:1: expected JSON"),
+        ("{\"event\": \"iteration\"}", "expected \"start\""),
+        (
+            "{\"event\": \"start\", \"version\": 3}",
+            "\"version\" is 3, expected a string",
+        ),
+        (
+            "{\"event\": \"start\", \"version\": \"0.1.0\", \"set\": \"times=1\"}",
+            "\"set\" is \"times=1\", expected a list of strings",
+        ),
+    ] {
+        scene.write("trace.jsonl", content);
+        replay().exits(1).complains(&[expected]);
+    }
+}
+
+#[test]
+fn a_pose_can_be_refined_in_place() {
+    let scene = Scene::new().with("--output", "./init.json");
+    scene.run().exits(0);
+    let text = std::fs::read_to_string(scene.path("init.json")).unwrap();
+    assert_improved(&pose_of(&serde_json::from_str(&text).unwrap()), &truth());
+    // The result can be refined again.
+    scene.run().exits(0);
+}
+
+#[test]
+fn other_poses_that_a_search_finds_are_written() {
+    let scene = Scene::new()
+        .with("--alternatives", "others.json")
+        .with("--pipeline", "always.toml");
+    let always = hybrid_icp::Preset::Search.toml();
+    let limit = "good_enough = 0.02\n";
+    let always = always.replace(limit, "good_enough = 0.0\nstart = \"ignored\"\n");
+    std::fs::write(scene.path("always.toml"), always).unwrap();
+    scene.run().exits(0);
+    let text = std::fs::read_to_string(scene.path("others.json")).unwrap();
+    let others: Vec<Value> = serde_json::from_str(&text).unwrap();
+    assert!(!others.is_empty());
+    let mut last = 0.0;
+    for other in &others {
+        let number = |key: &str| other[key].as_f64().unwrap();
+        assert!(number("score") >= last && number("mssd_mm") > 1.0);
+        assert!(number("gap") <= number("score") && number("rotation_degrees") > 0.0);
+        assert!(pose_of(other).translation.z > 0.0);
+        last = number("score");
+    }
+}
