@@ -1,5 +1,6 @@
 //! The agreement of colors, and the choice by color.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_sim::{Household, Lighting, Texture, stream};
@@ -169,9 +170,14 @@ fn a_lamp_and_its_shadow_matter_least_if_the_surroundings_are_removed() {
 
 /// A scene of the simulation that shows one object of a texture, and its index.
 pub(crate) fn scene(object: Household, texture: Texture) -> (Painted, Seen) {
+    noisy_scene(object, texture, 0.0..1.0)
+}
+
+/// The same, with noise in a range, percent of the depth.
+fn noisy_scene(object: Household, texture: Texture, noise: Range<f64>) -> (Painted, Seen) {
     let painted = Painted::new(&[object], &[texture]).unwrap();
     let scenes = (0..).flat_map(|seed| painted.scenes.scene(seed).unwrap());
-    let good = |seen: &Seen| seen.visible_share > 0.9 && seen.noise_percent() < 1.0;
+    let good = |seen: &Seen| seen.visible_share > 0.9 && noise.contains(&seen.noise_percent());
     let seen = scenes.into_iter().find(good).unwrap();
     (painted, seen)
 }
@@ -211,6 +217,22 @@ fn color_turns_a_can_around_its_axis() {
     // An estimate uses color with every pipeline.
     let found = Refiner::preset(Preset::Local).estimate(model, &observation);
     assert!(error(&found) < 0.05, "{}", error(&found));
+}
+
+#[test]
+fn color_turns_slender_objects_and_ones_with_much_noise() {
+    for (object, noise) in [(Household::Bottle, 0.0..1.0), (Household::Pot, 2.0..3.0)] {
+        let (painted, seen) = noisy_scene(object, Texture::Text, noise);
+        let model = &painted.scenes.objects[seen.model].1;
+        let points = ModelPoints::new(model);
+        let observation = painted
+            .observe(&seen, MaskKind::Exact, &lighting(), 5)
+            .unwrap();
+        let found = Refiner::preset(Preset::Local).estimate(model, &observation);
+        let pose = &found.outcome.camera_from_object;
+        let error = points.mssd(pose, &seen.truth) / points.diameter();
+        assert!(error < 0.05, "{}: {error}", object.name());
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ pub use background::{Background, Surroundings};
 pub use index::index;
 pub use label::type_label;
 pub use plane::DepthPlane;
-pub use seen_colors::{ColorSamples, FacingSample, faces_camera, seen_color};
+pub use seen_colors::{ColorSamples, FacingSample, SeenColors, faces_camera};
 pub use suggest::nearest_name;
 pub use vectorized::{VectorLoop, vectorized};
 pub use whole::whole;

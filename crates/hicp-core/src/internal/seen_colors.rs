@@ -4,37 +4,56 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
+use crate::internal::background::Surroundings;
 use crate::object::model::Model;
 use crate::object::sampling::sample_colored_surface;
 use crate::sensor::camera::PinholeCamera;
+use crate::sensor::image::ColorImage;
 use crate::sensor::observation::Observation;
 use crate::surfel::Surfel;
 
 /// Share of the diameter by which measured and modeled depth may differ.
 const AGREES: f64 = 0.05;
+/// The same in standard deviations of the depth noise, if that is more.
+const SIGMAS: f64 = 2.0;
 /// The channel value from which on a pixel is overexposed.
 const OVEREXPOSED: u8 = 250;
 
-/// Returns the color of the image at pixel (u, v), if the model's surface in a depth of `z` meters
-/// is what it shows.
-///
-/// It does not count if another surface was measured there, or if the pixel is not masked or
-/// overexposed.
-#[inline]
-#[must_use]
-pub fn seen_color(
-    model: &Model,
-    observation: &Observation,
-    (u, v): (u32, u32),
-    z: f64,
-) -> Option<[u8; 3]> {
-    let image = observation.color()?;
-    let index = v as usize * image.width() as usize + u as usize;
-    let measured = f64::from(observation.depth().pixels()[index]);
-    let seen = observation.mask().pixels()[index]
-        && (measured <= 0.0 || (measured - z).abs() < AGREES * model.diameter());
-    let pixel = image.pixels()[index];
-    (seen && pixel.iter().all(|value| *value < OVEREXPOSED)).then_some(pixel)
+/// The pixels of a color image that show a model.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenColors<'a> {
+    colors: &'a ColorImage,
+    observation: &'a Observation,
+    tolerance: f64,
+}
+
+impl<'a> SeenColors<'a> {
+    /// Returns the colors of an observation, or `None` if it or the model has none.
+    #[must_use]
+    pub fn of(model: &Model, observation: &'a Observation) -> Option<Self> {
+        model.mesh().color()?;
+        let noise = Surroundings::of(observation).noise;
+        Some(Self {
+            colors: observation.color()?,
+            observation,
+            tolerance: (AGREES * model.diameter()).max(SIGMAS * noise),
+        })
+    }
+
+    /// Returns the color of pixel (u, v), if it shows the model's surface in a depth of `z` meters.
+    ///
+    /// It does not count if another surface was measured there, or if the pixel is not masked or
+    /// overexposed.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, (u, v): (u32, u32), z: f64) -> Option<[u8; 3]> {
+        let index = v as usize * self.colors.width() as usize + u as usize;
+        let measured = f64::from(self.observation.depth().pixels()[index]);
+        let seen = self.observation.mask().pixels()[index]
+            && (measured <= 0.0 || (measured - z).abs() < self.tolerance);
+        let pixel = self.colors.pixels()[index];
+        (seen && pixel.iter().all(|value| *value < OVEREXPOSED)).then_some(pixel)
+    }
 }
 
 /// Returns whether a surface is seen well: not from behind and not from the side.

@@ -1,6 +1,6 @@
 //! A metric with the colors of the image.
 
-use hicp_core::internal::{ColorSamples, FacingSample, seen_color};
+use hicp_core::internal::{ColorSamples, FacingSample, SeenColors};
 use hicp_core::{Correspondences, Isometry3, Iteration, Model, Observation, Vector3};
 use nalgebra::{SMatrix, SVector};
 
@@ -79,13 +79,12 @@ impl<M> Photometric<M> {
     /// Compares the colors at the pose of the pairs. Returns `None` without evidence.
     fn term<'a>(&self, iteration: &Iteration<'a>, pairs: &Correspondences) -> Option<Term<'a>> {
         let (model, observation) = iteration.problem.sides()?;
-        if model.mesh().color().is_none() || observation.color().is_none() {
-            return None;
-        }
+        let seen = SeenColors::of(model, observation)?;
         let lambda = self.weight_diameters * model.diameter();
         let colors = Colors {
             model,
             observation,
+            seen,
             samples: self.samples,
             pose: *pairs.camera_from_object(),
         };
@@ -106,6 +105,7 @@ fn light(sample: &FacingSample) -> Light {
 struct Colors<'a> {
     model: &'a Model,
     observation: &'a Observation,
+    seen: SeenColors<'a>,
     samples: usize,
     pose: Isometry3<f64>,
 }
@@ -117,7 +117,7 @@ impl Colors<'_> {
         let samples = ColorSamples::of(self.model, self.samples);
         samples.visit(self.observation.camera(), &self.pose, |sample| {
             let (pixel, z) = (sample.nearest(), sample.point.z);
-            if seen_color(self.model, self.observation, pixel, z).is_some()
+            if self.seen.at(pixel, z).is_some()
                 && let Some(smooth) = smooth(self.observation, sample)
             {
                 visit(sample, &smooth);

@@ -1,6 +1,6 @@
 //! The agreement of a render with a color image.
 
-use hicp_core::internal::{faces_camera, index, seen_color};
+use hicp_core::internal::{SeenColors, faces_camera, index};
 use hicp_core::{Context, Isometry3, Problem};
 
 use crate::color::cells::{Cells, ColorEvidence, Shading};
@@ -40,9 +40,9 @@ impl ColorAgreement {
         let Some((model, observation)) = context.problem.sides() else {
             return nothing;
         };
-        if model.mesh().color().is_none() || observation.color().is_none() {
+        let Some(colors) = SeenColors::of(model, observation) else {
             return nothing;
-        }
+        };
         let placed = self
             .cells
             .place(model, observation.camera(), camera_from_object);
@@ -64,7 +64,7 @@ impl ColorAgreement {
                 if !faces_camera(&point, &normal) {
                     continue;
                 }
-                let Some(seen) = seen_color(model, observation, (u, v), point.z) else {
+                let Some(seen) = colors.at((u, v), point.z) else {
                     continue;
                 };
                 if let Some(color) = view.color_at(u, v, mesh, camera, camera_from_object) {

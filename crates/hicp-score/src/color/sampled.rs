@@ -1,6 +1,6 @@
 //! The agreement of a model's colors with an image, from samples of the model instead of a render.
 
-use hicp_core::internal::{ColorSamples, seen_color};
+use hicp_core::internal::{ColorSamples, SeenColors};
 use hicp_core::{Context, Isometry3, Model, Problem};
 
 use crate::color::cells::{Cells, ColorEvidence, LEAST_CONTRAST, Shading};
@@ -57,9 +57,9 @@ impl SampledColor {
         let Some((model, observation)) = problem.sides() else {
             return nothing;
         };
-        if model.mesh().color().is_none() || observation.color().is_none() {
+        let Some(seen) = SeenColors::of(model, observation) else {
             return nothing;
-        }
+        };
         if self
             .cells
             .place(model, observation.camera(), camera_from_object)
@@ -70,7 +70,7 @@ impl SampledColor {
         let samples = ColorSamples::of(model, self.samples);
         samples.visit(observation.camera(), camera_from_object, |sample| {
             let (pixel, z) = (sample.nearest(), sample.point.z);
-            if let Some(seen) = seen_color(model, observation, pixel, z) {
+            if let Some(seen) = seen.at(pixel, z) {
                 self.cells
                     .add(pixel, &sample.normal, [sample.color, seen.map(f32::from)]);
             }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use hicp_core::{
-    Isometry3, Matrix3, Model, Observation, Point3, Surfel, UnitQuaternion, UnitVector3, Vector3,
+    Isometry3, Matrix3, Model, Observation, Point3, Surfel, TriMesh, UnitQuaternion, UnitVector3,
+    Vector3,
 };
 
 use crate::stage::search::distinct::Distinct;
@@ -121,7 +122,7 @@ impl NearSymmetries {
         let distinct = Distinct::of(model);
         let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();
         let identity = Isometry3::identity();
-        let (axes, rotations) = rotations(&samples);
+        let (axes, rotations) = rotations(model.mesh());
         let (mut spins, mut aligned) = (Vec::new(), 0);
         for (index, rotation) in rotations.iter().enumerate() {
             let step = index % STEPS;
@@ -167,14 +168,23 @@ fn count(a: &Set, b: &Set) -> u32 {
     a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
 }
 
-/// Returns the principal axes of the samples, and rotations around them, without and with a flip.
-fn rotations(samples: &[Surfel]) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
-    let mean = mean(samples);
-    let covariance: Matrix3<f64> = samples
-        .iter()
-        .map(|s| s.point.cast::<f64>() - mean)
-        .map(|p| p * p.transpose())
-        .sum();
+/// Returns the principal axes of a surface, and rotations around them, without and with a flip.
+fn rotations(mesh: &TriMesh) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
+    // The moments of the triangles. Those of samples would tilt the axes by some degrees.
+    let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+    for triangle in 0..mesh.triangles().len() {
+        let [a, b, c] = mesh.corners(triangle).map(|p| p.coords.cast::<f64>());
+        let (weight, sum) = ((b - a).cross(&(c - a)).norm(), a + b + c);
+        area += weight;
+        first += sum * (weight / 3.0);
+        second += [a, b, c, sum]
+            .map(|p| p * p.transpose())
+            .iter()
+            .sum::<Matrix3<f64>>()
+            * (weight / 12.0);
+    }
+    let mean = first / area;
+    let covariance = second / area - mean * mean.transpose();
     let axes = covariance.symmetric_eigen().eigenvectors;
     let turn = |axis: usize, angle: f64| UnitQuaternion::new(axes.column(axis) * angle);
     let mut rotations = Vec::with_capacity(6 * STEPS);

@@ -98,7 +98,7 @@ impl Turns {
             })
             .collect();
         let spins = near.spins().iter();
-        let spins = spins.filter_map(|axis| spin(axis, &registered));
+        let spins = spins.filter_map(|axis| spin(axis, near.motions().zip(&registered)));
         Self {
             spins: spins.collect(),
             motions: registered.iter().map(|(motion, _)| *motion).collect(),
@@ -160,16 +160,21 @@ impl Renderer for NoRenderer {
 
 /// Returns the mean axis of the motions around `axis` that map the surface onto itself.
 ///
-/// Returns `None` if too many motions around it do not.
-fn spin(axis: &UnitVector3<f64>, motions: &[(Isometry3<f64>, bool)]) -> Option<Spin> {
+/// Each motion comes with what its registration made of it. Returns `None` if too many motions
+/// around the axis do not fit.
+fn spin<'a>(
+    axis: &UnitVector3<f64>,
+    motions: impl Iterator<Item = (&'a Isometry3<f64>, &'a (Isometry3<f64>, bool))>,
+) -> Option<Spin> {
     let (mut around, mut fitting) = (0, 0);
     let (mut direction, mut point) = (Vector3::zeros(), Vector3::zeros());
-    for (motion, fits) in motions {
-        let own = motion
-            .rotation
-            .axis()
-            .filter(|own| own.dot(axis).abs() > 0.99);
-        let Some(own) = own else { continue };
+    let along = |motion: &Isometry3<f64>| Some(motion.rotation.axis()?.dot(axis).abs());
+    for (before, (motion, fits)) in motions {
+        // A tilt that the registration removed says nothing about rotations around the axis.
+        let around_it = along(before) > Some(0.999) && along(motion) > Some(0.99);
+        let Some(own) = motion.rotation.axis().filter(|_| around_it) else {
+            continue;
+        };
         let angle = motion.rotation.angle();
         if angle < LEAST_ANGLE {
             continue;
