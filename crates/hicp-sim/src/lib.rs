@@ -42,7 +42,7 @@ pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
 pub use error::SimError;
 pub use mask::MaskDefects;
 pub use moving::{Hand, MovingConfig, MovingScene};
-pub use objects::{Household, Proportions, Solid, Texture};
+pub use objects::{Household, Proportions, Solid, Texture, invented};
 pub use photo::Lighting;
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise, WrongPose};
 pub use sampling::{

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use hicp_sim::{Household, Proportions, SimRng, stream};
+use hicp_sim::{Household, Proportions, SimError, SimRng, invented, stream};
 use hicp_tests::symmetric_pose_distance;
 use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
 use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
@@ -113,30 +113,60 @@ impl Case {
 /// Factors of width and height by which the objects of the fit are stretched.
 const STRETCHES: [(f64, f64); 3] = [(1.0, 1.0), (0.8, 1.2), (1.25, 0.85)];
 
+/// Sets of ten invented objects for the fit.
+const SETS: u64 = 20;
+
+/// The objects of the simulated scenes.
+pub enum Objects {
+    /// Household objects.
+    Household(&'static [Household; 10]),
+    /// The tuning objects in three proportions, and invented objects from a seed.
+    ForFit(u64),
+}
+
+impl Objects {
+    /// Returns the scenes of these objects, wider and higher by factors.
+    fn scenes(&self, (width, height): (f64, f64)) -> Result<Vec<Tabletop>, SimError> {
+        let household = |objects, (w, h): (f64, f64)| {
+            let (width, height) = (width * w, height * h);
+            Tabletop::stretched(objects, Proportions { width, height })
+        };
+        let invent = |seed: u64| {
+            let model = invented(seed, Proportions { width, height })?;
+            Ok((format!("invented {seed}"), model))
+        };
+        match *self {
+            Self::Household(objects) => Ok(vec![household(objects, (1.0, 1.0))?]),
+            Self::ForFit(seed) => {
+                let stretched = STRETCHES.map(|stretch| household(&Household::TUNING, stretch));
+                let invented = (0..SETS).map(|set| {
+                    let seeds = (0..10).map(|k| 10 * (seed * SETS + set) + k);
+                    Ok(Tabletop::of(
+                        seeds.map(invent).collect::<Result<_, SimError>>()?,
+                    ))
+                });
+                stretched.into_iter().chain(invented).collect()
+            }
+        }
+    }
+}
+
 /// Factors of width and height of models that do not quite fit.
 const ROUGH: (f64, f64) = (1.015, 0.985);
 
 /// Simulates cases of some objects until there are `count`.
 ///
-/// If `stretched`, two of three scenes have the objects in other proportions. If `distorted`, the
-/// sensor has systematic errors, and the model is not quite that of the object. Every visible
-/// object gets several poses, each with another random kind of mask.
+/// If `distorted`, the sensor has systematic errors, and the model is not quite that of the object.
+/// Every visible object gets several poses, each with another random kind of mask.
 pub fn simulate(
-    objects: &[Household],
-    (stretched, distorted): (bool, bool),
+    objects: &Objects,
+    distorted: bool,
     seed: u64,
     count: usize,
 ) -> Result<Vec<Case>, Box<dyn Error>> {
-    let stretches = &STRETCHES[..if stretched { 3 } else { 1 }];
-    let scenes = |factor: (f64, f64)| {
-        stretches.iter().map(move |(width, height)| {
-            let (width, height) = (width * factor.0, height * factor.1);
-            Tabletop::stretched(objects, Proportions { width, height })
-        })
-    };
-    let all: Vec<Tabletop> = scenes((1.0, 1.0)).collect::<Result<_, _>>()?;
-    let all_rough: Vec<Tabletop> = scenes(ROUGH).collect::<Result<_, _>>()?;
-    let all_alike: Vec<Tabletop> = scenes((1.12, 0.92)).collect::<Result<_, _>>()?;
+    let all = objects.scenes((1.0, 1.0))?;
+    let all_rough = objects.scenes(ROUGH)?;
+    let all_alike = objects.scenes((1.12, 0.92))?;
     let mut refiners = PRESETS.map(Refiner::preset);
     let mut cases = Vec::new();
     let models = all.iter().zip(&all_rough).zip(&all_alike);

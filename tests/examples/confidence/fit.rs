@@ -7,7 +7,7 @@ use rand::RngExt;
 use crate::cases::Case;
 
 /// Number of hidden units.
-const UNITS: usize = 16;
+const UNITS: usize = 32;
 /// The outputs: the log-odds, and the logarithms of the two errors.
 const OUTPUTS: usize = 3;
 /// The parameters of a unit: its bias and weights, and its factors in the outputs.

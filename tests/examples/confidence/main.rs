@@ -1,9 +1,10 @@
 //! Measures the calibration of the confidence on simulated and real cases, as Markdown tables.
 //!
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
-//! objects, and `-- fit [CASES]` for the network, which is fitted on the tuning objects: so many
-//! cases with white noise, and as many with systematic errors of sensor and model. `-- tuning
-//! [CASES]` and `-- distorted [CASES]` report on other cases of either kind.
+//! objects, and `-- fit [CASES]` for the network, which is fitted on tuning and invented objects:
+//! so many cases with white noise, and as many with systematic errors of sensor and model. `--
+//! tuning [CASES]` and `-- distorted [CASES]` report on other cases of tuning objects of either
+//! kind.
 
 mod cases;
 mod fit;
@@ -12,7 +13,7 @@ mod real;
 use hicp_sim::Household;
 use hybrid_icp::score::{LabeledScore, reliability, roc_area};
 
-use crate::cases::{Case, Kind};
+use crate::cases::{Case, Kind, Objects};
 
 /// Confidence at which a pose is accepted.
 const ACCEPTED: f64 = 0.95;
@@ -26,7 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     match arguments.first().map(String::as_str) {
         Some("fit") => {
             let half = |distorted| {
-                let cases = cases::simulate(&Household::TUNING, (true, distorted), 0, count);
+                let objects = Objects::ForFit(u64::from(distorted));
+                let cases = cases::simulate(&objects, distorted, 0, count);
                 cases.expect("the objects can be simulated")
             };
             let (mut cases, others) = std::thread::scope(|scope| {
@@ -37,21 +39,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             fit::print(&cases);
         }
         Some(name @ ("tuning" | "distorted")) => {
-            let options = (false, name == "distorted");
-            report(&cases::simulate(
-                &Household::TUNING,
-                options,
-                1 << 20,
-                count,
-            )?);
+            let objects = Objects::Household(&Household::TUNING);
+            let distorted = name == "distorted";
+            report(&cases::simulate(&objects, distorted, 1 << 20, count)?);
         }
         _ => {
-            report(&cases::simulate(
-                &Household::TEST,
-                (false, false),
-                0,
-                count,
-            )?);
+            let objects = Objects::Household(&Household::TEST);
+            report(&cases::simulate(&objects, false, 0, count)?);
             if let Some(cases) = real::cases() {
                 println!("\n## Real frames\n");
                 report(&cases);

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use hicp_core::{Facing, Isometry3, Model, Point3, TriMesh, Vector3};
-use hicp_sim::{Household, Proportions};
+use hicp_sim::{Household, Proportions, invented};
 
 /// Returns the distance of a point from a triangle, by the region of the nearest feature (Ericson
 /// 2005, 5.1.5).
@@ -169,4 +169,27 @@ fn undeclared_motions_are_not_symmetries() {
             }
         }
     }
+}
+
+#[test]
+fn invented_objects_are_closed_of_household_size_and_have_their_symmetries() {
+    let mut symmetric = 0;
+    for seed in 0..60 {
+        let model = invented(seed, Proportions::default()).unwrap();
+        assert!(model.mesh().is_closed(), "{seed}");
+        assert_eq!(model.mesh().facing(), Facing::Outward, "{seed}");
+        let diameter = model.diameter();
+        assert!((0.08..=0.3001).contains(&diameter), "{seed}: {diameter} m");
+        let symmetries = model.symmetries();
+        symmetric += usize::from(!symmetries.is_empty());
+        // Forty facets deviate by 0.3 % of the radius.
+        let around = symmetries.continuous.iter().map(|axis| axis.rotation(1.0));
+        for motion in symmetries.discrete.iter().copied().chain(around) {
+            let misfit = misfit(&model, &motion);
+            assert!(misfit < 0.002 * diameter, "{seed}: {misfit} m at {motion}");
+        }
+    }
+    assert!((6..30).contains(&symmetric), "{symmetric} of 60");
+    let [one, other] = [1, 2].map(|seed| invented(seed, Proportions::default()).unwrap());
+    assert_ne!(one.mesh().vertices(), other.mesh().vertices());
 }

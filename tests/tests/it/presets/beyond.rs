@@ -282,7 +282,8 @@ fn poses_that_look_the_same_lower_the_confidence_unless_declared() {
     let mut refiner = Refiner::preset(Preset::Local);
     let found = [&undeclared, &scene.model].map(|m| refiner.estimate(m, &scene.observation));
     assert!(found[0].look_alikes > 0.5, "{}", found[0].look_alikes);
-    assert_eq!(found[1].look_alikes, 0.0);
+    // Upside down it is not right, but nearly.
+    assert!(found[1].look_alikes < 1e-3, "{}", found[1].look_alikes);
     let [turned, equivalent] = found.map(|refined| refined.confidence);
     assert!(turned < 0.7 && equivalent > 0.9, "{turned} {equivalent}");
     let near = [&undeclared, &scene.model].map(|m| refiner.refine(m, &scene.observation, &init));
