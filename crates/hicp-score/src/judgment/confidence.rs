@@ -10,6 +10,9 @@ use crate::judgment::network::{BASE, N_FEATURES, UNITS};
 
 /// Smallest distance, in diameters, that the logarithm of a distance tells from 0.
 const FINEST: f64 = 0.002;
+/// Number of pixels from which on more make a pose no more certain. The images of the fit hardly
+/// show larger objects.
+const MOST_PIXELS: f64 = 22_000.0;
 /// Largest magnitude of a feature.
 const LIMIT: f64 = 20.0;
 
@@ -128,7 +131,7 @@ impl Confidence {
             evidence.inside,
             evidence.unmeasured,
             evidence.mask_missing,
-            (evidence.pixels as f64 * seen).max(1.0).ln(),
+            (evidence.pixels as f64 * seen).clamp(1.0, MOST_PIXELS).ln(),
             mve,
             look_alikes.ln_1p(),
         ]
