@@ -59,6 +59,8 @@ const GAIN: f64 = 0.7;
 const SMALL_MOVE: f64 = 0.1;
 /// Share of the depth's score that another pose may add to it.
 const TOLERANCE: f64 = 0.2;
+/// Largest MSSD of a base from a pose that is ranked already, as a share of the diameter.
+const SAME_BASE: f64 = 0.04;
 /// Number of poses that are polished.
 const POLISHED: usize = 3;
 
@@ -103,17 +105,26 @@ impl<S, P, C> ColorChoice<S, P, C> {
             .take(ALTERNATIVES)
             .map(|other| other.camera_from_object);
         let bases: Vec<_> = std::iter::once(*pose).chain(found).collect();
+        let mut candidates: Vec<Isometry3<f64>> = Vec::new();
         for base in &bases {
+            // The motions of an earlier base may contain this one.
+            let same = SAME_BASE * model.diameter();
+            if candidates
+                .iter()
+                .any(|known| distinct.mssd(known, base) < same)
+            {
+                continue;
+            }
             turns.undecided(model, observation, base, &mut self.motions);
             if self.motions.len() == 1 && bases.len() == 1 {
                 return;
             }
-            let mut context = session.workspace.context(problem);
-            for motion in &self.motions {
-                let pose = base * motion;
-                let score = self.color.score(&mut context, &pose);
-                insert(&mut self.ranked, (score, pose), &distinct);
-            }
+            candidates.extend(self.motions.iter().map(|motion| base * motion));
+        }
+        let mut context = session.workspace.context(problem);
+        for pose in candidates {
+            let score = self.color.score(&mut context, &pose);
+            insert(&mut self.ranked, (score, pose), &distinct);
         }
     }
 }
