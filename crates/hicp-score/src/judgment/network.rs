@@ -20,6 +20,7 @@ pub(crate) struct Unit {
 pub(crate) const BASE: [f64; 3] = [0.0883, -3.6659, 0.8602];
 
 /// The units.
+#[allow(clippy::approx_constant)] // A weight is near a constant by chance.
 pub(crate) const UNITS: [Unit; 32] = [
     Unit {
         bias: -2.5933,
