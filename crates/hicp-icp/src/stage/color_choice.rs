@@ -26,7 +26,7 @@ use crate::stage::stage_trait::Stage;
 /// the stage does not limit the choice.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
-/// no choice, and 2 to 5 ms if it does.
+/// no choice, and 2 to 12 ms if it does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorChoice<S, P, C> {
     /// Finds a pose.
