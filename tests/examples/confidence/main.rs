@@ -1,10 +1,9 @@
 //! Measures the calibration of the confidence on simulated and real cases, as Markdown tables.
 //!
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
-//! objects, and `-- fit [CASES]` for the network, which is fitted on tuning and invented objects:
-//! so many cases with white noise, and as many with systematic errors of sensor and model. `--
-//! tuning [CASES]` and `-- distorted [CASES]` report on other cases of tuning objects of either
-//! kind.
+//! objects. With `-- fit [CASES]`, it prints the network, fitted on tuning and invented objects: so
+//! many cases with white noise, and as many with systematic errors of sensor and model. With `--
+//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects.
 
 mod cases;
 mod fit;
