@@ -260,7 +260,11 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
         aligned: p.count("aligned", 0, 256, "hypotheses that are aligned")?,
         refined: p.count("refined", 0, 24, "hypotheses that are refined")?,
         spacing_degrees: p.number("spacing_degrees", DEGREES, 20.0, least)?,
-        widens: p.flag("widens", true, "goes on with all hypotheses if it fails")?,
+        widens: p.flag(
+            "widens",
+            true,
+            "goes on with all hypotheses if it fails, unless the local pose is near",
+        )?,
         ..SearchOptions::default()
     };
     let far = "largest distance of the result from the initial pose";

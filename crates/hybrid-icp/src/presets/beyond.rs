@@ -353,18 +353,18 @@ pub fn color() -> ByColor<Search> {
 /// `auto`: [`local`], followed by a search if the product of its doubt and its score is above 0.03.
 ///
 /// If the local pose is far from the initial one, the threshold is 0.005. The search ranks 512
-/// rotations, aligns 128 of them and refines 12. A hypothesis must beat the local pose by a gain;
-/// the result can then be far from the initial pose.
+/// rotations, aligns 128 of them and refines 12, and goes on with all of them if the pose stays bad
+/// and far from the initial one. A hypothesis must beat the local pose by a gain; the result can
+/// then be far from the initial pose.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.03,
         far_threshold: 0.005,
-        good_enough: 0.1,
+        good_enough: 0.05,
         hypotheses: 512,
         aligned: 128,
         refined: 12,
-        widens: false,
         ..SearchOptions::default()
     })
 }

@@ -15,7 +15,8 @@ use hybrid_icp::core::{
     Isometry3, Model, Observation, Point3, Problem, UnitQuaternion, Vector3, se3,
 };
 use hybrid_icp::icp::{
-    Bound, HypothesisSearch, Rotations, SearchOptions, Start, Termination, Verdict, Workspace,
+    Bound, HypothesisSearch, Rotations, SearchOptions, Session, Stage, Start, Termination, Verdict,
+    Workspace,
 };
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
@@ -313,6 +314,26 @@ fn a_search_out_of_time_returns_the_local_pose() {
         refined.outcome.camera_from_object,
         local.outcome.camera_from_object
     );
+}
+
+/// If no hypothesis can win by the gain, none is ranked.
+#[test]
+fn a_search_without_a_possible_gain_is_not_started() {
+    let scene = scene(Household::Mug, 0.3, &mut rng(0));
+    let init = flipped(&scene, Vector3::z());
+    let problem = Problem::new(&scene.model, &scene.observation);
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let mut ranked = |gain: f64| {
+        let mut search = presets::search_with(SearchOptions {
+            near_gain: gain,
+            far_gain: gain,
+            ..SearchOptions::default()
+        });
+        search.run(&problem, &init, &mut Session::new(&mut workspace, &mut ()));
+        search.ranked().count()
+    };
+    assert!(ranked(0.04) > 0);
+    assert_eq!(ranked(2.0), 0);
 }
 
 /// Rotations outside of the bound also cost time. Symmetries that an object does not have cost

@@ -32,7 +32,7 @@ impl Found {
     ///
     /// Errors of the sensor shift the scores of poses that explain the same pixels. The doubt also
     /// depends on where the errors are.
-    fn cost(&self) -> f64 {
+    pub(crate) fn cost(&self) -> f64 {
         self.score + DOUBT_WEIGHT * self.doubt()
     }
 

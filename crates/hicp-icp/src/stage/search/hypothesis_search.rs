@@ -24,8 +24,9 @@ use crate::stage::stage_trait::Stage;
 /// 3. **Try**: the local stage refines the best of the first 32. If that is good enough, the others
 ///    are not aligned, and nothing is explored.
 /// 4. **Explore**: a stage that costs some hundred scores refines each. If the best pose is still
-///    bad, [`SearchOptions::widens`] repeats steps 2 and 4 for all ranked hypotheses. Twice as many
-///    are then refined, and they differ by half as much.
+///    bad, and the local pose is far from the initial one, [`SearchOptions::widens`] repeats steps
+///    2 and 4 for all ranked hypotheses. Twice as many are then refined, and they differ by half as
+///    much.
 /// 5. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
 ///    local pose is good, because the score of a rotated mug is good, too. If the image shows
@@ -211,8 +212,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         }
     }
 
-    /// Searches the whole range for poses.
-    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
+    /// Searches the whole range for poses. A search that has failed goes on if it `widens`.
+    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>, widens: bool) {
         self.rank(run, local);
         let ranked = std::mem::take(&mut self.ranked);
         let poses = ranked.poses();
@@ -226,7 +227,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         if !self.is_good(run) {
             self.align(run, &poses[first..most], kept);
             self.explore(run, true);
-            if options.widens && self.is_bad(run, options.threshold.max(FAILED)) {
+            if widens && self.is_bad(run, options.threshold.max(FAILED)) {
                 self.aligned.clear();
                 self.align(run, poses, (2 * kept.0, 0.5 * kept.1));
                 self.explore(run, true);
@@ -279,8 +280,8 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
 /// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
 const FIRST: usize = 32;
-/// Product of doubt and score above which even a confident pose is not good enough: a score of 0.1.
-const UNEXPLAINED: f64 = 0.005;
+/// Product of doubt and score above which even a confident pose is not good enough: a score of .04.
+const UNEXPLAINED: f64 = 0.002;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
 /// Number of distinct poses that the local stage refines, even if one is good enough.
@@ -331,16 +332,20 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         }
         let (mut threshold, mut gain) = (self.options.threshold, self.options.near_gain);
         let pose = local.camera_from_object;
-        if !run.distinct.near(init, &pose) {
+        let far = !run.distinct.near(init, &pose);
+        if far {
             (threshold, gain) = (self.options.far_threshold, self.options.far_gain);
         }
         if !ignored {
             self.add(&mut run, local, true);
         }
         let from = self.found.cheapest();
-        let bad = self.is_bad(&mut run, threshold);
+        // No pose can win by the gain if the cost is lower.
+        let beatable = from.is_none_or(|from| from.cost() > gain);
+        let bad = beatable && self.is_bad(&mut run, threshold);
         if bad {
-            self.search(&mut run, &pose);
+            let widens = self.options.widens && (far || ignored);
+            self.search(&mut run, &pose, widens);
         }
         if let Some(best) = self.found.best().copied() {
             let bad = self.is_bad(&mut run, threshold);

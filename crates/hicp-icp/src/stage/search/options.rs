@@ -29,12 +29,12 @@ pub struct SearchOptions {
     /// The product of doubt and score above which the search starts.
     ///
     /// A doubtful pose may still explain the image well, because errors of real sensors raise the
-    /// doubt. A doubt below 0.05 counts as 0.05. At or below the threshold, only poses that look
-    /// like the local one are tried.
+    /// doubt. A doubt below 0.05 counts as 0.05. At or below the threshold, or if no pose can win
+    /// by the gain, only poses that look like the local one are tried.
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one.
     pub far_threshold: f64,
-    /// The doubt at which no further hypotheses are refined, unless the score is above 0.1.
+    /// The doubt at which no further hypotheses are refined, unless the score is above 0.04.
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
@@ -61,7 +61,7 @@ pub struct SearchOptions {
     ///
     /// Of two that are nearer, the better ranked one is kept. 0 removes only exact duplicates.
     pub spacing_degrees: f64,
-    /// Continues a search that has failed.
+    /// Continues a search that has failed, unless the local pose is near the initial one.
     ///
     /// It then aligns all hypotheses, refines twice as many, and halves the spacing.
     pub widens: bool,
