@@ -105,14 +105,12 @@ impl<S, P, C> ColorChoice<S, P, C> {
             .take(ALTERNATIVES)
             .map(|other| other.camera_from_object);
         let bases: Vec<_> = std::iter::once(*pose).chain(found).collect();
+        let limit = SAME_BASE * model.diameter();
         let mut candidates: Vec<Isometry3<f64>> = Vec::new();
         for base in &bases {
             // The motions of an earlier base may contain this one.
-            let same = SAME_BASE * model.diameter();
-            if candidates
-                .iter()
-                .any(|known| distinct.mssd(known, base) < same)
-            {
+            let same = |known: &Isometry3<f64>| distinct.mssd(known, base) < limit;
+            if candidates.iter().any(same) {
                 continue;
             }
             turns.undecided(model, observation, base, &mut self.motions);

@@ -27,6 +27,10 @@ const SMOOTH: f64 = 0.015;
 const SNAPPED: f64 = 0.15;
 /// Smallest rotation that determines an axis, radians.
 const LEAST_ANGLE: f64 = 0.4;
+/// Least cosine of the angle between the axis of a near symmetry and the axis to be found.
+const ALONG: f64 = 0.999;
+/// The same for the registered motion, whose axis is less exact.
+const REGISTERED_ALONG: f64 = 0.99;
 /// Share of the rotations around an axis that must map the surface onto itself. The registration of
 /// a few may fail.
 const LEAST_FITTING: f64 = 0.8;
@@ -171,7 +175,7 @@ fn spin<'a>(
     let along = |motion: &Isometry3<f64>| Some(motion.rotation.axis()?.dot(axis).abs());
     for (before, (motion, fits)) in motions {
         // A tilt that the registration removed says nothing about rotations around the axis.
-        let around_it = along(before) > Some(0.999) && along(motion) > Some(0.99);
+        let around_it = along(before) > Some(ALONG) && along(motion) > Some(REGISTERED_ALONG);
         let Some(own) = motion.rotation.axis().filter(|_| around_it) else {
             continue;
         };
