@@ -170,13 +170,14 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             .chain(from.of(options.rotations, options.hypotheses));
         for pose in hypotheses {
             if run.is_over() {
-                return;
+                break;
             }
             if let Some(pose) = pose {
                 let score = run.score(&mut self.ranking, &pose);
-                self.ranked.insert(score, pose, kept, 0.0);
+                self.ranked.push(score, pose, kept);
             }
         }
+        self.ranked.keep_best(kept);
     }
 
     /// Aligns poses and adds the best that differ to the list, `refined` at most.
