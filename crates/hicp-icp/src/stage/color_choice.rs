@@ -26,7 +26,8 @@ use crate::stage::stage_trait::Stage;
 /// the stage does not limit the choice.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
-/// no choice, and 2 to 12 ms if it does.
+/// no choice, 1 ms if it does but the colors agree at the pose of the stage, and 2 to 12 ms if they
+/// do not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorChoice<S, P, C> {
     /// Finds a pose.
@@ -51,6 +52,8 @@ pub struct ColorChoice<S, P, C> {
 const ALTERNATIVES: usize = 4;
 /// Correlation at which no other pose is tried.
 const SURE: f64 = 0.8;
+/// Correlation at which a pose is not even polished.
+const PERFECT: f64 = 0.95;
 /// Correlation that a single cell might have by chance; it falls with the root of their number.
 const CHANCE: f64 = 3.5;
 /// Share of that correlation by which another pose must beat that of the stage.
@@ -90,13 +93,18 @@ impl<S, P, C> ColorChoice<S, P, C> {
         }
     }
 
-    /// Lists the poses that may look the same in depth as `pose`, the best first.
+    /// Lists the poses that may look the same in depth as `pose`.
     ///
     /// The list is empty if there is no other.
-    fn rank(&mut self, problem: &Problem<'_>, pose: &Isometry3<f64>, session: &mut Session<'_>) {
-        self.ranked.clear();
+    fn candidates(
+        &mut self,
+        problem: &Problem<'_>,
+        pose: &Isometry3<f64>,
+        session: &Session<'_>,
+    ) -> Vec<Isometry3<f64>> {
+        let mut candidates = Vec::new();
         let Some((model, observation)) = problem.sides() else {
-            return;
+            return candidates;
         };
         let (turns, distinct) = (Turns::of(model), Distinct::of(model));
         let found = session.workspace.alternatives.iter();
@@ -106,7 +114,6 @@ impl<S, P, C> ColorChoice<S, P, C> {
             .map(|other| other.camera_from_object);
         let bases: Vec<_> = std::iter::once(*pose).chain(found).collect();
         let limit = SAME_BASE * model.diameter();
-        let mut candidates: Vec<Isometry3<f64>> = Vec::new();
         for base in &bases {
             // The motions of an earlier base may contain this one.
             let same = |known: &Isometry3<f64>| distinct.mssd(known, base) < limit;
@@ -115,15 +122,11 @@ impl<S, P, C> ColorChoice<S, P, C> {
             }
             turns.undecided(model, observation, base, &mut self.motions);
             if self.motions.len() == 1 && bases.len() == 1 {
-                return;
+                return candidates;
             }
             candidates.extend(self.motions.iter().map(|motion| base * motion));
         }
-        let mut context = session.workspace.context(problem);
-        for pose in candidates {
-            let score = self.color.score(&mut context, &pose);
-            insert(&mut self.ranked, (score, pose), &distinct);
-        }
+        candidates
     }
 }
 
@@ -158,11 +161,23 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         session: &mut Session<'_>,
     ) -> Outcome {
         let pose = outcome.camera_from_object;
-        self.rank(problem, &pose, session);
-        if self.ranked.is_empty() {
+        let candidates = self.candidates(problem, &pose, session);
+        if candidates.is_empty() {
             return outcome;
         }
         let first = self.measure(problem, outcome, session);
+        self.ranked.clear();
+        let mut ranked = &candidates[..];
+        if self.agrees(&first.color) && first.color.correlation > SURE {
+            // The pose itself is the first candidate.
+            ranked = &candidates[..usize::from(first.color.correlation < PERFECT)];
+        }
+        for pose in ranked {
+            let score = self
+                .color
+                .score(&mut session.workspace.context(problem), pose);
+            insert(&mut self.ranked, (score, *pose), distinct);
+        }
         let most = (1.0 + TOLERANCE) * first.score + self.tolerance;
         let ranked = std::mem::take(&mut self.ranked);
         let (mut chosen, mut tried) = (first, vec![first]);

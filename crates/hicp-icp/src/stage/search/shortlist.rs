@@ -49,7 +49,7 @@ impl Shortlist {
         self.poses.truncate(limit.min(MAX_LENGTH));
     }
 
-    /// Inserts a pose in order, unless it is too near to a better one or not among the best `limit`.
+    /// Inserts a pose in order, unless a better one is too near or `limit` others are better.
     ///
     /// Poses that are too near and not better leave the list.
     pub(crate) fn insert(
