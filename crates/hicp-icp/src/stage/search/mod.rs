@@ -7,6 +7,7 @@ pub(crate) mod hypothesis_search;
 pub(crate) mod look_alikes;
 pub(crate) mod near_symmetries;
 pub(crate) mod options;
+pub(crate) mod revolution;
 pub(crate) mod run;
 pub(crate) mod shortlist;
 pub(crate) mod turns;

@@ -8,6 +8,7 @@ use hicp_core::{
 };
 
 use crate::stage::search::distinct::Distinct;
+use crate::stage::search::revolution::axis_of;
 
 /// Number of surface samples that are compared, at most 256.
 const SAMPLES: usize = 256;
@@ -23,6 +24,8 @@ const LEAST_MOTION: f64 = 0.05;
 /// Number of alignments of the moved surface with itself, and the stride of their samples.
 const ALIGNMENTS: usize = 3;
 const STRIDE: usize = 3;
+/// Cosine of the smallest and of the largest angle by which a principal axis is corrected.
+const TILTED: std::ops::Range<f64> = 0.8..0.9995;
 /// Share of the seen samples that must tell two poses apart.
 const TELLING: f64 = 0.03;
 
@@ -32,10 +35,11 @@ type Set = [u64; SAMPLES / 64];
 /// The motions S, in the object frame, for which the object at `pose` and at `pose · S` look nearly
 /// the same.
 ///
-/// They are rotations in steps of 15° around the principal axes, also with the axis flipped. Each
-/// is shifted such that most of the surface lies on itself: the handle of a mug moves the center of
-/// the object away from the axis of its body. Declared symmetries are left out, and so are motions
-/// that differ from another one only by these.
+/// They are rotations in steps of 15° around the principal axes, also with the axis flipped. The
+/// axis of a mug is that of its body, which the handle would tilt ([`axis_of`]). Each rotation is
+/// shifted such that most of the surface lies on itself: the handle also moves the center of the
+/// object away from the axis. Declared symmetries are left out, and so are motions that differ from
+/// another one only by these.
 ///
 /// Computed once per model, in some 10 ms.
 #[derive(Debug)]
@@ -122,7 +126,11 @@ impl NearSymmetries {
         let distinct = Distinct::of(model);
         let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();
         let identity = Isometry3::identity();
-        let (axes, rotations) = rotations(model.mesh());
+        let mut axes = principal_axes(model.mesh());
+        if let Some(axis) = axis_of(model.samples(), model.diameter()) {
+            align_axes(&mut axes, &axis);
+        }
+        let rotations = rotations(&axes);
         let (mut spins, mut aligned) = (Vec::new(), 0);
         for (index, rotation) in rotations.iter().enumerate() {
             let step = index % STEPS;
@@ -168,8 +176,8 @@ fn count(a: &Set, b: &Set) -> u32 {
     a.iter().zip(b).map(|(a, b)| (a & b).count_ones()).sum()
 }
 
-/// Returns the principal axes of a surface, and rotations around them, without and with a flip.
-fn rotations(mesh: &TriMesh) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
+/// Returns the principal axes of a surface.
+fn principal_axes(mesh: &TriMesh) -> Matrix3<f64> {
     // The moments of the triangles. Those of samples would tilt the axes by some degrees.
     let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
     for triangle in 0..mesh.triangles().len() {
@@ -185,7 +193,23 @@ fn rotations(mesh: &TriMesh) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
     }
     let mean = first / area;
     let covariance = second / area - mean * mean.transpose();
-    let axes = covariance.symmetric_eigen().eigenvectors;
+    covariance.symmetric_eigen().eigenvectors
+}
+
+/// Rotates the axes such that the nearest one is a given axis, if it is tilted a little.
+fn align_axes(axes: &mut Matrix3<f64>, axis: &Vector3<f64>) {
+    let nearest = (axes.transpose() * axis).iamax();
+    let own = axes.column(nearest).into_owned();
+    let along = own.dot(axis);
+    if TILTED.contains(&along.abs())
+        && let Some(turn) = UnitQuaternion::rotation_between(&own, &(axis * along.signum()))
+    {
+        *axes = turn.to_rotation_matrix() * *axes;
+    }
+}
+
+/// Returns rotations around the axes, without and with a flip.
+fn rotations(axes: &Matrix3<f64>) -> Vec<UnitQuaternion<f64>> {
     let turn = |axis: usize, angle: f64| UnitQuaternion::new(axes.column(axis) * angle);
     let mut rotations = Vec::with_capacity(6 * STEPS);
     for axis in 0..3 {
@@ -196,7 +220,7 @@ fn rotations(mesh: &TriMesh) -> (Matrix3<f64>, Vec<UnitQuaternion<f64>>) {
             }));
         }
     }
-    (axes, rotations)
+    rotations
 }
 
 /// Shifts the rotated samples such that most of them lie on the samples.
