@@ -95,7 +95,7 @@ impl<S, P, C> ColorChoice<S, P, C> {
 
     /// Lists the poses that may look the same in depth as `pose`.
     ///
-    /// The list is empty if there is no other.
+    /// `pose` is the first. The list is empty if there is no other.
     fn candidates(
         &mut self,
         problem: &Problem<'_>,
@@ -169,7 +169,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         self.ranked.clear();
         let mut ranked = &candidates[..];
         if self.agrees(&first.color) && first.color.correlation > SURE {
-            // The pose itself is the first candidate.
+            // Only the pose itself is left to polish.
             ranked = &candidates[..usize::from(first.color.correlation < PERFECT)];
         }
         for pose in ranked {

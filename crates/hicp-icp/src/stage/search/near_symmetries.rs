@@ -24,7 +24,7 @@ const LEAST_MOTION: f64 = 0.05;
 /// Number of alignments of the moved surface with itself, and the stride of their samples.
 const ALIGNMENTS: usize = 3;
 const STRIDE: usize = 3;
-/// Cosine of the smallest and of the largest angle by which a principal axis is corrected.
+/// Cosines of the angles by which a principal axis is corrected: 2° to 37°.
 const TILTED: std::ops::Range<f64> = 0.8..0.9995;
 /// Share of the seen samples that must tell two poses apart.
 const TELLING: f64 = 0.03;
